@@ -1,0 +1,53 @@
+"""What every detector is: an image in, people in the Halpe-136 layout out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from hicp_lib.keypoints import N_KEYPOINTS
+
+
+@dataclass(frozen=True)
+class Detections:
+    """The people found in one image.
+
+    Attributes
+    ----------
+    keypoints_px : array, shape (n_persons, 136, 2)
+        (u, v) in pixels, pixel centres at integers, origin top-left; NaN where the
+        detector gives no such keypoint. Points may lie outside the image.
+    scores : array, shape (n_persons, 136)
+        Keypoint confidence in [0, 1]; 0 where the keypoint is NaN.
+    person_scores : array, shape (n_persons,)
+        What people are ranked by in AP.
+    """
+
+    keypoints_px: np.ndarray
+    scores: np.ndarray
+    person_scores: np.ndarray
+
+    @classmethod
+    def none(cls) -> Detections:
+        """Nobody found."""
+        return cls(np.full((0, N_KEYPOINTS, 2), np.nan), np.zeros((0, N_KEYPOINTS)), np.zeros(0))
+
+    def __len__(self) -> int:
+        return len(self.person_scores)
+
+
+class Detector(Protocol):
+    """A keypoint detector, ready to run.
+
+    `settings` (JSON-able: weights' SHA-256, thresholds, versions that matter) identifies
+    its results: two detectors with equal name and settings give equal detections.
+    """
+
+    name: str
+    settings: dict
+
+    def detect(self, image: np.ndarray) -> Detections:
+        """Find people in an RGB image, shape (height, width, 3), uint8."""
+        ...

@@ -1,0 +1,38 @@
+"""Images in and out: RGB, 8 bit, as arrays."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hicp_lib.errors import InputError
+from hicp_lib.files import write_bytes
+
+
+def read_image(path: str | Path) -> np.ndarray:
+    """Read an image as RGB, shape (height, width, 3), uint8; EXIF rotation is not applied.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or not an image OpenCV can decode.
+    """
+    try:
+        content = np.fromfile(path, dtype=np.uint8)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); expected an image file") from None
+    flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+    bgr = cv2.imdecode(content, flags) if content.size else None
+    if bgr is None:
+        raise InputError(f"{path}: is not an image (PNG, JPEG, ...) or is cut off; replace the file")
+    return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+
+
+def write_png(path: str | Path, image: np.ndarray) -> None:
+    """Write an image losslessly: RGB uint8 (height, width, 3), or one channel uint8/uint16."""
+    pixels = cv2.cvtColor(image, cv2.COLOR_RGB2BGR) if image.ndim == 3 else image
+    # Level 1: a third larger than the default, four times as fast.
+    _, encoded = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    write_bytes(path, encoded.tobytes())
