@@ -104,24 +104,25 @@ TO_HALPE: dict[str, np.ndarray] = {
 }  # fmt: skip
 
 
-def to_halpe(values: np.ndarray, convention: str, fill: float = np.nan) -> np.ndarray:
+def to_halpe(values: np.ndarray, convention: str, axis: int, fill: float = np.nan) -> np.ndarray:
     """Rearrange keypoints of another convention into Halpe-136.
 
     Parameters
     ----------
-    values : array, shape (..., n_source) or (..., n_source, k) with n_source of `convention`
-        Scores, or coordinates in any unit. The keypoint axis is found by its position:
-        the last one for scores in which it matches, otherwise the last but one.
+    values : array
+        Anything per keypoint (coordinates, scores) with the keypoints along `axis`.
     convention : a key of `TO_HALPE`
+    axis : the keypoint axis, e.g. -2 for (n, n_source, 2) coordinates, -1 for (n, n_source) scores
     fill : value of Halpe keypoints without counterpart
 
     Returns
     -------
-    array, shape (..., 136) or (..., 136, k)
+    array, float, 136 long along `axis`
     """
     indices = TO_HALPE[convention]
-    axis = -2 if values.ndim >= 2 and values.shape[-2] == len(indices) else -1
-    moved = np.moveaxis(np.asarray(values, dtype=float), axis, -1)
-    result = np.full((*moved.shape[:-1], N_KEYPOINTS), fill)
-    result[..., indices[indices >= 0]] = moved[..., indices >= 0]
+    source = np.moveaxis(np.asarray(values, dtype=float), axis, -1)
+    if source.shape[-1] != len(indices):
+        raise ValueError(f"{convention} has {len(indices)} keypoints, axis {axis} of {values.shape} does not")
+    result = np.full((*source.shape[:-1], N_KEYPOINTS), fill)
+    result[..., indices[indices >= 0]] = source[..., indices >= 0]
     return np.moveaxis(result, -1, axis)
