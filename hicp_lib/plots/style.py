@@ -1,0 +1,101 @@
+"""One style for all figures: the palette, a fixed colour per detector, and what a figure carries."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import matplotlib.figure
+import matplotlib.pyplot as plt
+import pandas as pd
+
+# Okabe and Ito's colour-blind-safe palette; a detector keeps its colour on every page.
+DETECTOR_COLOURS: dict[str, str] = {
+    "mediapipe": "#0072B2",
+    "mediapipe-pose": "#56B4E9",
+    "mediapipe-hands": "#CC79A7",
+    "openpose-mobilenet": "#E69F00",
+    "openpose": "#D55E00",
+    "mmpose": "#009E73",
+    "alphapose": "#7F5FA8",
+    "detectron2": "#8C6D31",
+}
+OTHER_COLOUR = "#595959"
+
+# The two subsets of HiCP, and the two boxes of the paper's figure of how they are made.
+SUBSET_COLOURS = {"basic": "#0072B2", "headless": "#D55E00"}
+HEAD_COLOUR = "#D5272D"
+BODY_COLOUR = "#1B9E4B"
+
+# The paper's marker shapes for the OKS thresholds.
+THRESHOLD_MARKERS = {".5": "s", ".75": "o", ".5:.95": "^"}
+
+_RC = {
+    "figure.dpi": 110,
+    "savefig.dpi": 160,
+    "figure.constrained_layout.use": True,
+    "font.size": 10,
+    "axes.titlesize": 11,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#E3E3E3",
+    "grid.linewidth": 0.8,
+    "axes.axisbelow": True,
+    "legend.frameon": False,
+    "svg.hashsalt": "hicp",
+    "svg.fonttype": "none",
+}
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure as the report needs it.
+
+    Attributes
+    ----------
+    figure : the Matplotlib figure
+    caption : what is drawn, on what data, with what uncertainty; one or two sentences
+    alt : what a reader who cannot see it should know: the axes and the main finding
+    table : the numbers behind it, offered for download; None for pictures
+    """
+
+    figure: matplotlib.figure.Figure
+    caption: str
+    alt: str
+    table: pd.DataFrame | None = None
+
+
+def in_style(draw: Callable[..., Figure]) -> Callable[..., Figure]:
+    """Decorator: run a drawing function in the report's style, leaving Matplotlib's settings as they were."""
+
+    @functools.wraps(draw)
+    def styled(*args, **kwargs) -> Figure:
+        with plt.rc_context(_RC):
+            return draw(*args, **kwargs)
+
+    return styled
+
+
+def new_figure(n_rows: int = 1, n_columns: int = 1, width_in: float = 8.0, height_in: float = 4.5, **kwargs):
+    """`plt.subplots` with the size in inches, of a figure that pyplot forgets at once.
+
+    A notebook then shows what it is given, not what pyplot remembers.
+    """
+    figure, axes = plt.subplots(n_rows, n_columns, figsize=(width_in, height_in), **kwargs)
+    plt.close(figure)
+    return figure, axes
+
+
+def detector_colour(name: str) -> str:
+    """The colour of a detector; combinations and unknown ones take the neutral grey."""
+    return DETECTOR_COLOURS.get(name, OTHER_COLOUR)
+
+
+def in_words(items: Sequence[str]) -> str:
+    """'a', 'a and b', 'a, b and c'."""
+    items = list(items)
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}" if items else "nothing"
