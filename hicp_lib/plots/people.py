@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import cv2
 import matplotlib.colors
 import numpy as np
 
+from hicp_lib.detectors.base import Detections
 from hicp_lib.keypoints import FACE, HANDS, LIMBS, N_KEYPOINTS
-from hicp_lib.plots.style import Figure, in_style, new_figure
+from hicp_lib.plots.style import Figure, detector_colour, in_style, in_words, new_figure
 
 _SHIFT = 4  # fractional bits of OpenCV's drawing coordinates
 
@@ -90,6 +91,35 @@ def picture_grid(
             if j == 0 and i < len(row_titles):
                 axis.set_ylabel(row_titles[i], fontsize=9)
     return Figure(figure, caption, alt)
+
+
+def detections_grid(
+    pictures: Mapping[str, tuple[np.ndarray, Mapping[str, Detections]]], min_score: float, note: str = ""
+) -> Figure:
+    """Pictures (rows) as seen by detectors (columns).
+
+    Parameters
+    ----------
+    pictures : title -> (RGB image, detector name -> its detections); all with the same detectors
+    min_score : keypoints below it are not drawn
+    note : what the pictures are, for the caption
+    """
+    detectors = list(next(iter(pictures.values()))[1])
+    rows = [
+        [draw_people(image, found[d].keypoints_px, found[d].scores, detector_colour(d), min_score) for d in detectors]
+        for image, found in pictures.values()
+    ]
+    seen = [
+        f"{detector} {sum(len(found[detector]) > 0 for _, found in pictures.values())}" for detector in detectors
+    ]
+    return picture_grid(
+        rows,
+        row_titles=list(pictures),
+        column_titles=detectors,
+        caption=f"Keypoints with a score of at least {min_score}, per detector.{' ' if note else ''}{note}",
+        alt=f"{len(rows)} pictures with drawn skeletons; pictures in which somebody was found: {in_words(seen)}.",
+        cell_in=min(3.2, 11 / len(detectors)),
+    )
 
 
 def visible_scores(visibility: np.ndarray) -> np.ndarray:

@@ -1,0 +1,97 @@
+"""Where the study's people come from: rendered scenes, or COCO images with Halpe annotations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from hicp_lib.errors import InputError
+from hicp_lib.files import cache_dir, read_json, sha256_file
+from hicp_lib.hicp_dataset import create_hicp
+from hicp_lib.provenance import DATA_DIR, LIBRARY_DIR, digest, files_sha256
+from hicp_lib.simulation.scenes import render_dataset
+
+SOURCES = ("rendered", "halpe")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Whole images, and the HiCP subsets made of them.
+
+    Attributes
+    ----------
+    kind : "rendered" or "halpe"
+    note : what the people are, in the words of captions
+    annotations, images : the whole images' annotation file and folder
+    basic, headless : dataset folders (`images/` and `annotations.json`)
+    summary : what `create_hicp` kept and left out, and why
+    """
+
+    kind: str
+    note: str
+    annotations: Path
+    images: Path
+    basic: Path
+    headless: Path
+    summary: dict
+
+    @property
+    def subsets(self) -> dict[str, Path]:
+        """The dataset folders by name."""
+        return {"basic": self.basic, "headless": self.headless}
+
+
+def open_source(
+    source: str = "rendered",
+    *,
+    n_scenes: int = 160,
+    seed: int = 0,
+    annotations: str | Path = "",
+    images: str | Path = "",
+    min_pixels: int = 20_000,
+) -> Source:
+    """Open the study's people; what is missing in the cache is rendered and cropped first.
+
+    Parameters
+    ----------
+    source : "rendered" (uses `n_scenes`, `seed`) or "halpe" (uses `annotations`, `images`)
+    min_pixels : the smallest crop that is kept
+
+    Raises
+    ------
+    InputError
+        For an unknown source, or Halpe annotations or images that are not there.
+    """
+    if source == "rendered":
+        annotations, images = _rendered(n_scenes, seed)
+        note = f"rendered people ({n_scenes} scenes)"
+    elif source == "halpe":
+        if not (annotations and images):
+            raise InputError("source=halpe needs annotations=HALPE.json and images=DIR of the COCO images")
+        annotations, images = Path(annotations), Path(images)
+        note = f"COCO images with Halpe annotations ({annotations.name})"
+    else:
+        raise InputError(f"source={source!r} is unknown; use one of {', '.join(SOURCES)}")
+    folder = _crops(annotations, images, min_pixels)
+    summary = read_json(folder / "summary.json")
+    return Source(source, note, annotations, images, folder / "basic", folder / "headless", summary)
+
+
+def _rendered(n_scenes: int, seed: int) -> tuple[Path, Path]:
+    renderer = files_sha256((LIBRARY_DIR / "simulation").glob("*.py"), LIBRARY_DIR)
+    key = digest([n_scenes, seed, renderer, files_sha256(DATA_DIR.glob("body*"), DATA_DIR)])
+    folder = cache_dir() / "scenes" / key[:16]
+    if not (folder / "annotations.json").is_file():
+        render_dataset(folder, n=n_scenes, seed=seed)
+    return folder / "annotations.json", folder / "images"
+
+
+def _crops(annotations: Path, images: Path, min_pixels: int) -> Path:
+    if not annotations.is_file():
+        raise InputError(f"{annotations}: is not there; give the path of the annotation file")
+    rules = [LIBRARY_DIR / name for name in ("hicp_dataset.py", "annotations.py", "images.py")]
+    key = digest([sha256_file(annotations), str(images.resolve()), min_pixels, files_sha256(rules, LIBRARY_DIR)])
+    folder = cache_dir() / "hicp" / key[:16]
+    if not (folder / "summary.json").is_file():
+        create_hicp(annotations, images, folder, min_pixels=min_pixels)
+    return folder
