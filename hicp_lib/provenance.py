@@ -1,0 +1,146 @@
+"""What a result was made with: code, data, environment, machine.
+
+The same hashes decide whether a result is still fresh (`hicp_lib.report.runs`) and are
+printed below it (`hicp_lib.study`), so the two can never disagree.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import os
+import platform
+import re
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import hicp_lib
+from hicp_lib.files import sha256_bytes, sha256_file
+
+ROOT = Path(hicp_lib.__file__).resolve().parent.parent
+LOCK_PATH = ROOT / "environment.lock"
+DATA_DIR = ROOT / "data"
+LIBRARY_DIR = ROOT / "hicp_lib"
+
+_SHOWN_VERSIONS = (
+    "numpy",
+    "pandas",
+    "opencv-python-headless",
+    "onnxruntime",
+    "mediapipe",
+    "open3d-cpu",
+    "open3d",
+    "pycocotools",
+    "matplotlib",
+)
+_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+
+
+def digest(value: Any) -> str:
+    """SHA-256 of a JSON-able value, independent of the order of its keys."""
+    return sha256_bytes(json.dumps(value, sort_keys=True, ensure_ascii=False).encode())
+
+
+def files_sha256(paths: Iterable[Path], base: Path) -> str:
+    """One SHA-256 over the names (relative to `base`) and contents of files, independent of their order."""
+    return digest({path.relative_to(base).as_posix(): sha256_file(path) for path in paths})
+
+
+def library_sha256() -> str:
+    """SHA-256 of every source file of `hicp_lib`."""
+    return files_sha256(LIBRARY_DIR.rglob("*.py"), LIBRARY_DIR)
+
+
+def data_sha256() -> str:
+    """SHA-256 of every file under `data/`; the detector registry with the weights' hashes is among them."""
+    return files_sha256((path for path in DATA_DIR.rglob("*") if path.is_file()), DATA_DIR)
+
+
+def lock_sha256() -> str:
+    """SHA-256 of `environment.lock`, or "missing"."""
+    return sha256_file(LOCK_PATH) if LOCK_PATH.is_file() else "missing"
+
+
+def installed_sha256() -> str:
+    """SHA-256 of what is installed, whatever the lock says: all distributions, Python, the kind of machine."""
+    distributions = {d.name: d.version for d in importlib.metadata.distributions()}
+    return digest([distributions, sys.version, platform.machine(), platform.system()])
+
+
+def input_sha256(path: Path) -> str:
+    """Identity of an input: a file's content, or a folder's file names, sizes and modification times.
+
+    A folder of images is not read: hashing gigabytes on every call would cost more than it protects.
+    """
+    if path.is_file():
+        return sha256_file(path)
+    files = sorted(p for p in path.rglob("*") if p.is_file())
+    return digest([[p.relative_to(path).as_posix(), p.stat().st_size, p.stat().st_mtime_ns] for p in files])
+
+
+def git_state() -> dict[str, Any]:
+    """Commit of the checkout and how many files differ from it; "unknown" without git or a checkout."""
+    commit = _git("rev-parse", "HEAD")
+    status = _git("status", "--porcelain")
+    return {
+        "commit": commit or "unknown",
+        "changed_files": None if status is None else len(status.splitlines()),
+    }
+
+
+def _git(*arguments: str) -> str | None:
+    try:
+        done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, timeout=20)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
+
+
+def versions() -> dict[str, str]:
+    """Python's version and those of the libraries that can move a number."""
+    installed = {d.name.lower(): d.version for d in importlib.metadata.distributions()}
+    return {"python": platform.python_version()} | {
+        n: installed[n] for n in _SHOWN_VERSIONS if n in installed
+    }
+
+
+def machine() -> dict[str, Any]:
+    """Processor, cores, system and the thread limits set by the environment."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    threads = {name: os.environ[name] for name in _THREAD_VARIABLES if name in os.environ}
+    return {
+        "cpu": _cpu_model(),
+        "cores": cores,
+        "system": f"{platform.system()} {platform.machine()}",
+    } | threads
+
+
+def _cpu_model() -> str:
+    try:
+        found = re.search(r"^model name\s*:\s*(.+)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+    except OSError:
+        found = None
+    return found.group(1).strip() if found else platform.processor() or "unknown"
+
+
+def onnx_providers() -> list[str]:
+    """ONNX Runtime's available execution providers; empty when this process has not loaded it."""
+    runtime = sys.modules.get("onnxruntime")
+    return list(runtime.get_available_providers()) if runtime else []
+
+
+def provenance(parameters: dict[str, Any]) -> dict[str, Any]:
+    """Everything a reader needs to judge or repeat a result made now, in this process, with `parameters`."""
+    return {
+        "parameters": parameters,
+        "git": git_state(),
+        "library_sha256": library_sha256(),
+        "lock_sha256": lock_sha256(),
+        "data_sha256": data_sha256(),
+        "versions": versions(),
+        "onnx_providers": onnx_providers(),
+        "machine": machine(),
+    }

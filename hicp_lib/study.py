@@ -1,0 +1,185 @@
+"""What a notebook says to the report: its figures, tables and numbers, and what they were made with.
+
+    study = Study("01_dataset", source=source, n_images=n_images, seed=seed)
+    study.figure("crops", plots.crops(...))
+    study.table("counts", counts, "Images per subset.")
+    study.value("n_basic", len(basic))
+    study.finish()
+
+A notebook opened in Jupyter writes to `results/interactive/<name>/`; `hicp report` runs it into
+`results/<profile>/<name>/`. The book takes every number and figure from there.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import json
+import math
+import os
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+from IPython.display import HTML, display
+
+from hicp_lib.files import atomic_path, write_bytes, write_json
+from hicp_lib.provenance import ROOT, provenance
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+    from hicp_lib.plots import Figure
+
+SCHEMA_VERSION = 1
+# Set by `hicp report` for the kernel it starts; absent in Jupyter.
+RESULTS_VARIABLE, PROFILE_VARIABLE = "HICP_RESULTS", "HICP_PROFILE"
+_SVG_STYLE = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
+
+
+class Study:
+    """Collects what one notebook found.
+
+    Parameters
+    ----------
+    name : the notebook's file name without `.ipynb`
+    parameters : every parameter of the notebook's `parameters` cell, by its name; `hicp report`
+        refuses a run whose stamp differs from what it was given
+
+    Attributes
+    ----------
+    folder : where this run's results are written
+    """
+
+    def __init__(self, name: str, /, **parameters: Any):
+        profile = os.environ.get(PROFILE_VARIABLE, "interactive")
+        results = Path(os.environ.get(RESULTS_VARIABLE) or ROOT / "results" / profile)
+        self.name = name
+        self.parameters = _plain(parameters)
+        self.folder = results / name
+        self._link = f"../results/{profile}/{name}"
+        self._values: dict[str, Any] = {}
+        self._captions: dict[str, dict[str, str]] = {}
+        self._start_s = time.perf_counter()
+
+    def figure(self, name: str, figure: Figure) -> None:
+        """Save a figure (PNG, SVG, its numbers as CSV) and show it with caption, alt text and downloads."""
+        png = _rendered(figure.figure, "png")
+        write_bytes(self.folder / f"{name}.png", png)
+        write_bytes(self.folder / f"{name}.svg", _rendered(figure.figure, "svg"))
+        downloads = ["svg"]
+        if figure.table is not None:
+            _write_csv(self.folder / f"{name}.csv", figure.table)
+            downloads.append("csv")
+        self._captions[name] = {"caption": figure.caption, "alt": figure.alt}
+        source = "data:image/png;base64," + base64.b64encode(png).decode()
+        image = f'<img src="{source}" alt="{html.escape(figure.alt)}">'
+        self._show_figure(name, image, figure.caption, downloads)
+
+    def scene(self, name: str, scene: go.Figure, caption: str, alt: str) -> None:
+        """Save an interactive 3D scene (its data as JSON) and show it; the page loads plotly.js once."""
+        write_bytes(self.folder / f"{name}.json", scene.to_json().encode())
+        body = scene.to_html(full_html=False, include_plotlyjs=False, div_id=f"scene-{name}")
+        body = f'<div class="hicp-scene" role="img" aria-label="{html.escape(alt)}">{body}</div>'
+        self._captions[name] = {"caption": caption, "alt": alt}
+        self._show_figure(name, body, caption, ["json"])
+
+    def table(self, name: str, table: pd.DataFrame, caption: str, digits: int = 3) -> None:
+        """Save a table (Parquet, CSV) and show it; NaN is shown as a dash, floats with `digits` decimals."""
+        self.save(name, table)
+        _write_csv(self.folder / f"{name}.csv", table)
+        self._captions[name] = {"caption": caption}
+        style = table.style.hide(axis="index").format(precision=digits, na_rep="–").set_uuid(name)
+        shown = style.to_html(table_attributes='class="table"')
+        self._show_figure(name, f'<div class="hicp-table">{shown}</div>', caption, ["parquet", "csv"])
+
+    def save(self, name: str, table: pd.DataFrame) -> None:
+        """Save a table as Parquet without showing it; its parameters travel in the file's metadata."""
+        arrow = pa.Table.from_pandas(table, preserve_index=False)
+        stamp = {"schema": SCHEMA_VERSION, "notebook": self.name, "parameters": self.parameters}
+        arrow = arrow.replace_schema_metadata(
+            (arrow.schema.metadata or {}) | {b"hicp": json.dumps(stamp).encode()}
+        )
+        with atomic_path(self.folder / f"{name}.parquet") as temporary:
+            pq.write_table(arrow, temporary)
+
+    def value(self, name: str, value: Any) -> None:
+        """Record a number, text or list for the prose of the book; None means "not run".
+
+        Raises
+        ------
+        ValueError
+            If it is not finite: a number is honest or absent.
+        """
+        self._values[name] = _plain(value)
+
+    def finish(self) -> None:
+        """Write the values and the provenance stamp, and show the stamp. The last line of every notebook."""
+        stamp = {"notebook": self.name, "schema": SCHEMA_VERSION} | provenance(self.parameters)
+        stamp["wall_s"] = round(time.perf_counter() - self._start_s, 2)
+        write_json(self.folder / "values.json", self._values, indent=2)
+        write_json(self.folder / "captions.json", self._captions, indent=2)
+        write_json(self.folder / "provenance.json", stamp, indent=2)
+        display(HTML(provenance_html(stamp)))
+
+    def _show_figure(self, name: str, body: str, caption: str, downloads: list[str]) -> None:
+        links = " ".join(
+            f'<a href="{self._link}/{name}.{kind}" download>{kind.upper()}</a>' for kind in downloads
+        )
+        caption = f'{html.escape(caption)} <span class="hicp-download">{links}</span>'
+        display(HTML(f'<figure class="hicp" id="{name}">{body}<figcaption>{caption}</figcaption></figure>'))
+
+
+def provenance_html(stamp: dict[str, Any]) -> str:
+    """The footer of a page: what the notebook ran with, folded away until asked for."""
+    git, machine = stamp["git"], stamp["machine"]
+    changed = {None: "", 0: ""}.get(git["changed_files"], f" with {git['changed_files']} changed files")
+    rows = {
+        "Parameters": ", ".join(
+            f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in stamp["parameters"].items()
+        ),
+        "Commit": git["commit"][:12] + changed,
+        "Hashes": ", ".join(f"{k} {stamp[k + '_sha256'][:12]}" for k in ("library", "lock", "data")),
+        "Versions": ", ".join(f"{k} {v}" for k, v in stamp["versions"].items()),
+        "Inference": ", ".join(stamp["onnx_providers"]) or "ONNX Runtime not used",
+        "Machine": ", ".join(f"{k} {v}" for k, v in machine.items()),
+        "Wall time": f"{stamp['wall_s']:.1f} s",
+    }
+    body = "".join(
+        f'<tr><th scope="row">{k}</th><td>{html.escape(str(v))}</td></tr>' for k, v in rows.items()
+    )
+    return (
+        '<details class="hicp-provenance"><summary>What this page was made with</summary>'
+        f"<table><tbody>{body}</tbody></table></details>"
+    )
+
+
+def _rendered(figure, kind: str) -> bytes:
+    """The same bytes for the same figure: no date, fixed identifiers."""
+    buffer = io.BytesIO()
+    with mpl.rc_context(_SVG_STYLE):
+        figure.savefig(buffer, format=kind, metadata={"Date": None} if kind == "svg" else None)
+    return buffer.getvalue()
+
+
+def _write_csv(path: Path, table: pd.DataFrame) -> None:
+    write_bytes(path, table.to_csv(index=False).encode())
+
+
+def _plain(value: Any) -> Any:
+    """`value` with NumPy's types turned into JSON's; what is not finite is refused."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, set)):
+        return [_plain(item) for item in value]
+    if isinstance(value, (np.generic, np.ndarray)):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"a result is {value}; record None for what was not measured")
+    return str(value) if isinstance(value, Path) else value
