@@ -1,0 +1,79 @@
+# From a fresh clone: `make report`. Needs Python 3.11-3.14 with venv, git and make.
+PYTHON ?= python3
+PROFILE ?= full
+PORT ?= 8888
+UV ?= uv
+
+BIN := .venv/bin
+INSTALLED := .venv/.installed
+INSTALLING := .venv/.installing
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_NO_INPUT := 1
+
+.DEFAULT_GOAL := help
+.PHONY: help setup system report test lab doctor lint lock clean
+
+help:
+	@echo "make report [PROFILE=full|quick]  run the study and build the report"
+	@echo "make test                         run the tests, notebooks included"
+	@echo "make lab                          open the notebooks in JupyterLab"
+	@echo "make doctor                       check the installation, line by line"
+	@echo "make lint                         check the style of the code"
+	@echo "make lock                         pin the environment anew (needs uv)"
+	@echo "make clean                        remove what was built, but no download"
+
+report: setup
+	@$(BIN)/hicp report --profile $(PROFILE)
+
+test: setup
+	@$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+lab: setup
+	@$(BIN)/jupyter lab --notebook-dir=. --port=$(PORT) notebooks/00_quickstart.ipynb
+
+doctor: $(INSTALLED)
+	@$(BIN)/hicp doctor
+
+lint: $(INSTALLED)
+	@$(BIN)/ruff check .
+
+setup: $(INSTALLED) system
+	@$(BIN)/hicp models fetch
+
+# The locked environment. mediapipe's wheel declares two packages that the study leaves out
+# (see pyproject.toml), hence --no-deps: the lock is complete by itself.
+# A marker tells an installation that was cut off: it is made anew.
+$(INSTALLED): environment.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' || \
+	  { echo "make: $(PYTHON) is not Python 3.11-3.14; name one that is: make PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -c 'import ensurepip, venv' || \
+	  { echo "make: $(PYTHON) has no venv; on Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
+	@echo "Installing the locked environment into .venv (a minute or two; 1.6 GB) ..."
+	@test ! -e $(INSTALLING) || rm -rf .venv
+	@$(BIN)/python -c pass 2>/dev/null || $(PYTHON) -m venv --clear .venv
+	@rm -f $(INSTALLED) && touch $(INSTALLING)
+	@$(BIN)/python -m pip install -qq --no-deps --no-compile --only-binary :all: --require-hashes \
+	  -r environment.lock || { echo "make: the environment could not be installed; it needs the package" \
+	  "index, 4 GB of disk and, on Linux, glibc 2.35 (Debian 12, Ubuntu 22.04) or newer" >&2; exit 1; }
+	@$(BIN)/python -m pip install -qq --no-deps --no-build-isolation --no-index --editable .
+	@rm $(INSTALLING) && touch $(INSTALLED)
+
+# Libraries that Open3D loads and a bare Debian lacks: installed where that is allowed.
+system: $(INSTALLED)
+	@packages="$$($(BIN)/python -m hicp_lib.system_libraries)"; \
+	if [ -z "$$packages" ]; then exit 0; fi; \
+	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	  echo "Installing system libraries: $$packages"; \
+	  apt-get update -qq && \
+	  DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends $$packages >/dev/null; \
+	else \
+	  echo "make: system libraries are missing; run: sudo apt-get install $$packages" >&2; exit 1; \
+	fi
+
+lock:
+	@command -v $(UV) >/dev/null || { echo "make: uv is missing; run: pip install uv" >&2; exit 1; }
+	@$(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-annotate \
+	  --group test --group build --custom-compile-command "make lock" --output-file environment.lock pyproject.toml
+
+clean:
+	@rm -rf _build results
