@@ -31,11 +31,11 @@ def draw_people(
     keypoints_px : array, shape (n_persons, 136, 2), NaN where absent
     scores : array, shape (n_persons, 136); points and limbs below `min_score` are left out
     colour : any Matplotlib colour; every line gets a thin dark rim so that it shows on any background
-    thickness_px : width of a body limb; default a 220th of the image's diagonal
+    thickness_px : width of a body limb; default a 260th of the image's diagonal
     """
     canvas = np.ascontiguousarray(image).copy()
     rgb = tuple(int(round(255 * channel)) for channel in matplotlib.colors.to_rgb(colour))
-    width_px = thickness_px or max(1.5, np.hypot(*image.shape[:2]) / 220)
+    width_px = thickness_px or max(1.5, np.hypot(*image.shape[:2]) / 260)
     for points, confidence in zip(keypoints_px, scores, strict=True):
         shown = np.isfinite(points).all(axis=1) & (confidence >= min_score) & (np.abs(points).max(axis=1) < 1e5)
         for rim, pen in ((1.6, (20, 20, 20)), (0.0, rgb)):
