@@ -1,0 +1,107 @@
+"""Task bundles for MediaPipe, assembled in memory from the separate model files.
+
+MediaPipe's Tasks API reads a `.task` bundle: a zip, stored and aligned, of two TFLite models.
+The package index has the models but no bundles. Hand models go in as they are; the pose models
+lack the metadata that tells the task how to scale pixels, which is added here: the detector
+takes [-1, 1], the landmark model [0, 1] (as in MediaPipe's own graphs for these files).
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+
+import flatbuffers
+import numpy as np
+from mediapipe.tasks.metadata import metadata_schema_py_generated as metadata
+from mediapipe.tasks.metadata import schema_py_generated as tflite
+from mediapipe.tasks.python.metadata.metadata_writers.model_asset_bundle_utils import AlignZipFile
+
+from hicp_lib.detectors.zoo import load
+from hicp_lib.errors import InputError
+
+# Task -> member of the bundle -> (weight file, (mean, std) of the pixel scaling to be declared).
+BUNDLES: dict[str, dict[str, tuple[str, tuple[float, float] | None]]] = {
+    "pose": {
+        "pose_detector.tflite": ("pose_detection.tflite", (127.5, 127.5)),
+        "pose_landmarks_detector.tflite": ("pose_landmark_full.tflite", (0.0, 255.0)),
+    },
+    "hand": {
+        "hand_detector.tflite": ("palm_detection_full.tflite", None),
+        "hand_landmarks_detector.tflite": ("hand_landmark_full.tflite", None),
+    },
+}
+
+
+def assemble(task: str) -> bytes:
+    """The bundle of a task ("pose" or "hand") made of verified weight files; equal bytes every time.
+
+    Raises
+    ------
+    InputError
+        If a weight file is absent or damaged.
+    """
+    bundle = io.BytesIO()
+    with AlignZipFile(bundle, mode="w", alignment=4) as archive:
+        for member, (weight, scaling) in BUNDLES[task].items():
+            model = load(weight) if scaling is None else _with_scaling(load(weight), *scaling)
+            # ZipInfo without a date: 1980, so the bytes do not depend on the clock.
+            archive.writestr(zipfile.ZipInfo(member), model)
+    return bundle.getvalue()
+
+
+def read_bundle(task: str, path: str | Path) -> bytes:
+    """An official `.task` bundle the user points to.
+
+    Raises
+    ------
+    InputError
+        If the file is unreadable or lacks a model the task needs.
+    """
+    try:
+        content = Path(path).read_bytes()
+        members = set(zipfile.ZipFile(io.BytesIO(content)).namelist())
+    except (OSError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: cannot be read as a MediaPipe .task bundle ({error}); give another file") from None
+    absent = [member for member in BUNDLES[task] if member not in members]
+    if absent:
+        raise InputError(f"{path}: is not a {task} landmarker bundle, {absent[0]} is not in it; give another .task file")
+    return content
+
+
+def _with_scaling(model: bytes, mean: float, std: float) -> bytes:
+    """Append TFLite metadata that declares (pixel - mean) / std for an RGB input."""
+    tree = tflite.ModelT.InitFromPackedBuf(model, 0)
+    block = tflite.BufferT()
+    block.data = np.frombuffer(_scaling_metadata(mean, std), dtype=np.uint8)
+    tree.buffers.append(block)
+    entry = tflite.MetadataT()
+    entry.name, entry.buffer = "TFLITE_METADATA", len(tree.buffers) - 1
+    tree.metadata = [*(tree.metadata or []), entry]
+    return _pack(tree, b"TFL3")
+
+
+def _scaling_metadata(mean: float, std: float) -> bytes:
+    scaling = metadata.NormalizationOptionsT()
+    scaling.mean, scaling.std = [mean] * 3, [std] * 3
+    unit = metadata.ProcessUnitT()
+    unit.optionsType, unit.options = metadata.ProcessUnitOptions.NormalizationOptions, scaling
+    colours = metadata.ImagePropertiesT()
+    colours.colorSpace = metadata.ColorSpaceType.RGB
+    content = metadata.ContentT()
+    content.contentPropertiesType = metadata.ContentProperties.ImageProperties
+    content.contentProperties = colours
+    tensor = metadata.TensorMetadataT()
+    tensor.name, tensor.content, tensor.processUnits = "image", content, [unit]
+    graph = metadata.SubGraphMetadataT()
+    graph.inputTensorMetadata = [tensor]
+    root = metadata.ModelMetadataT()
+    root.subgraphMetadata = [graph]
+    return _pack(root, b"M001")
+
+
+def _pack(tree: tflite.ModelT | metadata.ModelMetadataT, identifier: bytes) -> bytes:
+    builder = flatbuffers.Builder(0)
+    builder.Finish(tree.Pack(builder), identifier)
+    return bytes(builder.Output())

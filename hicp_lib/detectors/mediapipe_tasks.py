@@ -1,0 +1,203 @@
+"""MediaPipe Pose and Hands (Tasks API, still images) as detectors.
+
+What MediaPipe gives and what is made of it:
+
+- Landmarks are fractions of the image's width and height measured from its border, so a
+  landmark at x lies at ``x * width - 0.5`` where pixel centres are integers. Landmarks
+  outside the image are kept.
+- Pose: the score of a keypoint is its *visibility*, the probability of being inside the image
+  and not occluded. (*Presence*, inside the image or not, says less and is not used.) MediaPipe
+  returns no score of the person; the mean score of the 17 COCO keypoints stands in.
+- Hands: there is no score per keypoint. Every point of a hand carries the hand's handedness
+  score, which says how sure the *side* is, not the position. The person score is the mean
+  over the hands of the instance.
+- Sides: the Tasks API labels hands for images that are not mirrored, so "Left" is the person's
+  left hand. (The older solutions API labels them for mirrored images.)
+"""
+
+from __future__ import annotations
+
+import weakref
+from itertools import zip_longest
+from pathlib import Path
+
+import mediapipe
+import numpy as np
+from mediapipe.tasks.python import BaseOptions, vision
+
+from hicp_lib.detectors import mediapipe_bundle
+from hicp_lib.detectors.base import Detections
+from hicp_lib.detectors.native import keep_offline, quiet_stderr
+from hicp_lib.files import sha256_bytes
+from hicp_lib.keypoints import COCO_17, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND, to_halpe
+
+# Side -> (Halpe indices of the hand, Halpe index of the wrist of the body).
+_SIDES = {"Left": (LEFT_HAND, 9), "Right": (RIGHT_HAND, 10)}
+
+# One hand: side, handedness score, (21, 2) positions in pixels.
+Hand = tuple[str, float, np.ndarray]
+
+
+class MediaPipePose:
+    """MediaPipe Pose Landmarker: 33 landmarks, of which 21 have a Halpe counterpart.
+
+    Parameters
+    ----------
+    num_poses : most people to return per image; 1, as in the paper, suits crops of one person
+    min_score : threshold of MediaPipe's person detector and of its presence check
+    model : an official `.task` bundle to use in place of the fetched weights
+    """
+
+    name = "mediapipe-pose"
+
+    def __init__(self, num_poses: int = 1, min_score: float = 0.5, model: str | Path | None = None) -> None:
+        bundle, identity = _bundle("pose", model)
+        self.settings = {"num_poses": num_poses, "min_score": min_score, **identity}
+        options = vision.PoseLandmarkerOptions(
+            base_options=BaseOptions(model_asset_buffer=bundle),
+            num_poses=num_poses,
+            min_pose_detection_confidence=min_score,
+            min_pose_presence_confidence=min_score,
+        )
+        self._task = _Task(vision.PoseLandmarker, options)
+
+    def detect(self, image: np.ndarray) -> Detections:
+        """Find people in an RGB image, shape (height, width, 3), uint8."""
+        people = self._task.detect(image).pose_landmarks
+        if not people:
+            return Detections.none()
+        visibility = np.array([[point.visibility for point in person] for person in people])
+        scores = to_halpe(np.clip(visibility, 0, 1), "mediapipe_pose33", axis=-1, fill=0.0)
+        positions_px = np.stack([_positions_px(person, image) for person in people])
+        keypoints_px = to_halpe(positions_px, "mediapipe_pose33", axis=-2)
+        return Detections(keypoints_px, scores, scores[:, COCO_17].mean(axis=1))
+
+
+class MediaPipeHands:
+    """MediaPipe Hand Landmarker: 21 landmarks of each hand.
+
+    One instance holds the best left and the best right hand; further hands pair up in the
+    same way, by falling score.
+
+    Parameters
+    ----------
+    num_hands : most hands to return per image
+    min_score : threshold of MediaPipe's palm detector and of its presence check
+    model : an official `.task` bundle to use in place of the fetched weights
+    """
+
+    name = "mediapipe-hands"
+
+    def __init__(self, num_hands: int = 2, min_score: float = 0.5, model: str | Path | None = None) -> None:
+        bundle, identity = _bundle("hand", model)
+        self.settings = {"num_hands": num_hands, "min_score": min_score, **identity}
+        options = vision.HandLandmarkerOptions(
+            base_options=BaseOptions(model_asset_buffer=bundle),
+            num_hands=num_hands,
+            min_hand_detection_confidence=min_score,
+            min_hand_presence_confidence=min_score,
+        )
+        self._task = _Task(vision.HandLandmarker, options)
+
+    def find_hands(self, image: np.ndarray) -> list[Hand]:
+        """Hands in an RGB image by falling handedness score."""
+        result = self._task.detect(image)
+        hands = [
+            (sides[0].category_name, min(sides[0].score, 1.0), _positions_px(points, image))
+            for sides, points in zip(result.handedness, result.hand_landmarks, strict=True)
+        ]
+        return sorted(hands, key=lambda hand: -hand[1])
+
+    def detect(self, image: np.ndarray) -> Detections:
+        """Find hands in an RGB image, shape (height, width, 3), uint8, paired into instances."""
+        return _pair(self.find_hands(image))
+
+
+class MediaPipe:
+    """Pose and hands of the whole image as one detector.
+
+    A hand goes to the person whose wrist of that side is nearest and still free; a hand left
+    over becomes an instance of its own.
+
+    Parameters
+    ----------
+    num_people : most people to return per image (and half the number of hands)
+    min_score : threshold of both detectors
+    """
+
+    name = "mediapipe"
+
+    def __init__(self, num_people: int = 1, min_score: float = 0.5) -> None:
+        self._pose = MediaPipePose(num_people, min_score)
+        self._hands = MediaPipeHands(2 * num_people, min_score)
+        self.settings = {"pose": self._pose.settings, "hands": self._hands.settings}
+
+    def detect(self, image: np.ndarray) -> Detections:
+        """Find people in an RGB image, shape (height, width, 3), uint8."""
+        return attach_hands(self._pose.detect(image), self._hands.find_hands(image))
+
+
+def attach_hands(bodies: Detections, hands: list[Hand]) -> Detections:
+    """Give each hand (best first) to the body with the nearest free wrist of its side.
+
+    Returns
+    -------
+    The bodies with their hands, then instances of hands that found no free wrist.
+    """
+    keypoints_px, scores = bodies.keypoints_px.copy(), bodies.scores.copy()
+    left_over = []
+    for side, score, positions_px in hands:
+        indices, wrist = _SIDES[side]
+        free = np.flatnonzero(scores[:, indices[0]] == 0)
+        if not len(free):
+            left_over.append((side, score, positions_px))
+            continue
+        distances = np.linalg.norm(keypoints_px[free, wrist] - positions_px[0], axis=1)
+        body = free[np.argmin(distances)]
+        keypoints_px[body, indices], scores[body, indices] = positions_px, score
+    rest = _pair(left_over)
+    return Detections(
+        np.concatenate([keypoints_px, rest.keypoints_px]),
+        np.concatenate([scores, rest.scores]),
+        np.concatenate([bodies.person_scores, rest.person_scores]),
+    )
+
+
+def _pair(hands: list[Hand]) -> Detections:
+    """Instances of the k-th best left with the k-th best right hand."""
+    lefts, rights = ([hand for hand in hands if hand[0] == side] for side in ("Left", "Right"))
+    pairs = [[hand for hand in pair if hand] for pair in zip_longest(lefts, rights)]
+    keypoints_px = np.full((len(pairs), N_KEYPOINTS, 2), np.nan)
+    scores = np.zeros((len(pairs), N_KEYPOINTS))
+    for row, pair in enumerate(pairs):
+        for side, score, positions_px in pair:
+            indices = _SIDES[side][0]
+            keypoints_px[row, indices], scores[row, indices] = positions_px, score
+    return Detections(keypoints_px, scores, np.array([np.mean([hand[1] for hand in pair]) for pair in pairs]))
+
+
+def _bundle(task: str, model: str | Path | None) -> tuple[bytes, dict]:
+    """Bundle bytes, and what identifies them in a detector's settings."""
+    bundle = mediapipe_bundle.read_bundle(task, model) if model else mediapipe_bundle.assemble(task)
+    return bundle, {"bundle_sha256": sha256_bytes(bundle), "mediapipe": mediapipe.__version__}
+
+
+class _Task:
+    """A running MediaPipe task: silent, contacting nobody, closed before the interpreter is torn down."""
+
+    def __init__(self, task: type, options: object) -> None:
+        keep_offline()
+        with quiet_stderr():
+            self._task = task.create_from_options(options)
+        weakref.finalize(self, self._task.close)
+
+    def detect(self, image: np.ndarray) -> object:
+        pixels = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=np.ascontiguousarray(image))
+        with quiet_stderr():
+            return self._task.detect(pixels)
+
+
+def _positions_px(landmarks: list, image: np.ndarray) -> np.ndarray:
+    """Landmarks as (n, 2) pixels with pixel centres at integers."""
+    height, width = image.shape[:2]
+    return np.array([(point.x * width, point.y * height) for point in landmarks]) - 0.5
