@@ -63,10 +63,10 @@ def read_bundle(task: str, path: str | Path) -> bytes:
         content = Path(path).read_bytes()
         members = set(zipfile.ZipFile(io.BytesIO(content)).namelist())
     except (OSError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: cannot be read as a MediaPipe .task bundle ({error}); give another file") from None
+        raise InputError(f"{path}: is not a MediaPipe .task bundle ({error}); give another file") from None
     absent = [member for member in BUNDLES[task] if member not in members]
     if absent:
-        raise InputError(f"{path}: is not a {task} landmarker bundle, {absent[0]} is not in it; give another .task file")
+        raise InputError(f"{path}: has no {absent[0]}; give the .task file of the {task} landmarker")
     return content
 
 

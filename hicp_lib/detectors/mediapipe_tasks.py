@@ -189,12 +189,21 @@ class _Task:
         keep_offline()
         with quiet_stderr():
             self._task = task.create_from_options(options)
-        weakref.finalize(self, self._task.close)
+        weakref.finalize(self, _close, self._task)
 
     def detect(self, image: np.ndarray) -> object:
         pixels = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=np.ascontiguousarray(image))
         with quiet_stderr():
             return self._task.detect(pixels)
+
+
+def _close(task: object) -> None:
+    try:
+        task.close()
+    except RuntimeError:
+        # At interpreter exit the task's executor is gone already, and closing again from
+        # __del__ would print a traceback; the process frees the rest.
+        task._handle = None
 
 
 def _positions_px(landmarks: list, image: np.ndarray) -> np.ndarray:

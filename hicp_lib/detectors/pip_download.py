@@ -14,7 +14,7 @@ from pathlib import Path
 
 from hicp_lib.detectors.native import user_environment
 
-_BACK_END = '''
+_BACK_END = """
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -28,7 +28,7 @@ def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
     return folder.name
 
 __legacy__ = SimpleNamespace(**globals())
-'''
+"""
 
 
 def download(requirement: str, sha256: str, options: list[str], target: Path) -> str | None:
@@ -45,8 +45,8 @@ def download(requirement: str, sha256: str, options: list[str], target: Path) ->
         pinned.write_text(f"{requirement} --hash=sha256:{sha256}\n")
         _write_back_end(Path(folder) / "back_end" / "setuptools", requirement)
         command = [
-            *[sys.executable, "-m", "pip", "download", "--quiet", "--no-input", "--no-deps", "--require-hashes"],
-            *["--dest", str(target.parent), "--requirement", str(pinned), *options],
+            *(sys.executable, "-m", "pip", "download", "--quiet", "--no-input", "--no-deps"),
+            *("--require-hashes", "--requirement", str(pinned), "--dest", str(target.parent), *options),
         ]
         environment = user_environment() | {
             "PYTHONPATH": str(Path(folder) / "back_end"),

