@@ -65,7 +65,7 @@ def lock_sha256() -> str:
 
 
 def installed_sha256() -> str:
-    """SHA-256 of what is installed, whatever the lock says: all distributions, Python, the kind of machine."""
+    """SHA-256 of what is installed, whatever the lock says: distributions, Python, the kind of machine."""
     distributions = {d.name: d.version for d in importlib.metadata.distributions()}
     return digest([distributions, sys.version, platform.machine(), platform.system()])
 

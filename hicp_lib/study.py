@@ -31,6 +31,7 @@ from IPython.display import HTML, display
 
 from hicp_lib.files import atomic_path, write_bytes, write_json
 from hicp_lib.provenance import ROOT, provenance
+from hicp_lib.report import PROFILE_VARIABLE, RESULTS_VARIABLE
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -38,8 +39,6 @@ if TYPE_CHECKING:
     from hicp_lib.plots import Figure
 
 SCHEMA_VERSION = 1
-# Set by `hicp report` for the kernel it starts; absent in Jupyter.
-RESULTS_VARIABLE, PROFILE_VARIABLE = "HICP_RESULTS", "HICP_PROFILE"
 _SVG_STYLE = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
 
 

@@ -1,0 +1,5 @@
+"""The report: notebooks run under a profile, and the book built from them."""
+
+# Set for the kernel of a run: where its results go, and the profile's name. Absent in Jupyter.
+RESULTS_VARIABLE = "HICP_RESULTS"
+PROFILE_VARIABLE = "HICP_PROFILE"

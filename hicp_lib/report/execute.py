@@ -1,0 +1,67 @@
+"""Runs one notebook by papermill, in a process of its own: `python -m hicp_lib.report.execute JOB.json`.
+
+`hicp_lib.report.runs` starts it, holds the other end of its standard input, and checks what it left.
+When that end closes, however the parent died, this process ends the kernel and all its workers.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+import threading
+from pathlib import Path
+
+import papermill
+import psutil
+from jupyter_client.manager import AsyncKernelManager
+from papermill.exceptions import PapermillExecutionError
+
+START_TIMEOUT_S = 120
+CELL_TIMEOUT_S = 3600
+
+
+class IpcKernelManager(AsyncKernelManager):
+    """Talks to the kernel through files in a private folder: no port that two kernels could both pick."""
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.transport = "ipc"
+        self.ip = os.path.join(os.environ["JUPYTER_RUNTIME_DIR"], "kernel")
+
+
+def main(job_path: str) -> int:
+    """Run the job; 0 when every cell ran, 1 when one raised (the copy then holds the error)."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    job = json.loads(Path(job_path).read_text())
+    try:
+        papermill.execute_notebook(
+            job["notebook"],
+            job["output"],
+            parameters=job["parameters"],
+            cwd=job["folder"],
+            progress_bar=False,
+            kernel_name="python3",
+            request_save_on_cell_execute=False,
+            start_timeout=START_TIMEOUT_S,
+            execution_timeout=CELL_TIMEOUT_S,
+            kernel_manager_class=IpcKernelManager,
+            # What C++ libraries write to the terminal goes to the log; Python's own warnings stay visible.
+            extra_arguments=["--IPKernelApp.capture_fd_output=False"],
+        )
+    except PapermillExecutionError:
+        return 1
+    return 0
+
+
+def _end_with_parent() -> None:
+    os.read(0, 1)  # nothing is ever written: this returns when the other end closes
+    for process in psutil.Process().children(recursive=True):
+        process.kill()
+    shutil.rmtree(os.environ["JUPYTER_RUNTIME_DIR"], ignore_errors=True)
+    os._exit(3)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

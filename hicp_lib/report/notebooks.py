@@ -1,0 +1,196 @@
+"""The notebooks of the study: their declared parameters, and what each profile gives them."""
+
+from __future__ import annotations
+
+import ast
+import json
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import nbformat
+
+from hicp_lib.errors import InputError
+from hicp_lib.provenance import digest
+
+PARAMETERS_TAG = "parameters"
+
+
+@dataclass(frozen=True)
+class Notebook:
+    """A notebook as it lies in the repository.
+
+    Attributes
+    ----------
+    path : the file; `name` is its name without `.ipynb`
+    defaults : name -> value of every parameter, as its `parameters` cell assigns them
+    source_sha256 : hash of its cells' kinds, tags and text; outputs and other metadata do not count
+    """
+
+    path: Path
+    defaults: dict[str, Any]
+    source_sha256: str
+
+    @property
+    def name(self) -> str:
+        return self.path.stem
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What one profile asks for: per notebook the parameters that differ from the defaults.
+
+    `after` names, per notebook, those whose results it reads or whose work it shares.
+    """
+
+    name: str
+    parameters: dict[str, dict[str, Any]]
+    after: dict[str, list[str]]
+
+
+def read_notebooks(folder: Path) -> list[Notebook]:
+    """Every notebook of a folder, in the order of their names, which is the order they run in.
+
+    Raises
+    ------
+    InputError
+        If the folder holds none, or one cannot be read or has no clear `parameters` cell.
+    """
+    paths = sorted(folder.glob("*.ipynb"))
+    if not paths:
+        raise InputError(f"{folder}: holds no notebook; expected files such as 00_quickstart.ipynb")
+    return [read_notebook(path) for path in paths]
+
+
+def read_notebook(path: Path) -> Notebook:
+    """Read one notebook's declared parameters and hash its source.
+
+    Raises
+    ------
+    InputError
+        If it is not a notebook, or has not exactly one cell tagged `parameters` made of literal assignments.
+    """
+    try:
+        cells = nbformat.read(path, as_version=4).cells
+    except Exception as error:  # nbformat raises a dozen kinds for what is not a notebook
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(f"{path}: is not a notebook ({reason}); restore the file") from None
+    tagged = [cell.source for cell in cells if PARAMETERS_TAG in cell.metadata.get("tags", [])]
+    if len(tagged) != 1:
+        raise InputError(f"{path}: has {len(tagged)} cells tagged `{PARAMETERS_TAG}`; expected exactly one")
+    source = [[cell.cell_type, cell.metadata.get("tags", []), cell.source] for cell in cells]
+    return Notebook(path, _assignments(tagged[0], path), digest(source))
+
+
+def _assignments(source: str, path: Path) -> dict[str, Any]:
+    """Name -> value of `name = literal` lines. The text is parsed, never run."""
+    values = {}
+    try:
+        for line in ast.parse(source).body:
+            target = line.targets[0] if isinstance(line, ast.Assign) else line.target
+            values[target.id] = ast.literal_eval(line.value)
+    except (SyntaxError, AttributeError, ValueError, TypeError):
+        raise InputError(
+            f"{path}: its parameters cell is not `name = value` lines with literal values; rewrite it so"
+        ) from None
+    return values
+
+
+def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
+    """Read profile `name` from the file of profiles and check it against the notebooks.
+
+    Raises
+    ------
+    InputError
+        If the file or the profile is missing, or names a notebook or parameter that does not exist.
+    """
+    try:
+        content = tomllib.loads(path.read_text())
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); restore the file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not TOML ({error}); correct the file") from None
+    after = content.pop("after", {})
+    if name not in content:
+        raise InputError(f"{path}: has no profile '{name}'; choose one of {', '.join(sorted(content))}")
+    known = {notebook.name: notebook for notebook in notebooks}
+    for notebook in [*content[name], *after, *(item for items in after.values() for item in items)]:
+        if notebook not in known:
+            raise InputError(f"{path}: names notebook '{notebook}'; known are {', '.join(known)}")
+    parameters = {
+        key: check_parameters(known[key], given, f"{path}, [{name}.{key}]")
+        for key, given in content[name].items()
+    }
+    return Profile(name, parameters, after)
+
+
+def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> dict[str, Any]:
+    """`given` if the notebook declares every name with that type; int counts as float.
+
+    Raises
+    ------
+    InputError
+        Naming the unknown parameter and the known ones, or the type that was expected.
+    """
+    for name, value in given.items():
+        if name not in notebook.defaults:
+            known = ", ".join(notebook.defaults) or "none"
+            raise InputError(f"{origin}: {notebook.name} has no parameter '{name}'; known are {known}")
+        expected = type(notebook.defaults[name])
+        if not _fits(value, expected):
+            raise InputError(
+                f"{origin}: {notebook.name}: '{name}' is {json.dumps(value, default=str)}; "
+                f"expected {_article(expected)} such as {notebook.defaults[name]!r}"
+            )
+    return given
+
+
+def _fits(value: Any, expected: type) -> bool:
+    if expected is type(None):
+        return True
+    if expected is float:
+        return isinstance(value, (int, float)) and not isinstance(value, bool)
+    return type(value) is expected
+
+
+def _article(kind: type) -> str:
+    names = {int: "an integer", float: "a number", bool: "true or false", str: "text", list: "a list"}
+    return names.get(kind, f"a {kind.__name__}")
+
+
+def parse_overrides(pairs: list[tuple[str, str]], notebooks: list[Notebook]) -> dict[str, dict[str, Any]]:
+    """Turn `-p NAME VALUE` pairs into parameters of every notebook that declares NAME.
+
+    A value is read by the type of the notebook's default: `true`/`false`, numbers, lists as
+    `a,b` or JSON. Names ending in `_dir` or `_path` are made absolute, since notebooks run in
+    their own folder.
+
+    Raises
+    ------
+    InputError
+        If no notebook declares the name, or the value does not fit.
+    """
+    overrides: dict[str, dict[str, Any]] = {notebook.name: {} for notebook in notebooks}
+    for name, text in pairs:
+        users = [notebook for notebook in notebooks if name in notebook.defaults]
+        if not users:
+            known = ", ".join(sorted({key for notebook in notebooks for key in notebook.defaults})) or "none"
+            raise InputError(f"-p {name}: no notebook has such a parameter; known are {known}")
+        for notebook in users:
+            value = _parse(name, text, notebook.defaults[name])
+            overrides[notebook.name] |= check_parameters(notebook, {name: value}, f"-p {name}")
+    return overrides
+
+
+def _parse(name: str, text: str, default: Any) -> Any:
+    """`text` as a value of the type of `default`; unchanged text when it is not one."""
+    if isinstance(default, str):
+        return str(Path(text).resolve()) if text and name.endswith(("_dir", "_path")) else text
+    if isinstance(default, list) and not text.startswith("["):
+        first = default[0] if default else ""
+        return [_parse("", item, first) for item in text.split(",") if item]
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError:
+        return text

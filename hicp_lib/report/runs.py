@@ -1,0 +1,313 @@
+"""Runs of notebooks: only when something they depend on changed, whole or not at all.
+
+A run happens in a staging folder. Only when every cell completed, nothing was written to
+stderr and the results carry the parameters of the run, it takes the place of the last one;
+its stamp is written last. No stamp, another key, or an output that is not the stamped one:
+the notebook runs again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import nbformat
+
+from hicp_lib import provenance
+from hicp_lib.errors import InputError
+from hicp_lib.files import sha256_file, write_json
+from hicp_lib.report import PROFILE_VARIABLE, RESULTS_VARIABLE
+from hicp_lib.report.notebooks import Notebook
+
+WALL_LIMIT_S = 2 * 3600
+N_PARALLEL = 2
+
+
+class RunError(RuntimeError):
+    """A notebook failed. The message is one line that says where and where its copy lies."""
+
+
+@dataclass(frozen=True)
+class Folders:
+    """Where the runs of one profile go, below the root of the checkout."""
+
+    root: Path
+    profile: str
+
+    @property
+    def executed(self) -> Path:
+        """Executed notebooks and their stamps."""
+        return self.root / "_build" / "notebooks" / self.profile
+
+    @property
+    def results(self) -> Path:
+        """One folder of results per notebook."""
+        return self.root / "results" / self.profile
+
+
+@dataclass(frozen=True)
+class Run:
+    """One notebook with every parameter it runs with, and the runs that come before it."""
+
+    notebook: Notebook
+    parameters: dict[str, Any]
+    after: tuple[str, ...] = ()
+
+
+def run_all(runs: list[Run], folders: Folders, say: Callable[[str], None]) -> None:
+    """Bring every run up to date, two at a time where they do not depend on each other.
+
+    Parameters
+    ----------
+    runs : in an order in which each comes after those it names in `after`
+    say : takes one line per notebook
+
+    Raises
+    ------
+    RunError
+        If a notebook failed; the others are still brought to their end.
+    InputError
+        If a parameter names a file or folder that does not exist.
+    """
+    folders.executed.mkdir(parents=True, exist_ok=True)
+    for left_behind in folders.executed.glob(".run-*"):
+        shutil.rmtree(left_behind, ignore_errors=True)
+    kept = {run.notebook.name for run in runs}
+    for stamp in folders.executed.glob("*.json"):
+        if stamp.stem not in kept:
+            _discard(stamp.stem, folders)
+    done: dict[str, Future] = {}
+    with ThreadPoolExecutor(N_PARALLEL) as pool, _Children() as children:
+        for run in runs:
+            before = [done[name] for name in run.after if name in done]
+            done[run.notebook.name] = pool.submit(_bring_up_to_date, run, before, folders, children, say)
+        errors = [future.exception() for future in done.values()]
+    for error in errors:
+        if error is not None and not isinstance(error, _SkippedError):
+            raise error
+
+
+class _SkippedError(Exception):
+    """A notebook that was not run because one before it failed."""
+
+
+def _bring_up_to_date(run: Run, before: list[Future], folders: Folders, children: _Children, say) -> str:
+    """Run the notebook unless it is fresh; its key's digest."""
+    if any(future.exception() for future in before):
+        raise _SkippedError
+    key = run_key(run, [future.result() for future in before])
+    reason = why_stale(run.notebook.name, key, folders)
+    if reason is None:
+        say(f"{run.notebook.name}: unchanged")
+        return provenance.digest(key)
+    say(f"{run.notebook.name}: running ({reason}) ...")
+    start_s = time.perf_counter()
+    run_notebook(run, key, folders, children)
+    say(f"{run.notebook.name}: done in {time.perf_counter() - start_s:.1f} s")
+    return provenance.digest(key)
+
+
+def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
+    """Hashes of everything the outcome of a run depends on, by what they stand for.
+
+    Raises
+    ------
+    InputError
+        If a parameter names a file or folder that does not exist.
+    """
+    return {
+        "notebook": run.notebook.source_sha256,
+        "parameters": provenance.digest(run.parameters),
+        "library": provenance.library_sha256(),
+        "lock": provenance.lock_sha256(),
+        "installed packages": provenance.installed_sha256(),
+        "data": provenance.data_sha256(),
+        "input files": provenance.digest(_inputs(run)),
+        "earlier notebooks": provenance.digest(before or []),
+    }
+
+
+def _inputs(run: Run) -> dict[str, str]:
+    """Identity of what parameters named `*_path` or `*_dir` point to; an empty one points to nothing."""
+    inputs = {}
+    for name, value in run.parameters.items():
+        if name.endswith(("_path", "_dir")) and value:
+            path = run.notebook.path.parent / value
+            if not path.exists():
+                raise InputError(f"{path}: does not exist; parameter '{name}' must name a file or folder")
+            inputs[name] = provenance.input_sha256(path)
+    return inputs
+
+
+def why_stale(name: str, key: dict[str, Any], folders: Folders) -> str | None:
+    """What makes a new run necessary, in words; None when the last run still holds."""
+    try:
+        stamp = json.loads((folders.executed / f"{name}.json").read_text())
+        changed = [part for part in key if stamp["key"].get(part) != key[part]]
+        outputs = stamp["outputs"]
+    except (OSError, ValueError, KeyError, AttributeError):
+        return "no complete run yet"
+    if changed:
+        return f"changed: {', '.join(changed)}"
+    return None if outputs == _outputs(name, folders) else "its outputs were changed"
+
+
+def _outputs(name: str, folders: Folders) -> dict[str, str]:
+    """SHA-256 of the executed copy and of every result file."""
+    paths = [folders.executed / f"{name}.ipynb", *sorted((folders.results / name).rglob("*"))]
+    return {path.relative_to(folders.root).as_posix(): sha256_file(path) for path in paths if path.is_file()}
+
+
+def run_notebook(run: Run, key: dict[str, Any], folders: Folders, children: _Children) -> None:
+    """Run a notebook and put its outcome in place of the last one.
+
+    Raises
+    ------
+    RunError
+        If a cell failed, wrote to stderr or took too long, or the results are not those of this run.
+    """
+    name = run.notebook.name
+    staging = Path(tempfile.mkdtemp(prefix=f".run-{name}-", dir=folders.executed))
+    copy = staging / f"{name}.ipynb"
+    try:
+        status = children.execute(run, copy, staging, folders.profile)
+        _check(run, status, copy, staging)
+        if provenance.library_sha256() != key["library"]:
+            raise RunError(f"{name}: hicp_lib was changed while it ran; run the report again")
+        _discard(name, folders)
+        folders.results.mkdir(parents=True, exist_ok=True)
+        os.replace(staging / "results" / name, folders.results / name)
+        os.replace(copy, folders.executed / copy.name)
+        stamp = {"key": key, "parameters": run.parameters, "outputs": _outputs(name, folders)}
+        write_json(folders.executed / f"{name}.json", stamp, indent=2)
+    except RunError as error:
+        raise RunError(f"{error}{_keep_failed(copy, staging, folders)}") from None
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+def _discard(name: str, folders: Folders) -> None:
+    """Forget the last run. The stamp goes first: from here on it counts as not run."""
+    (folders.executed / f"{name}.json").unlink(missing_ok=True)
+    (folders.executed / f"{name}.ipynb").unlink(missing_ok=True)
+    for leftover in (folders.executed / "failed").glob(f"{name}.*"):
+        leftover.unlink()
+    shutil.rmtree(folders.results / name, ignore_errors=True)
+
+
+def _keep_failed(copy: Path, staging: Path, folders: Folders) -> str:
+    """Keep a failed run's copy and log for reading; the words that say where."""
+    failed = folders.executed / "failed"
+    failed.mkdir(exist_ok=True)
+    for path in (copy, staging / "log.txt"):
+        if path.is_file():
+            os.replace(path, failed / f"{copy.stem}{path.suffix}")
+    return f"; see {failed / copy.name}" if (failed / copy.name).is_file() else f"; see {failed}"
+
+
+def _check(run: Run, status: int | None, copy: Path, staging: Path) -> None:
+    """Raise RunError unless the executed copy and its results are whole."""
+    name = run.notebook.name
+    if status is None:
+        raise RunError(f"{name}: took longer than {WALL_LIMIT_S} s and was stopped")
+    if not copy.is_file():
+        log = (staging / "log.txt").read_text(errors="replace").strip().splitlines()
+        raise RunError(f"{name}: did not run: {log[-1] if log else f'exit code {status}'}")
+    problem = first_problem(copy)
+    if problem is None and status != 0:
+        problem = f"exit code {status}"
+    if problem is not None:
+        raise RunError(f"{name}: {problem}")
+    try:
+        stamp = json.loads((staging / "results" / name / "provenance.json").read_text())
+    except (OSError, ValueError):
+        raise RunError(f"{name}: ended without results; its last line must be `study.finish()`") from None
+    if stamp["parameters"] != json.loads(json.dumps(run.parameters)):
+        raise RunError(f"{name}: its results state other parameters than it ran with; pass all to `Study`")
+
+
+def first_problem(executed: Path) -> str | None:
+    """The first cell of an executed notebook that did not complete or wrote to stderr, in words."""
+    cells = nbformat.read(executed, as_version=4).cells
+    for cell in (cell for cell in cells if cell.cell_type == "code"):
+        place = f"In [{cell.execution_count or ' '}]"
+        for output in cell.outputs:
+            if output.output_type == "error":
+                return f"{place} failed: {output.ename}: {' '.join(output.evalue.split())}"
+            if output.output_type == "stream" and output.name == "stderr":
+                return f"{place} wrote to stderr: {output.text.strip().splitlines()[0]}"
+        if cell.metadata.get("papermill", {}).get("status") != "completed":
+            return f"{place} did not complete"
+    return None
+
+
+class _Children:
+    """The running processes; leaving the context for any reason ends them all."""
+
+    def __init__(self) -> None:
+        self._running: set[subprocess.Popen] = set()
+        self._ended = False
+
+    def __enter__(self) -> _Children:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended = True
+        for process in list(self._running):
+            process.stdin.close()
+
+    def execute(self, run: Run, copy: Path, staging: Path, profile: str) -> int | None:
+        """Run the notebook into `copy`; the exit code, or None when it hit the wall limit."""
+        if self._ended:
+            raise RunError(f"{run.notebook.name}: was not run, the report was stopped")
+        folder = run.notebook.path.parent.resolve()
+        job = {"notebook": str(run.notebook.path), "output": str(copy), "folder": str(folder)}
+        write_json(staging / "job.json", job | {"parameters": run.parameters})
+        command = [sys.executable, "-m", "hicp_lib.report.execute", str(staging / "job.json")]
+        with open(staging / "log.txt", "wb") as log, tempfile.TemporaryDirectory(prefix="hicp-") as private:
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=log,
+                stderr=log,
+                env=_environment(staging, profile, private),
+            )
+            self._running.add(process)
+            try:
+                return process.wait(WALL_LIMIT_S)
+            except subprocess.TimeoutExpired:
+                return None
+            finally:
+                process.stdin.close()
+                process.wait()
+                self._running.discard(process)
+
+
+def _environment(staging: Path, profile: str, private: str) -> dict[str, str]:
+    """A kernel's environment: nothing of the user's own set-up may move a number or a pixel."""
+    matplotlib = find_spec("matplotlib")
+    return os.environ | {
+        RESULTS_VARIABLE: str(staging / "results"),
+        PROFILE_VARIABLE: profile,
+        "IPYTHONDIR": private,
+        "JUPYTER_RUNTIME_DIR": private,
+        "JUPYTER_PREFER_ENV_PATH": "1",
+        "MATPLOTLIBRC": str(Path(matplotlib.origin).parent / "mpl-data" / "matplotlibrc"),
+        "MPLBACKEND": "module://matplotlib_inline.backend_inline",
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+        "PYTHONHASHSEED": "0",
+        "PYTHONNOUSERSITE": "1",
+        "TQDM_DISABLE": "1",
+    }
