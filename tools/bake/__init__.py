@@ -1,0 +1,1 @@
+"""Parts of `tools/bake_body.py`, which makes data/body.npz from the body model Anny."""

