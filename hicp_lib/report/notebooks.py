@@ -159,12 +159,16 @@ def _article(kind: type) -> str:
     return names.get(kind, f"a {kind.__name__}")
 
 
+def is_path(name: str, default: Any) -> bool:
+    """Whether a parameter names a file or folder: text, empty by default or called `*_path` or `*_dir`."""
+    return isinstance(default, str) and (default == "" or name.endswith(("_path", "_dir")))
+
+
 def parse_overrides(pairs: list[tuple[str, str]], notebooks: list[Notebook]) -> dict[str, dict[str, Any]]:
     """Turn `-p NAME VALUE` pairs into parameters of every notebook that declares NAME.
 
     A value is read by the type of the notebook's default: `true`/`false`, numbers, lists as
-    `a,b` or JSON. Names ending in `_dir` or `_path` are made absolute, since notebooks run in
-    their own folder.
+    `a,b` or JSON. Paths are made absolute, since notebooks run in their own folder.
 
     Raises
     ------
@@ -186,7 +190,7 @@ def parse_overrides(pairs: list[tuple[str, str]], notebooks: list[Notebook]) -> 
 def _parse(name: str, text: str, default: Any) -> Any:
     """`text` as a value of the type of `default`; unchanged text when it is not one."""
     if isinstance(default, str):
-        return str(Path(text).resolve()) if text and name.endswith(("_dir", "_path")) else text
+        return str(Path(text).resolve()) if text and is_path(name, default) else text
     if isinstance(default, list) and not text.startswith("["):
         first = default[0] if default else ""
         return [_parse("", item, first) for item in text.split(",") if item]

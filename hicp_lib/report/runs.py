@@ -28,7 +28,7 @@ from hicp_lib import provenance
 from hicp_lib.errors import InputError
 from hicp_lib.files import sha256_file, write_json
 from hicp_lib.report import PROFILE_VARIABLE, RESULTS_VARIABLE
-from hicp_lib.report.notebooks import Notebook
+from hicp_lib.report.notebooks import Notebook, is_path
 
 WALL_LIMIT_S = 2 * 3600
 N_PARALLEL = 2
@@ -139,10 +139,10 @@ def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
 
 
 def _inputs(run: Run) -> dict[str, str]:
-    """Identity of what parameters named `*_path` or `*_dir` point to; an empty one points to nothing."""
+    """Identity of the files and folders that parameters point to; an empty one points to nothing."""
     inputs = {}
     for name, value in run.parameters.items():
-        if name.endswith(("_path", "_dir")) and value:
+        if is_path(name, run.notebook.defaults[name]) and value:
             path = run.notebook.path.parent / value
             if not path.exists():
                 raise InputError(f"{path}: does not exist; parameter '{name}' must name a file or folder")
@@ -272,8 +272,10 @@ class _Children:
         if self._ended:
             raise RunError(f"{run.notebook.name}: was not run, the report was stopped")
         folder = run.notebook.path.parent.resolve()
+        defaults = run.notebook.defaults
+        changed = {name: value for name, value in run.parameters.items() if value != defaults[name]}
         job = {"notebook": str(run.notebook.path), "output": str(copy), "folder": str(folder)}
-        write_json(staging / "job.json", job | {"parameters": run.parameters})
+        write_json(staging / "job.json", job | {"parameters": changed})
         command = [sys.executable, "-m", "hicp_lib.report.execute", str(staging / "job.json")]
         with open(staging / "log.txt", "wb") as log, tempfile.TemporaryDirectory(prefix="hicp-") as private:
             process = subprocess.Popen(

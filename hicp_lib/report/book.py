@@ -1,0 +1,143 @@
+"""Builds the book from its pages and the executed notebooks: offline, checked, whole or not at all."""
+
+from __future__ import annotations
+
+import importlib.resources
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from hicp_lib import provenance
+from hicp_lib.files import sha256_file, write_json
+from hicp_lib.report.checks import book_problems
+from hicp_lib.report.prose import Results, render_page
+from hicp_lib.report.runs import Folders, RunError
+from hicp_lib.report.sphinx_extension import PLOTLY_PATH, SCRIPTS_DIR
+from hicp_lib.study import provenance_html
+
+BUILD_LIMIT_S = 900
+
+
+def build_book(folders: Folders) -> tuple[Path, bool]:
+    """Build the book of one profile, unless nothing it is made of changed.
+
+    Returns
+    -------
+    Its first page, and whether it was built now.
+
+    Raises
+    ------
+    RunError
+        If Sphinx warns, or the book would need a network or lacks alt text.
+    InputError
+        If a page uses a result that does not exist.
+    """
+    book = folders.root / "_build" / "book" / folders.profile
+    stamp = book.with_suffix(".json")
+    key = _key(folders)
+    if _is_fresh(book, stamp, key):
+        return book / "index.html", False
+    book.parent.mkdir(parents=True, exist_ok=True)
+    for left_behind in book.parent.glob(f".build-{folders.profile}-*"):
+        shutil.rmtree(left_behind, ignore_errors=True)
+    staging = Path(tempfile.mkdtemp(prefix=f".build-{folders.profile}-", dir=book.parent))
+    try:
+        _assemble(staging / "source", folders)
+        built = _run_sphinx(staging, book.parent / f"{folders.profile}.log")
+        shutil.copytree(folders.results, built / "results" / folders.profile)
+        _check(built)
+        stamp.unlink(missing_ok=True)
+        shutil.rmtree(book, ignore_errors=True)
+        os.replace(built, book)
+        write_json(stamp, {"key": key, "pages": _hashes(book)})
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+    return book / "index.html", True
+
+
+def _key(folders: Folders) -> str:
+    """Digest of all that the book is made of; the runs' stamps stand for notebooks and their results."""
+    return provenance.digest(
+        {
+            "pages": _hashes(folders.root / "book"),
+            "runs": {path.name: sha256_file(path) for path in folders.executed.glob("*.json")},
+            "library": provenance.library_sha256(),
+            "data": provenance.data_sha256(),
+            "installed": provenance.installed_sha256(),
+        }
+    )
+
+
+def _is_fresh(book: Path, stamp: Path, key: str) -> bool:
+    try:
+        last = json.loads(stamp.read_text())
+        return last["key"] == key and last["pages"] == _hashes(book)
+    except (OSError, ValueError, KeyError):
+        return False
+
+
+def _hashes(folder: Path) -> dict[str, str]:
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): sha256_file(path) for path in files}
+
+
+def _assemble(source: Path, folders: Folders) -> None:
+    """Fill the pages, put the executed notebooks and the scripts beside them."""
+    shutil.copytree(folders.root / "book", source)
+    results = Results(folders.results, folders.profile)
+    footer = provenance_html(_book_stamp(folders))
+    for page in source.rglob("*.md"):
+        page.write_text(f"{render_page(page, results, folders.profile)}\n\n{footer}\n")
+    notebooks = source / "notebooks"
+    notebooks.mkdir(exist_ok=True)
+    for executed in folders.executed.glob("*.ipynb"):
+        shutil.copy(executed, notebooks)
+    scripts = source / SCRIPTS_DIR
+    scripts.mkdir()
+    # One file with its fonts inside: browsers refuse font files to pages that are read from disk.
+    mathjax = importlib.resources.files("sphinx-mathjax-offline") / "static" / "mathjax" / "tex-svg.js"
+    shutil.copy(str(mathjax), scripts / "mathjax.js")
+    plotly = importlib.resources.files("plotly") / "package_data" / "plotly.min.js"
+    shutil.copy(str(plotly), scripts / PLOTLY_PATH)
+
+
+def _book_stamp(folders: Folders) -> dict:
+    """The stamp of prose pages: made now, from results of runs that took this long together."""
+    stamps = [json.loads(path.read_text()) for path in folders.results.glob("*/provenance.json")]
+    made = provenance.provenance({"profile": folders.profile})
+    return made | {
+        "onnx_providers": sorted({name for stamp in stamps for name in stamp["onnx_providers"]}),
+        "wall_s": sum(stamp["wall_s"] for stamp in stamps),
+    }
+
+
+def _run_sphinx(staging: Path, log: Path) -> Path:
+    """Build with every warning an error; the folder of the pages."""
+    command = [sys.executable, "-c", "from jupyter_book.cli.main import main; main()"]
+    command += ["build", str(staging / "source"), "--path-output", str(staging), "-W", "--keep-going", "-q"]
+    with open(log, "wb") as output:
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            timeout=BUILD_LIMIT_S,
+            env=os.environ | {"NO_COLOR": "1", "PYTHONNOUSERSITE": "1"},
+        )
+    built = staging / "_build" / "html"
+    if done.returncode != 0 or not (built / "index.html").is_file():
+        lines = log.read_text(errors="replace").splitlines()
+        warnings = [line for line in lines if "WARNING" in line or "ERROR" in line] or lines[-1:]
+        first = warnings[0].replace(str(staging / "source"), "book") if warnings else "no output"
+        raise RunError(f"book: {first} ({len(warnings)} in all; see {log})")
+    return built
+
+
+def _check(built: Path) -> None:
+    problems = book_problems(built)
+    if problems:
+        raise RunError(f"book: {problems[0]} ({len(problems)} such problems in all)")

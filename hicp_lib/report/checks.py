@@ -1,0 +1,83 @@
+"""What a built book promises: nothing loads from a network, every image has words."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+# Attributes through which a page loads something by itself; links that a reader clicks are fine.
+_LOADING = {
+    "script": ("src",),
+    "img": ("src", "srcset"),
+    "iframe": ("src",),
+    "source": ("src", "srcset"),
+    "video": ("src", "poster"),
+    "audio": ("src",),
+    "object": ("data",),
+    "embed": ("src",),
+    "link": ("href",),
+}
+_HARMLESS_LINKS = {
+    "canonical",
+    "author",
+    "license",
+    "index",
+    "search",
+    "next",
+    "prev",
+    "top",
+    "copyright",
+    "help",
+}
+_REMOTE = re.compile(r"\s*(https?:)?//", re.IGNORECASE)
+_REMOTE_IN_CSS = re.compile(r"(url\(\s*['\"]?|@import\s+['\"])\s*(https?:)?//", re.IGNORECASE)
+_LOADING_IN_SCRIPT = re.compile(
+    r"(import|importScripts|fetch|\.src\s*=|\.href\s*=)\s*\(?\s*['\"`](https?:)?//"
+)
+
+
+class _Page(HTMLParser):
+    """Collects the problems of one page."""
+
+    def __init__(self) -> None:
+        super().__init__(convert_charrefs=True)
+        self.problems: list[str] = []
+        self._inside = ""
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        given = {name: value or "" for name, value in attributes}
+        self._inside = tag
+        if tag == "img" and not given.get("alt", "").strip():
+            self.problems.append(f"image without alt text: {given.get('src', '')[:60]}")
+        if "hicp-scene" in given.get("class", "") and not given.get("aria-label", "").strip():
+            self.problems.append("3D scene without a description")
+        if tag == "link" and set(given.get("rel", "").lower().split()) & _HARMLESS_LINKS:
+            return
+        for name in _LOADING.get(tag, ()):
+            if _REMOTE.match(given.get(name, "")):
+                self.problems.append(f"loads from the network: <{tag} {name}={given[name][:80]}>")
+        if _REMOTE_IN_CSS.search(given.get("style", "")):
+            self.problems.append(f"loads from the network: style of <{tag}>")
+
+    def handle_endtag(self, tag: str) -> None:
+        self._inside = ""
+
+    def handle_data(self, data: str) -> None:
+        if self._inside == "style" and _REMOTE_IN_CSS.search(data):
+            self.problems.append("loads from the network: a style sheet inside the page")
+        if self._inside == "script" and _LOADING_IN_SCRIPT.search(data):
+            self.problems.append("loads from the network: a script inside the page")
+
+
+def book_problems(folder: Path) -> list[str]:
+    """What in a built book needs a network or lacks words, one line each; empty when it is sound."""
+    problems = []
+    for path in sorted(folder.rglob("*.html")):
+        page = _Page()
+        page.feed(path.read_text(errors="replace"))
+        problems += [f"{path.relative_to(folder)}: {problem}" for problem in page.problems]
+    for path in sorted(folder.rglob("*.css")):
+        if _REMOTE_IN_CSS.search(path.read_text(errors="replace")):
+            problems.append(f"{path.relative_to(folder)}: loads from the network")
+    return problems

@@ -1,0 +1,110 @@
+"""Pages of the book: Markdown templates that take every number, table and figure from result files.
+
+In a page of `book/`, between double braces:
+
+    value("02_evaluation_2d", "body_ap", digits=2)    a recorded value; "not run" when it is None
+    table("02_evaluation_2d", "ap", columns=[...])    a saved table in Markdown
+    figure("02_evaluation_2d", "precision_recall")    a saved figure with its caption and alt text
+    profile                                           "quick" or "full"
+    data("paper.json")                                a JSON file of `data/`, for loops over its rows
+
+A name that no result file has stops the build.
+"""
+
+from __future__ import annotations
+
+import html
+import json
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import pandas as pd
+
+from hicp_lib.errors import InputError
+from hicp_lib.files import read_json
+from hicp_lib.provenance import DATA_DIR
+
+NOT_RUN = "not run"
+
+
+class Results:
+    """The result files of one profile, as the pages see them."""
+
+    def __init__(self, folder: Path, profile: str):
+        self._folder = folder
+        self._profile = profile
+
+    def value(self, notebook: str, name: str, digits: int | None = None) -> str:
+        """A recorded value as text; "not run" when the notebook recorded None."""
+        value = self._entry(notebook, "values.json", name)
+        if value is None:
+            return NOT_RUN
+        return f"{value:.{digits}f}" if digits is not None else str(value)
+
+    def raw(self, notebook: str, name: str) -> Any:
+        """A recorded value as it is, for conditions in a template."""
+        return self._entry(notebook, "values.json", name)
+
+    def table(self, notebook: str, name: str, columns: list[str] | None = None, digits: int = 2) -> str:
+        """A saved table in Markdown; what is missing is a dash."""
+        path = self._folder / notebook / f"{name}.parquet"
+        if not path.is_file():
+            raise InputError(f"{path}: a page of the book needs this table; save it in the notebook")
+        table = pd.read_parquet(path)
+        return markdown_table(table[columns] if columns else table, digits)
+
+    def figure(self, notebook: str, name: str) -> str:
+        """A saved figure as HTML, with a link to the notebook that made it."""
+        texts = self._entry(notebook, "captions.json", name)
+        source = f"results/{self._profile}/{notebook}/{name}.png"
+        return (
+            f'<figure class="hicp"><img src="{source}" alt="{html.escape(texts["alt"])}">'
+            f"<figcaption>{html.escape(texts['caption'])} "
+            f'<a href="notebooks/{notebook}.html#{name}">How it was made</a></figcaption></figure>'
+        )
+
+    def _entry(self, notebook: str, file: str, name: str) -> Any:
+        path = self._folder / notebook / file
+        entries = read_json(path)
+        if name not in entries:
+            known = ", ".join(entries) or "none"
+            raise InputError(f"{path}: a page of the book needs '{name}'; the notebook recorded {known}")
+        return entries[name]
+
+
+def markdown_table(table: pd.DataFrame, digits: int = 2) -> str:
+    """A table in Markdown, numbers rounded to `digits` decimals; what is missing is a dash."""
+
+    def cell(value: Any) -> str:
+        if value is None or value is pd.NA or value != value:
+            return "–"
+        text = f"{value:.{digits}f}" if isinstance(value, float) else str(value)
+        return text.replace("|", "\\|").replace("\n", " ")
+
+    rows = [list(table.columns), *table.itertuples(index=False)]
+    lines = ["| " + " | ".join(cell(value) for value in row) + " |" for row in rows]
+    return "\n".join([lines[0], "|" + "---|" * len(table.columns), *lines[1:]])
+
+
+def render_page(source: Path, results: Results, profile: str) -> str:
+    """Fill one Markdown template.
+
+    Raises
+    ------
+    InputError
+        If the page uses a name that does not exist, or is not a valid template.
+    """
+    environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    try:
+        return environment.from_string(source.read_text()).render(
+            value=results.value,
+            raw=results.raw,
+            table=results.table,
+            figure=results.figure,
+            data=lambda name: json.loads((DATA_DIR / name).read_text()),
+            profile=profile,
+        )
+    except jinja2.TemplateError as error:
+        line = f", line {error.lineno}" if isinstance(error, jinja2.TemplateSyntaxError) else ""
+        raise InputError(f"{source}{line}: {error.message}; correct the page") from None
