@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from functools import lru_cache
 from pathlib import Path
 
 import flatbuffers
@@ -70,6 +71,7 @@ def read_bundle(task: str, path: str | Path) -> bytes:
     return content
 
 
+@lru_cache(maxsize=4)
 def _with_scaling(model: bytes, mean: float, std: float) -> bytes:
     """Append TFLite metadata that declares (pixel - mean) / std for an RGB input."""
     tree = tflite.ModelT.InitFromPackedBuf(model, 0)

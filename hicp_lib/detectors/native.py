@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -31,15 +32,41 @@ def user_environment() -> dict[str, str]:
     return {name: value for name, value in environment.items() if value is not None}
 
 
+_lock = threading.Lock()
+_quiet_depth = 0
+_saved_stderr = -1
+
+
 @contextmanager
 def quiet_stderr() -> Iterator[None]:
-    """Discard what is written to file descriptor 2, which native libraries use directly."""
-    sys.stderr.flush()
-    saved = os.dup(2)
-    with open(os.devnull, "wb") as nowhere:
-        os.dup2(nowhere.fileno(), 2)
+    """Discard what is written to file descriptor 2, which native libraries use directly.
+
+    The descriptor belongs to the whole process, so the first of several threads in such a
+    block redirects it and the last one restores it.
+    """
+    _redirect()
     try:
         yield
     finally:
-        os.dup2(saved, 2)
-        os.close(saved)
+        _restore()
+
+
+def _redirect() -> None:
+    global _quiet_depth, _saved_stderr
+    with _lock:
+        if _quiet_depth == 0:
+            sys.stderr.flush()
+            _saved_stderr = os.dup(2)
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, 2)
+            os.close(nowhere)
+        _quiet_depth += 1
+
+
+def _restore() -> None:
+    global _quiet_depth
+    with _lock:
+        _quiet_depth -= 1
+        if _quiet_depth == 0:
+            os.dup2(_saved_stderr, 2)
+            os.close(_saved_stderr)
