@@ -14,12 +14,13 @@ Both are checked where they enter. Conventions of this module, where formats in 
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 
 import numpy as np
 
-from hicp_lib.coco_rows import PART_KEYS, Rows
+from hicp_lib.coco_rows import PART_KEYS, Rows, shown
 from hicp_lib.detectors.base import Detections
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json, write_json
@@ -27,6 +28,7 @@ from hicp_lib.keypoints import NAMES
 
 PERSON_CATEGORY = 1
 MAX_SIDE_PX = 100_000
+_UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")  # control characters, halves of characters
 _KNOWN_KEYS = {
     "id", "image_id", "category_id", "bbox", "area", "iscrowd", "keypoints", "num_keypoints",
 }  # fmt: skip
@@ -107,14 +109,14 @@ def _read_images(rows: Rows) -> dict[int, ImageInfo]:
     names = rows.column("file_name")
     for i, name in enumerate(names):
         if not _is_inside(name):
-            raise rows.error(i, "file_name leads out of the images' folder; expected e.g. 785.jpg")
+            raise rows.error(i, f"file_name is {shown(name)}; expected a name inside the folder of images")
     widths, heights = (values.tolist() for values in sides.values())
     return {i: ImageInfo(i, *rest) for i, *rest in zip(ids, names, widths, heights, strict=True)}
 
 
 def _is_inside(name: object) -> bool:
     """Whether a file name cannot lead out of its folder, on any system."""
-    if not isinstance(name, str) or not name.isprintable():  # also no NUL and no lone surrogates
+    if not isinstance(name, str) or _UNWRITABLE.search(name):
         return False
     path = PureWindowsPath(name)  # splits at both kinds of slash and knows drives
     return bool(path.name) and not path.anchor and ".." not in path.parts

@@ -38,10 +38,10 @@ class Rows:
     def of(cls, path: Path, label: str, value: Any, name_key: str = "id") -> Rows:
         """Check that `value` is a list of JSON objects."""
         if not isinstance(value, list):
-            raise InputError(f"{path}: {label} is {_shown(value)}; expected a list of objects")
+            raise InputError(f"{path}: {label} is {shown(value)}; expected a list of objects")
         for i, row in enumerate(value):
             if not isinstance(row, dict):
-                raise InputError(f"{path}: {label}[{i}] is {_shown(row)}; expected an object")
+                raise InputError(f"{path}: {label}[{i}] is {shown(row)}; expected an object")
         return cls(path, label, value, name_key)
 
     def error(self, i: int, problem: str) -> InputError:
@@ -62,7 +62,7 @@ class Rows:
         values = self.column(key)
         for i, value in enumerate(values):
             if type(value) is not int or not -(2**63) <= value < 2**63:
-                raise self.error(i, f"{key} is {_shown(value)}; expected a whole number")
+                raise self.error(i, f"{key} is {shown(value)}; expected a whole number")
         return np.array(values, dtype=np.int64)
 
     def unique_integers(self, key: str) -> np.ndarray:
@@ -85,7 +85,7 @@ class Rows:
         values = self.column(key)
         for i, value in enumerate(values):
             if not isinstance(value, list) or len(value) != len(names):
-                raise self.error(i, f"{key} is {_shown(value)}; expected [{', '.join(names)}]")
+                raise self.error(i, f"{key} is {shown(value)}; expected [{', '.join(names)}]")
         return self._finite(values, len(names), lambda j: f"{key}[{j}] ({names[j]})")
 
     def keypoints(self) -> np.ndarray:
@@ -112,7 +112,7 @@ class Rows:
 
     def _one_list(self, i: int, value: Any) -> list:
         if not isinstance(value, list):
-            raise self.error(i, f"keypoints is {_shown(value)}; expected a list of x, y, v per keypoint")
+            raise self.error(i, f"keypoints is {shown(value)}; expected a list of x, y, v per keypoint")
         row = self.rows[i]
         if len(value) == 51 and all(isinstance(row.get(key), list) for key in PART_KEYS):
             value = list(chain(value, *(row[key] for key in PART_KEYS)))
@@ -124,7 +124,7 @@ class Rows:
     def _finite(
         self, lists: list[list], width: int, name: Callable[[int], str], rows: Sequence[int] | None = None
     ) -> np.ndarray:
-        """Lists of `width` numbers (of `rows`, default all) as one float array; `name` says what entry j is."""
+        """Lists of `width` numbers (of `rows`, default all) as a float array; `name` says what entry j is."""
         try:
             # The types first: numpy would take True for 1 and "3" for 3.
             if set(map(type, chain.from_iterable(lists))) <= {int, float}:
@@ -136,7 +136,7 @@ class Rows:
         i, j = next(
             (i, j) for i, values in enumerate(lists) for j, x in enumerate(values) if not _is_finite(x)
         )
-        problem = f"{name(j)} is {_shown(lists[i][j])}; expected a finite number up to {MAX_ABS:g}"
+        problem = f"{name(j)} is {shown(lists[i][j])}; expected a finite number up to {MAX_ABS:g}"
         raise self.error(i if rows is None else int(rows[i]), problem)
 
 
@@ -149,7 +149,7 @@ def _keypoint_namer(convention: str) -> Callable[[int], str]:
     return lambda j: f"keypoints[{j}] ({NAMES[indices[j // 3]]} {'xyv'[j % 3]})"
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
     """A value as a short piece of one line."""
     if isinstance(value, bool | None):
         return {True: "true", False: "false", None: "null"}[value]
@@ -159,4 +159,4 @@ def _shown(value: Any) -> str:
         return f"a list of {len(value)}"
     if isinstance(value, str):
         return f"the text {value[:40]!r}"
-    return str(value) if abs(value) < 1e30 else "too large a number"
+    return "too large a number" if isinstance(value, int) and abs(value) > 1e30 else str(value)

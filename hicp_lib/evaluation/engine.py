@@ -1,0 +1,154 @@
+"""pycocotools, fed with arrays and kept quiet; and the matches it made, from which AP can be had again."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from dataclasses import dataclass
+
+import numpy as np
+from pycocotools.coco import COCO
+from pycocotools.cocoeval import COCOeval
+
+OKS_THRESHOLDS = np.linspace(0.5, 0.95, 10)
+RECALLS = np.linspace(0.0, 1.0, 101)
+METRICS = ("AP", "AP50", "AP75", "AR", "AR50", "AR75")
+MAX_DETECTIONS = 20
+# Where a keypoint that is not given is put: so far off that it adds 0 to OKS. pycocotools must not
+# see NaN: comparisons with NaN fail, and then everything matches.
+_FAR_PX = -1e12
+
+
+@dataclass(frozen=True)
+class Matches:
+    """Which detections are right, sorted by falling score: all that AP and AR depend on.
+
+    Attributes
+    ----------
+    image_ids, n_people : arrays, shape (n_images,): people who count, per image
+    image_rows : array, shape (n_detections,): the detections' rows in `image_ids`
+    is_true, is_false : arrays, shape (10, n_detections), bool, per OKS threshold; both False if ignored
+    """
+
+    image_ids: np.ndarray
+    n_people: np.ndarray
+    image_rows: np.ndarray
+    is_true: np.ndarray
+    is_false: np.ndarray
+
+
+def truth_row(
+    image_id: int, keypoints_px: np.ndarray, visibility: np.ndarray, box_px: np.ndarray, area_px2: float,
+    ignored: bool,
+) -> dict:  # fmt: skip
+    """An annotated person for `run`: keypoints (k, 2) and visibility (k,) of the group."""
+    labelled = visibility > 0
+    return {
+        "image_id": image_id, "bbox": box_px.tolist(), "area": float(area_px2), "iscrowd": int(ignored),
+        "num_keypoints": int(labelled.sum()), "keypoints": _triples(keypoints_px, labelled, 0.0),
+    }  # fmt: skip
+
+
+def found_row(image_id: int, keypoints_px: np.ndarray, score: float) -> dict:
+    """A detection for `run`: keypoints (k, 2) of the group, NaN where not given."""
+    given = np.isfinite(keypoints_px).all(axis=-1)
+    # COCO ignores unmatched detections by their area; with one range over all areas any value does.
+    keypoints = _triples(keypoints_px, given, _FAR_PX)
+    return {"image_id": image_id, "area": 1.0, "score": float(score), "keypoints": keypoints}
+
+
+def _triples(keypoints_px: np.ndarray, given: np.ndarray, otherwise: float) -> list[float]:
+    points = np.where(given[:, None], keypoints_px, otherwise)
+    return np.concatenate([points, given[:, None]], axis=-1).ravel().tolist()
+
+
+def run(
+    image_ids: list[int], truth: list[dict], found: list[dict], sigmas: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, Matches]:
+    """Match detections to people by OKS.
+
+    Parameters
+    ----------
+    image_ids : all images
+    truth, found : rows from `truth_row` and `found_row`
+    sigmas : array, shape (k,)
+
+    Returns
+    -------
+    precision (10, 101), recall (10,) : per OKS threshold; NaN when nobody counts
+    Matches
+    """
+    with contextlib.redirect_stdout(io.StringIO()):
+        engine = COCOeval(_index(image_ids, truth), _index(image_ids, found), "keypoints")
+        engine.params.kpt_oks_sigmas = sigmas
+        engine.params.maxDets = [MAX_DETECTIONS]
+        engine.params.iouThrs, engine.params.recThrs = OKS_THRESHOLDS, RECALLS
+        engine.params.areaRng, engine.params.areaRngLbl = [[0.0, np.inf]], ["all"]
+        engine.evaluate()
+        engine.accumulate()
+    precision, recall = engine.eval["precision"][:, :, 0, 0, 0], engine.eval["recall"][:, 0, 0, 0]
+    return np.where(precision < 0, np.nan, precision), np.where(recall < 0, np.nan, recall), _matches(engine)
+
+
+def _index(image_ids: list[int], rows: list[dict]) -> COCO:
+    # Ids start at 1: to pycocotools a match with id 0 is no match.
+    numbered = [{**row, "id": i, "category_id": 1} for i, row in enumerate(rows, start=1)]
+    coco = COCO()
+    coco.dataset = {
+        "images": [{"id": i} for i in image_ids],
+        "annotations": numbered,
+        "categories": [{"id": 1}],
+    }
+    coco.createIndex()
+    return coco
+
+
+def _matches(engine: COCOeval) -> Matches:
+    image_ids = np.array(engine.params.imgIds, dtype=np.int64)
+    n_people = np.zeros(len(image_ids), dtype=int)
+    rows, scores = [np.zeros(0, dtype=int)], [np.zeros(0)]
+    right, wrong = (
+        [np.zeros((len(OKS_THRESHOLDS), 0), dtype=bool)],
+        [np.zeros((len(OKS_THRESHOLDS), 0), dtype=bool)],
+    )
+    for i, image in enumerate(engine.evalImgs):
+        if image is not None:
+            n_people[i] = np.count_nonzero(np.asarray(image["gtIgnore"]) == 0)
+            rows.append(np.full(len(image["dtScores"]), i))
+            scores.append(np.array(image["dtScores"], dtype=float))
+            matched, counted = image["dtMatches"] > 0, ~image["dtIgnore"]
+            right.append(matched & counted)
+            wrong.append(~matched & counted)
+    order = np.argsort(-np.concatenate(scores), kind="stable")
+    true, false = (np.concatenate(parts, axis=1)[:, order] for parts in (right, wrong))
+    return Matches(image_ids, n_people, np.concatenate(rows)[order], true, false)
+
+
+def precision_recall(matches: Matches, weights: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """COCO's interpolated precision and final recall when image i occurs `weights[i]` times (default once).
+
+    With all weights 1 this repeats pycocotools to the bit.
+
+    Returns
+    -------
+    precision (10, 101), recall (10,); NaN when nobody counts
+    """
+    weights = np.ones(len(matches.image_ids), dtype=int) if weights is None else weights
+    n_people = int((matches.n_people * weights).sum())
+    n_thresholds = len(matches.is_true)
+    if n_people == 0:
+        return np.full((n_thresholds, len(RECALLS)), np.nan), np.full(n_thresholds, np.nan)
+    times = weights[matches.image_rows]
+    true = np.cumsum(matches.is_true * times, axis=1, dtype=float)
+    false = np.cumsum(matches.is_false * times, axis=1, dtype=float)
+    recall = true / n_people
+    envelope = np.maximum.accumulate((true / (false + true + np.spacing(1)))[:, ::-1], axis=1)[:, ::-1]
+    reached = np.concatenate([envelope, np.zeros((n_thresholds, 1))], axis=1)  # past the last: precision 0
+    precision = np.stack([row[np.searchsorted(r, RECALLS)] for row, r in zip(reached, recall, strict=True)])
+    return precision, recall[:, -1] if recall.shape[1] else np.zeros(n_thresholds)
+
+
+def metrics(precision: np.ndarray, recall: np.ndarray) -> dict[str, float]:
+    """AP, AP50, AP75, AR, AR50, AR75 from precision (10, 101) and recall (10,)."""
+    values = (precision.mean(), precision[0].mean(), precision[5].mean(), recall.mean(), recall[0], recall[5])
+    return dict(zip(METRICS, map(float, values), strict=True))
