@@ -1,0 +1,234 @@
+"""The `hicp` command. Every subcommand only reads its arguments, calls the library and prints.
+
+Libraries are imported inside the commands, so that `hicp --help` answers at once.
+Exit codes: 0 done, 1 a notebook or the book failed, 2 bad input or usage; always with one line on
+standard error, never a traceback for a user's mistake.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any, NoReturn
+
+import click
+
+from hicp_lib.errors import InputError
+
+_PATH = click.Path(path_type=Path)
+_WORKERS = click.IntRange(min=1)
+
+
+def main() -> NoReturn:
+    """Run the command line and exit."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command; its exit code. A user's mistake is told in one line on standard error."""
+    try:
+        return hicp(arguments, prog_name="hicp", standalone_mode=False) or 0
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        return 2
+    except click.ClickException as error:
+        context = getattr(error, "ctx", None)
+        where = context.command_path if context else "hicp"
+        return _fail(f"{' '.join(error.format_message().split())} See: {where} --help", 2)
+    except (click.Abort, KeyboardInterrupt):
+        return _fail("stopped; run the same command again to go on", 130)
+    except InputError as error:
+        return _fail(error, 2)
+    except OSError as error:
+        if error.filename is None:
+            raise
+        return _fail(f"{error.filename}: {error.strerror}; check the path, the rights and the disk space", 2)
+
+
+def _fail(message: object, code: int) -> int:
+    click.echo(f"hicp: {message}", err=True)
+    return code
+
+
+def _say(line: str) -> None:
+    click.echo(line)
+    sys.stdout.flush()
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+def hicp() -> None:
+    """Human keypoint detection at close range: data, detectors, evaluation, report."""
+
+
+@hicp.group()
+def models() -> None:
+    """The detectors' weights."""
+
+
+@models.command("list")
+def models_list() -> None:
+    """List the weight files, their licences, and whether they are here."""
+    from hicp_lib.detectors.zoo import list_weights
+
+    for row in list_weights():
+        size = f"{row['size_bytes'] / 1e6:5.1f} MB"
+        _say(f"{row['name']:<32} {row['status']:<8} {size}  {row['licence']:<12} {', '.join(row['used_by'])}")
+
+
+@models.command("fetch")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+def models_fetch(names: tuple[str, ...]) -> None:
+    """Get the weight files that are not here, and check each against its hash.
+
+    NAME is a weight file or a detector; without any, all are fetched.
+    """
+    from hicp_lib.detectors.zoo import fetch
+
+    for name in fetch(names or None):
+        _say(f"fetched {name}")
+
+
+@hicp.group()
+def scenes() -> None:
+    """Rendered people."""
+
+
+@scenes.command("render")
+@click.argument("out", type=_PATH)
+@click.option("--n", default=100, show_default=True, type=click.IntRange(min=1), help="Number of images.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0))
+@click.option("--workers", type=_WORKERS, help="Processes; all cores if not given.")
+def scenes_render(out: Path, n: int, seed: int, workers: int | None) -> None:
+    """Render people at 1-5 m into the folder OUT, with annotations in Halpe's layout."""
+    from hicp_lib.simulation.scenes import render_dataset
+
+    render_dataset(out, n=n, seed=seed, workers=workers)
+    _say(f"{out}: {n} images")
+
+
+@hicp.group()
+def dataset() -> None:
+    """HiCP data sets: Basic and Headless crops."""
+
+
+@dataset.command("create")
+@click.option("--annotations", type=_PATH, required=True, help="Annotations in Halpe's layout.")
+@click.option("--images", type=_PATH, required=True, help="Folder of the images.")
+@click.option("--out", type=_PATH, required=True, help="Where basic/ and headless/ are written.")
+@click.option("--min-pixels", default=20_000, show_default=True, type=click.IntRange(min=1))
+def dataset_create(annotations: Path, images: Path, out: Path, min_pixels: int) -> None:
+    """Cut people out of annotated images: Basic, and Headless without their heads."""
+    from hicp_lib.hicp_dataset import create_hicp
+
+    counts = create_hicp(annotations, images, out, min_pixels=min_pixels, progress=sys.stderr.isatty())
+    _say(json.dumps(counts, indent=2))
+
+
+@hicp.command()
+@click.option("--detector", required=True, help="Its name; a wrong one lists those there are.")
+@click.option("--dataset", "dataset_dir", type=_PATH, help="Folder with images/ and annotations.json.")
+@click.option("--images", "images_dir", type=_PATH, help="Folder of images without annotations.")
+@click.option("--out", type=_PATH, required=True, help="COCO keypoint results to write.")
+@click.option("--workers", type=_WORKERS, help="Threads; all cores if not given.")
+def detect(detector: str, dataset_dir: Path | None, images_dir: Path | None, out: Path, workers) -> None:
+    """Find people and their keypoints in images."""
+    from hicp_lib.annotations import write_detections
+    from hicp_lib.detectors.run import detect_dataset, detect_images
+
+    if (dataset_dir is None) == (images_dir is None):
+        raise click.UsageError("Give either --dataset DIR or --images DIR.", click.get_current_context())
+    if dataset_dir is not None:
+        found = detect_dataset(detector, dataset_dir, workers=workers)
+    else:
+        paths = _numbered_images(images_dir)
+        found = {key: result.detections for key, result in detect_images(detector, paths, workers).items()}
+        _write_names(out, paths)
+    write_detections(out, found)
+    _say(f"{out}: {sum(len(people) for people in found.values())} people in {len(found)} images")
+
+
+def _numbered_images(folder: Path) -> dict[int, Path]:
+    """Image ids as COCO numbers its files (000000012345.jpg is 12345), else the place in the order of names."""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is not a folder; give the folder that holds the images")
+    kinds = {".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff"}
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in kinds)
+    if not paths:
+        raise InputError(f"{folder}: holds no images; expected files such as 000001.jpg or photo.png")
+    numbers = [int(path.stem) for path in paths if path.stem.isascii() and path.stem.isdigit()]
+    is_numbered = len(set(numbers)) == len(paths)
+    return dict(zip(numbers if is_numbered else range(1, len(paths) + 1), paths, strict=True))
+
+
+def _write_names(out: Path, paths: dict[int, Path]) -> None:
+    """Beside the results, the image of each id: COCO's result layout has no place for names."""
+    from hicp_lib.files import write_json
+
+    names = [{"id": number, "file_name": path.name} for number, path in paths.items()]
+    write_json(out.with_suffix(".images.json"), names, indent=1)
+
+
+@hicp.command()
+@click.option("--annotations", type=_PATH, required=True, help="Annotations in Halpe's layout.")
+@click.option("--detections", type=_PATH, required=True, help="COCO keypoint results.")
+@click.option("--group", default="body", show_default=True, help="body (17 points) or hand (42).")
+@click.option("--sigmas", default="halpe", show_default=True, help="halpe or wholebody.")
+@click.option("--area", default="segment", show_default=True, help="segment, box, box53 or source.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the bootstrap.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def evaluate(
+    annotations: Path, detections: Path, group: str, sigmas: str, area: str, seed: int, as_json
+) -> None:
+    """Average precision and recall by OKS, with 95 % bootstrap intervals over images."""
+    from hicp_lib.annotations import read_annotations, read_detections
+    from hicp_lib.evaluation.bootstrap import bootstrap_intervals
+    from hicp_lib.evaluation.coco import evaluate as evaluate_detections
+
+    people = read_annotations(annotations)
+    found = read_detections(detections, people)
+    evaluation = evaluate_detections(people, found, group, sigmas=sigmas, area=area)
+    rows = bootstrap_intervals(evaluation, seed=seed).to_dict("records")
+    if as_json:
+        figures = {row["metric"]: _finite({k: row[k] for k in ("value", "low", "high")}) for row in rows}
+        _say(json.dumps(_finite(evaluation.row()) | {"metrics": figures, "seed": seed}, indent=2))
+        return
+    _say(
+        f"{group}: {evaluation.n_people} people in {evaluation.n_images} images; {sigmas} sigmas, {area} area"
+    )
+    for row in rows:
+        _say(f"{row['metric']:<5} {row['value']:.3f}  [{row['low']:.3f}, {row['high']:.3f}]")
+
+
+def _finite(row: dict[str, Any]) -> dict[str, Any]:
+    """NaN, where nobody counts, is null in JSON."""
+    return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
+
+
+@hicp.command()
+@click.option("--profile", default="full", show_default=True, help="A profile of notebooks/profiles.toml.")
+@click.option("-p", "--parameter", "pairs", nargs=2, multiple=True, metavar="NAME VALUE",
+              help="A notebook parameter; may be repeated.")  # fmt: skip
+def report(profile: str, pairs: tuple[tuple[str, str], ...]) -> int:
+    """Run the notebooks and build the book; what has not changed is not done again."""
+    from hicp_lib.report.build import make_report
+    from hicp_lib.report.runs import RunError
+
+    try:
+        make_report(profile, list(pairs), _say)
+    except RunError as error:
+        return _fail(error, 1)
+    return 0
+
+
+@hicp.command()
+def doctor() -> int:
+    """Check the installation: one line each, with the remedy."""
+    from hicp_lib.doctor import run_checks
+
+    checks = run_checks()
+    for check in checks:
+        remedy = "" if check.is_ok else f"; remedy: {check.remedy}"
+        _say(f"{'ok  ' if check.is_ok else 'FAIL'} {check.name}: {check.finding}{remedy}")
+    return 0 if all(check.is_ok for check in checks) else 2
