@@ -9,7 +9,6 @@ from hicp_lib.errors import InputError
 from hicp_lib.files import cache_dir, read_json, sha256_file
 from hicp_lib.hicp_dataset import create_hicp
 from hicp_lib.provenance import DATA_DIR, LIBRARY_DIR, digest, files_sha256
-from hicp_lib.simulation.scenes import render_dataset
 
 SOURCES = ("rendered", "halpe")
 
@@ -82,6 +81,8 @@ def _rendered(n_scenes: int, seed: int) -> tuple[Path, Path]:
     key = digest([n_scenes, seed, renderer, files_sha256(DATA_DIR.glob("body*"), DATA_DIR)])
     folder = cache_dir() / "scenes" / key[:16]
     if not (folder / "annotations.json").is_file():
+        from hicp_lib.simulation.scenes import render_dataset  # Open3D takes a second to load
+
         render_dataset(folder, n=n_scenes, seed=seed)
     return folder / "annotations.json", folder / "images"
 

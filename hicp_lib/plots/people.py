@@ -73,10 +73,14 @@ def picture_grid(
     cell_in: float = 2.2,
 ) -> Figure:
     """Pictures in rows and columns, each scaled into an equal cell; None leaves a cell empty."""
-    n_rows, n_columns = len(rows), max(len(row) for row in rows)
-    aspect = np.median([image.shape[0] / image.shape[1] for row in rows for image in row if image is not None])
-    size = {"width_in": cell_in * n_columns, "height_in": cell_in * float(np.clip(aspect, 0.6, 1.6)) * n_rows + 0.3}
-    figure, axes = new_figure(n_rows, n_columns, squeeze=False, **size)
+    n_columns = max(len(row) for row in rows)
+    # Each row is as high as its highest picture needs, within limits; cells are equally wide.
+    heights = [
+        float(np.clip(max((image.shape[0] / image.shape[1] for image in row if image is not None), default=1), 0.4, 1.7))
+        for row in rows
+    ]
+    size = {"width_in": cell_in * n_columns, "height_in": cell_in * sum(heights) + 0.3}
+    figure, axes = new_figure(len(rows), n_columns, squeeze=False, height_ratios=heights, **size)
     for i, row in enumerate(rows):
         for j in range(n_columns):
             axis = axes[i, j]

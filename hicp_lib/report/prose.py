@@ -6,6 +6,7 @@ In a page of `book/`, between double braces:
     table("02_evaluation_2d", "ap", columns=[...])    a saved table in Markdown
     figure("02_evaluation_2d", "precision_recall")    a saved figure with its caption and alt text
     profile                                           "quick" or "full"
+    notebooks                                         names of the notebooks that were run
     data("paper.json")                                a JSON file of `data/`, for loops over its rows
 
 A name that no result file has stops the build.
@@ -34,6 +35,10 @@ class Results:
     def __init__(self, folder: Path, profile: str):
         self._folder = folder
         self._profile = profile
+
+    def notebooks(self) -> list[str]:
+        """Names of the notebooks that were run."""
+        return sorted(path.parent.name for path in self._folder.glob("*/values.json"))
 
     def value(self, notebook: str, name: str, digits: int | None = None) -> str:
         """A recorded value as text; "not run" when the notebook recorded None."""
@@ -104,6 +109,7 @@ def render_page(source: Path, results: Results, profile: str) -> str:
             figure=results.figure,
             data=lambda name: json.loads((DATA_DIR / name).read_text()),
             profile=profile,
+            notebooks=results.notebooks(),
         )
     except jinja2.TemplateError as error:
         line = f", line {error.lineno}" if isinstance(error, jinja2.TemplateSyntaxError) else ""

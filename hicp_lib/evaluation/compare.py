@@ -1,0 +1,112 @@
+"""Detectors compared on the HiCP subsets: one tidy table of figures, and the loss without the head.
+
+Throughout, `truth` maps a subset's name to its annotations, and `found` maps (subset, detector) to
+detections by image id. Crops of one source image are drawn together in the bootstrap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.annotations import Annotations
+from hicp_lib.detectors.base import Detections
+from hicp_lib.detectors.registry import DETECTORS
+from hicp_lib.evaluation.bootstrap import bootstrap_difference, bootstrap_intervals
+from hicp_lib.evaluation.coco import evaluate, person_oks
+from hicp_lib.evaluation.engine import METRICS
+
+Found = Mapping[tuple[str, str], Mapping[int, Detections]]
+
+
+def compare(
+    truth: Mapping[str, Annotations], found: Found, n_resamples: int = 1000, seed: int = 0
+) -> pd.DataFrame:
+    """AP and AR of every detector on every subset, for the groups of keypoints it gives.
+
+    Returns
+    -------
+    DataFrame, columns `subset, group, detector, metric, value, low, high, n_people`
+    """
+    tables = []
+    for subset, detector, group in _cases(found):
+        evaluation = evaluate(truth[subset], found[subset, detector], group)
+        table = bootstrap_intervals(evaluation, n_resamples, seed, source_images(truth[subset]))
+        table = table.assign(n_people=evaluation.n_people)
+        tables.append(_labelled(table, subset=subset, group=group, detector=detector))
+    return pd.concat(tables, ignore_index=True)
+
+
+def head_loss(
+    truth: Mapping[str, Annotations], found: Found, n_resamples: int = 1000, seed: int = 0
+) -> pd.DataFrame:
+    """Change of AP from Basic to Headless, on the people who are in both.
+
+    Returns
+    -------
+    DataFrame, columns `group, detector, basic, headless, change, low, high, n_people`; the interval
+    is the change's
+    """
+    shared = truth["basic"].images.keys() & truth["headless"].images.keys()
+    same = {subset: only_images(truth[subset], shared) for subset in ("basic", "headless")}
+    rows = []
+    for subset, detector, group in _cases(found):
+        if subset != "basic":
+            continue
+        basic, headless = (
+            evaluate(same[s], {i: found[s, detector][i] for i in shared}, group) for s in ("basic", "headless")
+        )
+        clusters = source_images(same["basic"])
+        change = bootstrap_difference(headless, basic, n_resamples, seed, clusters).set_index("metric").loc["AP"]
+        rows.append((group, detector, basic.AP, headless.AP, *change[["value", "low", "high"]], basic.n_people))
+    columns = ["group", "detector", "basic", "headless", "change", "low", "high", "n_people"]
+    return pd.DataFrame(rows, columns=columns).sort_values("group", kind="stable", ignore_index=True)
+
+
+def people_oks(truth: Mapping[str, Annotations], found: Found) -> pd.DataFrame:
+    """OKS of the best detection of each person: columns `subset, group, detector, image_id, annotation_id, oks, ...`."""
+    tables = [
+        _labelled(person_oks(truth[subset], found[subset, detector], group), subset=subset, group=group, detector=detector)
+        for subset, detector, group in _cases(found)
+    ]
+    return pd.concat(tables, ignore_index=True)
+
+
+def metrics_text(table: pd.DataFrame, group: str) -> pd.DataFrame:
+    """One group of a `compare` table for reading: a row per subset and detector, "0.71 [0.65, 0.77]" per metric."""
+    rows = table[table["group"] == group]
+    text = [
+        f"{value:.2f} [{low:.2f}, {high:.2f}]" if value == value else "–"
+        for value, low, high in zip(rows["value"], rows["low"], rows["high"], strict=True)
+    ]
+    wide = rows.assign(text=text).pivot(index=["subset", "detector", "n_people"], columns="metric", values="text")
+    order = rows[["subset", "detector", "n_people"]].drop_duplicates().itertuples(index=False, name=None)
+    wide = wide.reindex(list(order))[list(METRICS)]
+    return wide.rename_axis(columns=None).reset_index().rename(columns={"n_people": "people"})
+
+
+def source_images(annotations: Annotations) -> dict[int, int]:
+    """Image id -> the image it was cropped from (itself where the annotations do not say)."""
+    source = {i: i for i in annotations.images}
+    for image_id, extra in zip(annotations.image_ids.tolist(), annotations.extras, strict=True):
+        source[image_id] = extra.get("source_image_id", source[image_id])
+    return source
+
+
+def only_images(annotations: Annotations, image_ids) -> Annotations:
+    """The annotations of some images."""
+    chosen = np.array([i in image_ids for i in annotations.image_ids.tolist()], dtype=bool)
+    return replace(annotations.take(chosen), images={i: image for i, image in annotations.images.items() if i in image_ids})
+
+
+def _cases(found: Found) -> Iterator[tuple[str, str, str]]:
+    for subset, detector in found:
+        for group in DETECTORS[detector].groups:
+            yield subset, detector, group
+
+
+def _labelled(table: pd.DataFrame, **labels: str) -> pd.DataFrame:
+    return table.assign(**labels)[[*labels, *table.columns]]
