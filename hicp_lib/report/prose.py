@@ -5,6 +5,7 @@ In a page of `book/`, between double braces:
     value("02_evaluation_2d", "body_ap", digits=2)    a recorded value; "not run" when it is None
     table("02_evaluation_2d", "ap", columns=[...])    a saved table in Markdown
     figure("02_evaluation_2d", "precision_recall")    a saved figure with its caption and alt text
+    stamp("02_evaluation_2d")                         what a notebook was made with, its `provenance.json`
     profile                                           "quick" or "full"
     notebooks                                         names of the notebooks that were run
     data("paper.json")                                a JSON file of `data/`, for loops over its rows
@@ -69,6 +70,10 @@ class Results:
             f'<a href="notebooks/{notebook}.html#{name}">How it was made</a></figcaption></figure>'
         )
 
+    def stamp(self, notebook: str) -> dict[str, Any]:
+        """What a notebook was made with."""
+        return read_json(self._folder / notebook / "provenance.json")
+
     def _entry(self, notebook: str, file: str, name: str) -> Any:
         path = self._folder / notebook / file
         entries = read_json(path)
@@ -108,6 +113,7 @@ def render_page(source: Path, results: Results, profile: str) -> str:
             table=results.table,
             figure=results.figure,
             data=lambda name: json.loads((DATA_DIR / name).read_text()),
+            stamp=results.stamp,
             profile=profile,
             notebooks=results.notebooks(),
         )
