@@ -1,0 +1,132 @@
+"""What checking files, OKS and bootstrapping cost beside the obvious ways to have them.
+
+    python benchmarks/evaluation.py [--images 500] [--json OUT]
+
+Three comparisons, each against a baseline of the same run: reading annotations, checked and as
+arrays, against `json.load` alone; OKS of all pairs against pycocotools' loop; a bootstrap from matches
+against pycocotools evaluating each draw anew (timed on a few draws).
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import platform
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from pycocotools.coco import COCO
+from pycocotools.cocoeval import COCOeval
+
+from hicp_lib.annotations import Annotations, ImageInfo, read_annotations, write_annotations
+from hicp_lib.detectors.base import Detections
+from hicp_lib.evaluation import engine
+from hicp_lib.evaluation.bootstrap import N_RESAMPLES, bootstrap_intervals
+from hicp_lib.evaluation.coco import evaluate
+from hicp_lib.evaluation.oks import oks
+from hicp_lib.keypoints import COCO_17, SIGMAS
+
+N_FOUND = 3  # detections per image
+
+
+def make_people(n: int) -> tuple[Annotations, dict[int, Detections]]:
+    """One annotated person per image; detections near them and elsewhere."""
+    rng = np.random.default_rng(0)
+    points = rng.uniform(50, 400, (n, 1, 2)) + rng.normal(0, 60, (n, 136, 2))
+    boxes = np.concatenate([points.min(axis=1), np.ptp(points, axis=1)], axis=1)
+    people = Annotations(
+        {i: ImageInfo(i, f"{i}.png", 640, 480) for i in range(n)}, np.arange(1, n + 1), np.arange(n), boxes,
+        rng.uniform(5_000, 60_000, n), np.zeros(n, dtype=bool), points, np.full((n, 136), 2.0), [{}] * n,
+    )  # fmt: skip
+    spread = rng.choice([3, 10, 300], (n, N_FOUND, 1, 1))
+    found = points[:, None] + rng.normal(0, 1, (n, N_FOUND, 136, 2)) * spread
+    scores = rng.random((n, N_FOUND))
+    return people, {i: Detections(found[i], np.ones((N_FOUND, 136)), scores[i]) for i in range(n)}
+
+
+def seconds(work: Callable[[], object], repeats: int = 3) -> float:
+    """The best of some runs."""
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def reading(people: Annotations) -> dict:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "annotations.json"
+        write_annotations(path, people)
+        ours, base = seconds(lambda: read_annotations(path)), seconds(lambda: json.loads(path.read_bytes()))
+    return {"what": "read annotations / json.loads", "ours_s": ours, "baseline_s": base}
+
+
+def similarity(people: Annotations, found: dict[int, Detections]) -> dict:
+    sigmas = SIGMAS["halpe"][COCO_17]
+    truth, labelled = people.keypoints_px[:, None, COCO_17], people.visibility[:, None, COCO_17] > 0
+    points = np.stack([found[i].keypoints_px[:, COCO_17] for i in people.images])
+    ours = seconds(
+        lambda: oks(truth, labelled, people.boxes_px[:, None], people.areas_px2[:, None], points, sigmas)
+    )
+    base = seconds(_pycocotools_oks(people, found, sigmas))
+    return {"what": "OKS of all pairs / COCOeval.computeOks", "ours_s": ours, "baseline_s": base}
+
+
+def _pycocotools_oks(
+    people: Annotations, found: dict[int, Detections], sigmas: np.ndarray
+) -> Callable[[], object]:
+    truth = [
+        engine.truth_row(i, people.keypoints_px[i, COCO_17], people.visibility[i, COCO_17], people.boxes_px[i],
+                         people.areas_px2[i], False)
+        for i in people.images
+    ]  # fmt: skip
+    results = [engine.found_row(i, person[COCO_17], 1.0) for i in found for person in found[i].keypoints_px]
+    indexed = []
+    for rows in (truth, results):
+        coco = COCO()
+        coco.dataset = {"images": [{"id": i} for i in people.images], "categories": [{"id": 1}]}
+        coco.dataset["annotations"] = [row | {"id": i + 1, "category_id": 1} for i, row in enumerate(rows)]
+        with contextlib.redirect_stdout(io.StringIO()):
+            coco.createIndex()
+        indexed.append(coco)
+    run = COCOeval(*indexed, "keypoints")
+    run.params.kpt_oks_sigmas = sigmas
+    run._prepare()
+    return lambda: [run.computeOks(i, 1) for i in people.images]
+
+
+def bootstrapping(people: Annotations, found: dict[int, Detections], n_draws: int = 3) -> dict:
+    evaluation = evaluate(people, found)
+    ours = seconds(lambda: bootstrap_intervals(evaluation, N_RESAMPLES), repeats=1)
+    # A draw costs pycocotools what the whole set costs.
+    base = seconds(lambda: evaluate(people, found), repeats=n_draws) * N_RESAMPLES
+    return {
+        "what": f"{N_RESAMPLES} draws from matches / pycocotools anew",
+        "ours_s": ours,
+        "baseline_s": base,
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--images", type=int, default=500)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    people, found = make_people(options.images)
+    rows = [reading(people), similarity(people, found), bootstrapping(people, found)]
+    for row in rows:
+        row["ratio"] = row["ours_s"] / row["baseline_s"]
+        print(f"{row['what']:50} {row['ours_s']:9.4f} s / {row['baseline_s']:9.4f} s = {row['ratio']:.4f}")
+    if options.json:
+        about = {"images": options.images, "python": platform.python_version(), "numpy": np.__version__}
+        options.json.write_text(json.dumps({**about, "rows": rows}, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
