@@ -14,6 +14,7 @@ import pandas as pd
 
 from hicp_lib.annotations import Annotations
 from hicp_lib.detectors.base import Detections
+from hicp_lib.detectors.cache import Timed
 from hicp_lib.detectors.registry import DETECTORS
 from hicp_lib.evaluation.bootstrap import bootstrap_difference, bootstrap_intervals
 from hicp_lib.evaluation.coco import evaluate, person_oks
@@ -86,6 +87,16 @@ def metrics_text(table: pd.DataFrame, group: str) -> pd.DataFrame:
     order = rows[["subset", "detector", "n_people"]].drop_duplicates().itertuples(index=False, name=None)
     wide = wide.reindex(list(order))[list(METRICS)]
     return wide.rename_axis(columns=None).reset_index().rename(columns={"n_people": "people"})
+
+
+def detection_times(runs: Mapping[tuple[str, str], Mapping[int, Timed]]) -> pd.DataFrame:
+    """Time per image: columns `subset, detector, image_id, time_ms, workers`."""
+    rows = [
+        (subset, detector, image_id, result.time_ms, result.workers)
+        for (subset, detector), run in runs.items()
+        for image_id, result in run.items()
+    ]
+    return pd.DataFrame(rows, columns=["subset", "detector", "image_id", "time_ms", "workers"])
 
 
 def source_images(annotations: Annotations) -> dict[int, int]:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 
+from hicp_lib.images import read_image
+from hicp_lib.plots.people import detections_grid
 from hicp_lib.plots.style import THRESHOLD_MARKERS, Figure, detector_colour, in_style, in_words, new_figure
 
 _GROUP_TITLES = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
@@ -147,6 +151,27 @@ def _all_handles(axes):
     for axis in axes.flat:
         found.update({label: handle for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)})
     return list(found.values()), list(found)
+
+
+def examples(folders, truth, found, n_people: int, note: str) -> Figure:
+    """The first people who are in every subset, as each detector sees them.
+
+    Parameters
+    ----------
+    folders : subset -> dataset folder
+    truth, found : as in `hicp_lib.evaluation.compare`
+    """
+    shared = [i for i in list(truth.values())[-1].images if all(i in people.images for people in truth.values())]
+    detectors = list(dict.fromkeys(detector for _, detector in found))
+    pictures = {
+        f"{subset} {i}": (
+            read_image(Path(folder) / "images" / truth[subset].images[i].file_name),
+            {detector: found[subset, detector][i] for detector in detectors},
+        )
+        for i in shared[:n_people]
+        for subset, folder in folders.items()
+    }
+    return detections_grid(pictures, min_score=0.3, note=f"Data: {note}.")
 
 
 @in_style
