@@ -16,9 +16,12 @@ COCO_NAMES = (
     "nose left_eye right_eye left_ear right_ear left_shoulder right_shoulder left_elbow right_elbow "
     "left_wrist right_wrist left_hip right_hip left_knee right_knee left_ankle right_ankle"
 ).split()
-_BODY_NAMES = COCO_NAMES + (
-    "head_top neck mid_hip left_big_toe right_big_toe left_small_toe right_small_toe left_heel right_heel"
-).split()
+_BODY_NAMES = (
+    COCO_NAMES
+    + (
+        "head_top neck mid_hip left_big_toe right_big_toe left_small_toe right_small_toe left_heel right_heel"
+    ).split()
+)
 HAND_NAMES = ["hand_root"] + [
     f"{finger}_{joint}" for finger in ("thumb", "index", "middle", "ring", "little") for joint in (1, 2, 3, 4)
 ]
@@ -44,9 +47,12 @@ GROUPS: dict[str, np.ndarray] = {"body": COCO_17, "hand": HANDS}
 
 _BODY_LIMBS = [
     (15, 13), (13, 11), (16, 14), (14, 12), (11, 12), (5, 11), (6, 12), (5, 6), (5, 7), (7, 9),
-    (6, 8), (8, 10), (0, 1), (0, 2), (1, 3), (2, 4), (15, 20), (15, 22), (15, 24), (16, 21), (16, 23), (16, 25),
+    (6, 8), (8, 10), (0, 1), (0, 2), (1, 3), (2, 4),
+    (15, 20), (15, 22), (15, 24), (16, 21), (16, 23), (16, 25),
 ]  # fmt: skip
-_FINGERS = [(0 if joint == 1 else 4 * f + joint - 1, 4 * f + joint) for f in range(5) for joint in (1, 2, 3, 4)]
+_FINGERS = [
+    (0 if joint == 1 else 4 * f + joint - 1, 4 * f + joint) for f in range(5) for joint in (1, 2, 3, 4)
+]
 HAND_LIMBS: list[tuple[int, int]] = _FINGERS
 LIMBS: list[tuple[int, int]] = (
     _BODY_LIMBS + [(94 + a, 94 + b) for a, b in _FINGERS] + [(115 + a, 115 + b) for a, b in _FINGERS]
@@ -67,7 +73,7 @@ _WHOLEBODY_FACE_SIGMAS = [
     0.012, 0.010, 0.034, 0.008, 0.008, 0.009, 0.008, 0.008, 0.007, 0.010, 0.008, 0.009, 0.009, 0.009, 0.007,
     0.007, 0.008, 0.011, 0.008, 0.008, 0.008, 0.010, 0.008,
 ]  # fmt: skip
-# COCO-WholeBody's feet (big toe, small toe, heel of the left, then the right foot) in Halpe's interleaved order.
+# COCO-WholeBody's values for big toes, small toes and heels, in Halpe's interleaved order.
 _WHOLEBODY_FOOT_SIGMAS = [0.068, 0.092, 0.066, 0.094, 0.066, 0.094]
 
 # Per-keypoint constants sigma of OKS (k = 2 sigma). "halpe": the Halpe tool box; "wholebody":
@@ -75,7 +81,11 @@ _WHOLEBODY_FOOT_SIGMAS = [0.068, 0.092, 0.066, 0.094, 0.066, 0.094]
 SIGMAS: dict[str, np.ndarray] = {
     "halpe": np.array(_BODY_SIGMAS + [0.080] * 3 + [0.089] * 6 + [0.015] * 110),
     "wholebody": np.array(
-        _BODY_SIGMAS + [0.080] * 3 + _WHOLEBODY_FOOT_SIGMAS + _WHOLEBODY_FACE_SIGMAS + 2 * _WHOLEBODY_HAND_SIGMAS
+        _BODY_SIGMAS
+        + [0.080] * 3
+        + _WHOLEBODY_FOOT_SIGMAS
+        + _WHOLEBODY_FACE_SIGMAS
+        + 2 * _WHOLEBODY_HAND_SIGMAS
     ),
 }
 

@@ -42,18 +42,17 @@ class Source:
 
 def open_source(
     source: str = "rendered",
-    *,
+    annotations_path: str | Path = "",
+    images_dir: str | Path = "",
     n_scenes: int = 160,
     seed: int = 0,
-    annotations: str | Path = "",
-    images: str | Path = "",
     min_pixels: int = 20_000,
 ) -> Source:
     """Open the study's people; what is missing in the cache is rendered and cropped first.
 
     Parameters
     ----------
-    source : "rendered" (uses `n_scenes`, `seed`) or "halpe" (uses `annotations`, `images`)
+    source : "rendered" (uses `n_scenes`, `seed`) or "halpe" (uses `annotations_path`, `images_dir`)
     min_pixels : the smallest crop that is kept
 
     Raises
@@ -65,9 +64,11 @@ def open_source(
         annotations, images = _rendered(n_scenes, seed)
         note = f"rendered people ({n_scenes} scenes)"
     elif source == "halpe":
-        if not (annotations and images):
-            raise InputError("source=halpe needs annotations=HALPE.json and images=DIR of the COCO images")
-        annotations, images = Path(annotations), Path(images)
+        if not (annotations_path and images_dir):
+            raise InputError(
+                "source=halpe needs annotations_path=HALPE.json and images_dir=DIR of the COCO images"
+            )
+        annotations, images = Path(annotations_path), Path(images_dir)
         note = f"COCO images with Halpe annotations ({annotations.name})"
     else:
         raise InputError(f"source={source!r} is unknown; use one of {', '.join(SOURCES)}")
@@ -91,7 +92,9 @@ def _crops(annotations: Path, images: Path, min_pixels: int) -> Path:
     if not annotations.is_file():
         raise InputError(f"{annotations}: is not there; give the path of the annotation file")
     rules = [LIBRARY_DIR / name for name in ("hicp_dataset.py", "annotations.py", "images.py")]
-    key = digest([sha256_file(annotations), str(images.resolve()), min_pixels, files_sha256(rules, LIBRARY_DIR)])
+    key = digest(
+        [sha256_file(annotations), str(images.resolve()), min_pixels, files_sha256(rules, LIBRARY_DIR)]
+    )
     folder = cache_dir() / "hicp" / key[:16]
     if not (folder / "summary.json").is_file():
         create_hicp(annotations, images, folder, min_pixels=min_pixels)

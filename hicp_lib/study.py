@@ -68,14 +68,15 @@ class Study:
         self._start_s = time.perf_counter()
 
     def figure(self, name: str, figure: Figure) -> None:
-        """Save a figure (PNG, SVG, its numbers as CSV) and show it with caption, alt text and downloads."""
+        """Save a figure (PNG, SVG, its numbers as Parquet and CSV) and show it with caption, alt text and downloads."""
         png = _rendered(figure.figure, "png")
         write_bytes(self.folder / f"{name}.png", png)
         write_bytes(self.folder / f"{name}.svg", _rendered(figure.figure, "svg"))
         downloads = ["svg"]
         if figure.table is not None:
+            self.save(name, figure.table)
             _write_csv(self.folder / f"{name}.csv", figure.table)
-            downloads.append("csv")
+            downloads += ["parquet", "csv"]
         self._captions[name] = {"caption": figure.caption, "alt": figure.alt}
         source = "data:image/png;base64," + base64.b64encode(png).decode()
         image = f'<img src="{source}" alt="{html.escape(figure.alt)}">'

@@ -58,32 +58,44 @@ def head_loss(
         if subset != "basic":
             continue
         basic, headless = (
-            evaluate(same[s], {i: found[s, detector][i] for i in shared}, group) for s in ("basic", "headless")
+            evaluate(same[s], {i: found[s, detector][i] for i in shared}, group)
+            for s in ("basic", "headless")
         )
         clusters = source_images(same["basic"])
-        change = bootstrap_difference(headless, basic, n_resamples, seed, clusters).set_index("metric").loc["AP"]
-        rows.append((group, detector, basic.AP, headless.AP, *change[["value", "low", "high"]], basic.n_people))
+        change = (
+            bootstrap_difference(headless, basic, n_resamples, seed, clusters).set_index("metric").loc["AP"]
+        )
+        rows.append(
+            (group, detector, basic.AP, headless.AP, *change[["value", "low", "high"]], basic.n_people)
+        )
     columns = ["group", "detector", "basic", "headless", "change", "low", "high", "n_people"]
     return pd.DataFrame(rows, columns=columns).sort_values("group", kind="stable", ignore_index=True)
 
 
 def people_oks(truth: Mapping[str, Annotations], found: Found) -> pd.DataFrame:
-    """OKS of the best detection of each person: columns `subset, group, detector, image_id, annotation_id, oks, ...`."""
+    """OKS of each person's best detection: `subset, group, detector` and the columns of `person_oks`."""
     tables = [
-        _labelled(person_oks(truth[subset], found[subset, detector], group), subset=subset, group=group, detector=detector)
+        _labelled(
+            person_oks(truth[subset], found[subset, detector], group),
+            subset=subset,
+            group=group,
+            detector=detector,
+        )
         for subset, detector, group in _cases(found)
     ]
     return pd.concat(tables, ignore_index=True)
 
 
 def metrics_text(table: pd.DataFrame, group: str) -> pd.DataFrame:
-    """One group of a `compare` table for reading: a row per subset and detector, "0.71 [0.65, 0.77]" per metric."""
+    """One group of a `compare` table for reading: "0.71 [0.65, 0.77]" per subset, detector and metric."""
     rows = table[table["group"] == group]
     text = [
         f"{value:.2f} [{low:.2f}, {high:.2f}]" if value == value else "–"
         for value, low, high in zip(rows["value"], rows["low"], rows["high"], strict=True)
     ]
-    wide = rows.assign(text=text).pivot(index=["subset", "detector", "n_people"], columns="metric", values="text")
+    wide = rows.assign(text=text).pivot(
+        index=["subset", "detector", "n_people"], columns="metric", values="text"
+    )
     order = rows[["subset", "detector", "n_people"]].drop_duplicates().itertuples(index=False, name=None)
     wide = wide.reindex(list(order))[list(METRICS)]
     return wide.rename_axis(columns=None).reset_index().rename(columns={"n_people": "people"})
@@ -110,7 +122,10 @@ def source_images(annotations: Annotations) -> dict[int, int]:
 def only_images(annotations: Annotations, image_ids) -> Annotations:
     """The annotations of some images."""
     chosen = np.array([i in image_ids for i in annotations.image_ids.tolist()], dtype=bool)
-    return replace(annotations.take(chosen), images={i: image for i, image in annotations.images.items() if i in image_ids})
+    return replace(
+        annotations.take(chosen),
+        images={i: image for i, image in annotations.images.items() if i in image_ids},
+    )
 
 
 def _cases(found: Found) -> Iterator[tuple[str, str, str]]:

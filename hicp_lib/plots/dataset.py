@@ -24,8 +24,12 @@ from hicp_lib.plots.style import (
 )
 
 _TRUTH_COLOUR = "#F0E442"
-_PARTS = {**{NAMES[i].replace("_", " "): [i] for i in COCO_17}, "face (68)": FACE, "left hand (21)": LEFT_HAND,
-          "right hand (21)": RIGHT_HAND}  # fmt: skip
+_PARTS = {
+    **{NAMES[i].replace("_", " "): [i] for i in COCO_17},
+    "face (68)": FACE,
+    "left hand (21)": LEFT_HAND,
+    "right hand (21)": RIGHT_HAND,
+}
 
 
 def with_truth(annotations: Annotations, images_dir: str | Path, image_id: int) -> np.ndarray:
@@ -45,7 +49,7 @@ def scenes(annotations: Annotations, images_dir: str | Path, image_ids: Sequence
         [plain, marked],
         row_titles=["image", "annotated"],
         caption=f"Whole images and their annotated keypoints: {note}.",
-        alt=f"{len(plain)} images with {in_words([str(n) for n in n_people])} people, below each its keypoints.",
+        alt=f"{len(plain)} images with {in_words([str(n) for n in n_people])} people, their keypoints below.",
         cell_in=10 / len(plain),
     )
 
@@ -58,7 +62,9 @@ def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
     """
     figure, axes = new_figure(1, len(table), 2.6 * len(table), 3.8, squeeze=False)
     for axis, (_, row) in zip(axes[0], table.iterrows(), strict=True):
-        left, top, right, bottom = (int(row[f"basic_crop_{edge}_px"]) for edge in ("left", "top", "right", "bottom"))
+        left, top, right, bottom = (
+            int(row[f"basic_crop_{edge}_px"]) for edge in ("left", "top", "right", "bottom")
+        )
         image = read_image(Path(images_dir) / row["file_name"])[top:bottom, left:right]
         axis.imshow(image, extent=(left - 0.5, right - 0.5, bottom - 0.5, top - 0.5))
         for part, colour in (("head", HEAD_COLOUR), ("body", BODY_COLOUR)):
@@ -68,12 +74,15 @@ def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
         axis.set_title(f"person {row['annotation_id']}", fontsize=9)
         axis.grid(False)
     caption = (
-        "How Headless is made, on real rows of the data: extent and centre of the head's labelled keypoints (red), "
+        "How Headless is made, on real rows of the data: extent and centre of the head's keypoints (red), "
         f"of the other body keypoints (green), and the cut (dashed). {note}"
     )
     sides = in_words([str(side) for side in table["cut_side"]])
-    return Figure(figure, caption, f"{len(table)} people with a red box around the head, a green box around the body "
-                  f"and a dashed cut between them; the removed sides are {sides}.", table)  # fmt: skip
+    alt = (
+        f"{len(table)} people with a red box around the head, a green box around the body and a dashed cut "
+        f"between them; the removed sides are {sides}."
+    )
+    return Figure(figure, caption, alt, table)
 
 
 def _draw_box(axis, row: pd.Series, part: str, colour: str) -> None:
@@ -84,7 +93,9 @@ def _draw_box(axis, row: pd.Series, part: str, colour: str) -> None:
 
 
 def _draw_cut(axis, row: pd.Series) -> None:
-    line = {"top": axis.axhline, "bottom": axis.axhline, "left": axis.axvline, "right": axis.axvline}[row["cut_side"]]
+    line = {"top": axis.axhline, "bottom": axis.axhline, "left": axis.axvline, "right": axis.axvline}[
+        row["cut_side"]
+    ]
     line(row[f"headless_crop_{row['cut_side']}_px"] - 0.5, color="black", lw=2.6, ls=(0, (4, 2)))
     line(row[f"headless_crop_{row['cut_side']}_px"] - 0.5, color="white", lw=1.6, ls=(0, (4, 2)))
 
@@ -127,7 +138,9 @@ def labelled_share(subsets: Mapping[str, Annotations], note: str) -> Figure:
     axis.legend(loc="upper right", ncols=2, bbox_to_anchor=(1, 1.16))
     means = [f"{name} {wide[name].mean():.0%}" for name in wide]
     caption = f"Share of people in whom a keypoint is labelled (occluded ones included): {note}."
-    return Figure(figure, caption, f"Bars per body part for each subset; mean over parts: {in_words(means)}.", table)
+    return Figure(
+        figure, caption, f"Bars per body part for each subset; mean over parts: {in_words(means)}.", table
+    )
 
 
 def _people(annotations: Annotations) -> Annotations:
@@ -150,5 +163,7 @@ def crop_sizes(table: pd.DataFrame, min_pixels: int, note: str) -> Figure:
     axis.legend(loc="best")
     share = float((sizes >= min_pixels).mean())
     caption = f"Sizes of the crops and the paper's limit of {min_pixels:,} pixels (dashed): {note}."
-    alt = f"Histogram of crop sizes; {share:.0%} reach the limit, the median is {np.median(sizes):,.0f} pixels."
+    alt = (
+        f"Histogram of crop sizes; {share:.0%} reach the limit, the median is {np.median(sizes):,.0f} pixels."
+    )
     return Figure(figure, caption, alt, pd.DataFrame({"pixels": sizes}))

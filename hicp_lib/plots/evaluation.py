@@ -27,12 +27,20 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
     """
     subsets, groups = list(dict.fromkeys(table["subset"])), list(dict.fromkeys(table["group"]))
     figure, axes = new_figure(
-        len(groups), len(subsets), 4.4 * len(subsets), 4.0 * len(groups), sharex=True, sharey=True, squeeze=False
+        len(groups),
+        len(subsets),
+        4.4 * len(subsets),
+        4.0 * len(groups),
+        sharex=True,
+        sharey=True,
+        squeeze=False,
     )
     for i, group in enumerate(groups):
         for j, subset in enumerate(subsets):
             axis = axes[i, j]
-            for detector, rows in table.query("subset == @subset and group == @group").groupby("detector", sort=False):
+            for detector, rows in table.query("subset == @subset and group == @group").groupby(
+                "detector", sort=False
+            ):
                 _scatter_detector(axis, rows.set_index("metric"), detector)
             axis.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")
             axis.set_title(f"{subset.capitalize()} · {_GROUP_TITLES.get(group, group)}")
@@ -42,8 +50,8 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
                 axis.set_ylabel("average precision")
     _legend(figure, axes, list(dict.fromkeys(table["detector"])))
     caption = (
-        f"Average precision against average recall per detector, on {data_note}. The shape is the OKS threshold "
-        "(square .5, circle .75, triangle the mean over .5:.05:.95), as in Fig. 4 of the paper; whiskers are "
+        f"Average precision against average recall per detector, on {data_note}. The shape is the OKS "
+        "threshold (square .5, circle .75, triangle the mean over .5:.05:.95), as in Fig. 4 of the paper; whiskers are "
         "95 % bootstrap intervals over images."
     )
     return Figure(figure, caption, _describe_best(table), table)
@@ -55,7 +63,7 @@ def _scatter_detector(axis, rows: pd.DataFrame, detector: str) -> None:
         y, x = rows.loc[precision], rows.loc[recall]
         axis.errorbar(
             x["value"], y["value"], xerr=_whiskers(x), yerr=_whiskers(y),
-            fmt=THRESHOLD_MARKERS[threshold], color=colour, markersize=7, elinewidth=0.9, capsize=0, alpha=0.9,
+            fmt=THRESHOLD_MARKERS[threshold], color=colour, markersize=7, elinewidth=0.9, alpha=0.9,
         )  # fmt: skip
 
 
@@ -68,7 +76,8 @@ def _whiskers(row) -> list[list[float]] | None:
 def _legend(figure, axes, detectors) -> None:
     axis = axes[0, 0]
     shapes = [
-        axis.plot([], [], marker, color="#444444", label=f"OKS {name}")[0] for name, marker in THRESHOLD_MARKERS.items()
+        axis.plot([], [], marker, color="#444444", label=f"OKS {name}")[0]
+        for name, marker in THRESHOLD_MARKERS.items()
     ]
     colours = [axis.plot([], [], "-", lw=4, color=detector_colour(name), label=name)[0] for name in detectors]
     figure.legend(handles=[*colours, *shapes], loc="outside lower center", ncols=4, fontsize=9)
@@ -80,7 +89,9 @@ def _describe_best(table: pd.DataFrame) -> str:
     for (subset, group), part in rows.groupby(["subset", "group"], sort=False):
         top = part.loc[part["value"].idxmax()]
         best.append(f"{top['detector']} with {top['value']:.2f} on {subset} {group}")
-    return f"Scatter of average precision against average recall. Highest average precision: {in_words(best)}."
+    return (
+        f"Scatter of average precision against average recall. Highest average precision: {in_words(best)}."
+    )
 
 
 @in_style
@@ -107,10 +118,12 @@ def loss_without_head(table: pd.DataFrame, data_note: str) -> Figure:
     change = (drops["headless"] - drops["basic"]).dropna()
     said = in_words([f"{name} {group} {value:+.2f}" for (name, group), value in change.items()])
     caption = (
-        f"What removing the head costs: average precision on Basic (filled) and Headless (open) for each detector, "
-        f"on {data_note}."
+        "What removing the head costs: average precision on Basic (filled) and Headless (open) for each "
+        f"detector, on {data_note}."
     )
-    return Figure(figure, caption, f"Average precision with and without the head. Change per detector: {said}.", rows)
+    return Figure(
+        figure, caption, f"Average precision with and without the head. Change per detector: {said}.", rows
+    )
 
 
 @in_style
@@ -121,15 +134,29 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
     """
     subsets, groups = list(dict.fromkeys(table["subset"])), list(dict.fromkeys(table["group"]))
     figure, axes = new_figure(
-        len(groups), len(subsets), 4.4 * len(subsets), 3.2 * len(groups), sharex=True, sharey=True, squeeze=False
+        len(groups),
+        len(subsets),
+        4.4 * len(subsets),
+        3.2 * len(groups),
+        sharex=True,
+        sharey=True,
+        squeeze=False,
     )
     medians = []
     for (i, group), (j, subset) in ((a, b) for a in enumerate(groups) for b in enumerate(subsets)):
         axis = axes[i, j]
-        for detector, rows in table.query("subset == @subset and group == @group").groupby("detector", sort=False):
+        for detector, rows in table.query("subset == @subset and group == @group").groupby(
+            "detector", sort=False
+        ):
             oks = np.sort(rows["oks"].to_numpy())
             share = 1 - np.arange(len(oks)) / len(oks)
-            axis.step(np.r_[0, oks, 1], np.r_[1, share, 0], color=detector_colour(detector), where="pre", label=detector)
+            axis.step(
+                np.r_[0, oks, 1],
+                np.r_[1, share, 0],
+                color=detector_colour(detector),
+                where="pre",
+                label=detector,
+            )
             medians.append(f"{detector} {np.median(oks):.2f} ({subset} {group})")
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
         axis.set_title(f"{subset.capitalize()} · {_GROUP_TITLES.get(group, group)}")
@@ -161,7 +188,9 @@ def examples(folders, truth, found, n_people: int, note: str) -> Figure:
     folders : subset -> dataset folder
     truth, found : as in `hicp_lib.evaluation.compare`
     """
-    shared = [i for i in list(truth.values())[-1].images if all(i in people.images for people in truth.values())]
+    shared = [
+        i for i in list(truth.values())[-1].images if all(i in people.images for people in truth.values())
+    ]
     detectors = list(dict.fromkeys(detector for _, detector in found))
     pictures = {
         f"{subset} {i}": (
@@ -184,7 +213,18 @@ def time_per_image(table: pd.DataFrame, machine_note: str) -> Figure:
     for box, median, name in zip(boxes["boxes"], boxes["medians"], detectors, strict=True):
         box.set(facecolor=detector_colour(name), alpha=0.6)
         median.set(color="black", lw=1.5)
-    axis.set(yticks=range(1, len(detectors) + 1), yticklabels=detectors, xlabel="time per image [ms]", xlim=(0, None))
-    medians = [f"{name} {np.median(times):.0f} ms" for name, times in zip(detectors, samples, strict=True) if len(times)]
-    caption = f"Time to detect people in one image, {machine_note}: box 25–75 %, whiskers 5–95 %, line the median."
+    axis.set(
+        yticks=range(1, len(detectors) + 1),
+        yticklabels=detectors,
+        xlabel="time per image [ms]",
+        xlim=(0, None),
+    )
+    medians = [
+        f"{name} {np.median(times):.0f} ms"
+        for name, times in zip(detectors, samples, strict=True)
+        if len(times)
+    ]
+    caption = (
+        f"Time to detect people in one image, {machine_note}: box 25–75 %, whiskers 5–95 %, line the median."
+    )
     return Figure(figure, caption, f"Box plot of detection times; medians: {in_words(medians)}.", table)

@@ -37,7 +37,9 @@ def draw_people(
     rgb = tuple(int(round(255 * channel)) for channel in matplotlib.colors.to_rgb(colour))
     width_px = thickness_px or max(1.5, np.hypot(*image.shape[:2]) / 260)
     for points, confidence in zip(keypoints_px, scores, strict=True):
-        shown = np.isfinite(points).all(axis=1) & (confidence >= min_score) & (np.abs(points).max(axis=1) < 1e5)
+        shown = (
+            np.isfinite(points).all(axis=1) & (confidence >= min_score) & (np.abs(points).max(axis=1) < 1e5)
+        )
         for rim, pen in ((1.6, (20, 20, 20)), (0.0, rgb)):
             _draw_limbs(canvas, points, shown, pen, width_px, rim)
             _draw_points(canvas, points, shown, pen, width_px, rim)
@@ -48,7 +50,9 @@ def _draw_limbs(canvas, points, shown, pen, width_px, rim) -> None:
     for a, b in LIMBS:
         if shown[a] and shown[b]:
             width = width_px * (0.55 if a in HANDS else 1.0) + rim
-            cv2.line(canvas, _fixed(points[a]), _fixed(points[b]), pen, max(1, round(width)), cv2.LINE_AA, _SHIFT)
+            cv2.line(
+                canvas, _fixed(points[a]), _fixed(points[b]), pen, max(1, round(width)), cv2.LINE_AA, _SHIFT
+            )
 
 
 def _draw_points(canvas, points, shown, pen, width_px, rim) -> None:
@@ -76,7 +80,13 @@ def picture_grid(
     n_columns = max(len(row) for row in rows)
     # Each row is as high as its highest picture needs, within limits; cells are equally wide.
     heights = [
-        float(np.clip(max((image.shape[0] / image.shape[1] for image in row if image is not None), default=1), 0.4, 1.7))
+        float(
+            np.clip(
+                max((image.shape[0] / image.shape[1] for image in row if image is not None), default=1),
+                0.4,
+                1.7,
+            )
+        )
         for row in rows
     ]
     size = {"width_in": cell_in * n_columns, "height_in": cell_in * sum(heights) + 0.3}
@@ -110,18 +120,22 @@ def detections_grid(
     """
     detectors = list(next(iter(pictures.values()))[1])
     rows = [
-        [draw_people(image, found[d].keypoints_px, found[d].scores, detector_colour(d), min_score) for d in detectors]
+        [
+            draw_people(image, found[d].keypoints_px, found[d].scores, detector_colour(d), min_score)
+            for d in detectors
+        ]
         for image, found in pictures.values()
     ]
     seen = [
-        f"{detector} {sum(len(found[detector]) > 0 for _, found in pictures.values())}" for detector in detectors
+        f"{detector} {sum(len(found[detector]) > 0 for _, found in pictures.values())}"
+        for detector in detectors
     ]
     return picture_grid(
         rows,
         row_titles=list(pictures),
         column_titles=detectors,
         caption=f"Keypoints with a score of at least {min_score}, per detector.{' ' if note else ''}{note}",
-        alt=f"{len(rows)} pictures with drawn skeletons; pictures in which somebody was found: {in_words(seen)}.",
+        alt=f"{len(rows)} pictures with drawn skeletons; with somebody found: {in_words(seen)}.",
         cell_in=min(3.2, 11 / len(detectors)),
     )
 
