@@ -68,7 +68,7 @@ class Study:
         self._start_s = time.perf_counter()
 
     def figure(self, name: str, figure: Figure) -> None:
-        """Save a figure (PNG, SVG, its numbers as Parquet and CSV) and show it with caption, alt text and downloads."""
+        """Save a figure (PNG, SVG, its numbers) and show it with caption, alt text and downloads."""
         png = _rendered(figure.figure, "png")
         write_bytes(self.folder / f"{name}.png", png)
         write_bytes(self.folder / f"{name}.svg", _rendered(figure.figure, "svg"))

@@ -51,8 +51,8 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
     _legend(figure, axes, list(dict.fromkeys(table["detector"])))
     caption = (
         f"Average precision against average recall per detector, on {data_note}. The shape is the OKS "
-        "threshold (square .5, circle .75, triangle the mean over .5:.05:.95), as in Fig. 4 of the paper; whiskers are "
-        "95 % bootstrap intervals over images."
+        "threshold (square .5, circle .75, triangle the mean over .5:.05:.95), as in Fig. 4 of the paper; "
+        "whiskers are 95 % bootstrap intervals over images."
     )
     return Figure(figure, caption, _describe_best(table), table)
 
