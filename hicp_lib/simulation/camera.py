@@ -1,0 +1,106 @@
+"""A pinhole camera: rays through pixels, and points onto pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera without distortion. Pixel centres lie at integers.
+
+    Attributes
+    ----------
+    width_px, height_px : image size
+    fx_px, fy_px, cx_px, cy_px : focal lengths and principal point
+    T_world_camera : array, shape (4, 4)
+        Camera coordinates (x right, y down, z forward, metres) to world coordinates.
+    """
+
+    width_px: int
+    height_px: int
+    fx_px: float
+    fy_px: float
+    cx_px: float
+    cy_px: float
+    T_world_camera: np.ndarray
+
+    @property
+    def centre_m(self) -> np.ndarray:
+        """The camera's position in the world, shape (3,)."""
+        return self.T_world_camera[:3, 3]
+
+
+def look_at(
+    eye_m: np.ndarray, target_m: np.ndarray, up: tuple[float, float, float] = (0, 0, 1), roll_rad: float = 0.0
+) -> np.ndarray:
+    """Pose of a camera at `eye_m` that sees `target_m` in its centre: T_world_camera, shape (4, 4)."""
+    forward = _unit(np.asarray(target_m, float) - np.asarray(eye_m, float))
+    right = _unit(np.cross(forward, np.asarray(up, float)))
+    down = np.cross(forward, right)
+    cos, sin = np.cos(roll_rad), np.sin(roll_rad)
+    T_world_camera = np.eye(4)
+    T_world_camera[:3, 0] = cos * right + sin * down
+    T_world_camera[:3, 1] = cos * down - sin * right
+    T_world_camera[:3, 2] = forward
+    T_world_camera[:3, 3] = eye_m
+    return T_world_camera
+
+
+def pixel_rays(camera: Camera, pixels_px: np.ndarray | None = None) -> np.ndarray:
+    """Rays in the world whose parameter is the depth along the camera's z axis.
+
+    Parameters
+    ----------
+    pixels_px : array, shape (n, 2), optional
+        (u, v); all pixel centres, row by row, when left out.
+
+    Returns
+    -------
+    array, shape (n, 6), float32: origin and direction. Directions are not unit vectors:
+    their camera-frame z component is 1, so a hit at t lies at depth t.
+    """
+    if pixels_px is None:
+        v, u = np.mgrid[: camera.height_px, : camera.width_px]
+        pixels_px = np.stack([u.ravel(), v.ravel()], axis=1)
+    rays = np.empty((len(pixels_px), 6), np.float32)
+    rays[:, :3] = camera.centre_m
+    x = (pixels_px[:, 0] - camera.cx_px) / camera.fx_px
+    y = (pixels_px[:, 1] - camera.cy_px) / camera.fy_px
+    R = camera.T_world_camera[:3, :3].astype(np.float32)
+    for axis in range(3):
+        rays[:, 3 + axis] = R[axis, 0] * x + R[axis, 1] * y + R[axis, 2]
+    return rays
+
+
+def to_camera(camera: Camera, points_m: np.ndarray) -> np.ndarray:
+    """World points (..., 3) in camera coordinates."""
+    return (points_m - camera.centre_m) @ camera.T_world_camera[:3, :3]
+
+
+def project(camera: Camera, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Project world points.
+
+    Returns
+    -------
+    pixels_px : array, shape (..., 2); NaN for points not in front of the camera
+    depths_m : array, shape (...), along the camera's z axis
+    """
+    x, y, z = np.moveaxis(to_camera(camera, np.asarray(points_m, float)), -1, 0)
+    safe = np.where(z > 1e-6, z, np.nan)
+    pixels_px = np.stack(
+        [x / safe * camera.fx_px + camera.cx_px, y / safe * camera.fy_px + camera.cy_px], axis=-1
+    )
+    return pixels_px, z
+
+
+def inside_image(camera: Camera, pixels_px: np.ndarray) -> np.ndarray:
+    """Whether pixels (..., 2) lie on the image's pixels, [-0.5, size - 0.5); NaN does not."""
+    u, v = pixels_px[..., 0], pixels_px[..., 1]
+    return (u >= -0.5) & (u < camera.width_px - 0.5) & (v >= -0.5) & (v < camera.height_px - 0.5)
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)

@@ -1,0 +1,92 @@
+"""Image-space steps of the renderer: bumps from heights, and means that do not cross edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from hicp_lib.simulation.raycast import Trace, dot
+
+
+@dataclass
+class Looks:
+    """How things look at every pixel; components first, (3, n) or (n,). See `surfaces.Look`."""
+
+    positions_m: np.ndarray
+    normals: np.ndarray
+    albedo: np.ndarray
+    glow: np.ndarray
+    height_m: np.ndarray
+    gloss: np.ndarray
+    roughness: np.ndarray
+    softness: np.ndarray
+
+    @classmethod
+    def empty(cls, n: int) -> Looks:
+        """Black, flat and matt all over."""
+        vectors = [np.zeros((3, n), np.float32) for _ in range(4)]
+        return cls(*vectors, *(np.zeros(n, np.float32) for _ in range(4)))
+
+    def part(self, block: slice) -> Looks:
+        """A range of the pixels."""
+        return Looks(*(getattr(self, field.name)[..., block] for field in fields(self)))
+
+
+def tilt_by_height(looks: Looks, trace: Trace, shape: tuple[int, int]) -> None:
+    """Tilt `looks.normals` in place by the slope of `looks.height_m`, from differences between pixels.
+
+    Mikkelsen, "Bump mapping unparametrized surfaces on the GPU" (2010); pixels on the last
+    row and column, or beside another surface, keep their normals.
+    """
+    height = looks.height_m.reshape(shape)
+    surface, depth = trace.surface.reshape(shape), trace.depth_m.reshape(shape)
+    here, corner = slice(None, -1), (slice(None, -1), slice(None, -1))
+    with np.errstate(invalid="ignore"):
+        inner = (
+            (height[corner] != 0)
+            & (surface[corner] == surface[here, 1:]) & (surface[corner] == surface[1:, here])
+            & (np.abs(depth[here, 1:] - depth[corner]) < 0.03 * depth[corner])
+            & (np.abs(depth[1:, here] - depth[corner]) < 0.03 * depth[corner])
+        )  # fmt: skip
+    r, c = np.nonzero(inner)
+    at = r * shape[1] + c
+    right, below = at + 1, at + shape[1]
+    n = looks.normals[:, at]
+    position = looks.positions_m[:, at]
+    dx, dy = looks.positions_m[:, right] - position, looks.positions_m[:, below] - position
+    hx, hy = looks.height_m[right] - looks.height_m[at], looks.height_m[below] - looks.height_m[at]
+    rx, ry = _cross(dy, n), _cross(n, dx)
+    area = dot(dx, rx)
+    tilted = np.abs(area) * n - np.sign(area) * (hx * rx + hy * ry)
+    looks.normals[:, at] = tilted / np.maximum(np.sqrt(dot(tilted, tilted)), 1e-20)
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def mean_within(values: np.ndarray, surface: np.ndarray, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Mean over 4 x 4 pixels that lie on the same surface and close to its tangent plane.
+
+    Parameters
+    ----------
+    values : array, shape (k, height, width)
+    surface : array, shape (height, width)
+    positions_m, normals : arrays, shape (3, height, width)
+    """
+    sums = np.concatenate([values, np.ones((1, *surface.shape), np.float32)])
+    for axis in (1, 0):
+        total = sums.copy()
+        size = surface.shape[axis]
+        for shift in (1, 2):
+            low = tuple(slice(0, size - shift) if a == axis else slice(None) for a in (0, 1))
+            high = tuple(slice(shift, size) if a == axis else slice(None) for a in (0, 1))
+            every_low, every_high = (slice(None), *low), (slice(None), *high)
+            off_plane = dot(positions_m[every_high] - positions_m[every_low], normals[every_low])
+            same = ((surface[low] == surface[high]) & (np.abs(off_plane) < 0.012)).astype(np.float32)
+            total[every_low] += sums[every_high] * same
+            if shift == 1:
+                total[every_high] += sums[every_low] * same
+        sums = total
+    return sums[:-1] / sums[-1]

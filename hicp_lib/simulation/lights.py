@@ -1,0 +1,120 @@
+"""Lights, and how surfaces return them.
+
+Area lights are sampled once per pixel on a repeating 4 x 4 pattern of positions, so that a
+filter over 4 x 4 pixels which respects edges removes the noise and leaves soft shadows (interleaved
+sampling: Keller and Heidrich, 2001). Highlights are Cook-Torrance with the GGX distribution
+(Walter et al., 2007), in Karis's approximation of the masking term (2013).
+Vectors have their components first, (3, n).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hicp_lib.simulation.raycast import dot
+
+
+@dataclass(frozen=True)
+class Light:
+    """A rectangular light.
+
+    Attributes
+    ----------
+    centre_m, half_u_m, half_v_m : arrays, shape (3,); the corners are centre +- half_u +- half_v
+    power : linear RGB, shape (3,): irradiance at one metre, seen face on
+    direction : unit, where a one-sided light (a window) shines; None for one that shines all around
+    """
+
+    centre_m: np.ndarray
+    half_u_m: np.ndarray
+    half_v_m: np.ndarray
+    power: np.ndarray
+    direction: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Ambient:
+    """Light from everywhere: linear RGB from above, from below, and more from one side."""
+
+    up: np.ndarray
+    down: np.ndarray
+    side: np.ndarray
+    side_direction: np.ndarray
+
+
+# Bayer's matrix: neighbours take samples that lie far apart.
+_STRATA = np.array([0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5])
+
+
+def sample_offsets(row: np.ndarray, column: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Points of the unit square, (2, n): 16 strata that repeat every 4 x 4 pixels, jittered within."""
+    stratum = _STRATA[(row % 4) * 4 + column % 4]
+    jitter = rng.random((2, len(row)), np.float32)
+    return (np.stack([stratum % 4, stratum // 4]) + jitter).astype(np.float32) / 4
+
+
+def towards_light(light: Light, positions_m: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """Vectors from positions to points of the light, (3, n), float32."""
+    s, t = 2 * offsets - 1
+    c, u, v = (x.astype(np.float32)[:, None] for x in (light.centre_m, light.half_u_m, light.half_v_m))
+    return c + s * u + t * v - positions_m
+
+
+def hemisphere(normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """Cosine-distributed directions about unit normals, (3, n), float32."""
+    angle, z = np.float32(2 * np.pi) * offsets[0], 1 - 2 * offsets[1]
+    radius = np.sqrt(np.maximum(1 - z * z, 0))
+    return normals + np.float32(0.98) * np.stack([radius * np.cos(angle), radius * np.sin(angle), z])
+
+
+def diffuse_and_highlight(
+    light: Light,
+    positions_m: np.ndarray,
+    normals: np.ndarray,
+    view: np.ndarray,
+    gloss: np.ndarray,
+    roughness: np.ndarray,
+    softness: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """What unshadowed light does at each of n points.
+
+    `view` are unit vectors to the camera. Softness lets red light creep past the terminator
+    further than green and blue, which is what makes skin look like skin.
+
+    Returns
+    -------
+    diffuse : light that the albedo is to be multiplied with, (3, n)
+    highlight : reflected light, (3, n)
+    """
+    to_light = light.centre_m.astype(np.float32)[:, None] - positions_m
+    strength = 1 / dot(to_light, to_light)
+    to_light *= np.sqrt(strength)
+    if light.direction is not None:
+        strength *= np.clip(-dot(to_light, light.direction.astype(np.float32)), 0, 1)
+    n_l = dot(normals, to_light)
+    power = light.power.astype(np.float32)
+    diffuse = np.empty_like(normals)
+    for channel, reach in enumerate((0.40, 0.16, 0.10)):
+        wrap = softness * np.float32(reach)
+        diffuse[channel] = np.maximum((n_l + wrap) / (1 + wrap) ** 2, 0) * strength * power[channel]
+    half = to_light + view
+    half /= np.maximum(np.sqrt(dot(half, half)), 1e-6)
+    n_h = np.clip(dot(normals, half), 0, 1)
+    a2 = roughness * roughness
+    a2 *= a2
+    distribution = n_h * n_h * (a2 - 1) + 1
+    distribution = a2 / (distribution * distribution)
+    v_h = dot(view, half)
+    masking = 1 / np.maximum(v_h * v_h * 4 * (roughness + 0.5), 0.1)
+    lit = np.clip(n_l, 0, 1) * strength * gloss * np.minimum(distribution * masking, 60)
+    return diffuse, lit * power[:, None]
+
+
+def ambient_light(ambient: Ambient, normals: np.ndarray) -> np.ndarray:
+    """Diffuse light from all around by normal, (3, n)."""
+    up = 0.5 + 0.5 * normals[2]
+    lo, hi, extra = (x.astype(np.float32)[:, None] for x in (ambient.down, ambient.up, ambient.side))
+    side = np.clip(dot(normals, ambient.side_direction.astype(np.float32)), 0, 1)
+    return lo + up * (hi - lo) + side * extra

@@ -1,0 +1,198 @@
+"""Triangle meshes: normals, cuts, hems and the simple solids furniture is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A triangle mesh ready to be shaded.
+
+    Attributes
+    ----------
+    vertices_m : array, shape (n_vertices, 3), world frame
+    triangles : array, shape (n_triangles, 3), int32
+    normals : array, shape (n_vertices, 3), unit
+    coords : array, shape (n_vertices, n_coords)
+        What patterns are looked up with; interpolated over each triangle. The meaning is
+        the material's: texture coordinates, rest-pose positions, ...
+    """
+
+    vertices_m: np.ndarray
+    triangles: np.ndarray
+    normals: np.ndarray
+    coords: np.ndarray
+
+
+def vertex_normals(vertices_m: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Area-weighted unit vertex normals, shape (n_vertices, 3), float32."""
+    a, b, c = (vertices_m[triangles[:, i]] for i in range(3))
+    face = np.cross(b - a, c - a)
+    normals = np.empty(vertices_m.shape, np.float32)
+    flat = triangles.T.ravel()
+    for axis in range(3):
+        normals[:, axis] = np.bincount(flat, np.tile(face[:, axis], 3), len(vertices_m))
+    return unit(normals)
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (..., 3) scaled to length one; zero vectors stay zero."""
+    length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
+    return vectors / np.maximum(length, 1e-12)[..., None]
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Part of a mesh as a linear function of the whole mesh's vertices.
+
+    New vertex k is ``(1 - t[k]) * vertices[i[k]] + t[k] * vertices[j[k]]``, so a cut made once
+    in the rest pose follows every pose. `source` names the triangle each new one came from.
+    """
+
+    i: np.ndarray
+    j: np.ndarray
+    t: np.ndarray
+    triangles: np.ndarray
+    source: np.ndarray
+
+    def apply(self, values: np.ndarray) -> np.ndarray:
+        """Values per vertex of the whole mesh (n, ...) to values per vertex of the part."""
+        t = self.t.reshape(-1, *[1] * (values.ndim - 1)).astype(values.dtype)
+        return values[self.i] * (1 - t) + values[self.j] * t
+
+
+def cut(triangles: np.ndarray, field: np.ndarray) -> Cut:
+    """The part of a mesh where `field` (one value per vertex) is positive, cut along its zero line."""
+    inside = field > 0
+    count = inside[triangles].sum(axis=1)
+    source = [np.flatnonzero(count == 3)]
+    corners = [np.stack([triangles[source[0]]] * 2, axis=-1)]  # each corner an edge (i, j); i == j is a vertex
+    for n_inside in (1, 2):
+        rows = np.flatnonzero(count == n_inside)
+        # Rotate each triangle so that its odd vertex out comes first.
+        odd = np.argmax(inside[triangles[rows]] == (n_inside == 1), axis=1)
+        a, b, c = (triangles[rows, (odd + k) % 3] for k in range(3))
+        if n_inside == 1:
+            corners.append(_edges((a, a), (a, b), (a, c)))
+            source.append(rows)
+        else:
+            corners += [_edges((a, b), (b, b), (c, c)), _edges((a, b), (c, c), (a, c))]
+            source += [rows, rows]
+    edges = np.concatenate(corners)
+    edges = np.where((edges[..., :1] > edges[..., 1:]), edges[..., ::-1], edges)
+    unique, inverse = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
+    i, j = unique.T
+    gap = field[i] - field[j]
+    t = np.where(i == j, 0.0, field[i] / np.where(gap == 0, 1.0, gap))
+    return Cut(i, j, t.astype(np.float32), inverse.reshape(-1, 3).astype(np.int32), np.concatenate(source))
+
+
+def _edges(*corners: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    return np.stack([np.stack(corner, axis=-1) for corner in corners], axis=1)
+
+
+def neighbours(triangles: np.ndarray, n_vertices: int, most: int = 8) -> np.ndarray:
+    """Neighbouring vertices, (n_vertices, most); a row with fewer repeats them, or the vertex itself."""
+    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(np.int64)
+    keys = np.unique(np.concatenate([pairs @ [n_vertices, 1], pairs @ [1, n_vertices]]))
+    vertex, other = np.divmod(keys, n_vertices)
+    count = np.bincount(vertex, minlength=n_vertices)
+    first = np.cumsum(count) - count
+    place = first[:, None] + np.arange(most) % np.maximum(np.minimum(count, most), 1)[:, None]
+    rows = other[np.minimum(place, len(other) - 1)]
+    return np.where(count[:, None] > 0, rows, np.arange(n_vertices)[:, None])
+
+
+def boundary_edges(triangles: np.ndarray) -> np.ndarray:
+    """Directed edges (n, 2) that belong to one triangle only."""
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(np.int64)
+    key = np.minimum(edges[:, 0], edges[:, 1]) * (edges.max() + 1) + np.maximum(edges[:, 0], edges[:, 1])
+    _, inverse, count = np.unique(key, return_inverse=True, return_counts=True)
+    return edges[count[inverse] == 1].astype(np.int32)
+
+
+def concatenate(meshes: list[Mesh]) -> Mesh:
+    """Several meshes as one."""
+    offsets = np.cumsum([0] + [len(m.vertices_m) for m in meshes[:-1]])
+    return Mesh(
+        np.concatenate([m.vertices_m for m in meshes]),
+        np.concatenate([m.triangles + o for m, o in zip(meshes, offsets, strict=True)]),
+        np.concatenate([m.normals for m in meshes]),
+        np.concatenate([m.coords for m in meshes]),
+    )
+
+
+def quad(corner_m: np.ndarray, u_m: np.ndarray, v_m: np.ndarray) -> Mesh:
+    """A parallelogram; coords are metres along `u_m` and `v_m`. It faces cross(u, v)."""
+    corner_m, u_m, v_m = (np.asarray(x, np.float32) for x in (corner_m, u_m, v_m))
+    vertices = corner_m + np.array([0 * u_m, u_m, u_m + v_m, v_m])
+    lu, lv = np.linalg.norm(u_m), np.linalg.norm(v_m)
+    coords = np.array([[0, 0], [lu, 0], [lu, lv], [0, lv]], np.float32)
+    normals = np.tile(unit(np.cross(u_m, v_m)), (4, 1)).astype(np.float32)
+    return Mesh(vertices, np.array([[0, 1, 2], [0, 2, 3]], np.int32), normals, coords)
+
+
+def _unit_cube() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Corners (24, 3), normals (24, 3), triangles (12, 3), and which axes run along u and v, (24, 2)."""
+    corners, normals, axes = [], [], []
+    for normal, u, v in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
+        for side in (0, 1):
+            square = [(0, 0), (1, 0), (1, 1), (0, 1)]
+            if np.cross(np.eye(3)[u], np.eye(3)[v])[normal] * (2 * side - 1) < 0:
+                square.reverse()
+            face = np.zeros((4, 3))
+            face[:, normal], face[:, [u, v]] = side, square
+            corners.append(face)
+            normals.append(np.tile(np.eye(3)[normal] * (2 * side - 1), (4, 1)))
+            axes.append(np.tile([u, v], (4, 1)))
+    triangles = (4 * np.arange(6)[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
+    stacked = [np.concatenate(x) for x in (corners, normals)]
+    return *(x.astype(np.float32) for x in stacked), triangles.astype(np.int32), np.concatenate(axes)
+
+
+_CUBE = _unit_cube()
+
+
+def box(low_m: np.ndarray, high_m: np.ndarray, yaw_rad: float = 0.0) -> Mesh:
+    """A box between two corners, turned about the vertical through its centre; coords in metres."""
+    low, high = np.asarray(low_m, np.float32), np.asarray(high_m, np.float32)
+    corners, normals, triangles, axes = _CUBE
+    scaled = corners * (high - low)
+    mesh = Mesh(scaled + low, triangles, normals, np.take_along_axis(scaled, axes, axis=1))
+    return turned(mesh, yaw_rad, (low + high) / 2)
+
+
+def turned(mesh: Mesh, yaw_rad: float, about_m: np.ndarray) -> Mesh:
+    """The mesh turned about a vertical axis."""
+    if yaw_rad == 0:
+        return mesh
+    c, s = np.cos(yaw_rad), np.sin(yaw_rad)
+    R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], np.float32)
+    about = np.asarray(about_m, np.float32)
+    return Mesh((mesh.vertices_m - about) @ R.T + about, mesh.triangles, mesh.normals @ R.T, mesh.coords)
+
+
+def lathe(profile_m: np.ndarray, centre_m: np.ndarray, n_sides: int = 24) -> Mesh:
+    """A solid of revolution about the vertical: `profile_m` rows are (radius, height)."""
+    profile = np.asarray(profile_m, np.float32)
+    angle = np.linspace(0, 2 * np.pi, n_sides + 1, dtype=np.float32)
+    radius, height = profile.T
+    x, y = np.cos(angle)[:, None] * radius, np.sin(angle)[:, None] * radius
+    vertices = np.stack([x, y, np.broadcast_to(height, x.shape)], axis=-1)
+    coords = np.stack([np.broadcast_to(angle[:, None] * radius.max(), x.shape), vertices[..., 2]], axis=-1)
+    triangles = grid_triangles(n_sides + 1, len(profile))
+    flat = vertices.reshape(-1, 3)
+    normals = vertex_normals(flat, triangles)
+    seam = slice(0, len(profile))  # the first and last column coincide
+    normals[seam] = normals[-len(profile) :] = unit(normals[seam] + normals[-len(profile) :])
+    return Mesh(flat + np.asarray(centre_m, np.float32), triangles, normals, coords.reshape(-1, 2))
+
+
+def grid_triangles(n_rows: int, n_columns: int) -> np.ndarray:
+    """Triangles (int32) that join a row-major grid of vertices."""
+    index = np.arange(n_rows * n_columns).reshape(n_rows, n_columns)
+    a, b, c, d = (x.ravel() for x in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]).astype(np.int32)

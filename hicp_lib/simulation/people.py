@@ -1,0 +1,217 @@
+"""People: a posed body with skin, hair and clothes, as surfaces to render."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from hicp_lib.simulation import clothing, fabrics, hair, skin
+from hicp_lib.simulation import mesh as g
+from hicp_lib.simulation.body import BODY_FILE, REGIONS, Body, PosedBody, load_body, shape_weights
+from hicp_lib.simulation.surfaces import Material, Surface
+
+Rng = np.random.Generator
+
+# Body parts as the renderer numbers them: the body's regions, then the same on the right side.
+RIGHT = len(REGIONS)
+N_PARTS = 2 * RIGHT
+
+
+@dataclass(frozen=True)
+class Worn:
+    """A garment, its fabric and its sewing; `collar` adds a shirt collar."""
+
+    garment: clothing.Garment
+    fabric: fabrics.Fabric
+    trim: fabrics.Trim
+    folds: np.ndarray
+    collar: bool = False
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """One person, whatever the pose: shape (weights over the body's shapes), colours, hair, clothes.
+
+    `skirt` is (length in metres, flare, phase of its folds, fabric), or None.
+    """
+
+    shape: np.ndarray
+    complexion: skin.Complexion
+    style: hair.Style | None
+    beard: hair.Style | None
+    worn: list[Worn]
+    skirt: tuple[float, float, float, fabrics.Fabric] | None
+    seed: int
+
+
+def random_appearance(rng: Rng) -> Appearance:
+    """A random person: shape, skin, hair and clothes that could go together."""
+    body = load_body()
+    number = int(rng.integers(len(body.shape_names)))
+    name = body.shape_names[number]
+    woman = name.startswith(("woman", "girl"))
+    traits = _traits()[name]
+    weights = _blend(rng, body, number)
+    tone = np.clip(0.12 + 0.24 * traits["asian"] + 0.62 * traits["african"] + rng.normal(0, 0.09), 0, 1)
+    age = float(name.split("_")[1])
+    complexion = skin.random_complexion(rng, float(tone), woman, age)
+    style = hair.random_style(rng, woman, age)
+    beard = None
+    if not woman and age > 20 and rng.random() < 0.3:
+        complexion = replace(complexion, stubble=0.85)
+        length = rng.uniform(0.008, 0.03)
+        beard = hair.Style(length, length, 0.45, (0.2, 0, -0.8), 0.2, 0.35, 0.01, n_locks=900, n_steps=3, width_m=0.0035)
+    worn, skirt = _outfit(rng, woman, age)
+    return Appearance(weights, complexion, style, beard, worn, skirt, int(rng.integers(2**31)))
+
+
+@cache
+def _traits() -> dict:
+    return json.loads(BODY_FILE.with_suffix(".json").read_text())["shapes"]
+
+
+def _blend(rng: Rng, body: Body, number: int) -> np.ndarray:
+    """A shape, with some of another of the same sex and size."""
+    name = body.shape_names[number]
+    alike = [k for k, other in enumerate(body.shape_names) if other.split("_")[0] == name.split("_")[0] and k != number]
+    weights = np.zeros(len(body.shape_names), np.float32)
+    share = rng.uniform(0, 0.4) if alike else 0.0
+    weights[number] = 1 - share
+    if alike:
+        weights[rng.choice(alike)] += share
+    return weights
+
+
+def _outfit(rng: Rng, woman: bool, age: float) -> tuple[list[Worn], tuple | None]:
+    kinds = ["tshirt", "longsleeve", "shirt", "hoodie", "tank", "polo"]
+    kind = rng.choice(kinds, p=[0.34, 0.2, 0.2, 0.12, 0.06, 0.08])
+    top = _top(rng, kind, woman)
+    worn = [top]
+    skirt = None
+    if woman and rng.random() < 0.22:
+        fabric = top.fabric if rng.random() < 0.4 else fabrics.random_fabric(rng, 0.6)
+        skirt = (rng.uniform(0.38, 0.75), rng.uniform(0.05, 0.5), rng.uniform(0, 6), fabric)
+        if rng.random() < 0.4:
+            worn.append(_bottom(rng, "leggings"))
+    else:
+        odds = [0.42, 0.28, 0.18, 0.12] if woman else [0.45, 0.37, 0.18, 0.0]
+        worn.append(_bottom(rng, rng.choice(["jeans", "chinos", "shorts", "leggings"], p=odds)))
+    if rng.random() < 0.92:
+        shoe = clothing.Garment("shoe", rng.choice([1.88, 1.92, 1.80]), 0, thickness_m=0.006, ease_m=0.004, smoothing=30)
+        worn.append(Worn(shoe, fabrics.leather(rng), fabrics.Trim(0.02, 0.8), clothing.random_folds(rng, 0.0)))
+    return worn, skirt
+
+
+def _top(rng: Rng, kind: str, woman: bool) -> Worn:
+    fabric = fabrics.random_fabric(rng, {"hoodie": 0.9, "shirt": 0.3, "tshirt": 0.6}.get(kind, 0.6))
+    if fabric.pattern is None and kind in ("tshirt", "longsleeve", "hoodie") and rng.random() < 0.5:
+        fabric = replace(fabric, pattern=fabrics.printed(rng, fabric.colours))
+    hem, collar, opening = rng.choice([-0.16, -0.1, -0.05]), 1.03, rng.choice([0.04, 0.07, 0.1])
+    sleeve, ease, thick = 2.0, 0.010, 0.005
+    trim = fabrics.Trim(0.03, rng.choice([1.0, 0.9, 0.8]))
+    if kind == "tshirt":
+        sleeve, ease = rng.choice([0.45, 0.55, 0.7]), rng.choice([0.008, 0.014, 0.02])
+    elif kind == "polo":
+        sleeve, opening, trim = rng.choice([0.5, 0.6]), 0.06, fabrics.Trim(0.025, 0.9)
+    elif kind == "tank":
+        sleeve, ease, opening, thick = 0.06, 0.006, 0.14, 0.004
+    elif kind == "shirt":
+        sleeve, ease, trim = rng.choice([1.95, 1.95, 1.3, 0.6]), 0.012, fabrics.Trim(0.02, 1.0, "buttons")
+        opening = rng.choice([0.06, 0.1])
+    elif kind == "hoodie":
+        thick, ease, collar, opening = 0.011, 0.016, 1.06, 0.05
+        trim = fabrics.Trim(0.07, 0.88, rng.choice(["none", "zip"]))
+    elif kind == "longsleeve":
+        sleeve, thick = rng.choice([1.95, 1.9, 1.4]), rng.choice([0.005, 0.008])
+    if woman and rng.random() < 0.5:
+        ease *= 0.5
+    garment = clothing.Garment("top", hem, collar, sleeve, opening, thick, ease, 12)
+    folds = clothing.random_folds(rng, 0.0035 + 0.15 * ease)
+    return Worn(garment, fabric, trim, folds, kind in ("shirt", "polo"))
+
+
+def _bottom(rng: Rng, kind: str) -> Worn:
+    waist = rng.choice([0.12, 0.17])
+    if kind == "leggings":
+        garment = clothing.Garment("bottom", rng.choice([1.9, 1.5]), waist, thickness_m=0.002, ease_m=0.0, smoothing=2)
+        fabric = replace(fabrics.plain_fabric(rng, dark=True), crease_m=0.0005, gloss=0.03, roughness=0.6)
+        return Worn(garment, fabric, fabrics.Trim(0.0), clothing.random_folds(rng, 0.0))
+    end = rng.choice([0.7, 0.85, 0.95]) if kind == "shorts" else rng.choice([1.93, 2.0])
+    ease = rng.choice([0.006, 0.012, 0.02])
+    garment = clothing.Garment("bottom", end, waist, thickness_m=0.005, ease_m=ease, smoothing=10)
+    fabric = fabrics.denim(rng) if kind == "jeans" or rng.random() < 0.2 else fabrics.plain_fabric(rng)
+    return Worn(garment, fabric, fabrics.Trim(0.03, 0.93), clothing.random_folds(rng, 0.004 + 0.1 * ease))
+
+
+def landmarks_at_rest(body: Body, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices, bone heads and keypoints (136, 3) of a shape at rest, metres, body frame."""
+    rest, heads = np.tensordot(weights, body.vertices_m, 1), np.tensordot(weights, body.heads_m, 1)
+    return rest, heads, body.keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
+
+
+def part_of_vertices(body: Body) -> np.ndarray:
+    """Part number of each vertex: its region, plus `RIGHT` on the person's right side."""
+    return (body.regions + RIGHT * (body.vertices_m[0, :, 1] < 0)).astype(np.int16)
+
+
+def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface]:
+    """Surfaces of a posed person: skin, clothes, hair."""
+    body = load_body()
+    weights = shape_weights(body, appearance.shape)
+    rest, rest_heads, landmarks = landmarks_at_rest(body, weights)
+    rng = np.random.default_rng(appearance.seed)
+    part = part_of_vertices(body)[body.triangles[:, 0]]
+    cuts = fabrics.make_cuts(landmarks)
+    surfaces, hidden = [], np.zeros(len(body.triangles), bool)
+    for worn in appearance.worn:
+        mesh, source = clothing.put_on(worn.garment, posed, rest, worn.folds)
+        hidden |= clothing.cut_pattern(worn.garment).hidden
+        material = fabrics.cloth_material(worn.fabric, cuts, _panel_of_part(part[source]), worn.trim)
+        surfaces.append(Surface(mesh, material, person, part[source]))
+        if worn.collar:
+            surfaces.append(_collar(worn, mesh, posed, cuts, person))
+    if appearance.skirt is not None:
+        surfaces.append(_skirt(appearance.skirt, body, posed, cuts, person))
+    surfaces = _skin(appearance, body, posed, rest, landmarks, ~hidden, part, person) + surfaces
+    material = hair.hair_material(appearance.complexion.hair)
+    if appearance.style is not None:
+        grown = hair.grow(appearance.style, body, rest, landmarks, rng)
+        surfaces.append(_hair(hair.carry(grown, body, posed, rest_heads, landmarks), material, person))
+    return surfaces
+
+
+def _skin(appearance, body, posed, rest, landmarks, shown, part, person) -> list[Surface]:
+    coords = skin.paint_coords(body, rest, landmarks)
+    covered = 0.0 if appearance.style is None else 0.95
+    material = skin.skin_material(appearance.complexion, covered if covered else appearance.complexion.stubble * 0.3)
+    mesh = g.Mesh(posed.vertices_m, body.triangles[shown], posed.normals, coords)
+    return [Surface(mesh, material, person, part[shown])]
+
+
+def _panel_of_part(part: np.ndarray) -> np.ndarray:
+    panels = np.zeros(N_PARTS, np.int8)
+    for name, panel in (("upper_arm", 1), ("forearm", 1), ("hand", 1), ("thigh", 3), ("shin", 3), ("foot", 3), ("nail", 3)):
+        panels[REGIONS.index(name)], panels[REGIONS.index(name) + RIGHT] = panel, panel + 1
+    return panels[part]
+
+
+def _collar(worn: Worn, mesh: g.Mesh, posed: PosedBody, cuts: fabrics.Cuts, person: int) -> Surface:
+    strip = clothing.collar(worn.garment, mesh, posed, 0.026, 0.02)
+    panels = np.zeros(len(strip.triangles), np.int8)
+    material = fabrics.cloth_material(worn.fabric, cuts, panels, fabrics.Trim(0.0))
+    return Surface(strip, material, person, np.full(len(strip.triangles), REGIONS.index("neck"), np.int16))
+
+
+def _skirt(skirt: tuple, body: Body, posed: PosedBody, cuts: fabrics.Cuts, person: int) -> Surface:
+    length, flare, phase, fabric = skirt
+    mesh = clothing.skirt(posed, posed.rotations[body.bone_names.index("root")], length, flare, phase)
+    panels = np.zeros(len(mesh.triangles), np.int8)
+    material = fabrics.cloth_material(fabric, cuts, panels, fabrics.Trim(0.02, 0.95))
+    return Surface(mesh, material, person, np.full(len(mesh.triangles), REGIONS.index("hips"), np.int16))
+
+
+def _hair(mesh: g.Mesh, material: Material, person: int) -> Surface:
+    return Surface(mesh, material, person, np.full(len(mesh.triangles), REGIONS.index("scalp"), np.int16))

@@ -1,0 +1,93 @@
+"""Rays against surfaces, through Open3D's RaycastingScene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import open3d as o3d
+
+from hicp_lib.simulation.surfaces import Hits, Surface
+
+N_THREADS = 1  # frames are rendered in parallel by processes; one scene takes calls from one thread only
+
+
+@dataclass(frozen=True)
+class Trace:
+    """The first thing each ray met; every array has n rows.
+
+    `depth_m` is the ray parameter (infinite: nothing hit), `triangle` the triangle's number in
+    the whole scene (-1: nothing), `surface` the surface's number (-1: nothing), `barycentric`
+    the weights of the triangle's second and third corner, `face_normals` its own unit normal.
+    """
+
+    depth_m: np.ndarray
+    triangle: np.ndarray
+    surface: np.ndarray
+    barycentric: np.ndarray
+    face_normals: np.ndarray
+
+
+class RayScene:
+    """Surfaces that rays can be cast at."""
+
+    def __init__(self, surfaces: list[Surface]):
+        self.surfaces = surfaces
+        n_vertices = [len(s.mesh.vertices_m) for s in surfaces]
+        n_triangles = [len(s.mesh.triangles) for s in surfaces]
+        first_vertex = np.cumsum([0, *n_vertices])
+        self.first_triangle = np.cumsum([0, *n_triangles])
+        self.surface_of_triangle = np.repeat(np.arange(len(surfaces), dtype=np.int16), n_triangles)
+        vertices = np.concatenate([s.mesh.vertices_m for s in surfaces]).astype(np.float32)
+        triangles = np.concatenate(
+            [s.mesh.triangles + first for s, first in zip(surfaces, first_vertex, strict=False)]
+        ).astype(np.uint32)
+        self._scene = o3d.t.geometry.RaycastingScene(nthreads=N_THREADS)
+        self._scene.add_triangles(o3d.core.Tensor(vertices), o3d.core.Tensor(triangles))
+
+    def trace(self, rays: np.ndarray) -> Trace:
+        """Cast rays, shape (n, 6), float32; their direction's length sets the unit of `depth_m`."""
+        answer = self._scene.cast_rays(o3d.core.Tensor(rays), nthreads=N_THREADS)
+        depth_m = answer["t_hit"].numpy()
+        triangle = answer["primitive_ids"].numpy().astype(np.int32)
+        hit = np.isfinite(depth_m)
+        triangle[~hit] = -1
+        surface = np.where(hit, self.surface_of_triangle[triangle], np.int16(-1))
+        barycentric, normals = answer["primitive_uvs"].numpy(), answer["primitive_normals"].numpy()
+        return Trace(depth_m, triangle, surface, barycentric, normals)
+
+    def occluded(self, origins_m: np.ndarray, towards_m: np.ndarray, end: float = 1.0) -> np.ndarray:
+        """Whether something lies between each origin and ``origin + end * towards``, shape (n,), bool."""
+        rays = np.concatenate([origins_m, towards_m], axis=1, dtype=np.float32)
+        return self._scene.test_occlusions(
+            o3d.core.Tensor(rays), tnear=0.0, tfar=end, nthreads=N_THREADS
+        ).numpy()
+
+    def hits(self, trace: Trace, rays: np.ndarray, rows: np.ndarray, number: int, pixel_rad: float) -> Hits:
+        """Interpolate surface `number`'s mesh at the rays `rows` that met it."""
+        mesh = self.surfaces[number].mesh
+        local = trace.triangle[rows] - self.first_triangle[number]
+        corners = mesh.triangles[local].T.astype(np.intp)
+        second, third = trace.barycentric[rows].T
+        weights = (1 - second - third, second, third)
+        depth, direction = trace.depth_m[rows], rays[rows, 3:].T
+        normals = interpolate(mesh.normals, corners, weights)
+        # Cloth and leaves are seen from both sides.
+        away = dot(trace.face_normals[rows].T, direction) > 0
+        normals *= np.where(away, -1, 1).astype(np.float32) / np.maximum(np.sqrt(dot(normals, normals)), 1e-9)
+        positions = rays[rows, :3].T + depth * direction
+        return Hits(positions, normals, interpolate(mesh.coords, corners, weights), local, depth * pixel_rad)
+
+
+def interpolate(values: np.ndarray, corners: np.ndarray, weights: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Values per vertex (n_vertices, k) at n places of triangles with corners (3, n): (k, n), float32."""
+    result = np.empty((values.shape[1], corners.shape[1]), np.float32)
+    for k in range(values.shape[1]):
+        component = np.ascontiguousarray(values[:, k], np.float32)
+        result[k] = sum(w * component[c] for w, c in zip(weights, corners, strict=True))
+    return result
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Dot products of vectors (3, n)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -1,0 +1,73 @@
+"""From light to an 8-bit image: lens, exposure, noise and tone, as a consumer camera does it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A consumer camera's settings.
+
+    Attributes
+    ----------
+    white_balance : gains of the linear RGB channels, shape (3,)
+    exposure : multiplies the automatic exposure
+    blur_px : standard deviation of lens and demosaicking blur
+    vignette : loss of light in the corners, 0 to 1
+    shot_noise, read_noise : standard deviations for full-scale light and for black, of full scale
+    contrast : steepness of the tone curve, 1 neutral
+    saturation : 1 neutral
+    """
+
+    white_balance: np.ndarray
+    exposure: float = 1.0
+    blur_px: float = 0.5
+    vignette: float = 0.2
+    shot_noise: float = 0.015
+    read_noise: float = 0.003
+    contrast: float = 1.1
+    saturation: float = 1.0
+
+
+def expose(radiance: np.ndarray, sensor: Sensor, rng: np.random.Generator, meter: np.ndarray | None = None) -> np.ndarray:
+    """Develop linear light, shape (height, width, 3), into RGB uint8 of the same shape.
+
+    `meter` marks the pixels that count most for the exposure (people: cameras look for faces).
+    """
+    height, width = radiance.shape[:2]
+    light = radiance * (sensor.white_balance * _auto_exposure(radiance, meter) * sensor.exposure).astype(np.float32)
+    y = np.linspace(-1, 1, height, dtype=np.float32)[:, None]
+    x = np.linspace(-1, 1, width, dtype=np.float32)[None, :]
+    light *= (1 - sensor.vignette * 0.5 * (x * x + y * y))[..., None]
+    light = cv2.GaussianBlur(light, (0, 0), max(sensor.blur_px, 0.2))
+    sigma = np.sqrt(sensor.shot_noise**2 * np.maximum(light, 0) + sensor.read_noise**2)
+    grey = rng.standard_normal((height, width, 1), np.float32)
+    colour = cv2.GaussianBlur(rng.standard_normal((height, width, 3), np.float32), (0, 0), 0.8)
+    light += sigma * (0.8 * grey + 1.2 * colour)
+    grey = light @ np.array([0.2126, 0.7152, 0.0722], np.float32)
+    light = grey[..., None] + sensor.saturation * (light - grey[..., None])
+    return _tone(light, sensor.contrast)
+
+
+def _auto_exposure(radiance: np.ndarray, meter: np.ndarray | None) -> float:
+    grey = radiance[::4, ::4] @ np.array([0.2126, 0.7152, 0.0722], np.float32)
+    log = np.log(np.maximum(grey, 1e-4))
+    level = log.mean()
+    if meter is not None and meter[::4, ::4].any():
+        level = 0.5 * level + 0.5 * log[meter[::4, ::4]].mean()
+    return float(0.22 / np.exp(level))
+
+
+def _tone(light: np.ndarray, contrast: float) -> np.ndarray:
+    """Linear light to sRGB with a shoulder that rolls highlights off, through a table."""
+    x = np.linspace(0, 4, 4096)
+    shoulder = x * (1 + x / 9) / (1 + x * 0.45)  # near the identity in the shadows, slowly towards white
+    shoulder = np.clip(shoulder / (0.18 * (1 + 0.18 / 9) / (1 + 0.18 * 0.45)) * 0.18, 0, 1)
+    srgb = np.where(shoulder <= 0.0031308, 12.92 * shoulder, 1.055 * shoulder ** (1 / 2.4) - 0.055)
+    curved = 0.5 + 0.5 * np.tanh(contrast * 2 * (srgb - 0.46)) / np.tanh(contrast)
+    table = np.clip(255 * (0.35 * curved + 0.65 * srgb) + 0.5, 0, 255).astype(np.uint8)
+    return table[np.clip(light * (4095 / 4), 0, 4095).astype(np.int16)]
