@@ -150,7 +150,7 @@ def detect(detector: str, dataset_dir: Path | None, images_dir: Path | None, out
 
 
 def _numbered_images(folder: Path) -> dict[int, Path]:
-    """Image ids as COCO numbers its files (000000012345.jpg is 12345), else the place in the order of names."""
+    """Image ids as COCO numbers its files (000000012345.jpg is 12345), else by the order of names."""
     if not folder.is_dir():
         raise InputError(f"{folder}: is not a folder; give the folder that holds the images")
     kinds = {".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff"}

@@ -6,6 +6,7 @@ printed below it (`hicp_lib.study`), so the two can never disagree.
 
 from __future__ import annotations
 
+import functools
 import importlib.metadata
 import json
 import os
@@ -64,6 +65,7 @@ def lock_sha256() -> str:
     return sha256_file(LOCK_PATH) if LOCK_PATH.is_file() else "missing"
 
 
+@functools.cache
 def installed_sha256() -> str:
     """SHA-256 of what is installed, whatever the lock says: distributions, Python, the kind of machine."""
     distributions = {d.name: d.version for d in importlib.metadata.distributions()}

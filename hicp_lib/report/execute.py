@@ -43,6 +43,7 @@ def main(job_path: str) -> int:
             cwd=job["folder"],
             progress_bar=False,
             kernel_name="python3",
+            language="python",
             request_save_on_cell_execute=False,
             start_timeout=START_TIMEOUT_S,
             execution_timeout=CELL_TIMEOUT_S,

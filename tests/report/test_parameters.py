@@ -1,0 +1,132 @@
+"""Declared parameters: what is unknown or does not fit is refused by one line that says what would."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from tiny_study import write_notebook
+
+from hicp_lib.errors import InputError
+from hicp_lib.report.notebooks import (
+    check_parameters,
+    parse_overrides,
+    read_notebook,
+    read_notebooks,
+    read_profile,
+)
+
+
+def test_declared_parameters_are_read_without_running_them(study):
+    notebook = read_notebook(study / "notebooks" / "00_first.ipynb")
+    assert notebook.defaults == {"seed": 0, "scale": 1.5, "detectors": ["a", "b"], "images": ""}
+
+
+@pytest.mark.parametrize("parameters", ["n = open('x')", "n, m = 1, 2", "print(1)", "n = ", "n: int"])
+def test_parameters_that_are_no_plain_values_are_refused(tmp_path, parameters):
+    path = write_notebook(tmp_path / "x.ipynb", parameters=parameters)
+    with pytest.raises(InputError, match=r"x\.ipynb: its parameters cell is not `name = value` lines"):
+        read_notebook(path)
+
+
+@pytest.mark.parametrize("content", ["", "{}", "[]", '{"cells": 3}', "\x00", '{"nbformat": 4, "cells": [1]}'])
+def test_what_is_no_notebook_is_refused(tmp_path, content):
+    path = tmp_path / "x.ipynb"
+    path.write_text(content)
+    with pytest.raises(InputError, match=r"x\.ipynb"):
+        read_notebook(path)
+
+
+def test_source_hash_ignores_outputs_and_sees_every_cell(tmp_path):
+    import nbformat
+
+    path = write_notebook(tmp_path / "x.ipynb", "1 + 1")
+    before = read_notebook(path).source_sha256
+    notebook = nbformat.read(path, as_version=4)
+    notebook.cells[-1].execution_count = 7
+    notebook.metadata["kernelspec"] = {"name": "other", "display_name": "other"}
+    nbformat.write(notebook, path)
+    assert read_notebook(path).source_sha256 == before
+    notebook.cells[0].source += "."
+    nbformat.write(notebook, path)
+    assert read_notebook(path).source_sha256 != before
+
+
+def test_profile_and_order_are_read(study):
+    profile = read_profile(
+        study / "notebooks" / "profiles.toml", "quick", read_notebooks(study / "notebooks")
+    )
+    assert profile.parameters == {"00_first": {"seed": 3}}
+    assert profile.after == {"01_second": ["00_first"]}
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ("[full]", "has no profile 'quick'; choose one of full"),
+        ("[quick.99_none]\nseed = 1", "names notebook '99_none'; known are 00_first, 01_second"),
+        ("[quick.00_first]\nsed = 1", "00_first has no parameter 'sed'; known are seed, "),
+        ("[quick.00_first]\nseed = 1.5", "'seed' is 1.5; expected an integer such as 0"),
+        ("[quick.00_first]\nseed = true", "'seed' is true; expected an integer such as 0"),
+        ("[quick]\n[after]\n01_second = ['x']", "names notebook 'x'"),
+        ("[quick", "not TOML"),
+    ],
+)
+def test_faulty_profiles_are_refused(study, content, expected):
+    path = study / "notebooks" / "profiles.toml"
+    path.write_text(content)
+    with pytest.raises(InputError) as error:
+        read_profile(path, "quick", read_notebooks(study / "notebooks"))
+    assert expected in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("seed", "7", 7),
+        ("scale", "2", 2),
+        ("scale", "2.5", 2.5),
+        ("detectors", "x,y", ["x", "y"]),
+        ("detectors", '["x"]', ["x"]),
+        ("images", "", ""),
+    ],
+)
+def test_overrides_take_the_type_of_the_default(study, name, text, expected):
+    overrides = parse_overrides([(name, text)], read_notebooks(study / "notebooks"))
+    assert overrides == {"00_first": {name: expected}, "01_second": {name: expected}}
+
+
+def test_relative_paths_are_those_of_the_caller(study, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    overrides = parse_overrides([("images", "here")], read_notebooks(study / "notebooks"))
+    assert overrides["00_first"]["images"] == str(tmp_path / "here")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("sed", "1", "-p sed: no notebook has such a parameter; known are detectors, images, scale, seed"),
+        ("seed", "x", "'seed' is \"x\"; expected an integer such as 0"),
+        ("seed", "1.5", "expected an integer"),
+        ("scale", "[1]", "expected a number such as 1.5"),
+    ],
+)
+def test_faulty_overrides_are_refused(study, name, text, expected):
+    with pytest.raises(InputError) as error:
+        parse_overrides([(name, text)], read_notebooks(study / "notebooks"))
+    assert expected in str(error.value)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(st.sampled_from(["seed", "scale", "detectors", "images"]), st.text(max_size=30))
+def test_any_text_is_taken_or_refused(study, name, text):
+    notebooks = read_notebooks(study / "notebooks")
+    if "\x00" in text:
+        return  # no argument of a process holds one
+    try:
+        overrides = parse_overrides([(name, text)], notebooks)
+    except InputError as error:
+        assert "\n" not in str(error)
+        return
+    check_parameters(notebooks[0], overrides["00_first"], "again")

@@ -1,0 +1,145 @@
+"""Runs are whole or absent, and never stand for anything but what they were made with."""
+
+from __future__ import annotations
+
+import json
+import os
+
+import pytest
+from tiny_study import FINISH, MEASURE, START, pretend_to_execute, tiny_run, write_notebook
+
+from hicp_lib import provenance
+from hicp_lib.errors import InputError
+from hicp_lib.files import sha256_file
+from hicp_lib.report.notebooks import read_notebook
+from hicp_lib.report.runs import Run, RunError, _Children, run_all, run_key, why_stale
+
+
+def test_a_run_leaves_its_results_and_is_not_repeated(tmp_path):
+    run, folders = tiny_run(tmp_path, START, MEASURE, FINISH, seed=4)
+    lines: list[str] = []
+    run_all([run], folders, lines.append)
+    results = folders.results / "05_tiny"
+    assert json.loads((results / "values.json").read_text()) == {"seed": 4}
+    assert json.loads((results / "provenance.json").read_text())["parameters"]["seed"] == 4
+    executed = (folders.executed / "05_tiny.ipynb").stat().st_mtime_ns
+    run_all([run], folders, lines.append)
+    assert lines[-1] == "05_tiny: unchanged"
+    assert (folders.executed / "05_tiny.ipynb").stat().st_mtime_ns == executed
+
+    (results / "values.json").write_text('{"seed": 5}')
+    assert why_stale("05_tiny", run_key(run, []), folders) == "its outputs were changed"
+    assert not list(folders.executed.glob(".run-*")), "staging folders are removed"
+
+
+@pytest.mark.parametrize(
+    ("cells", "expected"),
+    [
+        (
+            (START, "raise ValueError('no\\nluck')", FINISH),
+            r"05_tiny: In \[3\] failed: ValueError: no luck; see ",
+        ),
+        (
+            (START, "import warnings; warnings.warn('odd')", FINISH),
+            r"05_tiny: In \[3\] wrote to stderr: .*odd",
+        ),
+        ((START, MEASURE), r"05_tiny: ended without results; its last line must be"),
+        (
+            ("from hicp_lib.study import Study\nstudy = Study({name!r}, seed=9)", FINISH),
+            "05_tiny: its results state other parameters",
+        ),
+        (("import os; os._exit(1)",), "05_tiny: did not run: .*Kernel died"),
+    ],
+)
+def test_a_faulty_run_is_an_error_and_leaves_nothing_half_done(tmp_path, cells, expected):
+    run, folders = tiny_run(tmp_path, *cells)
+    with pytest.raises(RunError, match=expected) as error:
+        run_all([run], folders, print)
+    assert "\n" not in str(error.value)
+    assert not folders.results.exists()
+    assert why_stale("05_tiny", run_key(run, []), folders) == "no complete run yet"
+    assert not list(folders.executed.glob("*.ipynb"))
+
+
+def test_a_failed_run_keeps_the_last_one_but_not_as_fresh(tmp_path):
+    run, folders = tiny_run(tmp_path, START, MEASURE, FINISH)
+    run_all([run], folders, print)
+    before = sha256_file(folders.results / "05_tiny" / "t.parquet")
+    worse, _ = tiny_run(tmp_path, START, "1 / 0", FINISH)
+    with pytest.raises(RunError, match="ZeroDivisionError"):
+        run_all([worse], folders, print)
+    assert sha256_file(folders.results / "05_tiny" / "t.parquet") == before
+    assert why_stale("05_tiny", run_key(worse, []), folders) == "changed: notebook"
+
+
+def test_what_libraries_write_to_the_terminal_is_no_fault(tmp_path):
+    run, folders = tiny_run(tmp_path, START, "import os; os.write(2, b'native noise\\n');", FINISH)
+    run_all([run], folders, print)
+
+
+def test_a_notebook_waits_for_those_before_it_and_is_skipped_when_they_fail(tmp_path):
+    first, folders = tiny_run(tmp_path, START, "1 / 0", FINISH)
+    path = write_notebook(tmp_path / "notebooks" / "06_next.ipynb", START, FINISH)
+    second = Run(read_notebook(path), first.parameters, after=("05_tiny",))
+    lines: list[str] = []
+    with pytest.raises(RunError, match="05_tiny"):
+        run_all([first, second], folders, lines.append)
+    assert not any(line.startswith("06_next") for line in lines)
+
+
+def test_every_dependency_is_in_the_key(tmp_path, monkeypatch, library):
+    images = tmp_path / "images"
+    images.mkdir()
+    (images / "1.png").write_bytes(b"1")
+    run, _ = tiny_run(tmp_path, START, FINISH, images=str(images))
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "paper.json").write_text("{}")
+    lock = tmp_path / "environment.lock"
+    lock.write_text("numpy==1")
+    monkeypatch.setattr(provenance, "DATA_DIR", tmp_path / "data")
+    monkeypatch.setattr(provenance, "LOCK_PATH", lock)
+    key = run_key(run, ["x"])
+    assert run_key(run, ["x"]) == key
+
+    def changed(run: Run = run, before: tuple[str, ...] = ("x",)) -> list[str]:
+        return [part for part, value in run_key(run, list(before)).items() if value != key[part]]
+
+    (library / "module.py").write_text("a = 2")
+    assert changed() == ["library"]
+    (library / "module.py").write_text("a = 1")
+    (tmp_path / "data" / "weights.json").write_text("{}")
+    assert changed() == ["data"]
+    (tmp_path / "data" / "weights.json").unlink()
+    lock.write_text("numpy==2")
+    assert changed() == ["lock"]
+    lock.write_text("numpy==1")
+    (images / "1.png").write_bytes(b"22")
+    assert changed() == ["input files"]
+    os.utime(images / "1.png", (0, 0))
+    assert changed() == ["input files"]
+    (images / "1.png").unlink()
+    assert changed() == ["input files"]
+    key = run_key(run, ["x"])
+    assert changed(Run(run.notebook, run.parameters | {"seed": 1})) == ["parameters"]
+    assert changed(before=("y",)) == ["earlier notebooks"]
+    monkeypatch.setattr(provenance, "installed_sha256", lambda: "other")
+    assert changed() == ["installed packages"]
+
+
+def test_a_library_edited_during_the_run_is_not_stamped(tmp_path, monkeypatch, library):
+    run, folders = tiny_run(tmp_path, START, FINISH)
+
+    def edit(*arguments):
+        (library / "module.py").write_text("a = 2")
+        return pretend_to_execute(*arguments)
+
+    monkeypatch.setattr(_Children, "execute", edit)
+    with pytest.raises(RunError, match="hicp_lib was changed while it ran"):
+        run_all([run], folders, print)
+    assert not folders.results.exists()
+
+
+def test_an_input_that_is_not_there_is_the_users_mistake(tmp_path):
+    run, folders = tiny_run(tmp_path, START, FINISH, images="/nowhere/images")
+    with pytest.raises(InputError, match="/nowhere/images: does not exist; parameter 'images'"):
+        run_all([run], folders, print)
