@@ -81,11 +81,8 @@ def similarity(people: Annotations, found: dict[int, Detections]) -> dict:
 def _pycocotools_oks(
     people: Annotations, found: dict[int, Detections], sigmas: np.ndarray
 ) -> Callable[[], object]:
-    truth = [
-        engine.truth_row(i, people.keypoints_px[i, COCO_17], people.visibility[i, COCO_17], people.boxes_px[i],
-                         people.areas_px2[i], False)
-        for i in people.images
-    ]  # fmt: skip
+    rows = (people.keypoints_px[:, COCO_17], people.visibility[:, COCO_17], people.boxes_px, people.areas_px2)
+    truth = [engine.truth_row(i, *row, False) for i, *row in zip(people.images, *rows, strict=True)]
     results = [engine.found_row(i, person[COCO_17], 1.0) for i in found for person in found[i].keypoints_px]
     indexed = []
     for rows in (truth, results):

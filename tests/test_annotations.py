@@ -126,6 +126,14 @@ def test_detections_are_read_in_the_order_of_the_file(write):
     assert list(read_detections(write(lines[:1]))) == [9]
 
 
+def test_the_order_is_kept_among_many(write):
+    scores = np.arange(200.0)
+    lines = [result(7 + 2 * (i % 2), score=score, n=17) for i, score in enumerate(scores.tolist())]
+    found = read_detections(write(lines))
+    assert found[7].person_scores.tolist() == scores[::2].tolist()
+    assert found[9].person_scores.tolist() == scores[1::2].tolist()
+
+
 def test_a_missing_keypoint_is_zeros_in_the_file_and_nan_in_memory(tmp_path):
     points, scores = np.full((1, 136, 2), np.nan), np.zeros((1, 136))
     points[0, :3], scores[0, :3] = [[0, 0], [-4.25, 1 / 3], [5, 6]], [0.5, 0.25, 0.0]

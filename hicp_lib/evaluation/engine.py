@@ -118,7 +118,7 @@ def _matches(engine: COCOeval) -> Matches:
             scores.append(np.array(image["dtScores"], dtype=float))
             matched, counted = image["dtMatches"] > 0, ~image["dtIgnore"]
             right.append(matched & counted)
-            wrong.append(~matched & counted)
+            wrong.append(~matched)  # over all areas, only matched detections are ever ignored
     order = np.argsort(-np.concatenate(scores), kind="stable")
     true, false = (np.concatenate(parts, axis=1)[:, order] for parts in (right, wrong))
     return Matches(image_ids, n_people, np.concatenate(rows)[order], true, false)

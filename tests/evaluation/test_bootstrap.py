@@ -86,15 +86,14 @@ def test_pairing_takes_the_images_share_out_of_a_difference(annotated, detected)
 
 
 def test_subsets_are_paired_by_image_id(annotated, detected):
-    a = found_or_not(annotated, detected, np.ones(30, dtype=bool))
-    fewer = {name: getattr(a.matches, name)[10:] for name in ("image_ids", "n_people")}
-    keep = a.matches.image_rows >= 10
-    b = replace(a, matches=replace(
-        a.matches, **fewer, image_rows=a.matches.image_rows[keep] - 10,
-        is_true=a.matches.is_true[:, keep], is_false=a.matches.is_false[:, keep],
-    ))  # fmt: skip
-    of_a, of_b = resample([a, b], 20, seed=0)
-    assert (of_a == 1).all(axis=None) and (of_b == 1).all(axis=None)
+    # Images 0-9, all found, are drawn together, and so are 10-29, none found; b has only the latter.
+    a = found_or_not(annotated, detected, np.arange(30) < 10)
+    later = {name: getattr(a.matches, name)[10:] for name in ("image_ids", "n_people")}
+    none = {name: getattr(a.matches, name)[..., :0] for name in ("image_rows", "is_true", "is_false")}
+    b = replace(a, matches=replace(a.matches, **later, **none))
+    of_a, of_b = resample([a, b], 40, seed=0, clusters={i: i < 10 for i in range(30)})
+    assert set(of_a["AR"].round(3)) == {0, 0.333, 1}
+    assert np.array_equal(of_b["AR"].isna(), of_a["AR"].round(3) == 1) and (of_b["AR"].dropna() == 0).all()
 
 
 def test_the_seed_decides(scene):
