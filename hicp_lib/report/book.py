@@ -107,7 +107,8 @@ def _assemble(source: Path, folders: Folders) -> None:
 
 def _book_stamp(folders: Folders) -> dict:
     """The stamp of prose pages: made now, from results of runs that took this long together."""
-    stamps = [json.loads(path.read_text()) for path in folders.results.glob("*/provenance.json")]
+    results = Results(folders.results, folders.profile)
+    stamps = [results.stamp(name) for name in results.notebooks()]
     made = provenance.provenance({"profile": folders.profile})
     return made | {
         "onnx_providers": sorted({name for stamp in stamps for name in stamp["onnx_providers"]}),
