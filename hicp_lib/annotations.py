@@ -13,8 +13,8 @@ Both are checked where they enter. Conventions of this module, where formats in 
 
 from __future__ import annotations
 
-import json
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 
@@ -30,7 +30,7 @@ PERSON_CATEGORY = 1
 MAX_SIDE_PX = 100_000
 _UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")  # control characters, halves of characters
 _KNOWN_KEYS = {
-    "id", "image_id", "category_id", "bbox", "area", "iscrowd", "keypoints", "num_keypoints",
+    "id", "image_id", "category_id", "bbox", "area", "iscrowd", "keypoints", "num_keypoints", *PART_KEYS,
 }  # fmt: skip
 
 
@@ -135,7 +135,7 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo]) -> Annotations:
     visibility = np.maximum(triples[..., 2], 0.0)
     return Annotations(
         images, ids, image_ids, boxes, areas, _crowd_flags(rows),
-        np.where(visibility[..., None] > 0, triples[..., :2], np.nan), visibility, _extras(rows),
+        np.where(visibility[..., None] > 0, triples[..., :2], np.nan), visibility, rows.extras(_KNOWN_KEYS),
     )  # fmt: skip
 
 
@@ -154,17 +154,6 @@ def _crowd_flags(rows: Rows) -> np.ndarray:
         if not isinstance(flag, int | float) or flag not in (0, 1):
             raise rows.error(i, "iscrowd is neither 0 nor 1")
     return np.array(flags, dtype=bool)
-
-
-def _extras(rows: Rows) -> list[dict]:
-    known = _KNOWN_KEYS.union(PART_KEYS)
-    extras = [{key: value for key, value in row.items() if key not in known} for row in rows.rows]
-    for i, extra in enumerate(extras):
-        try:
-            json.dumps(extra, allow_nan=False)
-        except (ValueError, RecursionError):
-            raise rows.error(i, "a further key holds NaN, infinity or a value nested too deeply") from None
-    return extras
 
 
 def write_annotations(path: str | Path, annotations: Annotations) -> None:
@@ -209,7 +198,7 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     """
     rows = Rows.of(Path(path), "results", read_json(path), name_key="image_id")
     if not rows.rows:
-        raise InputError(f"{path}: holds no detections; run the detector again")
+        raise InputError(f"{path}: holds no detections; if nobody was found AP is 0, else write it again")
     image_ids, person_scores = rows.integers("image_id"), rows.numbers("score")
     _check_references(rows, image_ids, annotations and annotations.images)
     triples = rows.keypoints()
@@ -224,13 +213,22 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     return found
 
 
-def write_detections(path: str | Path, detections: dict[int, Detections]) -> None:
-    """Write detections as COCO keypoint results with 136 keypoints in Halpe's order."""
+def write_detections(
+    path: str | Path, detections: dict[int, Detections], extras: Mapping[int, list[dict]] | None = None
+) -> None:
+    """Write detections as COCO keypoint results with 136 keypoints in Halpe's order.
+
+    `extras` are further keys of each person's JSON object, by image id; readers pass over them.
+    """
     results = [
-        {"image_id": int(image_id), "category_id": PERSON_CATEGORY, "keypoints": keypoints, "score": score}
+        {
+            **extra, "image_id": int(image_id), "category_id": PERSON_CATEGORY,
+            "keypoints": keypoints, "score": score,
+        }
         for image_id, found in detections.items()
-        for keypoints, score in zip(
-            _triples(found.keypoints_px, found.scores), found.person_scores.tolist(), strict=True
+        for keypoints, score, extra in zip(
+            _triples(found.keypoints_px, found.scores), found.person_scores.tolist(),
+            extras[image_id] if extras is not None else [{}] * len(found), strict=True,
         )
-    ]
+    ]  # fmt: skip
     write_json(path, results)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import json
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -15,6 +16,7 @@ from hicp_lib.keypoints import N_KEYPOINTS, NAMES, TO_HALPE, to_halpe
 
 # Beyond any image and any detector's raw output, and small enough for squares and products.
 MAX_ABS = 1e9
+MAX_INTEGER = 2**53  # every JSON reader has them exact up to here
 _CONVENTIONS = {17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"}
 # COCO-WholeBody files spread their 133 keypoints over five keys, in this order.
 PART_KEYS = ("foot_kpts", "face_kpts", "lefthand_kpts", "righthand_kpts")
@@ -47,7 +49,7 @@ class Rows:
     def error(self, i: int, problem: str) -> InputError:
         """The error for row i."""
         name = self.rows[i].get(self.name_key)
-        named = f" ({self.name_key} {name})" if type(name) is int and abs(name) < 2**63 else ""
+        named = f" ({self.name_key} {name})" if type(name) is int and abs(name) <= MAX_INTEGER else ""
         return InputError(f"{self.path}: {self.label}[{i}]{named}: {problem}")
 
     def column(self, key: str) -> list:
@@ -61,7 +63,7 @@ class Rows:
         """Whole numbers, shape (n,), int64."""
         values = self.column(key)
         for i, value in enumerate(values):
-            if type(value) is not int or not -(2**63) <= value < 2**63:
+            if type(value) is not int or abs(value) > MAX_INTEGER:
                 raise self.error(i, f"{key} is {shown(value)}; expected a whole number")
         return np.array(values, dtype=np.int64)
 
@@ -109,6 +111,18 @@ class Rows:
                 triples = self._finite(lists, 3 * count, _keypoint_namer(convention), chosen)
                 result[chosen] = to_halpe(triples.reshape(-1, count, 3), convention, axis=-2, fill=0.0)
         return result
+
+    def extras(self, known: Collection[str]) -> list[dict]:
+        """Per row, the keys other than `known`; refused where JSON could not be written from them again."""
+        extras = [{key: value for key, value in row.items() if key not in known} for row in self.rows]
+        for i, extra in enumerate(extras):
+            try:
+                json.dumps(extra, allow_nan=False)
+            except (ValueError, RecursionError):
+                raise self.error(
+                    i, "a further key holds NaN, infinity or a value nested too deeply"
+                ) from None
+        return extras
 
     def _one_list(self, i: int, value: Any) -> list:
         if not isinstance(value, list):
