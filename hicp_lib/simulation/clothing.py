@@ -121,17 +121,39 @@ def put_on(garment: Garment, posed: PosedBody, rest_m: np.ndarray, folds: np.nda
     cut, body = pattern.cut, load_body()
     skin, skin_normals = cut.apply(posed.vertices_m), g.unit(cut.apply(posed.normals))
     rest = cut.apply(rest_m.astype(np.float32))
+    if garment.kind == "shoe":
+        cloth = _shoe(garment, pattern, posed, skin)
+    else:
+        cloth = _drape(garment, pattern, skin, skin_normals, rest, folds)
+    normals = g.vertex_normals(cloth, cut.triangles)
+    coords = np.column_stack([rest, *(cut.apply(body.field(f)) for f in ("arm", "leg", "torso")), pattern.distance])
+    return _with_rim(pattern, g.Mesh(cloth, cut.triangles, normals, coords.astype(np.float32)), skin)
+
+
+def _drape(garment: Garment, pattern: Pattern, skin, skin_normals, rest, folds) -> np.ndarray:
+    body = load_body()
     away = garment.thickness_m + garment.ease_m * np.exp(-pattern.distance / 0.25)
+    torso = pattern.cut.apply(body.field("torso"))
+    if garment.kind == "top":  # over whatever is worn below
+        away = away + 0.007 * np.clip((0.3 - torso) / 0.1, 0, 1)
+    else:  # a waistband is tight
+        away = np.where(torso > 0, np.minimum(away, garment.thickness_m), away)
     cloth = _smooth(skin, pattern.neighbours, garment.smoothing)
     cloth = _keep_away(cloth, skin, skin_normals, away)
     heights = sum(h * np.sin(rest @ np.array([x, y, z], np.float32) + p) for x, y, z, p, h in folds)
     cloth = cloth + (heights * np.minimum(away / 0.01, 1.5))[:, None] * skin_normals
-    cloth = _keep_away(_smooth(cloth, pattern.neighbours, 1), skin, skin_normals, np.full(len(skin), 0.003))
-    if garment.kind == "shoe":
-        cloth = _sole(cloth, posed)
-    normals = g.vertex_normals(cloth, cut.triangles)
-    coords = np.column_stack([rest, *(cut.apply(body.field(f)) for f in ("arm", "leg", "torso")), pattern.distance])
-    return _with_rim(pattern, g.Mesh(cloth, cut.triangles, normals, coords.astype(np.float32)), skin)
+    return _keep_away(_smooth(cloth, pattern.neighbours, 1), skin, skin_normals, 0.6 * away)
+
+
+def _shoe(garment: Garment, pattern: Pattern, posed: PosedBody, skin: np.ndarray) -> np.ndarray:
+    """A shoe hides the toes: the foot smoothed, inflated, and flattened where it meets the floor."""
+    cloth = _smooth(skin, pattern.neighbours, garment.smoothing)
+    normals = g.vertex_normals(cloth, pattern.cut.triangles)
+    leg = pattern.cut.apply(load_body().field("leg"))
+    away = garment.thickness_m + 0.008 * np.clip((leg - 2.2) / 0.4, 0, 1)
+    cloth = cloth + away[:, None] * normals
+    cloth[:, 2] = np.maximum(cloth[:, 2], posed.vertices_m[:, 2].min() + 0.001)
+    return cloth.astype(np.float32)
 
 
 def _smooth(points: np.ndarray, neighbours: np.ndarray, steps: int) -> np.ndarray:
@@ -143,13 +165,6 @@ def _smooth(points: np.ndarray, neighbours: np.ndarray, steps: int) -> np.ndarra
 def _keep_away(cloth: np.ndarray, skin: np.ndarray, normals: np.ndarray, away: np.ndarray) -> np.ndarray:
     distance = np.einsum("ij,ij->i", cloth - skin, normals)
     return (cloth + np.maximum(away - distance, 0)[:, None] * normals).astype(np.float32)
-
-
-def _sole(shoe: np.ndarray, posed: PosedBody) -> np.ndarray:
-    """Flatten what would go through the floor a person stands on."""
-    floor = posed.vertices_m[:, 2].min()
-    shoe[:, 2] = np.maximum(shoe[:, 2], floor + 0.001)
-    return shoe
 
 
 def _with_rim(pattern: Pattern, mesh: g.Mesh, skin: np.ndarray) -> tuple[g.Mesh, np.ndarray]:

@@ -41,9 +41,20 @@ def make_cuts(landmarks_m: np.ndarray) -> Cuts:
     return Cuts(np.array(starts), axes, fronts, np.array([0.15, 0.06, 0.06, 0.085, 0.085]))
 
 
-def flat_coordinates(cuts: Cuts, rest: np.ndarray, panel: np.ndarray) -> np.ndarray:
-    """Metres around and along each panel, (2, n), for rest positions (3, n)."""
-    uv = np.empty((2, rest.shape[1]), np.float32)
+def flat_coordinates(cuts: Cuts, coords: np.ndarray, limbs: str) -> tuple[np.ndarray, np.ndarray]:
+    """Metres around and along each panel, (2, n), and the panel (n,), for a garment's coords (7, n).
+
+    `limbs` is "arms" for tops, whose sleeves begin where the `arm` field does, "legs" for
+    trousers, whose halves meet in the middle, "" for skirts.
+    """
+    rest, arm = coords[:3], coords[3]
+    left = rest[1] > 0
+    panel = np.zeros(len(arm), np.int8)
+    if limbs == "arms":
+        panel = np.where(arm > 0.07, np.where(left, 1, 2), 0)
+    elif limbs == "legs":
+        panel = np.where(left, 3, 4)
+    uv = np.empty((2, len(arm)), np.float32)
     for number in range(len(cuts.axes)):
         rows = np.flatnonzero(panel == number)
         if len(rows) == 0:
@@ -51,9 +62,16 @@ def flat_coordinates(cuts: Cuts, rest: np.ndarray, panel: np.ndarray) -> np.ndar
         local = rest[:, rows] - np.float32(cuts.origins_m[number])[:, None]
         axis, front = np.float32(cuts.axes[number]), np.float32(cuts.fronts[number])
         side = np.cross(axis, front).astype(np.float32)
-        around = np.arctan2(side @ local, front @ local)
-        uv[0, rows], uv[1, rows] = around * np.float32(cuts.radii_m[number]), axis @ local
-    return uv
+        around = np.arctan2(side @ local, front @ local) * np.float32(cuts.radii_m[number])
+        along = axis @ local
+        if number == 0:  # a shirt is flat above the chest, a tube below it
+            chest = np.clip((coords[5, rows] - 0.55) / 0.3, 0, 1)
+            x, y = local[0], local[1]
+            flat = np.where(x > 0, y, np.sign(y) * (np.pi * cuts.radii_m[0] - np.abs(y)))
+            around = around + chest * (flat - around)
+            along = along - 0.6 * chest * np.abs(x)
+        uv[0, rows], uv[1, rows] = around, along
+    return uv, panel
 
 
 Weights = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -115,7 +133,7 @@ def printed(rng: Rng, colours: np.ndarray) -> Weights:
     number, size = int(rng.integers(24)), rng.uniform(0.7, 1.1)
 
     def weights(uv: np.ndarray, footprint: np.ndarray) -> np.ndarray:
-        place = np.stack([0.15 - uv[0] / size, 0.15 - (uv[1] - 0.34) / size])
+        place = np.stack([0.15 + uv[0] / size, 0.15 - (uv[1] - 0.34) / size])
         found = textures.prints(number).sample(place, footprint / size)
         inside = (np.abs(place - 0.15) < 0.15).all(axis=0)
         return found * inside
@@ -167,14 +185,14 @@ class Trim:
     line: str = "none"
 
 
-def cloth_material(fabric: Fabric, cuts: Cuts, panels: np.ndarray, trim: Trim) -> Material:
-    """The look of a garment whose mesh has `clothing.put_on`'s coords; `panels` per triangle."""
+def cloth_material(fabric: Fabric, cuts: Cuts, limbs: str, trim: Trim) -> Material:
+    """The look of a garment whose mesh has `clothing.put_on`'s coords; `limbs` as in `flat_coordinates`."""
     base = np.float32(fabric.colours[0])[:, None]
     extra = (np.float32(fabric.colours[1:3]) - np.float32(fabric.colours[:1])).T
 
     def look(hits: Hits) -> Look:
         rest, distance = hits.coords[:3], hits.coords[6]
-        uv = flat_coordinates(cuts, rest, panels[hits.triangles])
+        uv, panel = flat_coordinates(cuts, hits.coords, limbs)
         albedo = np.repeat(base, uv.shape[1], axis=1)
         if fabric.pattern is not None:
             albedo += extra @ fabric.pattern(uv, hits.footprint_m)[:2]
@@ -182,7 +200,7 @@ def cloth_material(fabric: Fabric, cuts: Cuts, panels: np.ndarray, trim: Trim) -
         soft, creased = textures.wrinkles().sample(uv, hits.footprint_m)
         height = fabric.crease_m * (0.55 * soft + 0.30 * creased)
         albedo *= (1 + 0.10 * weave * (fabric.weave_m > 0) + 0.04 * soft)
-        height, albedo = _sew(trim, distance, rest, panels[hits.triangles], height, albedo)
+        height, albedo = _sew(trim, distance, rest, panel, height, albedo)
         height += fabric.weave_m * weave * (hits.footprint_m < 0.002)
         return Look(np.clip(albedo, 0.002, 0.95), height, fabric.gloss, fabric.roughness, fabric.fuzz)
 
@@ -205,6 +223,6 @@ def _sew(trim: Trim, distance, rest, panel, height, albedo) -> tuple[np.ndarray,
         albedo = np.where(front & (across < 0.004), 0.25, albedo)
     else:
         along = np.mod(rest[2], 0.085) - 0.04
-        button = front & (rest[1] ** 2 + along**2 < 0.0055**2)
+        button = front & (rest[1] ** 2 + along**2 < 0.0042**2)
         albedo = np.where(button, 0.55 * albedo + 0.25, albedo)
     return height.astype(np.float32), albedo.astype(np.float32)

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from hicp_lib.simulation import mesh as g
 from hicp_lib.simulation import textures
-from hicp_lib.simulation.body import Body, PosedBody
+from hicp_lib.simulation.body import REGIONS, Body, PosedBody
 from hicp_lib.simulation.surfaces import Hits, Look, Material
 
 
@@ -33,6 +34,7 @@ class Style:
     tie : "", "tail" or "bun": gathered at the back of the head
     n_locks, n_steps : how many locks of how many pieces
     width_m : width of a lock
+    coil_m : radius of curls
     """
 
     top_m: float
@@ -47,6 +49,7 @@ class Style:
     n_locks: int = 1400
     n_steps: int = 6
     width_m: float = 0.006
+    coil_m: float = 0.0
 
 
 def random_style(rng: np.random.Generator, woman: bool, age: float) -> Style | None:
@@ -57,80 +60,129 @@ def random_style(rng: np.random.Generator, woman: bool, age: float) -> Style | N
     else:
         odds = [0.42, 0.2, 0.16, 0.08, 0.14] if age < 50 else [0.4, 0.05, 0.25, 0.05, 0.25]
         kind = rng.choice(["side", "quiff", "crop", "curly", "bald"], p=odds)
-    wave = rng.uniform(0.04, 0.22)
+    wave = rng.uniform(0.0, 0.10)
     if kind == "bald":
         return None
     if kind == "long":
         length = rng.uniform(0.30, 0.48)
-        return Style(length, length * 0.9, 0.15, (-0.35, 0, -0.35), 0.35, wave, 0.014, parting, "", 1500, 13, 0.008)
+        return Style(length, length * 0.95, 0.10, (-0.5, 0, -0.3), 0.4, wave, 0.016, parting, "", 1000, 13, 0.017)
     if kind == "bob":
-        length = rng.uniform(0.16, 0.24)
-        return Style(length, length * 0.8, 0.2, (-0.2, 0, -0.4), 0.35, wave, 0.016, parting, "", 1500, 9, 0.008)
+        length = rng.uniform(0.17, 0.25)
+        return Style(length, length * 0.85, 0.12, (-0.3, 0, -0.4), 0.4, wave, 0.018, parting, "", 1000, 9, 0.016)
     if kind in ("tail", "bun"):
-        return Style(0.3, 0.3, 0.05, (-1, 0, 0.1), 0.0, 0.03, 0.006, 0, kind, 1300, 9, 0.006)
+        return Style(0.3, 0.3, 0.05, (-1, 0, 0.1), 0.0, 0.01, 0.006, 0, kind, 800, 8, 0.012)
     if kind == "short":
-        return Style(0.09, 0.06, 0.3, (0.1, 0, -0.4), 0.2, wave, 0.016, parting, "", 1800, 6, 0.006)
+        return Style(0.10, 0.07, 0.15, (0.1, 0, -0.5), 0.2, wave, 0.018, parting, "", 1200, 6, 0.012)
     if kind == "curly":
-        return Style(0.07, 0.05, 0.8, (0, 0, 0), 0.05, 0.75, 0.035, 0, "", 2200, 6, 0.006)
+        return Style(0.07, 0.05, 0.5, (0, 0, -0.3), 0.1, 0.1, 0.03, 0, "", 1500, 8, 0.009, 0.007)
     if kind == "side":
-        length = rng.uniform(0.04, 0.075)
-        return Style(length, rng.uniform(0.01, 0.025), 0.35, (0.35, 0, -0.2), 0.08, wave, 0.012, parting, "", 2200, 4, 0.005)
+        length = rng.uniform(0.045, 0.08)
+        return Style(length, rng.uniform(0.012, 0.025), 0.18, (0.45, 0, -0.2), 0.05, wave, 0.014, parting, "", 1500, 4, 0.010)
     if kind == "quiff":
-        return Style(rng.uniform(0.04, 0.07), 0.012, 0.8, (-0.1, 0, 0.25), 0.0, wave, 0.03, 0, "", 2200, 4, 0.005)
-    return Style(rng.uniform(0.008, 0.016), 0.007, 0.7, (0.2, 0, -0.1), 0.0, 0.1, 0.014, 0, "", 2400, 2, 0.004)
+        return Style(rng.uniform(0.035, 0.06), 0.012, 0.45, (-0.5, 0, 0.3), 0.0, wave, 0.024, 0, "", 1500, 4, 0.009)
+    return Style(rng.uniform(0.010, 0.018), 0.009, 0.3, (0.3, 0, -0.1), 0.0, 0.05, 0.010, 0, "", 1900, 2, 0.007)
 
 
 @dataclass(frozen=True)
-class Head:
-    """What hair must know of the head at rest: its middle, and its radius by direction."""
+class Obstacles:
+    """What hair lies on, at rest: head and neck by direction from the head's middle, the trunk by columns.
+
+    `radius_m` has rows of rising and columns of turning direction; `back_m` and `front_m` are
+    the trunk's extent along x over a grid of y and z that starts at `corner_m` in steps of `_CELL_M`.
+    """
 
     centre_m: np.ndarray
-    radius_m: np.ndarray  # (n_rise, n_azimuth)
+    radius_m: np.ndarray
+    corner_m: np.ndarray
+    back_m: np.ndarray
+    front_m: np.ndarray
 
 
 _GRID = (36, 72)
+_CELL_M = 0.02
+_CLOTH_M = 0.018
 
 
-def measure_head(rest_m: np.ndarray, landmarks_m: np.ndarray) -> Head:
-    """Radii of everything within reach of hair, seen from the middle of the head."""
+def measure(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> Obstacles:
+    """Head, neck and trunk of a body at rest."""
     ears, top = landmarks_m[3:5].mean(axis=0), landmarks_m[17]
     centre = np.array([ears[0] + 0.005, 0.0, 0.5 * (ears[2] + top[2]) - 0.015])
-    offset = rest_m - centre
-    distance = np.linalg.norm(offset, axis=1)
-    near = (distance < 0.55) & (offset[:, 2] > -0.5)
-    row, column = _cell(offset[near])
+    trunk = body.regions <= REGIONS.index("torso")
+    corner, back, front = _columns(rest_m[trunk & (rest_m[:, 2] > centre[2] - 0.75)])
+    head = rest_m[np.isin(body.regions, [REGIONS.index(n) for n in ("face", "scalp", "neck", "eyebrow")])]
+    return Obstacles(centre, _radii(head - centre), corner, back, front)
+
+
+def _radii(offset: np.ndarray) -> np.ndarray:
+    row, column = (x.astype(int) for x in _place(offset))
     radius = np.zeros(_GRID)
-    np.maximum.at(radius, (row, column), distance[near])
+    np.maximum.at(radius, (np.clip(row, 0, _GRID[0] - 1), column % _GRID[1]), np.linalg.norm(offset, axis=1))
     for _ in range(12):  # directions no vertex lies in take their neighbours'
-        around = [np.roll(radius, s, axis=1) for s in (-1, 1)] + [_shifted(radius, s) for s in (-1, 1)]
+        padded = np.pad(radius, ((1, 1), (0, 0)), mode="edge")
+        around = [np.roll(radius, s, axis=1) for s in (-1, 1)] + [padded[2:], padded[:-2]]
         radius = np.where(radius == 0, np.max(around, axis=0), radius)
-    return Head(centre, radius)
+    padded = np.pad(np.pad(radius, ((2, 2), (0, 0)), mode="edge"), ((0, 0), (6, 6)), mode="wrap")
+    return np.maximum(cv2.GaussianBlur(padded, (0, 0), 0.8)[2:-2, 6:-6], radius * 0.98)
 
 
-def _shifted(grid: np.ndarray, step: int) -> np.ndarray:
-    return np.concatenate([grid[1:], grid[-1:]]) if step > 0 else np.concatenate([grid[:1], grid[:-1]])
+def _columns(trunk_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    corner = trunk_m[:, 1:].min(axis=0)
+    cells = ((trunk_m[:, 1:] - corner) / _CELL_M).astype(int)
+    shape = tuple(cells.max(axis=0) + 1)
+    back, front = np.full(shape, np.inf), np.full(shape, -np.inf)
+    np.minimum.at(back, tuple(cells.T), trunk_m[:, 0])
+    np.maximum.at(front, tuple(cells.T), trunk_m[:, 0])
+    kernel = np.ones((3, 3))
+    return corner, cv2.erode(back, kernel), cv2.dilate(front, kernel)
 
 
-def _cell(offset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _place(offset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Row and column in the grid of directions, fractional."""
     rise = np.arctan2(offset[..., 2], np.hypot(offset[..., 0], offset[..., 1]))
     azimuth = np.arctan2(offset[..., 1], offset[..., 0])
-    row = np.clip(((rise / np.pi + 0.5) * _GRID[0]).astype(int), 0, _GRID[0] - 1)
-    return row, np.clip(((azimuth / (2 * np.pi) + 0.5) * _GRID[1]).astype(int), 0, _GRID[1] - 1)
+    return (rise / np.pi + 0.5) * _GRID[0], (azimuth / (2 * np.pi) + 0.5) * _GRID[1]
+
+
+def _radius(obstacles: Obstacles, offset: np.ndarray) -> np.ndarray:
+    """Bilinear between the middles of cells."""
+    row, column = _place(offset)
+    row, column = np.clip(row - 0.5, 0, _GRID[0] - 1.001), np.mod(column - 0.5, _GRID[1])
+    r, c = row.astype(int), column.astype(int)
+    fr, fc, right = row - r, column - c, (c + 1) % _GRID[1]
+    c = c % _GRID[1]
+    radius = obstacles.radius_m
+    low = radius[r, c] * (1 - fc) + radius[r, right] * fc
+    high = radius[r + 1, c] * (1 - fc) + radius[r + 1, right] * fc
+    return low * (1 - fr) + high * fr
+
+
+def _keep_off(obstacles: Obstacles, points: np.ndarray, layer: np.ndarray) -> np.ndarray:
+    """Push points out of the head, away from its middle, and out of the trunk, to its front or back."""
+    offset = points - obstacles.centre_m
+    distance = np.linalg.norm(offset, axis=1)
+    wanted = _radius(obstacles, offset) + layer
+    scale = np.where(distance < wanted, wanted / np.maximum(distance, 1e-3), 1)
+    points = obstacles.centre_m + offset * scale[:, None]
+    cell = ((points[:, 1:] - obstacles.corner_m) / _CELL_M).astype(int)
+    shape = obstacles.back_m.shape
+    within = ((cell >= 0) & (cell < shape)).all(axis=1)
+    cell = np.clip(cell, 0, np.array(shape) - 1)
+    back, front = obstacles.back_m[tuple(cell.T)] - _CLOTH_M - layer, obstacles.front_m[tuple(cell.T)] + _CLOTH_M + layer
+    x = points[:, 0]
+    inside = within & (x > back) & (x < front)
+    points[:, 0] = np.where(inside, np.where(x < 0.45 * back + 0.55 * front, back, front), x)
+    return points
 
 
 def grow(style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, rng: np.random.Generator) -> g.Mesh:
     """Hair on the body at rest; coords are (across -1..1, length along in metres, random per lock, lying depth)."""
-    head = measure_head(rest_m, landmarks_m)
+    head = measure(body, rest_m, landmarks_m)
     roots, normals, inside = _roots(style, body, rest_m, rng)
     points, reach = _strands(style, head, roots, normals, inside, rng)
     if style.tie:
         tied, tied_reach = _tail(style, head, rng)
-        points, reach = _pad(points, tied), np.concatenate([reach, tied_reach])
+        points, reach = np.concatenate([points, tied]), np.concatenate([reach, tied_reach])
     return _ribbons(style, head, points, reach, rng)
-
-
-def _pad(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.concatenate([a, b], axis=0)
 
 
 def _roots(style: Style, body: Body, rest_m: np.ndarray, rng: np.random.Generator):
@@ -147,38 +199,61 @@ def _roots(style: Style, body: Body, rest_m: np.ndarray, rng: np.random.Generato
     return roots, g.unit(np.einsum("nk,nkj->nj", weights, normals)), inside
 
 
-def _strands(style: Style, head: Head, roots, normals, inside, rng) -> tuple[np.ndarray, np.ndarray]:
+def _strands(style: Style, head: Obstacles, roots, normals, inside, rng) -> tuple[np.ndarray, np.ndarray]:
     """Points along the locks, (n, n_steps + 1, 3), and each lock's length."""
     n = len(roots)
     relative = roots - head.centre_m
     crown = np.clip((relative[:, 2] + 0.02) / 0.09, 0, 1)
     length = style.side_m + (style.top_m - style.side_m) * crown
     length = length * rng.uniform(0.75, 1.1, n) * np.clip(0.35 + inside / 0.012, 0.35, 1)
-    layer = style.volume_m * rng.random(n) ** 1.5 * np.clip(inside / 0.02, 0.1, 1) + 0.0015
+    layer = style.volume_m * rng.random(n) * np.clip(inside / 0.02, 0.1, 1) + 0.001
+    if style.tie:
+        length = 1.25 * np.linalg.norm(_tie_point(style, head) - roots, axis=1)
     comb = _combing(style, head, roots, normals)
-    clump = rng.normal(0, 1, (n, 3))
-    direction = g.unit(style.lift * normals + (1 - style.lift) * comb + 0.15 * clump)
+    wave = _smooth_random(rng, roots)
+    direction = g.unit(style.lift * normals + (1 - style.lift) * comb + 0.04 * rng.normal(0, 1, (n, 3)))
     step = (length / style.n_steps)[:, None]
     points = [roots - 0.001 * normals]
     for k in range(style.n_steps):
-        wander = rng.normal(0, 1, (n, 3)) * style.curl + 0.5 * style.curl * clump * np.sin(2.2 * k + clump[:, :1] * 3)
+        wander = style.curl * (1.5 * np.roll(wave, k, axis=1) * (-1) ** (k // 2) + 0.6 * rng.normal(0, 1, (n, 3)))
         pull = np.array([0, 0, -style.gravity])
-        direction = g.unit(direction + 0.5 * (1 - style.lift) * comb + pull + wander)
-        points.append(_keep_off(head, points[-1] + step * direction, layer))
-        direction = g.unit(points[-1] - points[-2])
-        if not style.tie:
-            comb = comb * 0.75
+        direction = g.unit(direction + 0.6 * comb + pull + wander)
+        here = points[-1]
+        if style.tie:
+            left = _tie_point(style, head) - here
+            comb, step = g.unit(left), np.minimum(step, np.linalg.norm(left, axis=1)[:, None])
         else:
-            comb = g.unit(_tie_point(style, head) - points[-1])
-    return np.stack(points, axis=1), length
+            comb = comb * 0.7
+        points.append(_keep_off(head, here + step * direction, layer))
+        direction = g.unit(points[-1] - here)
+    return _coil(style, np.stack(points, axis=1), rng), length
 
 
-def _tie_point(style: Style, head: Head) -> np.ndarray:
+def _coil(style: Style, points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Wind locks around themselves, the more the curlier."""
+    if style.coil_m == 0:
+        return points
+    n, k, _ = points.shape
+    turn = rng.uniform(0, 2 * np.pi, (n, 1)) + np.arange(k) * rng.uniform(1.3, 2.0, (n, 1)) * rng.choice([-1, 1], (n, 1))
+    axes = rng.normal(0, 1, (2, n, 1, 3))
+    axes = axes / np.linalg.norm(axes, axis=-1, keepdims=True)
+    grow = np.minimum(np.arange(k) / 2, 1)[:, None] * style.coil_m
+    return points + grow * (np.cos(turn)[..., None] * axes[0] + np.sin(turn)[..., None] * axes[1])
+
+
+def _smooth_random(rng: np.random.Generator, roots: np.ndarray) -> np.ndarray:
+    """Random vectors (n, 3) that neighbouring locks share."""
+    waves = rng.normal(0, 60, (3, 3, 3))
+    phase = rng.uniform(0, 2 * np.pi, (3, 3))
+    return np.sin(np.einsum("nj,kwj->nkw", roots, waves) + phase).mean(axis=2)
+
+
+def _tie_point(style: Style, head: Obstacles) -> np.ndarray:
     height = 0.03 if style.tie == "tail" else 0.0
     return head.centre_m + np.array([-0.105, 0, height])
 
 
-def _combing(style: Style, head: Head, roots, normals) -> np.ndarray:
+def _combing(style: Style, head: Obstacles, roots, normals) -> np.ndarray:
     if style.tie:
         comb = _tie_point(style, head) - roots
     else:
@@ -191,17 +266,7 @@ def _combing(style: Style, head: Head, roots, normals) -> np.ndarray:
     return g.unit(comb)
 
 
-def _keep_off(head: Head, points: np.ndarray, layer: np.ndarray) -> np.ndarray:
-    offset = points - head.centre_m
-    distance = np.linalg.norm(offset, axis=1)
-    wanted = head.radius_m[_cell(offset)] + layer
-    # Below the head only shoulders and back are in the way, and cloth lies on them.
-    wanted = wanted + np.where(offset[:, 2] < -0.2, 0.015, 0)
-    scale = np.where((distance < wanted) & (distance > 0.02), wanted / np.maximum(distance, 1e-6), 1)
-    return head.centre_m + offset * scale[:, None]
-
-
-def _tail(style: Style, head: Head, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _tail(style: Style, head: Obstacles, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Locks of a ponytail or a bun, from the point where the hair is tied."""
     n = 260
     origin = _tie_point(style, head)
@@ -226,7 +291,7 @@ def _tail(style: Style, head: Head, rng: np.random.Generator) -> tuple[np.ndarra
     return origin + np.array([-0.018, 0, 0]) + ring * scale, np.full(n, 0.08)
 
 
-def _ribbons(style: Style, head: Head, points: np.ndarray, length: np.ndarray, rng) -> g.Mesh:
+def _ribbons(style: Style, head: Obstacles, points: np.ndarray, length: np.ndarray, rng) -> g.Mesh:
     n, k, _ = points.shape
     along = np.gradient(points, axis=1)
     outward = g.unit(points - head.centre_m)
@@ -235,13 +300,13 @@ def _ribbons(style: Style, head: Head, points: np.ndarray, length: np.ndarray, r
     outward = g.unit(outward)
     side = g.unit(np.cross(along, outward))
     outward = g.unit(np.cross(side, along))
-    twist = rng.normal(0, 0.25, (n, 1, 1))
+    twist = rng.normal(0, 0.12, (n, 1, 1))
     side, outward = side + twist * outward, outward - twist * side
     t = np.linspace(0, 1, k)
     width = style.width_m * rng.uniform(0.5, 1.2, (n, 1)) * (1 - 0.75 * t**2)
     half = 0.5 * width[..., None] * side
     vertices = np.stack([points - half, points + half], axis=2)
-    normals = g.unit(np.stack([outward - 0.55 * side, outward + 0.55 * side], axis=2))
+    normals = g.unit(np.stack([outward - 0.35 * side, outward + 0.35 * side], axis=2))
     coords = np.empty((n, k, 2, 4), np.float32)
     coords[..., 0] = [-1, 1]
     coords[..., 1] = (t * length[:, None])[..., None]
@@ -274,10 +339,10 @@ def hair_material(colour: np.ndarray) -> Material:
 
     def look(hits: Hits) -> Look:
         across, along, lock, t = hits.coords
-        uv = np.stack([across * 0.003 + lock * 7.3, along + lock * 3.1])
+        uv = np.stack([across * 0.007 + lock * 7.3, along + lock * 3.1])
         strand = textures.strands().sample(uv, hits.footprint_m * 0.5)[0]
-        shade = (0.72 + 0.5 * lock) * (1 + 0.28 * strand) * (0.62 + 0.45 * np.minimum(3 * t, 1))
+        shade = (0.8 + 0.35 * lock) * (1 + 0.35 * strand) * (0.7 + 0.35 * np.minimum(3 * t, 1))
         albedo = colour * np.clip(shade, 0.15, 2) + 0.004
-        return Look(np.minimum(albedo, 0.9), gloss=0.06 + 0.02 * strand, roughness=0.38, softness=0.5)
+        return Look(np.minimum(albedo, 0.9), gloss=0.022 + 0.015 * strand, roughness=0.42, softness=0.5)
 
     return look

@@ -166,10 +166,10 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
     part = part_of_vertices(body)[body.triangles[:, 0]]
     cuts = fabrics.make_cuts(landmarks)
     surfaces, hidden = [], np.zeros(len(body.triangles), bool)
-    for worn in appearance.worn:
+    for worn in sorted(appearance.worn, key=lambda w: w.garment.kind):  # trousers before shoes before tops
         mesh, source = clothing.put_on(worn.garment, posed, rest, worn.folds)
         hidden |= clothing.cut_pattern(worn.garment).hidden
-        material = fabrics.cloth_material(worn.fabric, cuts, _panel_of_part(part[source]), worn.trim)
+        material = fabrics.cloth_material(worn.fabric, cuts, _LIMBS[worn.garment.kind], worn.trim)
         surfaces.append(Surface(mesh, material, person, part[source]))
         if worn.collar:
             surfaces.append(_collar(worn, mesh, posed, cuts, person))
@@ -191,25 +191,19 @@ def _skin(appearance, body, posed, rest, landmarks, shown, part, person) -> list
     return [Surface(mesh, material, person, part[shown])]
 
 
-def _panel_of_part(part: np.ndarray) -> np.ndarray:
-    panels = np.zeros(N_PARTS, np.int8)
-    for name, panel in (("upper_arm", 1), ("forearm", 1), ("hand", 1), ("thigh", 3), ("shin", 3), ("foot", 3), ("nail", 3)):
-        panels[REGIONS.index(name)], panels[REGIONS.index(name) + RIGHT] = panel, panel + 1
-    return panels[part]
+_LIMBS = {"top": "arms", "bottom": "legs", "shoe": "legs"}
 
 
 def _collar(worn: Worn, mesh: g.Mesh, posed: PosedBody, cuts: fabrics.Cuts, person: int) -> Surface:
-    strip = clothing.collar(worn.garment, mesh, posed, 0.026, 0.02)
-    panels = np.zeros(len(strip.triangles), np.int8)
-    material = fabrics.cloth_material(worn.fabric, cuts, panels, fabrics.Trim(0.0))
+    strip = clothing.collar(worn.garment, mesh, posed, 0.022, 0.02)
+    material = fabrics.cloth_material(worn.fabric, cuts, "arms", fabrics.Trim(0.0))
     return Surface(strip, material, person, np.full(len(strip.triangles), REGIONS.index("neck"), np.int16))
 
 
 def _skirt(skirt: tuple, body: Body, posed: PosedBody, cuts: fabrics.Cuts, person: int) -> Surface:
     length, flare, phase, fabric = skirt
     mesh = clothing.skirt(posed, posed.rotations[body.bone_names.index("root")], length, flare, phase)
-    panels = np.zeros(len(mesh.triangles), np.int8)
-    material = fabrics.cloth_material(fabric, cuts, panels, fabrics.Trim(0.02, 0.95))
+    material = fabrics.cloth_material(fabric, cuts, "", fabrics.Trim(0.02, 0.95))
     return Surface(mesh, material, person, np.full(len(mesh.triangles), REGIONS.index("hips"), np.int16))
 
 

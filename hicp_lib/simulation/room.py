@@ -11,7 +11,7 @@ import numpy as np
 
 from hicp_lib.simulation import materials as m
 from hicp_lib.simulation import mesh as g
-from hicp_lib.simulation import textures
+from hicp_lib.simulation.body import REGIONS, PosedBody, load_body
 from hicp_lib.simulation.surfaces import Surface
 
 Rng = np.random.Generator
@@ -337,4 +337,21 @@ def _cupboard(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
     return [Surface(_turned([body, *doors], yaw, place), material)]
 
 
-__all__ = ["Room", "make_room", "textures"]
+def stool(rng: Rng, posed: PosedBody) -> Surface:
+    """Something to sit on, right under a sitting person."""
+    body = load_body()
+    seat = posed.vertices_m[np.isin(body.regions, [REGIONS.index("hips"), REGIONS.index("torso"), REGIONS.index("thigh")])]
+    x, y = posed.keypoints_m[19, :2]
+    near = np.hypot(seat[:, 0] - x, seat[:, 1] - y) < 0.2
+    top = float(seat[near, 2].min()) - 0.004
+    r = rng.uniform(0.17, 0.21)
+    if rng.random() < 0.5:
+        mesh = g.box([x - r, y - r, 0], [x + r, y + r, top], rng.uniform(0, 3))
+    else:
+        mesh = g.lathe([[r * 0.8, 0], [0.05, 0.05], [0.05, top - 0.06], [r, top - 0.05], [r, top], [0, top]], [x, y, 0])
+    return Surface(mesh, wood_or_paint(rng))
+
+
+def wood_or_paint(rng: Rng) -> m.Material:
+    """Furniture is wood, or painted."""
+    return m.wooden(rng) if rng.random() < 0.5 else m.plain(m.any_colour(rng), 0.4)

@@ -25,7 +25,7 @@ def visibility(
 ) -> np.ndarray:
     """Visible share of each light and (last) of the surroundings, (n_lights + 1, n) in [0, 1]."""
     v, u = np.mgrid[: shape[0] : 2, : shape[1] : 2]
-    coarse = _sampled(sources, scene, trace, looks, v * shape[1] + u, 2, 2, shape[1], rng)
+    coarse = _sampled(sources, scene, trace, looks, v * shape[1] + u, 2, 3, shape[1], rng)
     seen = _enlarge(coarse, trace, shape)
     rows, columns = (np.flatnonzero(is_person.reshape(shape).any(axis=axis)) for axis in (1, 0))
     if len(rows):

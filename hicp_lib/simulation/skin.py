@@ -129,9 +129,9 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
         c = dict(zip(COORDS, hits.coords, strict=True))
         uv = np.stack([c["y"] + 0.5 * c["x"], c["z"] + 0.3 * c["x"]])
         blotches, pores, freckles = textures.skin().sample(uv, hits.footprint_m)
-        flush = np.clip(c["flush"] * (1 + 0.4 * blotches) + 0.12 * blotches, -0.3, 1) * (1 - 0.4 * complexion.tone)
+        flush = np.clip(c["flush"] * (1 + 0.25 * blotches) + 0.07 * blotches, -0.2, 1) * (1 - 0.4 * complexion.tone)
         albedo = _mix(tone, red, flush)
-        albedo *= 1 + 0.035 * blotches + 0.03 * pores
+        albedo *= 1 + 0.02 * blotches + 0.025 * pores
         albedo *= 1 - 0.35 * complexion.freckles * freckles * np.clip(2 * c["flush"], 0, 1)
         albedo *= 1 - 0.10 * _step(c["eyelid"], 0.4, 0.9)
         gloss, roughness = 0.035 + 0.01 * pores, np.full(len(uv[0]), 0.46, np.float32)

@@ -13,7 +13,7 @@ from hicp_lib.simulation.materials import hsv
 from hicp_lib.simulation.people import dress, random_appearance
 from hicp_lib.simulation.poses import sample_pose
 from hicp_lib.simulation.render import World
-from hicp_lib.simulation.room import Room, make_room
+from hicp_lib.simulation.room import Room, make_room, stool
 from hicp_lib.simulation.sensor import Sensor
 from hicp_lib.simulation.surfaces import Surface
 
@@ -68,8 +68,18 @@ def _person(rng: Rng, place: tuple[float, float], number: int) -> tuple[PosedBod
     T_world_body = np.eye(4)
     T_world_body[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
     T_world_body[:2, 3] = place
-    posed = pose_body(load_body(), appearance.shape, sample_pose(rng), T_world_body)
-    return posed, dress(appearance, posed, number)
+    kind = str(rng.choice(list(_POSES), p=list(_POSES.values())))
+    body = load_body()
+    posed = pose_body(body, appearance.shape, sample_pose(rng, body, kind, appearance.shape), T_world_body)
+    surfaces = dress(appearance, posed, number)
+    return posed, [*surfaces, stool(rng, posed)] if kind == "sitting" else surfaces
+
+
+# How often each kind of pose is photographed.
+_POSES = {
+    "standing": 0.14, "walking": 0.10, "reaching": 0.17, "reaching_both": 0.15, "pointing": 0.08,
+    "crossed": 0.06, "raised": 0.10, "hips": 0.07, "face": 0.07, "sitting": 0.06,
+}  # fmt: skip
 
 
 def _camera(rng: Rng, person: PosedBody) -> Camera:
