@@ -8,9 +8,9 @@ never an answer: it is computed again.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
-import zipfile
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -21,6 +21,9 @@ import numpy as np
 from hicp_lib import keypoints
 from hicp_lib.detectors.base import Detections, Detector
 from hicp_lib.files import cache_dir, sha256_bytes, sha256_file, write_bytes
+from hicp_lib.keypoints import N_KEYPOINTS
+
+_N_COLUMNS = 3 * N_KEYPOINTS + 1
 
 
 @dataclass(frozen=True)
@@ -60,28 +63,31 @@ def cache_folder(detector: Detector) -> Path:
 def read_result(path: Path) -> Timed | None:
     """The result kept at `path`; None if there is none or it is damaged."""
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            found = Detections(arrays["keypoints_px"], arrays["scores"], arrays["person_scores"])
-            time_ms, workers = arrays["timing"]
-    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
+        content = path.read_bytes()
+    except OSError:
         return None
-    n = len(found.person_scores)
-    if found.keypoints_px.shape != (n, keypoints.N_KEYPOINTS, 2) or found.scores.shape != (
-        n,
-        keypoints.N_KEYPOINTS,
-    ):
+    digest, payload = content[:32], content[32:]
+    if hashlib.sha256(payload).digest() != digest:
         return None
-    return Timed(found, float(time_ms), int(workers))
+    timing, *people = np.load(io.BytesIO(payload), allow_pickle=False)
+    rows = np.array(people).reshape(-1, _N_COLUMNS)
+    keypoints_px, scores, person_scores = np.split(rows, [2 * N_KEYPOINTS, 3 * N_KEYPOINTS], axis=1)
+    found = Detections(keypoints_px.reshape(-1, N_KEYPOINTS, 2), scores, person_scores[:, 0])
+    return Timed(found, float(timing[0]), int(timing[1]))
 
 
 def write_result(path: Path, result: Timed) -> None:
-    """Keep a result at `path`; another process may do the same at the same time."""
-    content = io.BytesIO()
-    np.savez(
-        content,
-        keypoints_px=result.detections.keypoints_px,
-        scores=result.detections.scores,
-        person_scores=result.detections.person_scores,
-        timing=np.array([result.time_ms, result.workers], dtype=float),
-    )
-    write_bytes(path, content.getvalue())
+    """Keep a result at `path`; another process may do the same at the same time.
+
+    The file is a SHA-256 digest and the `.npy` array it is of: a row with the timing, then one
+    row per person with positions, scores and person score.
+    """
+    found = result.detections
+    rows = np.zeros((len(found) + 1, _N_COLUMNS))
+    rows[0, :2] = result.time_ms, result.workers
+    rows[1:, : 2 * N_KEYPOINTS] = found.keypoints_px.reshape(len(found), 2 * N_KEYPOINTS)
+    rows[1:, 2 * N_KEYPOINTS : -1] = found.scores
+    rows[1:, -1] = found.person_scores
+    payload = io.BytesIO()
+    np.save(payload, rows)
+    write_bytes(path, hashlib.sha256(payload.getvalue()).digest() + payload.getvalue())

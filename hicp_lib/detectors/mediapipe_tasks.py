@@ -11,8 +11,9 @@ What MediaPipe gives and what is made of it:
 - Hands: there is no score per keypoint. Every point of a hand carries the hand's handedness
   score, which says how sure the *side* is, not the position. The person score is the mean
   over the hands of the instance.
-- Sides: the Tasks API labels hands for images that are not mirrored, so "Left" is the person's
-  left hand. (The older solutions API labels them for mirrored images.)
+- Sides: the Tasks API labels hands for images that are not mirrored: "Left" is the person's left
+  hand. (The older solutions API means mirrored images, and has it the other way round.) The
+  tests hold this against rendered hands, of which about four in five get the true label.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ from hicp_lib.detectors.native import keep_offline, quiet_stderr
 from hicp_lib.files import sha256_bytes
 from hicp_lib.keypoints import COCO_17, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND, to_halpe
 
-# Side -> (Halpe indices of the hand, Halpe index of the wrist of the body).
-_SIDES = {"Left": (LEFT_HAND, 9), "Right": (RIGHT_HAND, 10)}
+_SIDES = {"Left": LEFT_HAND, "Right": RIGHT_HAND}
+_WRISTS = [9, 10]
 
 # One hand: side, handedness score, (21, 2) positions in pixels.
 Hand = tuple[str, float, np.ndarray]
@@ -116,8 +117,10 @@ class MediaPipeHands:
 class MediaPipe:
     """Pose and hands of the whole image as one detector.
 
-    A hand goes to the person whose wrist of that side is nearest and still free; a hand left
-    over becomes an instance of its own.
+    A hand goes to the nearest wrist of a body that has no hand yet, and takes its side from
+    there: the body's left and right are far more often correct than the hand's own label
+    (on 135 plainly rendered hands with known sides: all against 106). A hand left over becomes
+    an instance of its own, sided by its label.
 
     Parameters
     ----------
@@ -138,22 +141,24 @@ class MediaPipe:
 
 
 def attach_hands(bodies: Detections, hands: list[Hand]) -> Detections:
-    """Give each hand (best first) to the body with the nearest free wrist of its side.
+    """Give each hand (best first) to the nearest wrist that has none yet, whatever its label says.
 
     Returns
     -------
-    The bodies with their hands, then instances of hands that found no free wrist.
+    The bodies with their hands, then instances of the hands that found no free wrist.
     """
     keypoints_px, scores = bodies.keypoints_px.copy(), bodies.scores.copy()
+    free = np.ones((len(bodies), 2), dtype=bool)
     left_over = []
-    for side, score, positions_px in hands:
-        indices, wrist = _SIDES[side]
-        free = np.flatnonzero(scores[:, indices[0]] == 0)
-        if not len(free):
-            left_over.append((side, score, positions_px))
+    for hand in hands:
+        if not free.any():
+            left_over.append(hand)
             continue
-        distances = np.linalg.norm(keypoints_px[free, wrist] - positions_px[0], axis=1)
-        body = free[np.argmin(distances)]
+        _, score, positions_px = hand
+        distances = np.linalg.norm(keypoints_px[:, _WRISTS] - positions_px[0], axis=-1)
+        body, side = np.unravel_index(np.argmin(np.where(free, distances, np.inf)), free.shape)
+        free[body, side] = False
+        indices = list(_SIDES.values())[side]
         keypoints_px[body, indices], scores[body, indices] = positions_px, score
     rest = _pair(left_over)
     return Detections(
@@ -171,7 +176,7 @@ def _pair(hands: list[Hand]) -> Detections:
     scores = np.zeros((len(pairs), N_KEYPOINTS))
     for row, pair in enumerate(pairs):
         for side, score, positions_px in pair:
-            indices = _SIDES[side][0]
+            indices = _SIDES[side]
             keypoints_px[row, indices], scores[row, indices] = positions_px, score
     return Detections(keypoints_px, scores, np.array([np.mean([hand[1] for hand in pair]) for pair in pairs]))
 

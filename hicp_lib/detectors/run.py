@@ -75,7 +75,7 @@ def detect_images(
     InputError
         If an image cannot be read, or the detector cannot be made.
     """
-    workers = max(1, min(workers or _n_cores(), len(paths) or 1))
+    workers = max(1, min(workers or n_cores(), len(paths) or 1))
     pool = _DetectorPool(name, options)
     folder = cache_folder(pool.first)
 
@@ -114,7 +114,7 @@ class _DetectorPool:
 
 def _detect_one(pool: _DetectorPool, path: Path, folder: Path, workers: int) -> Timed:
     try:
-        kept = folder / f"{sha256_file(path)}.npz"
+        kept = folder / f"{sha256_file(path)}.bin"
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); expected an image file") from None
     result = read_result(kept)
@@ -138,6 +138,6 @@ def _single_threaded_opencv() -> Iterator[None]:
         cv2.setNumThreads(before)
 
 
-def _n_cores() -> int:
+def n_cores() -> int:
     """Cores this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

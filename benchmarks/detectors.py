@@ -1,0 +1,125 @@
+"""What the detector pipeline costs on top of the bare model calls.
+
+    python benchmarks/detectors.py [--images 100] [--repeats 3] [--json OUT]
+
+The same image files, threads and models twice: in the shortest loop that can be written (read
+the image, call the model, throw the output away), and through `detect_images` with an empty
+cache (hashing, conversion to Halpe, for OpenPose peaks and assembly, results written). The two
+are timed in turn and the best of the repeats counts. The project's floor is a ratio of 1.10.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from threading import local
+
+import cv2
+import matplotlib
+import mediapipe
+import numpy as np
+
+from hicp_lib.detectors import openpose_net, registry, run, zoo
+from hicp_lib.images import read_image, write_png
+
+NAMES = ("mediapipe-pose", "mediapipe-hands", "openpose-mobilenet")
+
+
+def make_images(folder: Path, n: int) -> dict[int, Path]:
+    """Crops of matplotlib's sample photograph, of the sizes HiCP crops have, as PNG."""
+    photograph = read_image(Path(matplotlib.get_data_path()) / "sample_data" / "grace_hopper.jpg")
+    rng = np.random.default_rng(0)
+    paths = {}
+    for i in range(n):
+        left, top = rng.integers(0, 60, 2)
+        crop = photograph[top : top + rng.integers(420, 540), left : left + rng.integers(400, 450)]
+        paths[i] = folder / f"{i}.png"
+        write_png(paths[i], cv2.resize(crop, None, fx=0.7, fy=0.7, interpolation=cv2.INTER_AREA))
+    return paths
+
+
+def bare_call(name: str) -> Callable[[np.ndarray], object]:
+    """The model as its own library calls it: a function of an RGB image."""
+    detector = registry.make_detector(name)
+    if isinstance(detector, openpose_net.OpenPoseMobileNet):
+        return lambda image: detector.maps(openpose_net.fit(image, 368))
+    # Through `detector`, which closes its task when nothing refers to it any more.
+    return lambda image: detector._task._task.detect(
+        mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=image)
+    )
+
+
+def time_bare(name: str, paths: dict[int, Path], workers: int) -> float:
+    """Seconds for the models to be made and to see every image."""
+    own = local()
+
+    def call(path: Path) -> None:
+        if not hasattr(own, "model"):
+            own.model = bare_call(name)
+        own.model(read_image(path))
+
+    cv2.setNumThreads(1)
+    start = time.perf_counter()
+    with ThreadPoolExecutor(workers) as executor:
+        list(executor.map(call, paths.values()))
+    return time.perf_counter() - start
+
+
+def time_pipeline(name: str, paths: dict[int, Path], workers: int) -> float:
+    """Seconds for `detect_images` with nothing in its cache."""
+    shutil.rmtree(Path(os.environ["HICP_CACHE"]) / "detections", ignore_errors=True)
+    start = time.perf_counter()
+    run.detect_images(name, paths, workers=workers, progress=False)
+    return time.perf_counter() - start
+
+
+def measure(name: str, paths: dict[int, Path], workers: int, repeats: int) -> dict:
+    """Best times of both and their ratio."""
+    times = [(time_bare(name, paths, workers), time_pipeline(name, paths, workers)) for _ in range(repeats)]
+    bare_s, pipeline_s = np.min(times, axis=0)
+    n = len(paths)
+    return {
+        "detector": name,
+        "workers": workers,
+        "images": n,
+        "bare_ms_per_image": 1e3 * bare_s / n,
+        "pipeline_ms_per_image": 1e3 * pipeline_s / n,
+        "ratio": pipeline_s / bare_s,
+    }
+
+
+def main() -> None:
+    """Measure all detectors on one thread and on all cores; print a table, write JSON if asked."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--images", type=int, default=100)
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--json", type=Path)
+    arguments = parser.parse_args()
+    rows = []
+    weights = zoo.weights_dir()
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["HICP_CACHE"] = folder
+        shutil.copytree(weights, Path(folder) / "weights")
+        (Path(folder) / "images").mkdir()
+        paths = make_images(Path(folder) / "images", arguments.images)
+        for name in NAMES:
+            for workers in sorted({1, run.n_cores()}):
+                row = measure(name, paths, workers, arguments.repeats)
+                rows.append(row)
+                print(
+                    f"{name:20} workers {workers}: bare {row['bare_ms_per_image']:6.1f} ms, "
+                    f"pipeline {row['pipeline_ms_per_image']:6.1f} ms per image, ratio {row['ratio']:.3f}"
+                )
+    if arguments.json:
+        arguments.json.write_text(json.dumps(rows, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
