@@ -62,11 +62,12 @@ def whole_pixel_boxes(boxes_px: np.ndarray, widths_px: np.ndarray, heights_px: n
     Returns
     -------
     array, shape (n, 4), int: left, top, right, bottom, the last two exclusive. Right <= left
-    or bottom <= top where a box lies outside its image.
+    or bottom <= top where a box is empty or lies outside its image.
     """
     limits = np.stack([widths_px, heights_px], axis=-1)
-    first = np.clip(np.floor(boxes_px[:, :2]), 0, limits)
-    past = np.clip(np.ceil(boxes_px[:, :2] + boxes_px[:, 2:]), 0, limits)
+    start, end = boxes_px[:, :2], boxes_px[:, :2] + boxes_px[:, 2:]
+    first = np.clip(np.floor(start), 0, limits)
+    past = np.where(end > start, np.clip(np.ceil(end), 0, limits), first)
     return np.concatenate([first, past], axis=-1).astype(int)
 
 

@@ -47,10 +47,12 @@ def people(keypoints_px, boxes_px, image_ids=None, visibility=None, crowd=(), si
 
 
 def test_boxes_are_rounded_outwards_and_clipped():
-    boxes = np.array([[1.2, 2.0, 3.0, 4.5], [-5, -5, 700, 20], [630.5, 470.5, 50, 50], [700, 10, 5, 5]])
-    whole = whole_pixel_boxes(boxes, np.full(4, 640), np.full(4, 480))
-    assert whole.tolist() == [[1, 2, 5, 7], [0, 0, 640, 15], [630, 470, 640, 480], [640, 10, 640, 15]]
-    assert [n_pixels(box) for box in whole] == [20, 9600, 100, 0]
+    boxes = np.array(
+        [[1.2, 2.0, 3.0, 4.5], [-5, -5, 700, 20], [630.5, 470.5, 50, 50], [700, 10, 5, 5], [1.5, 0, 0, 9]]
+    )
+    whole = whole_pixel_boxes(boxes, np.full(5, 640), np.full(5, 480))
+    assert whole[:3].tolist() == [[1, 2, 5, 7], [0, 0, 640, 15], [630, 470, 640, 480]]
+    assert [n_pixels(box) for box in whole] == [20, 9600, 100, 0, 0]
 
 
 def test_a_keypoint_belongs_to_the_pixel_whose_centre_is_nearest():
