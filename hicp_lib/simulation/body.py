@@ -3,7 +3,7 @@
 Body frame: metres, x forward (the way the person faces), y to the person's left, z up. The pelvis
 is above the origin and the lowest point of the posed body touches z = 0.
 
-A pose is a rotation vector (radians) per bone, in body axes, relative to one reference stance that
+A pose is a rotation per bone, in body axes, relative to one reference stance that
 is the same for all shapes: standing at attention, arms and fingers straight down, palms to the
 thighs, feet level and pointing forward. A rotation moves the bone and all that hangs on it. So
 `{"lowerarm01.L": (0, -1.57, 0)}` bends the left elbow to bring the forearm forward, whatever the
@@ -51,7 +51,7 @@ lips, eyelid, mouth, ear, nail : 1 inside, 0 outside, smooth at the border
 STORED_STEP_M = 5e-5  # vertices are stored as whole multiples of this
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Body:
     """All shapes of the body model; arrays are read-only.
 
@@ -88,7 +88,7 @@ class Body:
         return self.fields[:, FIELDS.index(name)]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PosedBody:
     """A posed person in the world: metres; normals are unit vectors."""
 
@@ -100,7 +100,8 @@ class PosedBody:
 
 
 Pose = Mapping[str, np.ndarray]
-"""Bone name -> rotation vector (3,) in radians; bones left out stay as in the reference stance."""
+"""Bone name -> rotation, as a vector (3,) in radians or a matrix (3, 3); bones left out stay as in
+the reference stance."""
 
 
 @lru_cache(maxsize=1)
@@ -139,9 +140,8 @@ def pose_body(
     """
     weights = shape_weights(body, shape)
     vertices = np.tensordot(weights, body.vertices_m, 1)
-    heads = np.tensordot(weights, body.heads_m, 1)
-    turns = _nearest_rotations(np.tensordot(weights, body.to_reference, 1))
-    rotations, posed_heads = _forward_kinematics(body, heads, turns, rotation_matrices(body, pose))
+    heads, _ = _skeleton(body, weights.tobytes())
+    rotations, posed_heads = pose_bones(body, weights, pose)
     posed = _skin(body, vertices, rotations, posed_heads - np.einsum("bij,bj->bi", rotations, heads))
     offset = np.array([-posed_heads[0, 0], -posed_heads[0, 1], -posed[:, 2].min()])
     T = np.eye(4) if T_world_body is None else np.asarray(T_world_body, float)
@@ -156,6 +156,30 @@ def pose_body(
         heads_m=posed_heads,
         rotations=T[:3, :3] @ rotations,
     )
+
+
+def pose_bones(
+    body: Body, shape: int | str | np.ndarray, pose: Pose | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The bones of a posed person, without its skin; arguments as in `pose_body`.
+
+    Returns
+    -------
+    rotations : (n_bones, 3, 3), each bone from rest to pose, body axes
+    heads_m : (n_bones, 3), where the bones begin, relative to the pelvis, body axes
+    """
+    heads, to_reference = _skeleton(body, shape_weights(body, shape).tobytes())
+    # Turns of the reference stance add up along the chain; the turn from rest to it comes before all.
+    rotations = rotation_matrices(body, pose).copy()
+    for level in _levels(tuple(body.bone_parents)):
+        rotations[level] = rotations[body.bone_parents[level]] @ rotations[level]
+    rotations = rotations @ to_reference
+    posed = np.zeros_like(heads)
+    offsets = heads - heads[body.bone_parents]
+    for level in _levels(tuple(body.bone_parents)):
+        parent = body.bone_parents[level]
+        posed[level] = posed[parent] + np.einsum("bij,bj->bi", rotations[parent], offsets[level])
+    return rotations, posed
 
 
 def shape_weights(body: Body, shape: int | str | np.ndarray) -> np.ndarray:
@@ -188,12 +212,20 @@ def rotation_matrices(body: Body, pose: Pose | np.ndarray) -> np.ndarray:
     """
     if isinstance(pose, np.ndarray):
         return pose
-    vectors = np.zeros((len(body.bone_names), 3))
-    for name, vector in pose.items():
-        if name not in body.bone_names:
+    number = {name: i for i, name in enumerate(body.bone_names)}
+    vectors = np.zeros((len(number), 3))
+    matrices = {}
+    for name, rotation in pose.items():
+        if name not in number:
             raise ValueError(f"no bone {name!r} in the body model")
-        vectors[body.bone_names.index(name)] = vector
-    return rotations_from_vectors(vectors)
+        if np.shape(rotation) == (3, 3):
+            matrices[number[name]] = rotation
+        else:
+            vectors[number[name]] = rotation
+    result = rotations_from_vectors(vectors)
+    if matrices:
+        result[list(matrices)] = list(matrices.values())
+    return result
 
 
 def rotations_from_vectors(vectors: np.ndarray) -> np.ndarray:
@@ -215,28 +247,29 @@ def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return (normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)).astype(np.float32)
 
 
-def _forward_kinematics(body: Body, heads, turns, local) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation of each bone from rest to pose, and the posed heads relative to the root's."""
-    pose = np.empty_like(turns)
-    rotations, posed = np.empty_like(turns), np.zeros_like(heads, float)
-    for bone, parent in enumerate(body.bone_parents):
-        pose[bone] = local[bone] if parent < 0 else pose[parent] @ local[bone]
-        rotations[bone] = pose[bone] @ turns[bone]
-        if parent >= 0:
-            posed[bone] = posed[parent] + rotations[parent] @ (heads[bone] - heads[parent])
-    return rotations, posed
+@lru_cache(maxsize=16)
+def _skeleton(body: Body, weights: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Bone heads at rest and rotations to the reference stance of a blend of shapes."""
+    blend = np.frombuffer(weights, np.float32)
+    # Blends of rotations are brought back to the nearest ones (orthogonal Procrustes); these
+    # are so alike that their blends never turn inside out.
+    u, _, vt = np.linalg.svd(np.tensordot(blend, body.to_reference, 1))
+    return np.tensordot(blend, body.heads_m, 1), u @ vt
+
+
+@lru_cache(maxsize=4)
+def _levels(parents: tuple[int, ...]) -> list[np.ndarray]:
+    """Bones by depth below the root, without it."""
+    depth = np.zeros(len(parents), int)
+    for bone, parent in enumerate(parents[1:], start=1):
+        depth[bone] = depth[parent] + 1
+    return [np.flatnonzero(depth == d) for d in range(1, depth.max() + 1)]
 
 
 def _skin(body: Body, vertices, rotations, translations) -> np.ndarray:
     transforms = np.concatenate([rotations, translations[..., None]], axis=2).astype(np.float32)
     blended = (body.skin_weights @ transforms.reshape(len(transforms), 12)).reshape(-1, 3, 4)
     return np.einsum("vij,vj->vi", blended[:, :, :3], vertices) + blended[:, :, 3]
-
-
-def _nearest_rotations(matrices: np.ndarray) -> np.ndarray:
-    """Rotations nearest to blended ones (orthogonal Procrustes; blends of near rotations have det > 0)."""
-    u, _, vt = np.linalg.svd(matrices)
-    return u @ vt
 
 
 def _unpack(stored) -> Body:
