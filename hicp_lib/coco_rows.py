@@ -17,7 +17,7 @@ from hicp_lib.keypoints import N_KEYPOINTS, NAMES, TO_HALPE, to_halpe
 # Beyond any image and any detector's raw output, and small enough for squares and products.
 MAX_ABS = 1e9
 MAX_INTEGER = 2**53  # every JSON reader has them exact up to here
-_CONVENTIONS = {17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"}
+CONVENTIONS = {17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"}
 # COCO-WholeBody files spread their 133 keypoints over five keys, in this order.
 PART_KEYS = ("foot_kpts", "face_kpts", "lefthand_kpts", "righthand_kpts")
 
@@ -80,7 +80,7 @@ class Rows:
 
     def numbers(self, key: str) -> np.ndarray:
         """Finite numbers, shape (n,)."""
-        return self._finite([[value] for value in self.column(key)], 1, lambda j: key)[:, 0]
+        return self.finite([[value] for value in self.column(key)], 1, lambda j: key)[:, 0]
 
     def vectors(self, key: str, names: Sequence[str]) -> np.ndarray:
         """Lists of finite numbers, one for each of `names`, shape (n, len(names))."""
@@ -88,7 +88,7 @@ class Rows:
         for i, value in enumerate(values):
             if not isinstance(value, list) or len(value) != len(names):
                 raise self.error(i, f"{key} is {shown(value)}; expected [{', '.join(names)}]")
-        return self._finite(values, len(names), lambda j: f"{key}[{j}] ({names[j]})")
+        return self.finite(values, len(names), lambda j: f"{key}[{j}] ({names[j]})")
 
     def keypoints(self) -> np.ndarray:
         """Triples (x, y, v) in the Halpe-136 order, zeros where the file's convention has no such keypoint.
@@ -104,13 +104,18 @@ class Rows:
         flat = [self._one_list(i, value) for i, value in enumerate(values)]
         result = np.zeros((len(flat), N_KEYPOINTS, 3))
         sizes = np.array([len(value) // 3 for value in flat])
-        for count, convention in _CONVENTIONS.items():
+        for count, convention in CONVENTIONS.items():
             chosen = np.flatnonzero(sizes == count)
             if len(chosen):
                 lists = [flat[i] for i in chosen]
-                triples = self._finite(lists, 3 * count, _keypoint_namer(convention), chosen)
+                triples = self.finite(lists, 3 * count, _keypoint_namer(convention), chosen)
                 result[chosen] = to_halpe(triples.reshape(-1, count, 3), convention, axis=-2, fill=0.0)
         return result
+
+    def conventions(self) -> list[str]:
+        """Per row, the convention its keypoints come in, a key of `hicp_lib.keypoints.TO_HALPE`."""
+        lists = enumerate(self.column("keypoints"))
+        return [CONVENTIONS[len(self._one_list(i, value)) // 3] for i, value in lists]
 
     def extras(self, known: Collection[str]) -> list[dict]:
         """Per row, the keys other than `known`; refused where JSON could not be written from them again."""
@@ -130,12 +135,12 @@ class Rows:
         row = self.rows[i]
         if len(value) == 51 and all(isinstance(row.get(key), list) for key in PART_KEYS):
             value = list(chain(value, *(row[key] for key in PART_KEYS)))
-        if len(value) % 3 or len(value) // 3 not in _CONVENTIONS:
-            counts = ", ".join(str(count) for count in _CONVENTIONS)
+        if len(value) % 3 or len(value) // 3 not in CONVENTIONS:
+            counts = ", ".join(str(count) for count in CONVENTIONS)
             raise self.error(i, f"keypoints has {len(value)} numbers; expected 3 per keypoint, of {counts}")
         return value
 
-    def _finite(
+    def finite(
         self, lists: list[list], width: int, name: Callable[[int], str], rows: Sequence[int] | None = None
     ) -> np.ndarray:
         """Lists of `width` numbers (of `rows`, default all) as a float array; `name` says what entry j is."""
