@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.resources
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from hicp_lib.report.sphinx_extension import PLOTLY_PATH, SCRIPTS_DIR
 from hicp_lib.study import provenance_html
 
 BUILD_LIMIT_S = 900
+_COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 
 
 def build_book(folders: Folders) -> tuple[Path, bool]:
@@ -127,11 +129,11 @@ def _run_sphinx(staging: Path, log: Path) -> Path:
             stdout=output,
             stderr=subprocess.STDOUT,
             timeout=BUILD_LIMIT_S,
-            env=os.environ | {"NO_COLOR": "1", "PYTHONNOUSERSITE": "1"},
+            env=os.environ | {"PYTHONNOUSERSITE": "1"},
         )
     built = staging / "_build" / "html"
     if done.returncode != 0 or not (built / "index.html").is_file():
-        lines = log.read_text(errors="replace").splitlines()
+        lines = _COLOURS.sub("", log.read_text(errors="replace")).splitlines()
         warnings = [line for line in lines if "WARNING" in line or "ERROR" in line] or lines[-1:]
         first = warnings[0].replace(str(staging / "source"), "book") if warnings else "no output"
         raise RunError(f"book: {first} ({len(warnings)} in all; see {log})")

@@ -11,18 +11,20 @@ PLOTLY_PATH = "plotly.js"
 
 def setup(app: Any) -> dict[str, bool]:
     """Called by Sphinx."""
-    app.connect("builder-inited", lambda app: app.config.html_static_path.append(SCRIPTS_DIR))
-    app.connect("html-page-context", _choose_scripts, priority=900)
+    app.connect("config-inited", _prepare)
+    app.connect("html-page-context", _choose_files, priority=900)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
-def _choose_scripts(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
-    """Drop thebe, whose script comes from a server; load Plotly where there is a 3D scene."""
-    for kind in ("script_files", "css_files"):
-        context[kind][:] = [file for file in context[kind] if not _is_thebe(file)]
+def _prepare(app: Any, config: Any) -> None:
+    """Offer our scripts; leave out thebe, which Jupyter Book always brings and which loads from a server."""
+    config.html_static_path.append(SCRIPTS_DIR)
+    for listeners in app.events.listeners.values():
+        listeners[:] = [entry for entry in listeners if entry.handler.__module__ != "sphinx_thebe"]
+
+
+def _choose_files(app: Any, page: str, template: str, context: dict[str, Any], doctree: Any) -> None:
+    """Load Plotly where there is a 3D scene."""
+    context["css_files"][:] = [file for file in context["css_files"] if "thebe" not in str(file.filename)]
     if "hicp-scene" in context.get("body", ""):
         app.add_js_file(PLOTLY_PATH)
-
-
-def _is_thebe(file: Any) -> bool:
-    return "thebe" in f"{file.filename} {file.attributes.get('body') or ''}".lower()

@@ -1,0 +1,77 @@
+"""A small book: built offline and checked, again only when something changed, refused when it has a fault."""
+
+from __future__ import annotations
+
+import pytest
+
+from hicp_lib.errors import InputError
+from hicp_lib.report.build import make_report
+from hicp_lib.report.runs import Folders, RunError
+
+
+def test_report_of_two_notebooks(study):
+    lines: list[str] = []
+    page = make_report("quick", [("scale", "2")], lines.append, root=study)
+    book = page.parent
+    assert page == study / "_build" / "book" / "quick" / "index.html"
+    assert "The seed is 3." in page.read_text(), "the profile's parameter reaches the prose"
+    assert "mathjax.js" in page.read_text()
+    assert (book / "_static" / "mathjax.js").stat().st_size > 1e6
+    assert (book / "results" / "quick" / "01_second" / "t.parquet").is_file()
+    for name in ("index", "notebooks/00_first", "notebooks/01_second"):
+        html = (book / f"{name}.html").read_text()
+        assert "What this page was made with" in html
+        assert "thebe" not in html.lower()
+        assert "plotly" not in html
+    assert str(page) in lines[-1]
+
+    lines.clear()
+    make_report("quick", [("scale", "2")], lines.append, root=study)
+    assert lines[:3] == ["00_first: unchanged", "01_second: unchanged", "book: unchanged"]
+
+    home = study / "book" / "index.md"
+    home.write_text(home.read_text() + "\nMore.\n")
+    make_report("quick", [("scale", "2")], lines.append, root=study)
+    assert "More." in page.read_text()
+    assert lines[-2] == "book: built"
+
+    written = page.read_text()
+    page.write_text(written + " ")
+    make_report("quick", [("scale", "2")], lines.append, root=study)
+    assert lines[-2] == "book: built", "a page that was changed is built anew"
+
+    home.write_text(home.read_text() + "\n{doc}`nowhere`\n")
+    with pytest.raises(RunError, match=r"book: book/index.md:\d+: WARNING: unknown document: 'nowhere'"):
+        make_report("quick", [("scale", "2")], lines.append, root=study)
+    home.write_text("# Home\n\n<img src='x.png'>\n")
+    with pytest.raises(RunError, match=r"book: index.html: image without alt text: x.png"):
+        make_report("quick", [("scale", "2")], lines.append, root=study)
+    home.write_text("# Home\n\n{{ value('00_first', 'none') }}\n")
+    with pytest.raises(InputError, match="needs 'none'"):
+        make_report("quick", [("scale", "2")], lines.append, root=study)
+    assert not list(book.parent.glob(".build-*"))
+
+
+@pytest.mark.parametrize(
+    ("profile", "pairs", "expected"),
+    [
+        ("quik", [], "has no profile 'quik'; choose one of full, quick"),
+        ("quick", [("sed", "1")], "-p sed: no notebook has such a parameter"),
+        ("quick", [("images", "/nowhere")], "/nowhere: does not exist; parameter 'images'"),
+    ],
+)
+def test_mistakes_are_told_before_anything_runs(study, profile, pairs, expected):
+    with pytest.raises(InputError, match=expected):
+        make_report(profile, pairs, print, root=study)
+    assert not Folders(study, profile).results.exists()
+
+
+def test_two_reports_of_one_profile_do_not_mix(study):
+    import fcntl
+
+    folder = Folders(study, "quick").executed
+    folder.mkdir(parents=True)
+    with open(folder / ".lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        with pytest.raises(InputError, match="another report of this profile is being made"):
+            make_report("quick", [], print, root=study)
