@@ -45,7 +45,7 @@ class Timed:
 @cache
 def code_sha256() -> str:
     """SHA-256 over the sources that turn network output into keypoints."""
-    sources = sorted(Path(__file__).parent.glob("*.py")) + [Path(keypoints.__file__)]
+    sources = sorted(Path(__file__).parent.rglob("*.py")) + [Path(keypoints.__file__)]
     return sha256_bytes("".join(sha256_file(source) for source in sources).encode())
 
 

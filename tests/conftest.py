@@ -1,0 +1,38 @@
+"""Fixtures shared by the tests."""
+
+import os
+from pathlib import Path
+
+import matplotlib
+import pytest
+
+from hicp_lib.detectors import zoo
+from hicp_lib.images import read_image
+
+
+@pytest.fixture(scope="session")
+def weights() -> Path:
+    """Folder of the fetched weights; `hicp models fetch` comes before the tests."""
+    absent = [row["name"] for row in zoo.list_weights() if row["status"] != "present"]
+    if absent and os.environ.get("HICP_TESTS_WITHOUT_WEIGHTS"):
+        pytest.skip(f"weights are absent: {', '.join(absent)}")
+    assert not absent, f"weights are absent: {', '.join(absent)}; run: hicp models fetch"
+    return zoo.weights_dir()
+
+
+@pytest.fixture
+def own_cache(tmp_path, monkeypatch, weights) -> Path:
+    """An empty cache folder with the fetched weights in it."""
+    cache = tmp_path / "cache"
+    (cache / "weights").mkdir(parents=True)
+    for path in weights.iterdir():
+        if path.is_file():
+            (cache / "weights" / path.name).write_bytes(path.read_bytes())
+    monkeypatch.setenv("HICP_CACHE", str(cache))
+    return cache
+
+
+@pytest.fixture(scope="session")
+def photograph():
+    """The photograph of a person that ships with matplotlib: (600, 512, 3), RGB."""
+    return read_image(Path(matplotlib.get_data_path()) / "sample_data" / "grace_hopper.jpg")
