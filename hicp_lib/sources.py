@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from hicp_lib.errors import InputError
 from hicp_lib.files import cache_dir, read_json, sha256_file
 from hicp_lib.hicp_dataset import create_hicp
-from hicp_lib.provenance import DATA_DIR, LIBRARY_DIR, digest, files_sha256
+from hicp_lib.provenance import DATA_DIR, LIBRARY_DIR, digest, files_sha256, input_sha256
 
+# What crops are made by: a change there makes them anew.
+_CROP_MODULES = (
+    "annotations.py",
+    "coco_rows.py",
+    "files.py",
+    "hicp_crops.py",
+    "hicp_dataset.py",
+    "images.py",
+    "keypoints.py",
+)
 SOURCES = ("rendered", "halpe")
 
 
@@ -84,18 +95,18 @@ def _rendered(n_scenes: int, seed: int) -> tuple[Path, Path]:
     if not (folder / "annotations.json").is_file():
         from hicp_lib.simulation.scenes import render_dataset  # Open3D takes a second to load
 
-        render_dataset(folder, n=n_scenes, seed=seed)
+        render_dataset(folder, n=n_scenes, seed=seed, progress=sys.stderr.isatty())
     return folder / "annotations.json", folder / "images"
 
 
 def _crops(annotations: Path, images: Path, min_pixels: int) -> Path:
     if not annotations.is_file():
         raise InputError(f"{annotations}: is not there; give the path of the annotation file")
-    rules = [LIBRARY_DIR / name for name in ("hicp_dataset.py", "annotations.py", "images.py")]
-    key = digest(
-        [sha256_file(annotations), str(images.resolve()), min_pixels, files_sha256(rules, LIBRARY_DIR)]
-    )
+    if not images.is_dir():
+        raise InputError(f"{images}: is not there; give the folder that holds the annotated images")
+    rules = files_sha256((LIBRARY_DIR / name for name in _CROP_MODULES), LIBRARY_DIR)
+    key = digest([sha256_file(annotations), str(images.resolve()), input_sha256(images), min_pixels, rules])
     folder = cache_dir() / "hicp" / key[:16]
     if not (folder / "summary.json").is_file():
-        create_hicp(annotations, images, folder, min_pixels=min_pixels)
+        create_hicp(annotations, images, folder, min_pixels=min_pixels, progress=sys.stderr.isatty())
     return folder

@@ -136,10 +136,10 @@ def test_crops_need_twenty_thousand_pixels():
     assert plan(people([upright()], [[0, 0, 100, 199]]), min_pixels=19_900)["basic"].item() == "kept"
 
 
-def test_headless_needs_its_pixels_too_unless_told_otherwise():
+def test_headless_needs_its_pixels_only_when_told_so():
     annotations = people([upright()] * 2, [[50, 0, 100, 200], [0, 0, 200, 300]])
-    assert plan(annotations)["headless"].tolist() == ["too small", "kept"]
-    assert plan(annotations, headless_min_pixels=1)["headless"].tolist() == ["kept", "kept"]
+    assert plan(annotations)["headless"].tolist() == ["kept", "kept"]
+    assert plan(annotations, headless_min_pixels=20_000)["headless"].tolist() == ["too small", "kept"]
 
 
 def test_every_reason_is_named():
@@ -178,7 +178,7 @@ def test_sensitivity_counts_move_with_the_rules():
     boxes = [[50, 0, 100, 200], [0, 0, 200, 300], [0, 0, 200, 300], [50, 0, 60, 170]]
     table = count_sensitivity(people([upright()] * 4, boxes, visibility=visibility))
     assert table["basic"].tolist() == [2, 2, 3, 1, 3]
-    assert table["headless"].tolist() == [0, 1, 1, 0, 2]
+    assert table["headless"].tolist() == [1, 0, 2, 0, 3]
 
 
 # ---- annotations of the crops
@@ -318,7 +318,7 @@ def test_a_changed_image_replaces_the_crops(source, tmp_path):
 
 
 def test_summary_is_written(source, tmp_path):
-    counts = create(source, tmp_path / "hicp", min_pixels=45_000)
+    counts = create(source, tmp_path / "hicp", min_pixels=45_000, headless_min_pixels=45_000)
     assert json.loads((tmp_path / "hicp" / "summary.json").read_text()) == counts
     assert counts["people"] == 3 and counts["basic"] == {"kept": 2, "too small": 1}
     assert counts["headless"] == {"kept": 0, "too small": 2, "not in Basic": 1}
