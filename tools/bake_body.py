@@ -63,7 +63,7 @@ def _of_kept(weights: np.ndarray, body: mesh.BodyMesh, n_all: int) -> np.ndarray
 
 
 def _sparse_skin(weights: np.ndarray) -> dict[str, np.ndarray]:
-    bones = np.argsort(-weights, axis=1, kind="stable")[:, : N_BONES_PER_VERTEX]
+    bones = np.argsort(-weights, axis=1, kind="stable")[:, :N_BONES_PER_VERTEX]
     kept = np.take_along_axis(weights, bones, axis=1)
     kept /= kept.sum(axis=1, keepdims=True)
     return dict(skin_bones=bones.astype(np.uint8), skin_weights=kept.astype(np.float16))

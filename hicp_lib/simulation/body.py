@@ -22,6 +22,8 @@ import numpy as np
 
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import N_KEYPOINTS
+from hicp_lib.simulation.mesh import vertex_normals
+from hicp_lib.simulation.rotations import rotations_from_vectors
 
 BODY_FILE = Path(__file__).parents[2] / "data" / "body.npz"
 
@@ -226,25 +228,6 @@ def rotation_matrices(body: Body, pose: Pose | np.ndarray) -> np.ndarray:
     if matrices:
         result[list(matrices)] = list(matrices.values())
     return result
-
-
-def rotations_from_vectors(vectors: np.ndarray) -> np.ndarray:
-    """Rotation matrices (n, 3, 3) of rotation vectors (n, 3) in radians (Rodrigues)."""
-    angle = np.linalg.norm(vectors, axis=1)[:, None, None]
-    x, y, z = (vectors / np.where(angle[:, 0] > 0, angle[:, 0], 1)).T
-    zero = np.zeros_like(x)
-    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-
-
-def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Unit normals (n_v, 3), float32: means of the adjacent triangles' weighted by area."""
-    a, b, c = (vertices[triangles[:, i]] for i in range(3))
-    face = np.cross(b - a, c - a)
-    corners = triangles.T.ravel()
-    summed = [np.bincount(corners, np.tile(face[:, axis], 3), len(vertices)) for axis in range(3)]
-    normals = np.stack(summed, axis=1)
-    return (normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-20)).astype(np.float32)
 
 
 @lru_cache(maxsize=16)

@@ -10,11 +10,11 @@ palm turns forward), deviation towards the thumb, a turn or bend to the person's
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import cos, sin
 
 import numpy as np
 
-from hicp_lib.simulation.body import Pose, rotations_from_vectors
+from hicp_lib.simulation.body import Pose
+from hicp_lib.simulation.rotations import about, rotation
 
 JointAngles = Mapping[str, float]
 
@@ -81,8 +81,8 @@ def pose_from_joints(angles: JointAngles) -> Pose:
     pose = _trunk(angles)
     for side, suffix in (("left", "L"), ("right", "R")):
         limb = {joint: angles.get(f"{side}_{joint}", 0.0) for joint in _LIMB_LIMITS_DEG}
-        for bone, rotation in (_arm(limb) | _hand(limb) | _leg(limb)).items():
-            pose[f"{bone}.{suffix}"] = rotation if side == "left" else rotation * _MIRROR[rotation.ndim]
+        for bone, turn in (_arm(limb) | _hand(limb) | _leg(limb)).items():
+            pose[f"{bone}.{suffix}"] = turn if side == "left" else turn * _MIRROR[turn.ndim]
     return pose
 
 
@@ -92,16 +92,16 @@ def shoulder_rotation(flexion: float, abduction: float, inward: float) -> np.nda
     The arm first turns inward about itself, then is abducted, then flexed.
     """
     tilt = ARM_TILT_RAD
-    return _about(1, -flexion) @ _about(0, abduction + tilt) @ _about(2, -inward) @ _about(0, -tilt)
+    return about(1, -flexion) @ about(0, abduction + tilt) @ about(2, -inward) @ about(0, -tilt)
 
 
-def shoulder_angles(rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def shoulder_angles(swing: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Flexion, abduction and inward rotation (radians) of rotations (..., 3, 3) of the left upper arm.
 
     The inverse of `shoulder_rotation` for abduction between -99 and 81 degrees; beyond,
     the other of the two descriptions of the same rotation is returned.
     """
-    m = rotation @ _about(0, ARM_TILT_RAD)
+    m = swing @ about(0, ARM_TILT_RAD)
     abduction = np.arcsin(np.clip(-m[..., 1, 2], -1, 1)) - ARM_TILT_RAD
     return -np.arctan2(m[..., 0, 2], m[..., 2, 2]), abduction, -np.arctan2(m[..., 1, 0], m[..., 1, 1])
 
@@ -119,18 +119,18 @@ def _trunk(angles: JointAngles) -> dict[str, np.ndarray]:
 
 def _arm(limb: dict[str, float]) -> dict[str, np.ndarray]:
     """A left arm. Turns about its own axis are spread along it, so that the skin twists evenly."""
-    along = _about(0, ARM_TILT_RAD) @ np.array([0.0, 0.0, -1.0])
+    along = about(0, ARM_TILT_RAD) @ np.array([0.0, 0.0, -1.0])
     turn = limb["shoulder_rotation"] * along
     swing = shoulder_rotation(limb["shoulder_flexion"], limb["shoulder_abduction"], 0.0)
     girdle, upper = _with_girdle(swing)
     supination = -limb["forearm_supination"] * along
-    hand = _about(1, -limb["wrist_deviation"]) @ _about(0, -limb["wrist_flexion"])
+    hand = about(1, -limb["wrist_deviation"]) @ about(0, -limb["wrist_flexion"])
     return girdle | {
-        "upperarm01": upper @ _rotation(turn / 2),
+        "upperarm01": upper @ rotation(turn / 2),
         "upperarm02": turn / 2,
         "lowerarm01": np.array([0.0, -limb["elbow_flexion"], 0.0]),
         "lowerarm02": supination / 2,
-        "wrist": _rotation(supination / 2) @ hand,
+        "wrist": rotation(supination / 2) @ hand,
     }
 
 
@@ -144,7 +144,7 @@ def _with_girdle(swing: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
     beyond = axis / length * (angle - _GIRDLE_FROM_RAD)
     girdle = {bone: share * beyond for bone, share in _GIRDLE_SHARES.items()}
     # All turn about the same axis, so the shares simply add up.
-    return girdle, _rotation(-sum(_GIRDLE_SHARES.values()) * beyond) @ swing
+    return girdle, rotation(-sum(_GIRDLE_SHARES.values()) * beyond) @ swing
 
 
 def _hand(limb: dict[str, float]) -> dict[str, np.ndarray]:
@@ -152,32 +152,20 @@ def _hand(limb: dict[str, float]) -> dict[str, np.ndarray]:
     for number, finger in enumerate(FINGERS, start=2):
         # Fingers spread away from the middle one; at the knuckle both movements combine.
         outward = -limb[f"{finger}_spread"] if finger in ("index", "middle") else limb[f"{finger}_spread"]
-        knuckle = _about(1, outward) @ _about(0, -limb[f"{finger}_knuckle"])
+        knuckle = about(1, outward) @ about(0, -limb[f"{finger}_knuckle"])
         pose[f"finger{number}-1"] = knuckle
         pose[f"finger{number}-2"] = np.array([-limb[f"{finger}_middle"], 0.0, 0.0])
         pose[f"finger{number}-3"] = np.array([-limb[f"{finger}_end"], 0.0, 0.0])
-    pose["finger1-1"] = _about(2, limb["thumb_spread"]) @ _rotation(limb["thumb_base"] * _THUMB_HINGE)
+    pose["finger1-1"] = about(2, limb["thumb_spread"]) @ rotation(limb["thumb_base"] * _THUMB_HINGE)
     pose["finger1-2"] = limb["thumb_knuckle"] * _THUMB_HINGE
     pose["finger1-3"] = limb["thumb_end"] * _THUMB_HINGE
     return pose
 
 
 def _leg(limb: dict[str, float]) -> dict[str, np.ndarray]:
-    turned = _about(0, limb["hip_abduction"]) @ _about(2, -limb["hip_rotation"])
+    turned = about(0, limb["hip_abduction"]) @ about(2, -limb["hip_rotation"])
     return {
-        "upperleg01": _about(1, -limb["hip_flexion"]) @ turned,
+        "upperleg01": about(1, -limb["hip_flexion"]) @ turned,
         "lowerleg01": np.array([0.0, limb["knee_flexion"], 0.0]),
         "foot": np.array([0.0, limb["ankle_flexion"], 0.0]),
     }
-
-
-def _about(axis: int, angle_rad: float) -> np.ndarray:
-    """Rotation about a coordinate axis."""
-    c, s = cos(angle_rad), sin(angle_rad)
-    if axis == 0:
-        return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
-    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]] if axis == 1 else [[c, -s, 0], [s, c, 0], [0, 0, 1]])
-
-
-def _rotation(vector: np.ndarray) -> np.ndarray:
-    return rotations_from_vectors(vector[None])[0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hicp_lib.simulation.body import Body, pose_bones, rotations_from_vectors
+from hicp_lib.simulation.body import Body, pose_bones
 from hicp_lib.simulation.joints import (
     ARM_TILT_RAD,
     LIMITS_DEG,
@@ -12,6 +12,7 @@ from hicp_lib.simulation.joints import (
     pose_from_joints,
     shoulder_angles,
 )
+from hicp_lib.simulation.rotations import between, rotation, rotations_from_vectors
 
 _SHOULDER = ("shoulder_flexion", "shoulder_abduction", "shoulder_rotation")
 _N_SWIVELS = 36
@@ -69,9 +70,9 @@ def _two_segments(target: np.ndarray, lengths: tuple[float, float], elbow_toward
     if flexion > np.radians(LIMITS_DEG["left_elbow_flexion"][1]):
         return None
     hanging = np.array([0.0, np.sin(ARM_TILT_RAD), -np.cos(ARM_TILT_RAD)])
-    bent = upper * hanging + fore * _rotation((0, -flexion, 0)) @ hanging
+    bent = upper * hanging + fore * rotation((0, -flexion, 0)) @ hanging
     aim = target / np.linalg.norm(target)
-    align = _between(bent / np.linalg.norm(bent), aim)
+    align = between(bent / np.linalg.norm(bent), aim)
     swivels = np.arange(_N_SWIVELS)[:, None] * 2 * np.pi / _N_SWIVELS
     rotations = rotations_from_vectors(swivels * aim) @ align
     angles = np.stack(shoulder_angles(rotations), axis=1)
@@ -81,16 +82,3 @@ def _two_segments(target: np.ndarray, lengths: tuple[float, float], elbow_toward
         return None
     best = np.argmax(np.where(allowed, rotations @ hanging @ elbow_toward, -np.inf))
     return dict(zip(_SHOULDER, map(float, angles[best]), strict=True)) | {"elbow_flexion": flexion}
-
-
-def _between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The smallest rotation from unit vector `a` to unit vector `b`."""
-    axis = np.cross(a, b)
-    sine = np.linalg.norm(axis)
-    if sine < 1e-9:
-        return np.eye(3) if a @ b > 0 else _rotation(np.pi * np.cross(a, np.eye(3)[np.argmin(np.abs(a))]))
-    return _rotation(axis / sine * np.arctan2(sine, a @ b))
-
-
-def _rotation(vector) -> np.ndarray:
-    return rotations_from_vectors(np.asarray(vector, float)[None])[0]

@@ -1,0 +1,39 @@
+"""Rotation matrices from rotation vectors, axes and directions."""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+def rotations_from_vectors(vectors: np.ndarray) -> np.ndarray:
+    """Rotation matrices (n, 3, 3) of rotation vectors (n, 3) in radians (Rodrigues)."""
+    angle = np.linalg.norm(vectors, axis=1)[:, None, None]
+    x, y, z = (vectors / np.where(angle[:, 0] > 0, angle[:, 0], 1)).T
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def rotation(vector: ArrayLike) -> np.ndarray:
+    """Rotation matrix (3, 3) of one rotation vector (3,) in radians."""
+    return rotations_from_vectors(np.asarray(vector, float)[None])[0]
+
+
+def about(axis: int, angle_rad: float) -> np.ndarray:
+    """Rotation (3, 3) about a coordinate axis: 0, 1 or 2 for x, y or z."""
+    c, s = cos(angle_rad), sin(angle_rad)
+    if axis == 0:
+        return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]] if axis == 1 else [[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The smallest rotation from unit vector `a` to unit vector `b`."""
+    axis = np.cross(a, b)
+    sine = np.linalg.norm(axis)
+    if sine < 1e-9:
+        return np.eye(3) if a @ b > 0 else rotation(np.pi * np.cross(a, np.eye(3)[np.argmin(np.abs(a))]))
+    return rotation(axis / sine * np.arctan2(sine, a @ b))
