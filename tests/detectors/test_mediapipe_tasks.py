@@ -1,0 +1,232 @@
+"""MediaPipe: landmarks where they belong, sides that are the person's own, silence."""
+
+import io
+import os
+import subprocess
+import sys
+import zipfile
+from socketserver import StreamRequestHandler, ThreadingTCPServer
+from threading import Thread
+
+import numpy as np
+import pytest
+
+from hicp_lib.detectors.base import Detections
+from hicp_lib.detectors.registry import make_detector
+from hicp_lib.errors import InputError
+from hicp_lib.keypoints import INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
+
+from .plain_people import render_person
+
+N_PEOPLE = 8
+
+
+@pytest.fixture(scope="module")
+def people():
+    """Rendered people with known keypoints, hands of some 60 pixels beside the shoulders."""
+    return [render_person(seed, distance_m=1.4) for seed in range(N_PEOPLE)]
+
+
+def hand_errors(positions_px: np.ndarray, truth_px: np.ndarray) -> tuple[float, float]:
+    """Mean distance of 21 points to the true left and to the true right hand."""
+    return tuple(
+        np.linalg.norm(positions_px - truth_px[hand], axis=1).mean() for hand in (LEFT_HAND, RIGHT_HAND)
+    )
+
+
+def test_pose_finds_rendered_people_to_a_few_pixels(weights, people):
+    detector = make_detector("mediapipe-pose")
+    for image, truth_px in people:
+        found = detector.detect(image)
+        assert len(found) == 1
+        errors = np.linalg.norm(found.keypoints_px[0, :13] - truth_px[:13], axis=1)
+        assert np.median(errors) < 10
+        # A swap of sides would be off by the width of the shoulders.
+        assert errors[[5, 6]].max() < 0.3 * np.linalg.norm(truth_px[5] - truth_px[6])
+
+
+def test_pose_gives_halpe_points_it_has_and_no_others(weights, people):
+    found = make_detector("mediapipe-pose").detect(people[0][0])
+    given = np.isfinite(found.keypoints_px[0]).all(axis=1)
+    feet = [INDEX[f"{side}_{part}"] for side in ("left", "right") for part in ("big_toe", "heel")]
+    assert set(np.flatnonzero(given)) == {*range(17), *feet}
+    assert (found.scores[0, ~given] == 0).all()
+    assert ((found.scores >= 0) & (found.scores <= 1)).all()
+    assert found.person_scores[0] == pytest.approx(found.scores[0, :17].mean())
+
+
+def test_points_outside_the_image_are_kept(weights, people):
+    image, truth_px = people[0]
+    cut = int(truth_px[[11, 12], 1].mean()) - 20
+    found = make_detector("mediapipe-pose").detect(image[:cut])
+    assert found.keypoints_px[0, INDEX["left_knee"], 1] > cut
+    assert found.scores[0, INDEX["left_knee"]] < 0.5 < found.scores[0, INDEX["left_shoulder"]]
+
+
+def test_hands_are_labelled_with_the_persons_own_side(weights, people):
+    """The truth is the body model's; single labels err, most do not."""
+    detector = make_detector("mediapipe-hands")
+    own, other = 0, 0
+    for image, truth_px in people:
+        found = detector.detect(image)
+        for row in range(len(found)):
+            for side, indices in enumerate((LEFT_HAND, RIGHT_HAND)):
+                if found.scores[row, indices[0]] > 0:
+                    errors = hand_errors(found.keypoints_px[row, indices], truth_px)
+                    assert min(errors) < 12
+                    own += errors[side] < errors[1 - side]
+                    other += errors[side] > errors[1 - side]
+    assert own + other >= N_PEOPLE
+    assert own >= 2 * other
+
+
+def test_pose_and_hands_together_get_every_side_right(weights, people):
+    detector = make_detector("mediapipe")
+    n_hands = 0
+    for image, truth_px in people:
+        found = detector.detect(image)
+        assert len(found) == 1
+        for side, indices in enumerate((LEFT_HAND, RIGHT_HAND)):
+            if found.scores[0, indices[0]] > 0:
+                n_hands += 1
+                errors = hand_errors(found.keypoints_px[0, indices], truth_px)
+                assert errors[side] < errors[1 - side]
+    assert n_hands >= N_PEOPLE
+
+
+def make_body(left_wrist, right_wrist) -> Detections:
+    keypoints_px, scores = np.full((1, N_KEYPOINTS, 2), np.nan), np.zeros((1, N_KEYPOINTS))
+    keypoints_px[0, [9, 10]], scores[0, [9, 10]] = (left_wrist, right_wrist), 0.9
+    return Detections(keypoints_px, scores, np.array([0.7]))
+
+
+def make_hand(side: str, score: float, root) -> tuple:
+    return side, score, np.add(root, np.arange(21)[:, None])
+
+
+def test_a_hand_goes_to_the_nearest_free_wrist_and_the_rest_stand_alone(weights):
+    from hicp_lib.detectors.mediapipe_tasks import attach_hands
+
+    body = make_body((300, 100), (100, 100))
+    hands = [
+        make_hand("Right", 0.9, (290, 100)),
+        make_hand("Left", 0.8, (285, 100)),
+        make_hand("Left", 0.6, (0, 0)),
+    ]
+    found = attach_hands(body, hands)
+    assert found.keypoints_px[0, LEFT_HAND[0]].tolist() == [290, 100]
+    assert found.keypoints_px[0, RIGHT_HAND[0]].tolist() == [285, 100]
+    assert found.keypoints_px[1, LEFT_HAND[0]].tolist() == [0, 0]
+    assert found.person_scores.tolist() == [0.7, 0.6]
+    assert np.isnan(body.keypoints_px[0, LEFT_HAND]).all()
+    alone = attach_hands(Detections.none(), hands)
+    assert alone.person_scores == pytest.approx([0.85, 0.6])
+    assert alone.keypoints_px[:, LEFT_HAND[0], 0].tolist() == [285, 0]
+    assert np.isnan(alone.keypoints_px[1, RIGHT_HAND]).all()
+
+
+def test_a_photograph(weights, photograph):
+    """A portrait in uniform, facing the camera: the face in the upper half, his left on the right."""
+    found = make_detector("mediapipe-pose").detect(photograph)
+    nose, left_eye, right_eye, left_shoulder, right_shoulder = found.keypoints_px[0, [0, 1, 2, 5, 6]]
+    assert np.linalg.norm(nose - (270, 225)) < 20
+    assert left_eye[0] - right_eye[0] == pytest.approx(75, abs=15)
+    assert left_shoulder[0] - right_shoulder[0] == pytest.approx(360, abs=50)
+
+
+def test_an_empty_image_has_nobody(weights):
+    for name in ("mediapipe-pose", "mediapipe-hands", "mediapipe"):
+        found = make_detector(name).detect(np.full((90, 50, 3), 128, np.uint8))
+        assert found.keypoints_px.shape == (0, N_KEYPOINTS, 2)
+        assert found.scores.shape == (0, N_KEYPOINTS) and found.person_scores.shape == (0,)
+
+
+def test_bundles_are_equal_every_time_and_a_bundle_can_be_given(weights, tmp_path, photograph):
+    from hicp_lib.detectors import mediapipe_bundle
+
+    bundle = mediapipe_bundle.assemble("pose")
+    mediapipe_bundle._with_scaling.cache_clear()
+    assert mediapipe_bundle.assemble("pose") == bundle
+    path = tmp_path / "pose.task"
+    path.write_bytes(bundle)
+    given, own = make_detector("mediapipe-pose", model=path), make_detector("mediapipe-pose")
+    assert given.settings == own.settings
+    assert np.array_equal(
+        given.detect(photograph).keypoints_px, own.detect(photograph).keypoints_px, equal_nan=True
+    )
+
+
+def test_a_file_that_is_no_bundle_is_refused(tmp_path):
+    path = tmp_path / "hand.task"
+    path.write_bytes(b"no zip")
+    with pytest.raises(InputError, match=r"hand\.task: is not a MediaPipe \.task bundle"):
+        make_detector("mediapipe-hands", model=path)
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as file:
+        file.writestr("pose_detector.tflite", b"")
+    path.write_bytes(content.getvalue())
+    with pytest.raises(InputError, match=r"has no hand_detector\.tflite; give the \.task file of the hand"):
+        make_detector("mediapipe-hands", model=path)
+
+
+def test_a_damaged_weight_is_refused(own_cache):
+    path = own_cache / "weights" / "palm_detection_full.tflite"
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 16
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"palm_detection_full\.tflite.*damaged"):
+        make_detector("mediapipe-hands")
+    assert make_detector("mediapipe-pose").settings["num_poses"] == 1
+
+
+class _Recorder(StreamRequestHandler):
+    """A proxy that notes what it is asked for and refuses."""
+
+    def handle(self) -> None:
+        self.server.requests.append(self.rfile.readline().decode())
+        self.wfile.write(b"HTTP/1.1 403 Forbidden\r\n\r\n")
+
+
+@pytest.fixture
+def proxy():
+    with ThreadingTCPServer(("127.0.0.1", 0), _Recorder) as server:
+        server.requests = []
+        thread = Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        yield server
+        server.shutdown()
+
+
+_RUN = """
+import os, time, numpy as np
+from hicp_lib.detectors import native
+{before}
+from hicp_lib.detectors.registry import make_detector
+detector = make_detector("mediapipe-hands")
+detector.detect(np.zeros((50, 50, 3), np.uint8))
+detector._task._task.close()
+time.sleep(1)
+make_detector("mediapipe-pose")
+"""
+
+
+def run_behind(proxy, before: str = "") -> subprocess.CompletedProcess:
+    address = f"http://127.0.0.1:{proxy.server_address[1]}"
+    environment = os.environ | {"https_proxy": address, "no_proxy": "*", "NO_PROXY": ""}
+    return subprocess.run(
+        [sys.executable, "-c", _RUN.format(before=before)], env=environment, capture_output=True, text=True
+    )
+
+
+def test_mediapipe_says_nothing_and_contacts_nobody(weights, proxy):
+    """Its usage metrics would go out when the task is closed; see `hicp_lib.detectors.native`."""
+    run = run_behind(proxy)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
+    assert proxy.requests == []
+
+
+def test_the_proxy_would_have_seen_it(weights, proxy):
+    """The control to the test above: without `keep_offline` the library does try."""
+    run = run_behind(proxy, before="native.keep_offline = lambda: os.environ.pop('no_proxy', None)")
+    assert run.returncode == 0
+    assert any(request.startswith("CONNECT") for request in proxy.requests)
