@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+
+import matplotlib
 import pytest
 
 from hicp_lib.errors import InputError
@@ -43,8 +46,9 @@ def test_report_of_two_notebooks(study):
     home.write_text(home.read_text() + "\n{doc}`nowhere`\n")
     with pytest.raises(RunError, match=r"book: book/index.md:\d+: WARNING: unknown document: 'nowhere'"):
         make_report("quick", [("scale", "2")], lines.append, root=study)
-    home.write_text("# Home\n\n<img src='x.png'>\n")
-    with pytest.raises(RunError, match=r"book: index.html: image without alt text: x.png"):
+    home.write_text("# Home\n\n![](_static/x.png)\n")
+    shutil.copy(matplotlib.get_data_path() + "/images/home.png", study / "book" / "_static" / "x.png")
+    with pytest.raises(RunError, match=r"book: index.html: image without alt text: _images/x.png"):
         make_report("quick", [("scale", "2")], lines.append, root=study)
     home.write_text("# Home\n\n{{ value('00_first', 'none') }}\n")
     with pytest.raises(InputError, match="needs 'none'"):

@@ -24,6 +24,7 @@ def test_a_sound_page_has_no_problem(tmp_path):
     [
         ("<img src=a.png>", "image without alt text: a.png"),
         ("<img src=a.png alt=' '>", "image without alt text"),
+        ("<img src=_images/a.png alt=_images/a.png>", "image without alt text: _images/a.png"),
         ("<div class='x hicp-scene'></div>", "3D scene without a description"),
         ("<script src='https://cdn.example/x.js'></script>", "loads from the network: <script src="),
         ("<script src='//cdn.example/x.js'></script>", "loads from the network"),
