@@ -57,7 +57,7 @@ def render_dataset(
     stamp = {"renderer": renderer_version(), "seed": seed}
     _prepare(out, stamp)
     todo = [(str(out), seed, index) for index in range(n) if not _is_done(out, index)]
-    bar = tqdm(total=n, initial=n - len(todo), desc="rendering", unit="image", disable=not progress)
+    bar = tqdm(total=n, initial=n - len(todo), desc="rendering", unit="image", disable=None if progress else True)
     for _ in _in_processes(todo, workers or os.cpu_count() or 1):
         bar.update()
     bar.close()
