@@ -200,7 +200,7 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     if not rows.rows:
         raise InputError(f"{path}: holds no detections; if nobody was found AP is 0, else write it again")
     image_ids, person_scores = rows.integers("image_id"), rows.numbers("score")
-    _check_references(rows, image_ids, annotations and annotations.images)
+    _check_references(rows, image_ids, None if annotations is None else annotations.images)
     triples = rows.keypoints()
     keypoints = np.where((triples == 0).all(axis=-1, keepdims=True), np.nan, triples[..., :2])
     found = {} if annotations is None else dict.fromkeys(annotations.images, Detections.none())
