@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 import numpy as np
-import open3d as o3d
+
+# Open3D would announce and start its web viewer in every notebook that renders.
+os.environ.setdefault("OPEN3D_DISABLE_WEB_VISUALIZER", "true")
+
+import open3d as o3d  # noqa: E402
 
 from hicp_lib.simulation.surfaces import Hits, Surface
 
@@ -26,6 +31,11 @@ class Trace:
     surface: np.ndarray
     barycentric: np.ndarray
     face_normals: np.ndarray
+
+    def take(self, rows: np.ndarray) -> Trace:
+        """Some of the rays."""
+        arrays = (self.depth_m, self.triangle, self.surface, self.barycentric, self.face_normals)
+        return Trace(*(array[rows] for array in arrays))
 
 
 class RayScene:
