@@ -70,7 +70,7 @@ class Summary:
         """For people."""
         low, middle, high = self.score_range
         scaled = f"divided by {self.score_scale:g}" if self.score_scale != 1 else "taken as they are"
-        unmatched = ", ".join(self.unmatched[:3]) + (", ..." if len(self.unmatched) > 3 else "")
+        unmatched = ", ".join(map(repr, self.unmatched[:3])) + (", ..." if len(self.unmatched) > 3 else "")
         return [
             f"{self.format}: {self.n_people} people in {self.n_with_people} of {self.n_images} images; "
             f"{self.n_without_people} with nobody, {self.n_not_mentioned} not mentioned",
