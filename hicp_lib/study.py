@@ -40,6 +40,11 @@ if TYPE_CHECKING:
 
 SCHEMA_VERSION = 1
 _SVG_STYLE = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
+_SAVE_OPTIONS: dict[str, dict[str, Any]] = {
+    "png": {},
+    "svg": {"metadata": {"Date": None}},
+    "webp": {"pil_kwargs": {"quality": 88, "method": 4}},
+}
 
 
 class Study:
@@ -68,17 +73,20 @@ class Study:
         self._start_s = time.perf_counter()
 
     def figure(self, name: str, figure: Figure) -> None:
-        """Save a figure (PNG, SVG, its numbers) and show it with caption, alt text and downloads."""
-        png = _rendered(figure.figure, "png")
-        write_bytes(self.folder / f"{name}.png", png)
-        write_bytes(self.folder / f"{name}.svg", _rendered(figure.figure, "svg"))
-        downloads = ["svg"]
+        """Save a figure and show it with its caption, alt text and downloads.
+
+        A drawing is saved as PNG and SVG with its numbers as CSV, a picture (without numbers) as WebP.
+        """
+        kind = "webp" if figure.table is None else "png"
+        content = _rendered(figure.figure, kind)
+        write_bytes(self.folder / f"{name}.{kind}", content)
+        downloads = [kind]
         if figure.table is not None:
-            self.save(name, figure.table)
+            write_bytes(self.folder / f"{name}.svg", _rendered(figure.figure, "svg"))
             _write_csv(self.folder / f"{name}.csv", figure.table)
-            downloads += ["parquet", "csv"]
-        self._captions[name] = {"caption": figure.caption, "alt": figure.alt}
-        source = "data:image/png;base64," + base64.b64encode(png).decode()
+            downloads += ["svg", "csv"]
+        self._captions[name] = {"file": f"{name}.{kind}", "caption": figure.caption, "alt": figure.alt}
+        source = f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
         image = f'<img src="{source}" alt="{html.escape(figure.alt)}">'
         self._show_figure(name, image, figure.caption, downloads)
 
@@ -164,7 +172,7 @@ def _rendered(figure, kind: str) -> bytes:
     """The same bytes for the same figure: no date, fixed identifiers."""
     buffer = io.BytesIO()
     with mpl.rc_context(_SVG_STYLE):
-        figure.savefig(buffer, format=kind, metadata={"Date": None} if kind == "svg" else None)
+        figure.savefig(buffer, format=kind, **_SAVE_OPTIONS[kind])
     return buffer.getvalue()
 
 

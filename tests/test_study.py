@@ -47,6 +47,14 @@ def test_a_figure_is_shown_with_its_words_and_saved_the_same_each_time(study, sh
     assert first == {kind: (study.folder / f"line.{kind}").read_bytes() for kind in first}
 
 
+def test_a_picture_is_saved_small_and_without_numbers(study, shown):
+    line = line_figure()
+    study.figure("photo", Figure(line.figure, line.caption, line.alt))
+    assert [path.name for path in study.folder.iterdir()] == ["photo.webp"]
+    assert 'src="data:image/webp;base64,' in shown[0]
+    assert (study.folder / "photo.webp").read_bytes()[8:12] == b"WEBP"
+
+
 def test_a_table_is_saved_exactly_with_the_parameters_of_its_run(study, shown):
     table = pd.DataFrame({"detector": ["a", "b"], "oks": [1 / 3, np.nan]})
     study.table("t", table, "A table.")

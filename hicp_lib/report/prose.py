@@ -63,7 +63,7 @@ class Results:
     def figure(self, notebook: str, name: str) -> str:
         """A saved figure as HTML, with a link to the notebook that made it."""
         texts = self._entry(notebook, "captions.json", name)
-        source = f"results/{self._profile}/{notebook}/{name}.png"
+        source = f"results/{self._profile}/{notebook}/{texts['file']}"
         return (
             f'<figure class="hicp"><img src="{source}" alt="{html.escape(texts["alt"])}">'
             f"<figcaption>{html.escape(texts['caption'])} "

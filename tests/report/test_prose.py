@@ -18,7 +18,9 @@ def results(tmp_path: Path) -> Results:
     folder = tmp_path / "results" / "02_x"
     folder.mkdir(parents=True)
     (folder / "values.json").write_text(json.dumps({"ap": 0.98765, "n": 7, "absent": None}))
-    (folder / "captions.json").write_text(json.dumps({"f": {"caption": "A & B", "alt": 'Says "no"'}}))
+    (folder / "captions.json").write_text(
+        json.dumps({"f": {"file": "f.png", "caption": "A & B", "alt": 'Says "no"'}})
+    )
     (folder / "provenance.json").write_text(json.dumps({"wall_s": 1.5}))
     pd.DataFrame({"name": ["a|b"], "ap": [np.nan]}).to_parquet(folder / "t.parquet")
     return Results(tmp_path / "results", "quick")
