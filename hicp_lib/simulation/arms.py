@@ -30,8 +30,8 @@ _RAISED_DEG: tuple[Ranges, ...] = (
      "elbow_flexion": (5, 70), "forearm_supination": (-60, 60)},
     {"shoulder_abduction": (85, 150), "shoulder_flexion": (0, 20), "shoulder_rotation": (-30, 30),
      "elbow_flexion": (5, 60), "forearm_supination": (-40, 60)},
-    {"shoulder_abduction": (30, 75), "shoulder_flexion": (0, 30), "shoulder_rotation": (-90, -65),
-     "elbow_flexion": (80, 130), "forearm_supination": (-70, -20)},
+    {"shoulder_abduction": (50, 80), "shoulder_flexion": (0, 25), "shoulder_rotation": (-90, -75),
+     "elbow_flexion": (85, 130), "forearm_supination": (-70, -20)},
 )  # fmt: skip
 
 

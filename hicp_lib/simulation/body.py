@@ -13,6 +13,8 @@ names sources and licences.
 
 from __future__ import annotations
 
+import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -106,7 +108,7 @@ Pose = Mapping[str, np.ndarray]
 the reference stance."""
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=4)
 def load_body(path: Path = BODY_FILE) -> Body:
     """The body model of the project.
 
@@ -118,7 +120,7 @@ def load_body(path: Path = BODY_FILE) -> Body:
     try:
         with np.load(path, allow_pickle=False) as stored:
             body = _unpack(stored)
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(
             f"{path}: not a body model ({error}); restore it from the repository or run tools/bake_body.py"
         ) from None
