@@ -13,11 +13,14 @@ from hicp_lib.simulation.raycast import RayScene, Trace
 
 # Rotated grid: four sub-pixel positions with distinct rows and columns.
 SAMPLES_PX = np.array([[-0.125, -0.375], [0.375, -0.125], [-0.375, 0.125], [0.125, 0.375]])
-MAX_PIXELS = 40_000
 
 
-def edge_pixels(trace: Trace, shape: tuple[int, int]) -> np.ndarray:
-    """Numbers of the pixels at an outline, a step in depth or a crease."""
+def edge_pixels(trace: Trace, sharp: np.ndarray) -> np.ndarray:
+    """Numbers of the pixels at an outline, a step in depth or a crease, where one side is `sharp`.
+
+    `sharp` is a mask of the image's shape, (height, width).
+    """
+    shape = sharp.shape
     surface, depth = trace.surface.reshape(shape), trace.depth_m.reshape(shape)
     normals = trace.face_normals.reshape(*shape, 3)
     edge = np.zeros(shape, bool)
@@ -26,7 +29,8 @@ def edge_pixels(trace: Trace, shape: tuple[int, int]) -> np.ndarray:
             low = tuple(slice(0, -1) if a == axis else slice(None) for a in (0, 1))
             high = tuple(slice(1, None) if a == axis else slice(None) for a in (0, 1))
             step = (surface[low] != surface[high]) | (np.abs(depth[low] - depth[high]) > 0.02 * depth[low])
-            step |= np.einsum("ijk,ijk->ij", normals[low], normals[high]) < 0.5
+            step |= np.einsum("ijk,ijk->ij", normals[low], normals[high]) < 0.3
+            step &= sharp[low] | sharp[high]
             edge[low] |= step
             edge[high] |= step
     return np.flatnonzero(edge)
@@ -35,32 +39,35 @@ def edge_pixels(trace: Trace, shape: tuple[int, int]) -> np.ndarray:
 def smooth_edges(
     image: np.ndarray, edges: np.ndarray, trace: Trace, scene: RayScene, camera: Camera
 ) -> np.ndarray:
-    """The image with its edge pixels replaced by the mean of four samples."""
+    """The image (height, width, 3) with its edge pixels replaced by the mean of four samples."""
     if len(edges) == 0:
         return image
     height, width = image.shape[:2]
     v, u = np.divmod(edges, width)
-    where = np.stack([u, v], axis=1)[:, None] + SAMPLES_PX
+    where = (np.stack([u, v], axis=1)[:, None] + SAMPLES_PX).astype(np.float32)
     found = scene.trace(pixel_rays(camera, where.reshape(-1, 2)))
-    n_samples = len(SAMPLES_PX)
-    best_cost = np.full(len(edges) * n_samples, np.inf, np.float32)
-    best = np.repeat(edges, n_samples)
-    depth = np.where(np.isfinite(found.depth_m), found.depth_m, 1e3)
-    for dv in (0, -1, 1):
-        for du in (0, -1, 1):
+    best = np.repeat(edges, len(SAMPLES_PX))
+    cost = _difference(trace, best, found, slice(None))
+    open_rows = np.flatnonzero(cost > 0.012)  # the others show what their pixel's middle shows
+    v, u, cost = (np.repeat(v, 4)[open_rows], np.repeat(u, 4)[open_rows], cost[open_rows])
+    for dv in (-1, 0, 1):
+        for du in (-1, 0, 1):
             near = np.clip(v + dv, 0, height - 1) * width + np.clip(u + du, 0, width - 1)
-            near = np.repeat(near, n_samples)
-            near_depth = trace.depth_m[near]
-            cost = np.abs(np.where(np.isfinite(near_depth), near_depth, 1e3) - depth) / depth
-            cost += 10 * (trace.surface[near] != found.surface)
-            cost += 0.2 * (1 - np.einsum("ij,ij->i", trace.face_normals[near], found.face_normals))
-            cost += 0.002 * (abs(du) + abs(dv))
-            better = cost < best_cost
-            best_cost[better], best[better] = cost[better], near[better]
+            other = _difference(trace, near, found, open_rows) + np.float32(0.002)
+            better = other < cost
+            cost[better], best[open_rows[better]] = other[better], near[better]
     flat = image.reshape(-1, 3)
     # Averaged after compression: a bright window does not eat its frame.
     mixed = flat[best] / (1 + flat[best])
-    mixed = mixed.reshape(len(edges), n_samples, 3).mean(axis=1)
-    result = flat.copy()
-    result[edges] = mixed / (1 - mixed)
-    return result.reshape(image.shape)
+    mixed = mixed.reshape(len(edges), len(SAMPLES_PX), 3).mean(axis=1)
+    flat[edges] = mixed / (1 - mixed)
+    return image
+
+
+def _difference(trace: Trace, pixels: np.ndarray, found: Trace, rows: np.ndarray | slice) -> np.ndarray:
+    """How little pixels show what samples found: another surface, another depth, another slant."""
+    depth = np.minimum(found.depth_m[rows], 1e3)
+    cost = np.abs(np.minimum(trace.depth_m[pixels], 1e3) - depth) / depth
+    cost += 10 * (trace.surface[pixels] != found.surface[rows])
+    slant = np.einsum("ij,ij->i", trace.face_normals[pixels], found.face_normals[rows])
+    return cost + np.float32(0.04) * (1 - slant)

@@ -22,9 +22,9 @@ class Garment:
 
     Attributes
     ----------
-    kind : "top", "bottom" or "shoe"
+    kind : "top" or "bottom"
     start, end : where it begins and ends. Top: height of hem and collar in the body's `torso` field.
-        Bottom: end in the `leg` field and waist in the `torso` field. Shoe: top edge in `leg`, 0.
+        Bottom: end in the `leg` field and waist in the `torso` field.
     sleeve : end of the sleeves in the `arm` field
     opening : how much deeper the collar is in front, in the `torso` field
     thickness_m : everywhere
@@ -57,9 +57,14 @@ class Pattern:
     hidden: np.ndarray
 
 
-@cache
 def cut_pattern(garment: Garment) -> Pattern:
     """Cut a garment out of the body's surface."""
+    # What it is made of does not change the cut.
+    return _cut_pattern(Garment(garment.kind, garment.start, garment.end, garment.sleeve, garment.opening))
+
+
+@cache
+def _cut_pattern(garment: Garment) -> Pattern:
     body = load_body()
     field = _FIELDS[garment.kind](body, garment)
     candidates = np.flatnonzero((field[body.triangles] > 0).any(axis=1))
@@ -92,25 +97,23 @@ def _bottom_field(body: Body, garment: Garment) -> np.ndarray:
     return np.where(allowed, field, -1)
 
 
-def _shoe_field(body: Body, garment: Garment) -> np.ndarray:
-    leg = body.field("leg")
-    return np.where(_is(body, "foot", "shin", "nail") & (leg > 0), leg - garment.start, -1)
-
-
-_FIELDS = {"top": _top_field, "bottom": _bottom_field, "shoe": _shoe_field}
+_FIELDS = {"top": _top_field, "bottom": _bottom_field}
 
 
 def _is(body: Body, *names: str) -> np.ndarray:
     return np.isin(body.regions, [REGIONS.index(name) for name in names])
 
 
-def put_on(garment: Garment, posed: PosedBody, rest_m: np.ndarray, folds: np.ndarray) -> tuple[g.Mesh, np.ndarray]:
+def put_on(
+    garment: Garment, posed: PosedBody, rest_m: np.ndarray, folds: np.ndarray, layers_m: np.ndarray
+) -> tuple[g.Mesh, np.ndarray]:
     """Put a garment on a posed body.
 
     Parameters
     ----------
     rest_m : array, shape (n_v, 3): the same person at rest; patterns and folds are tied to it
     folds : array, shape (n_waves, 5): wave vector in rest coordinates (rad/m), phase, height (m)
+    layers_m : array, shape (n_v,): how far from the skin the clothes worn below reach; updated in place
 
     Returns
     -------
@@ -121,44 +124,39 @@ def put_on(garment: Garment, posed: PosedBody, rest_m: np.ndarray, folds: np.nda
     cut, body = pattern.cut, load_body()
     skin, skin_normals = cut.apply(posed.vertices_m), g.unit(cut.apply(posed.normals))
     rest = cut.apply(rest_m.astype(np.float32))
-    if garment.kind == "shoe":
-        cloth = _shoe(garment, pattern, posed, skin)
-    else:
-        cloth = _drape(garment, pattern, skin, skin_normals, rest, folds)
+    below = cut.apply(layers_m)
+    cloth = _drape(garment, pattern, skin, skin_normals, rest, folds, below)
+    height = np.einsum("ij,ij->i", cloth - skin, skin_normals)
+    layers_m[cut.i] = np.maximum(layers_m[cut.i], height)
     normals = g.vertex_normals(cloth, cut.triangles)
-    coords = np.column_stack([rest, *(cut.apply(body.field(f)) for f in ("arm", "leg", "torso")), pattern.distance])
+    # Smoothing also slides cloth along the skin: its pattern slides with it.
+    laid = _smooth(rest, pattern.neighbours, garment.smoothing)
+    coords = np.column_stack([laid, *(cut.apply(body.field(f)) for f in ("arm", "leg", "torso")), pattern.distance])
     return _with_rim(pattern, g.Mesh(cloth, cut.triangles, normals, coords.astype(np.float32)), skin)
 
 
-def _drape(garment: Garment, pattern: Pattern, skin, skin_normals, rest, folds) -> np.ndarray:
+def _drape(garment: Garment, pattern: Pattern, skin, skin_normals, rest, folds, below) -> np.ndarray:
     body = load_body()
-    away = garment.thickness_m + garment.ease_m * np.exp(-pattern.distance / 0.25)
+    ends = pattern.distance if garment.kind == "top" else garment.start - pattern.cut.apply(body.field("leg"))
+    away = garment.thickness_m + garment.ease_m * np.exp(-ends / 0.25)
     torso = pattern.cut.apply(body.field("torso"))
-    if garment.kind == "top":  # over whatever is worn below
-        away = away + 0.007 * np.clip((0.3 - torso) / 0.1, 0, 1)
-    else:  # a waistband is tight
+    if garment.kind == "bottom":  # a waistband is tight
         away = np.where(torso > 0, np.minimum(away, garment.thickness_m), away)
+    away = np.maximum(away, below + 0.004 * (below > 0))
     cloth = _smooth(skin, pattern.neighbours, garment.smoothing)
     cloth = _keep_away(cloth, skin, skin_normals, away)
     heights = sum(h * np.sin(rest @ np.array([x, y, z], np.float32) + p) for x, y, z, p, h in folds)
     cloth = cloth + (heights * np.minimum(away / 0.01, 1.5))[:, None] * skin_normals
-    return _keep_away(_smooth(cloth, pattern.neighbours, 1), skin, skin_normals, 0.6 * away)
-
-
-def _shoe(garment: Garment, pattern: Pattern, posed: PosedBody, skin: np.ndarray) -> np.ndarray:
-    """A shoe hides the toes: the foot smoothed, inflated, and flattened where it meets the floor."""
-    cloth = _smooth(skin, pattern.neighbours, garment.smoothing)
-    normals = g.vertex_normals(cloth, pattern.cut.triangles)
-    leg = pattern.cut.apply(load_body().field("leg"))
-    away = garment.thickness_m + 0.008 * np.clip((leg - 2.2) / 0.4, 0, 1)
-    cloth = cloth + away[:, None] * normals
-    cloth[:, 2] = np.maximum(cloth[:, 2], posed.vertices_m[:, 2].min() + 0.001)
-    return cloth.astype(np.float32)
+    return _keep_away(_smooth(cloth, pattern.neighbours, 1), skin, skin_normals, np.maximum(0.6 * away, below + 0.003 * (below > 0)))
 
 
 def _smooth(points: np.ndarray, neighbours: np.ndarray, steps: int) -> np.ndarray:
+    columns, share = np.ascontiguousarray(neighbours.T), np.float32(0.6 / neighbours.shape[1])
     for _ in range(steps):
-        points = 0.4 * points + 0.6 * points[neighbours].mean(axis=1)
+        total = points[columns[0]]
+        for column in columns[1:]:
+            total += points[column]
+        points = np.float32(0.4) * points + share * total
     return points
 
 

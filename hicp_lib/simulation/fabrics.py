@@ -51,7 +51,7 @@ def flat_coordinates(cuts: Cuts, coords: np.ndarray, limbs: str) -> tuple[np.nda
     left = rest[1] > 0
     panel = np.zeros(len(arm), np.int8)
     if limbs == "arms":
-        panel = np.where(arm > 0.07, np.where(left, 1, 2), 0)
+        panel = np.where(arm > 0.15, np.where(left, 1, 2), 0)
     elif limbs == "legs":
         panel = np.where(left, 3, 4)
     uv = np.empty((2, len(arm)), np.float32)
@@ -64,12 +64,9 @@ def flat_coordinates(cuts: Cuts, coords: np.ndarray, limbs: str) -> tuple[np.nda
         side = np.cross(axis, front).astype(np.float32)
         around = np.arctan2(side @ local, front @ local) * np.float32(cuts.radii_m[number])
         along = axis @ local
-        if number == 0:  # a shirt is flat above the chest, a tube below it
-            chest = np.clip((coords[5, rows] - 0.55) / 0.3, 0, 1)
+        if number == 0 and limbs:  # two flat panels, front and back, that bend round the sides
             x, y = local[0], local[1]
-            flat = np.where(x > 0, y, np.sign(y) * (np.pi * cuts.radii_m[0] - np.abs(y)))
-            around = around + chest * (flat - around)
-            along = along - 0.6 * chest * np.abs(x)
+            around = y + np.sign(y) * np.maximum(0.04 - np.abs(x), 0)
         uv[0, rows], uv[1, rows] = around, along
     return uv, panel
 
@@ -165,12 +162,6 @@ def plain_fabric(rng: Rng, dark: bool = False) -> Fabric:
     if rng.random() < 0.4:
         colour = hsv(rng.uniform(0.07, 0.12), rng.uniform(0.15, 0.45), rng.uniform(0.25, 0.8))
     return Fabric(np.array([colour] * 3), None, 0.0001, rng.uniform(0.003, 0.006), 0.85, 0.02, rng.uniform(0.05, 0.2))
-
-
-def leather(rng: Rng) -> Fabric:
-    """Shoes and belts."""
-    colour = any_colour(rng) if rng.random() < 0.5 else hsv(0.07, rng.uniform(0.0, 0.6), rng.uniform(0.05, 0.35))
-    return Fabric(np.array([colour] * 3), None, 0.0, 0.001, rng.uniform(0.35, 0.6), 0.04, 0.0)
 
 
 @dataclass(frozen=True)

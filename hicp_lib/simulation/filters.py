@@ -9,6 +9,25 @@ import numpy as np
 from hicp_lib.simulation.raycast import Trace, dot
 
 
+@dataclass(frozen=True)
+class View:
+    """A grid of pixels to be shaded together: their rays (n, 6), what these met, and which are wanted.
+
+    `wanted` has the grid's shape (rows, columns); n = rows * columns.
+    """
+
+    wanted: np.ndarray
+    rays: np.ndarray
+    trace: Trace
+
+    @classmethod
+    def of(cls, trace: Trace, rays: np.ndarray, pixels: np.ndarray, wanted: np.ndarray) -> View:
+        """The view of pixel numbers (rows, columns); where nothing was hit, nothing is wanted."""
+        chosen = pixels.ravel()
+        met = trace.take(chosen)
+        return cls(wanted & (met.surface >= 0).reshape(wanted.shape), rays[chosen], met)
+
+
 @dataclass
 class Looks:
     """How things look at every pixel; components first, (3, n) or (n,). See `surfaces.Look`."""
@@ -28,19 +47,20 @@ class Looks:
         vectors = [np.zeros((3, n), np.float32) for _ in range(4)]
         return cls(*vectors, *(np.zeros(n, np.float32) for _ in range(4)))
 
-    def part(self, block: slice) -> Looks:
-        """A range of the pixels."""
+    def part(self, block: np.ndarray) -> Looks:
+        """Some of the pixels."""
         return Looks(*(getattr(self, field.name)[..., block] for field in fields(self)))
 
 
-def tilt_by_height(looks: Looks, trace: Trace, shape: tuple[int, int]) -> None:
+def tilt_by_height(looks: Looks, view: View) -> None:
     """Tilt `looks.normals` in place by the slope of `looks.height_m`, from differences between pixels.
 
     Mikkelsen, "Bump mapping unparametrized surfaces on the GPU" (2010); pixels on the last
     row and column, or beside another surface, keep their normals.
     """
+    shape = view.wanted.shape
     height = looks.height_m.reshape(shape)
-    surface, depth = trace.surface.reshape(shape), trace.depth_m.reshape(shape)
+    surface, depth = view.trace.surface.reshape(shape), view.trace.depth_m.reshape(shape)
     here, corner = slice(None, -1), (slice(None, -1), slice(None, -1))
     with np.errstate(invalid="ignore"):
         inner = (

@@ -65,21 +65,21 @@ def random_style(rng: np.random.Generator, woman: bool, age: float) -> Style | N
         return None
     if kind == "long":
         length = rng.uniform(0.30, 0.48)
-        return Style(length, length * 0.95, 0.10, (-0.5, 0, -0.3), 0.4, wave, 0.016, parting, "", 1000, 13, 0.017)
+        return Style(length, length * 0.95, 0.06, (-0.5, 0, -0.3), 1.0, wave, 0.014, parting, "", 1000, 12, 0.018)
     if kind == "bob":
         length = rng.uniform(0.17, 0.25)
-        return Style(length, length * 0.85, 0.12, (-0.3, 0, -0.4), 0.4, wave, 0.018, parting, "", 1000, 9, 0.016)
+        return Style(length, length * 0.85, 0.06, (-0.3, 0, -0.4), 1.0, wave, 0.016, parting, "", 1000, 8, 0.017)
     if kind in ("tail", "bun"):
         return Style(0.3, 0.3, 0.05, (-1, 0, 0.1), 0.0, 0.01, 0.006, 0, kind, 800, 8, 0.012)
     if kind == "short":
-        return Style(0.10, 0.07, 0.15, (0.1, 0, -0.5), 0.2, wave, 0.018, parting, "", 1200, 6, 0.012)
+        return Style(0.10, 0.07, 0.08, (0.1, 0, -0.5), 0.5, wave, 0.016, parting, "", 1600, 5, 0.010)
     if kind == "curly":
         return Style(0.07, 0.05, 0.5, (0, 0, -0.3), 0.1, 0.1, 0.03, 0, "", 1500, 8, 0.009, 0.007)
     if kind == "side":
         length = rng.uniform(0.045, 0.08)
-        return Style(length, rng.uniform(0.012, 0.025), 0.18, (0.45, 0, -0.2), 0.05, wave, 0.014, parting, "", 1500, 4, 0.010)
+        return Style(length, rng.uniform(0.012, 0.025), 0.10, (0.45, 0, -0.2), 0.1, wave, 0.014, parting, "", 1900, 4, 0.008)
     if kind == "quiff":
-        return Style(rng.uniform(0.035, 0.06), 0.012, 0.45, (-0.5, 0, 0.3), 0.0, wave, 0.024, 0, "", 1500, 4, 0.009)
+        return Style(rng.uniform(0.04, 0.06), 0.014, 0.22, (-0.9, 0, 0.25), 0.05, wave, 0.020, 0, "", 1900, 4, 0.008)
     return Style(rng.uniform(0.010, 0.018), 0.009, 0.3, (0.3, 0, -0.1), 0.0, 0.05, 0.010, 0, "", 1900, 2, 0.007)
 
 
@@ -133,6 +133,7 @@ def _columns(trunk_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     np.minimum.at(back, tuple(cells.T), trunk_m[:, 0])
     np.maximum.at(front, tuple(cells.T), trunk_m[:, 0])
     kernel = np.ones((3, 3))
+    back, front = np.where(np.isfinite(back), back, 9), np.where(np.isfinite(front), front, -9)
     return corner, cv2.erode(back, kernel), cv2.dilate(front, kernel)
 
 
@@ -205,7 +206,7 @@ def _strands(style: Style, head: Obstacles, roots, normals, inside, rng) -> tupl
     relative = roots - head.centre_m
     crown = np.clip((relative[:, 2] + 0.02) / 0.09, 0, 1)
     length = style.side_m + (style.top_m - style.side_m) * crown
-    length = length * rng.uniform(0.75, 1.1, n) * np.clip(0.35 + inside / 0.012, 0.35, 1)
+    length = length * rng.uniform(0.85, 1.05, n) * np.clip(0.35 + inside / 0.012, 0.35, 1)
     layer = style.volume_m * rng.random(n) * np.clip(inside / 0.02, 0.1, 1) + 0.001
     if style.tie:
         length = 1.25 * np.linalg.norm(_tie_point(style, head) - roots, axis=1)
@@ -259,7 +260,7 @@ def _combing(style: Style, head: Obstacles, roots, normals) -> np.ndarray:
     else:
         comb = np.tile(np.array(style.comb, float), (len(roots), 1))
         side = np.where(roots[:, 1] > 0.02 * style.parting, 1.0, -1.0)
-        comb[:, 1] += 0.7 * side * (style.parting != 0)
+        comb[:, 1] += 0.45 * side * (style.parting != 0)
         front = np.clip((roots[:, 0] - head.centre_m[0]) / 0.08, 0, 1)
         comb[:, 0] -= 0.5 * front * (style.top_m > 0.1)  # long hair leaves the face free
     comb = comb - np.einsum("ij,ij->i", comb, normals)[:, None] * normals

@@ -159,10 +159,22 @@ _CUBE = _unit_cube()
 def box(low_m: np.ndarray, high_m: np.ndarray, yaw_rad: float = 0.0) -> Mesh:
     """A box between two corners, turned about the vertical through its centre; coords in metres."""
     low, high = np.asarray(low_m, np.float32), np.asarray(high_m, np.float32)
+    return turned(boxes(low[None], high[None]), yaw_rad, (low + high) / 2)
+
+
+def boxes(lows_m: np.ndarray, highs_m: np.ndarray) -> Mesh:
+    """Boxes between pairs of corners, (n, 3) each, as one mesh; coords in metres."""
+    lows, highs = np.asarray(lows_m, np.float32), np.asarray(highs_m, np.float32)
     corners, normals, triangles, axes = _CUBE
-    scaled = corners * (high - low)
-    mesh = Mesh(scaled + low, triangles, normals, np.take_along_axis(scaled, axes, axis=1))
-    return turned(mesh, yaw_rad, (low + high) / 2)
+    scaled = corners * (highs - lows)[:, None]
+    coords = np.take_along_axis(scaled, np.broadcast_to(axes, (len(lows), *axes.shape)), axis=2)
+    all_triangles = triangles + 24 * np.arange(len(lows), dtype=np.int32)[:, None, None]
+    return Mesh(
+        (scaled + lows[:, None]).reshape(-1, 3),
+        all_triangles.reshape(-1, 3),
+        np.tile(normals, (len(lows), 1)),
+        coords.reshape(-1, 2),
+    )
 
 
 def turned(mesh: Mesh, yaw_rad: float, about_m: np.ndarray) -> Mesh:

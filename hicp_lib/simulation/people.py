@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from hicp_lib.simulation import clothing, fabrics, hair, skin
+from hicp_lib.simulation import clothing, fabrics, footwear, hair, skin
 from hicp_lib.simulation import mesh as g
 from hicp_lib.simulation.body import BODY_FILE, REGIONS, Body, PosedBody, load_body, shape_weights
 from hicp_lib.simulation.surfaces import Material, Surface
@@ -35,7 +35,7 @@ class Worn:
 class Appearance:
     """One person, whatever the pose: shape (weights over the body's shapes), colours, hair, clothes.
 
-    `skirt` is (length in metres, flare, phase of its folds, fabric), or None.
+    `shoes` None is barefoot; `skirt` is (length in metres, flare, phase of its folds, fabric), or None.
     """
 
     shape: np.ndarray
@@ -44,6 +44,7 @@ class Appearance:
     beard: hair.Style | None
     worn: list[Worn]
     skirt: tuple[float, float, float, fabrics.Fabric] | None
+    shoes: footwear.Shoes | None
     seed: int
 
 
@@ -65,7 +66,8 @@ def random_appearance(rng: Rng) -> Appearance:
         length = rng.uniform(0.008, 0.03)
         beard = hair.Style(length, length, 0.45, (0.2, 0, -0.8), 0.2, 0.35, 0.01, n_locks=900, n_steps=3, width_m=0.0035)
     worn, skirt = _outfit(rng, woman, age)
-    return Appearance(weights, complexion, style, beard, worn, skirt, int(rng.integers(2**31)))
+    shoes = footwear.random_shoes(rng) if rng.random() < 0.93 else None
+    return Appearance(weights, complexion, style, beard, worn, skirt, shoes, int(rng.integers(2**31)))
 
 
 @cache
@@ -99,9 +101,6 @@ def _outfit(rng: Rng, woman: bool, age: float) -> tuple[list[Worn], tuple | None
     else:
         odds = [0.42, 0.28, 0.18, 0.12] if woman else [0.45, 0.37, 0.18, 0.0]
         worn.append(_bottom(rng, rng.choice(["jeans", "chinos", "shorts", "leggings"], p=odds)))
-    if rng.random() < 0.92:
-        shoe = clothing.Garment("shoe", rng.choice([1.88, 1.92, 1.80]), 0, thickness_m=0.006, ease_m=0.004, smoothing=30)
-        worn.append(Worn(shoe, fabrics.leather(rng), fabrics.Trim(0.02, 0.8), clothing.random_folds(rng, 0.0)))
     return worn, skirt
 
 
@@ -166,8 +165,9 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
     part = part_of_vertices(body)[body.triangles[:, 0]]
     cuts = fabrics.make_cuts(landmarks)
     surfaces, hidden = [], np.zeros(len(body.triangles), bool)
-    for worn in sorted(appearance.worn, key=lambda w: w.garment.kind):  # trousers before shoes before tops
-        mesh, source = clothing.put_on(worn.garment, posed, rest, worn.folds)
+    layers = np.zeros(len(rest), np.float32)
+    for worn in sorted(appearance.worn, key=lambda w: w.garment.kind):  # trousers before tops
+        mesh, source = clothing.put_on(worn.garment, posed, rest, worn.folds, layers)
         hidden |= clothing.cut_pattern(worn.garment).hidden
         material = fabrics.cloth_material(worn.fabric, cuts, _LIMBS[worn.garment.kind], worn.trim)
         surfaces.append(Surface(mesh, material, person, part[source]))
@@ -175,6 +175,10 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
             surfaces.append(_collar(worn, mesh, posed, cuts, person))
     if appearance.skirt is not None:
         surfaces.append(_skirt(appearance.skirt, body, posed, cuts, person))
+    if appearance.shoes is not None:
+        hidden |= (body.field("leg")[body.triangles] > 2.06).all(axis=1)
+        surfaces += _shoes(appearance.shoes, posed, person)
+    hidden |= (body.field("mouth")[body.triangles] > 0.9).all(axis=1)  # lips are closed
     surfaces = _skin(appearance, body, posed, rest, landmarks, ~hidden, part, person) + surfaces
     material = hair.hair_material(appearance.complexion.hair)
     if appearance.style is not None:
@@ -185,13 +189,13 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
 
 def _skin(appearance, body, posed, rest, landmarks, shown, part, person) -> list[Surface]:
     coords = skin.paint_coords(body, rest, landmarks)
-    covered = 0.0 if appearance.style is None else 0.95
+    covered = 0.0 if appearance.style is None else 1.0
     material = skin.skin_material(appearance.complexion, covered if covered else appearance.complexion.stubble * 0.3)
     mesh = g.Mesh(posed.vertices_m, body.triangles[shown], posed.normals, coords)
     return [Surface(mesh, material, person, part[shown])]
 
 
-_LIMBS = {"top": "arms", "bottom": "legs", "shoe": "legs"}
+_LIMBS = {"top": "arms", "bottom": "legs"}
 
 
 def _collar(worn: Worn, mesh: g.Mesh, posed: PosedBody, cuts: fabrics.Cuts, person: int) -> Surface:
@@ -205,6 +209,14 @@ def _skirt(skirt: tuple, body: Body, posed: PosedBody, cuts: fabrics.Cuts, perso
     mesh = clothing.skirt(posed, posed.rotations[body.bone_names.index("root")], length, flare, phase)
     material = fabrics.cloth_material(fabric, cuts, "", fabrics.Trim(0.02, 0.95))
     return Surface(mesh, material, person, np.full(len(mesh.triangles), REGIONS.index("hips"), np.int16))
+
+
+def _shoes(shoes: footwear.Shoes, posed: PosedBody, person: int) -> list[Surface]:
+    pair = [footwear.put_on_shoe(shoes, posed, side) for side in ("left", "right")]
+    n = len(pair[0].triangles)
+    foot = REGIONS.index("foot")
+    parts = np.repeat(np.array([foot, foot + RIGHT], np.int16), n)
+    return [Surface(g.concatenate(pair), footwear.shoe_material(shoes), person, parts)]
 
 
 def _hair(mesh: g.Mesh, material: Material, person: int) -> Surface:

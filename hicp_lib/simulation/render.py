@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from hicp_lib.simulation import lights
 from hicp_lib.simulation.antialias import edge_pixels, smooth_edges
 from hicp_lib.simulation.camera import Camera, pixel_rays
-from hicp_lib.simulation.filters import Looks, tilt_by_height
+from hicp_lib.simulation.filters import Looks, View, tilt_by_height
 from hicp_lib.simulation.raycast import RayScene, Trace, dot
 from hicp_lib.simulation.shadows import visibility
 from hicp_lib.simulation.surfaces import Look, Surface
@@ -48,18 +49,52 @@ class Frame:
 
 
 def render(world: World, camera: Camera, rng: np.random.Generator) -> Frame:
-    """Render one frame; the random generator scatters the shadow rays."""
+    """Render one frame; the random generator scatters the shadow rays.
+
+    Everything is traced at every pixel, but only people are shaded there: they are in focus.
+    What is around them is shaded at every second row and column, and a little out of focus.
+    """
     scene = RayScene(world.surfaces)
     rays = pixel_rays(camera)
     trace = scene.trace(rays)
     shape = (camera.height_px, camera.width_px)
-    person, part = _labels(scene, trace)
-    looks = _gather_looks(scene, trace, rays, 1 / camera.fx_px)
-    tilt_by_height(looks, trace, shape)
-    seen = visibility(world.lights, scene, trace, looks, person >= 0, shape, rng)
-    image = _shade(world, looks, rays, seen, trace).T.reshape(*shape, 3)
-    image = smooth_edges(image, edge_pixels(trace, shape), trace, scene, camera)
-    return Frame(image, trace.depth_m.reshape(shape), person.reshape(shape), part.reshape(shape), scene)
+    person, part = (labels.reshape(shape) for labels in _labels(scene, trace))
+    numbers = np.arange(len(rays)).reshape(shape)
+    around = View.of(trace, rays, numbers[::2, ::2], person[::2, ::2] < 0)
+    image = _enlarge(_paint(world, scene, around, camera, 3, rng), around.wanted, shape)
+    rows, columns = (np.flatnonzero((person >= 0).any(axis=axis)) for axis in (1, 0))
+    if len(rows):
+        crop = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+        people = View.of(trace, rays, numbers[crop], person[crop] >= 0)
+        painted = _paint(world, scene, people, camera, 2, rng)
+        image[crop][people.wanted] = np.moveaxis(painted, 0, -1)[people.wanted]
+        image = smooth_edges(image, edge_pixels(trace, person >= 0), trace, scene, camera)
+    return Frame(image, trace.depth_m.reshape(shape), person, part, scene)
+
+
+def _paint(world: World, scene: RayScene, view: View, camera: Camera, passes: int, rng) -> np.ndarray:
+    """Linear RGB of a view, (3, rows, columns), black where nothing is wanted."""
+    looks = _gather_looks(scene, view, 1 / camera.fx_px)
+    tilt_by_height(looks, view)
+    seen = visibility(world.lights, scene, view, looks, passes, rng)
+    image = np.zeros((3, view.wanted.size), np.float32)
+    pixels = np.flatnonzero(view.wanted)
+    for start in range(0, len(pixels), _BLOCK):
+        block = pixels[start : start + _BLOCK]
+        image[:, block] = _shade_block(world, looks.part(block), view.rays[block, 3:].T, seen[:, block])
+    image[:, view.trace.surface < 0] = world.backdrop.astype(np.float32)[:, None]
+    return image.reshape(3, *view.wanted.shape)
+
+
+def _enlarge(painted: np.ndarray, wanted: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """From every second pixel to all, (height, width, 3); wanted colours run on under people."""
+    weighted = np.dstack([np.moveaxis(painted, 0, -1) * wanted[..., None], wanted]).astype(np.float32)
+    filled = cv2.GaussianBlur(weighted, (0, 0), 0.8) + 1e-4 * cv2.blur(weighted, (9, 9)) + 1e-9
+    to_coarse = np.array([[0.5, 0, 0], [0, 0.5, 0]])
+    full = cv2.warpAffine(
+        filled, to_coarse, shape[::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE
+    )
+    return full[..., :3] / full[..., 3:]
 
 
 def _labels(scene: RayScene, trace: Trace) -> tuple[np.ndarray, np.ndarray]:
@@ -69,15 +104,16 @@ def _labels(scene: RayScene, trace: Trace) -> tuple[np.ndarray, np.ndarray]:
     return owner[trace.surface], np.concatenate([*parts, [-1]]).astype(np.int16)[trace.triangle]
 
 
-def _gather_looks(scene: RayScene, trace: Trace, rays: np.ndarray, pixel_rad: float) -> Looks:
-    order = np.argsort(trace.surface, kind="stable")
-    bounds = np.searchsorted(trace.surface[order], np.arange(len(scene.surfaces) + 1))
-    looks = Looks.empty(len(rays))
+def _gather_looks(scene: RayScene, view: View, pixel_rad: float) -> Looks:
+    surface = np.where(view.wanted.ravel(), view.trace.surface, -1)
+    order = np.argsort(surface, kind="stable")
+    bounds = np.searchsorted(surface[order], np.arange(len(scene.surfaces) + 1))
+    looks = Looks.empty(len(surface))
     for number, (start, stop) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
         if start == stop:
             continue
         rows = order[start:stop]
-        hits = scene.hits(trace, rays, rows, number, pixel_rad)
+        hits = scene.hits(view.trace, view.rays, rows, number, pixel_rad)
         look: Look = scene.surfaces[number].material(hits)
         looks.positions_m[:, rows] = hits.positions_m
         looks.normals[:, rows] = hits.normals if look.normals is None else look.normals
@@ -86,16 +122,6 @@ def _gather_looks(scene: RayScene, trace: Trace, rays: np.ndarray, pixel_rad: fl
             if np.ndim(value) or value:
                 getattr(looks, name)[..., rows] = value
     return looks
-
-
-def _shade(world: World, looks: Looks, rays: np.ndarray, seen: np.ndarray, trace: Trace) -> np.ndarray:
-    """Linear RGB per ray, (3, n)."""
-    image = np.empty((3, len(rays)), np.float32)
-    for start in range(0, len(rays), _BLOCK):
-        block = slice(start, start + _BLOCK)
-        image[:, block] = _shade_block(world, looks.part(block), rays[block, 3:].T, seen[:, block])
-    image[:, trace.surface < 0] = world.backdrop.astype(np.float32)[:, None]
-    return image
 
 
 def _shade_block(world: World, looks: Looks, direction: np.ndarray, seen: np.ndarray) -> np.ndarray:

@@ -67,6 +67,13 @@ class _Wall:
         corners = np.array([self.point(u[i], v[i], w[i]) for i in (0, 1)])
         return g.box(corners.min(axis=0), corners.max(axis=0))
 
+    def boxes(self, spans: list[tuple]) -> g.Mesh:
+        """Several boxes at once, each ((u, u), (v, v), (w, w))."""
+        corners = np.moveaxis(np.array(spans, np.float32), 1, 2)  # (n, low or high, uvw)
+        up = np.array([0, 0, 1], np.float32)
+        points = self.centre + corners[..., :1] * self.u + corners[..., 1:2] * up + corners[..., 2:] * self.inward
+        return g.boxes(points.min(axis=1), points.max(axis=1))
+
     def panel(self, u: tuple[float, float], v: tuple[float, float], w: float) -> g.Mesh:
         across, up = (u[1] - u[0]) * self.u, np.array([0, 0, v[1] - v[0]])
         mesh = g.quad(self.point(u[0], v[0], w), across, up)
@@ -113,8 +120,8 @@ def _on_wall(rng: Rng, wall: _Wall, windows: list) -> list[Surface]:
         elif kind == "shelf":
             surfaces += _shelf(rng, wall, span)
         elif kind == "radiator":
-            ribs = [wall.box((a, a + 0.05), (0.12, 0.7), (0.03, 0.12)) for a in np.arange(u, u + width - 0.05, 0.075)]
-            surfaces.append(Surface(g.concatenate(ribs), m.plain(m.off_white(rng), 0.35)))
+            ribs = [((a, a + 0.05), (0.12, 0.7), (0.03, 0.12)) for a in np.arange(u, u + width - 0.05, 0.075)]
+            surfaces.append(Surface(wall.boxes(ribs), m.plain(m.off_white(rng), 0.35)))
         u += width + rng.uniform(0.15, 0.9)
     return surfaces
 
@@ -208,14 +215,14 @@ def _shelf(rng: Rng, wall: _Wall, span: tuple[float, float]) -> list[Surface]:
             if u + thick > span[1] - 0.02:
                 break
             tall = min(rng.uniform(0.17, 0.29), levels[1] - levels[0] - 0.04)
-            book = wall.box((u, u + thick), (v + 0.012, v + tall), (0.015, depth - rng.uniform(0.01, 0.07)))
+            book = ((u, u + thick), (v + 0.012, v + tall), (0.015, depth - rng.uniform(0.01, 0.07)))
             groups[int(rng.integers(5))].append(book)
             u += thick + 0.002
     wood = m.wooden(rng) if rng.random() < 0.6 else m.plain(m.off_white(rng), 0.4)
     surfaces = [Surface(g.concatenate(boards), wood)]
     for books in groups.values():
         if books:
-            surfaces.append(Surface(g.concatenate(books), m.plain(m.any_colour(rng), 0.55)))
+            surfaces.append(Surface(wall.boxes(books), m.plain(m.any_colour(rng), 0.55)))
     return surfaces
 
 

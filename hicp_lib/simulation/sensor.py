@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import cv2
 import numpy as np
@@ -45,12 +46,28 @@ def expose(radiance: np.ndarray, sensor: Sensor, rng: np.random.Generator, meter
     light *= (1 - sensor.vignette * 0.5 * (x * x + y * y))[..., None]
     light = cv2.GaussianBlur(light, (0, 0), max(sensor.blur_px, 0.2))
     sigma = np.sqrt(sensor.shot_noise**2 * np.maximum(light, 0) + sensor.read_noise**2)
-    grey = rng.standard_normal((height, width, 1), np.float32)
-    colour = cv2.GaussianBlur(rng.standard_normal((height, width, 3), np.float32), (0, 0), 0.8)
-    light += sigma * (0.8 * grey + 1.2 * colour)
+    light += sigma * _noise(height, width, rng)
     grey = light @ np.array([0.2126, 0.7152, 0.0722], np.float32)
     light = grey[..., None] + sensor.saturation * (light - grey[..., None])
     return _tone(light, sensor.contrast)
+
+
+@cache
+def _noise_tile() -> np.ndarray:
+    """Noise of brightness and, blurred by demosaicking, of colour; (1536, 1536, 3)."""
+    rng = np.random.default_rng(1536)
+    colour = cv2.GaussianBlur(rng.standard_normal((1536, 1536, 3), np.float32), (0, 0), 0.8)
+    return 0.8 * rng.standard_normal((1536, 1536, 1), np.float32) + 1.2 * colour
+
+
+def _noise(height: int, width: int, rng: np.random.Generator) -> np.ndarray:
+    """A random piece of the noise, (height, width, 3); drawing it anew would cost more than shading."""
+    tile = _noise_tile()
+    if height > tile.shape[0] or width > tile.shape[1]:
+        raise ValueError(f"an image of {width} x {height} pixels is larger than the noise kept for it")
+    row, column = rng.integers(0, tile.shape[0] - height + 1), rng.integers(0, tile.shape[1] - width + 1)
+    piece = tile[row : row + height, column : column + width]
+    return piece[:: rng.choice([-1, 1]), :: rng.choice([-1, 1])]
 
 
 def _auto_exposure(radiance: np.ndarray, meter: np.ndarray | None) -> float:
@@ -59,14 +76,13 @@ def _auto_exposure(radiance: np.ndarray, meter: np.ndarray | None) -> float:
     level = log.mean()
     if meter is not None and meter[::4, ::4].any():
         level = 0.5 * level + 0.5 * log[meter[::4, ::4]].mean()
-    return float(0.22 / np.exp(level))
+    return float(0.20 / np.exp(level))
 
 
 def _tone(light: np.ndarray, contrast: float) -> np.ndarray:
     """Linear light to sRGB with a shoulder that rolls highlights off, through a table."""
     x = np.linspace(0, 4, 4096)
-    shoulder = x * (1 + x / 9) / (1 + x * 0.45)  # near the identity in the shadows, slowly towards white
-    shoulder = np.clip(shoulder / (0.18 * (1 + 0.18 / 9) / (1 + 0.18 * 0.45)) * 0.18, 0, 1)
+    shoulder = np.clip(1.156 * x * (1 + x / 36) / (1 + 0.9 * x), 0, 1)  # keeps middle grey, rolls off to white at 4
     srgb = np.where(shoulder <= 0.0031308, 12.92 * shoulder, 1.055 * shoulder ** (1 / 2.4) - 0.055)
     curved = 0.5 + 0.5 * np.tanh(contrast * 2 * (srgb - 0.46)) / np.tanh(contrast)
     table = np.clip(255 * (0.35 * curved + 0.65 * srgb) + 0.5, 0, 255).astype(np.uint8)

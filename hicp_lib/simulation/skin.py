@@ -15,7 +15,7 @@ from hicp_lib.simulation.surfaces import Hits, Look, Material
 _TONES = linear(
     np.array(
         [
-            [0.945, 0.795, 0.720], [0.910, 0.735, 0.635], [0.855, 0.660, 0.540], [0.765, 0.565, 0.430],
+            [0.925, 0.755, 0.665], [0.895, 0.705, 0.590], [0.845, 0.640, 0.515], [0.765, 0.565, 0.430],
             [0.620, 0.435, 0.325], [0.455, 0.310, 0.235], [0.320, 0.215, 0.170],
         ]
     )
@@ -71,7 +71,7 @@ def _hair_colour(rng: np.random.Generator, dark: bool, age: float) -> np.ndarray
     if dark or rng.random() < 0.25:
         return hsv(rng.uniform(0.04, 0.09), rng.uniform(0.2, 0.5), rng.uniform(0.09, 0.2))
     kind = rng.choice(4, p=[0.4, 0.25, 0.25, 0.1])
-    value = (rng.uniform(0.18, 0.32), rng.uniform(0.32, 0.48), rng.uniform(0.55, 0.8), rng.uniform(0.4, 0.55))[kind]
+    value = (rng.uniform(0.26, 0.38), rng.uniform(0.40, 0.55), rng.uniform(0.62, 0.85), rng.uniform(0.45, 0.62))[kind]
     hue, saturation = ((0.07, 0.55), (0.075, 0.55), (0.105, 0.45), (0.045, 0.7))[kind]
     return hsv(hue + rng.normal(0, 0.008), saturation * rng.uniform(0.8, 1.15), value)
 
@@ -178,7 +178,7 @@ def _paint_lips(complexion: Complexion, tone, albedo, roughness, c) -> tuple[np.
 
 def _paint_hair(complexion: Complexion, scalp: float, albedo, c, uv, footprint) -> np.ndarray:
     """Eyebrows, lashes, stubble and the hair's roots."""
-    hair = np.float32(complexion.hair)[:, None] * 0.8
+    hair = np.float32(complexion.hair)[:, None] * 0.7
     slanted = np.stack([uv[0] + uv[1], uv[1] * 2 - uv[0]])
     fibre = textures.strands().sample(slanted, footprint)[0]
     brow = complexion.brows * _step(c["brow_m"] + 0.0008 * fibre, -0.0012, 0.0022)
