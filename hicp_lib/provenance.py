@@ -7,6 +7,7 @@ printed below it (`hicp_lib.study`), so the two can never disagree.
 from __future__ import annotations
 
 import functools
+import html
 import importlib.metadata
 import json
 import os
@@ -146,3 +147,27 @@ def provenance(parameters: dict[str, Any]) -> dict[str, Any]:
         "onnx_providers": onnx_providers(),
         "machine": machine(),
     }
+
+
+def provenance_html(stamp: dict[str, Any]) -> str:
+    """The footer of a page: what the notebook ran with, folded away until asked for."""
+    git, machine = stamp["git"], stamp["machine"]
+    changed = {None: "", 0: ""}.get(git["changed_files"], f" with {git['changed_files']} changed files")
+    rows = {
+        "Parameters": ", ".join(
+            f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in stamp["parameters"].items()
+        ),
+        "Commit": git["commit"][:12] + changed,
+        "Hashes": ", ".join(f"{k} {stamp[k + '_sha256'][:12]}" for k in ("library", "lock", "data")),
+        "Versions": ", ".join(f"{k} {v}" for k, v in stamp["versions"].items()),
+        "Inference": ", ".join(stamp["onnx_providers"]) or "ONNX Runtime not used",
+        "Machine": ", ".join(f"{k} {v}" for k, v in machine.items()),
+        "Wall time": f"{stamp['wall_s']:.1f} s",
+    }
+    body = "".join(
+        f'<tr><th scope="row">{k}</th><td>{html.escape(str(v))}</td></tr>' for k, v in rows.items()
+    )
+    return (
+        '<details class="hicp-provenance"><summary>What this page was made with</summary>'
+        f"<table><tbody>{body}</tbody></table></details>"
+    )

@@ -30,7 +30,7 @@ import pyarrow.parquet as pq
 from IPython.display import HTML, display
 
 from hicp_lib.files import atomic_path, write_bytes, write_json
-from hicp_lib.provenance import ROOT, provenance
+from hicp_lib.provenance import ROOT, provenance, provenance_html
 from hicp_lib.report import PROFILE_VARIABLE, RESULTS_VARIABLE
 
 if TYPE_CHECKING:
@@ -142,30 +142,6 @@ class Study:
         )
         caption = f'{html.escape(caption)} <span class="hicp-download">{links}</span>'
         display(HTML(f'<figure class="hicp" id="{name}">{body}<figcaption>{caption}</figcaption></figure>'))
-
-
-def provenance_html(stamp: dict[str, Any]) -> str:
-    """The footer of a page: what the notebook ran with, folded away until asked for."""
-    git, machine = stamp["git"], stamp["machine"]
-    changed = {None: "", 0: ""}.get(git["changed_files"], f" with {git['changed_files']} changed files")
-    rows = {
-        "Parameters": ", ".join(
-            f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in stamp["parameters"].items()
-        ),
-        "Commit": git["commit"][:12] + changed,
-        "Hashes": ", ".join(f"{k} {stamp[k + '_sha256'][:12]}" for k in ("library", "lock", "data")),
-        "Versions": ", ".join(f"{k} {v}" for k, v in stamp["versions"].items()),
-        "Inference": ", ".join(stamp["onnx_providers"]) or "ONNX Runtime not used",
-        "Machine": ", ".join(f"{k} {v}" for k, v in machine.items()),
-        "Wall time": f"{stamp['wall_s']:.1f} s",
-    }
-    body = "".join(
-        f'<tr><th scope="row">{k}</th><td>{html.escape(str(v))}</td></tr>' for k, v in rows.items()
-    )
-    return (
-        '<details class="hicp-provenance"><summary>What this page was made with</summary>'
-        f"<table><tbody>{body}</tbody></table></details>"
-    )
 
 
 def _rendered(figure, kind: str) -> bytes:

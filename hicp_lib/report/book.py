@@ -18,7 +18,6 @@ from hicp_lib.report.checks import book_problems
 from hicp_lib.report.prose import Results, render_page
 from hicp_lib.report.runs import Folders, RunError
 from hicp_lib.report.sphinx_extension import PLOTLY_PATH, SCRIPTS_DIR
-from hicp_lib.study import provenance_html
 
 BUILD_LIMIT_S = 900
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
@@ -91,7 +90,7 @@ def _assemble(source: Path, folders: Folders) -> None:
     """Fill the pages, put the executed notebooks and the scripts beside them."""
     shutil.copytree(folders.root / "book", source)
     results = Results(folders.results, folders.profile)
-    footer = provenance_html(_book_stamp(folders))
+    footer = provenance.provenance_html(_book_stamp(folders))
     for page in source.rglob("*.md"):
         page.write_text(f"{render_page(page, results, folders.profile)}\n\n{footer}\n")
     notebooks = source / "notebooks"
