@@ -96,6 +96,8 @@ TO_HALPE: dict[str, np.ndarray] = {
     for name, indices in {
         "halpe136": range(136),
         "halpe26": range(26),
+        # Halpe without its face, as AlphaPose has models for.
+        "halpe68_noface": [*range(26), *range(94, 136)],
         "coco17": range(17),
         "wholebody133": [*range(17), 20, 22, 24, 21, 23, 25, *range(26, 136)],
         "openpose_coco18": [0, 18, 6, 8, 10, 5, 7, 9, 12, 14, 16, 11, 13, 15, 2, 1, 4, 3],
@@ -136,3 +138,42 @@ def to_halpe(values: np.ndarray, convention: str, axis: int, fill: float = np.na
     result = np.full((*source.shape[:-1], N_KEYPOINTS), fill)
     result[..., indices[indices >= 0]] = source[..., indices >= 0]
     return np.moveaxis(result, -1, axis)
+
+
+# Left and right within the 300-W face: points first...last mirror onto total - i
+# (contour, brows, nose, eyes, outer and inner lips).
+_FACE_MIRROR = [
+    (0, 16, 16), (17, 26, 43), (31, 35, 66), (36, 39, 81), (42, 45, 81), (40, 41, 87), (46, 47, 87),
+    (48, 54, 102), (55, 59, 114), (60, 64, 124), (65, 67, 132),
+]  # fmt: skip
+
+
+def _halpe_mirror() -> np.ndarray:
+    swap = {"left": "right", "right": "left"}
+    parts = [name.partition("_") for name in NAMES]
+    indices = [INDEX[swap.get(side, side) + bar + rest] for side, bar, rest in parts]
+    for first, last, total in _FACE_MIRROR:
+        for i in range(first, last + 1):
+            indices[FACE[i]] = int(FACE[total - i])
+    return np.array(indices)
+
+
+_HALPE_MIRROR = _halpe_mirror()
+
+
+def mirror(convention: str) -> np.ndarray:
+    """For each keypoint, the one it becomes in a mirrored image: `values[..., mirror(c)]` swaps the sides.
+
+    Hands on their own map onto themselves: the mirror image of a left hand is a right hand's.
+
+    Parameters
+    ----------
+    convention : a key of `TO_HALPE` whose keypoints all have a Halpe counterpart
+
+    Returns
+    -------
+    array of indices, shape (n_source,)
+    """
+    indices = TO_HALPE[convention]
+    place = {int(halpe): i for i, halpe in enumerate(indices)}
+    return np.array([place.get(int(_HALPE_MIRROR[halpe]), i) for i, halpe in enumerate(indices)])

@@ -19,6 +19,7 @@ from hicp_lib.keypoints import (
     RIGHT_HAND,
     SIGMAS,
     TO_HALPE,
+    mirror,
     to_halpe,
 )
 
@@ -139,3 +140,34 @@ def test_to_halpe_moves_values_and_fills_the_rest():
     assert scores.shape == (3, 136) and scores.sum() == 3 * 68 * 0.5 and (scores[:, FACE] == 0.5).all()
     with pytest.raises(ValueError, match="coco17 has 17"):
         to_halpe(np.zeros((2, 18)), "coco17", axis=-1)
+
+
+@pytest.mark.parametrize("convention", ["halpe136", "wholebody133", "halpe26", "coco17", "halpe68_noface"])
+def test_mirror_swaps_the_sides_and_is_its_own_inverse(convention):
+    mirrored = mirror(convention)
+    np.testing.assert_array_equal(mirrored[mirrored], np.arange(len(mirrored)))
+    for source, other in enumerate(mirrored):
+        name, partner = (NAMES[TO_HALPE[convention][i]] for i in (source, other))
+        if not name.startswith("face"):
+            side, bar, rest = name.partition("_")
+            assert partner == {"left": "right", "right": "left"}.get(side, side) + bar + rest
+
+
+def test_mirror_of_the_face_matches_a_symmetric_drawing():
+    """300-W points of a face drawn symmetric about x = 0: every point mirrors onto its partner."""
+    contour = [(-np.cos(a), -np.sin(a)) for a in np.linspace(0, np.pi, 17)]
+    brow = [(-0.8, 0.5), (-0.65, 0.6), (-0.5, 0.62), (-0.35, 0.6), (-0.2, 0.52)]
+    bridge = [(0, 0.4), (0, 0.3), (0, 0.2), (0, 0.1)]
+    base = [(-0.2, 0), (-0.1, -0.02), (0, -0.04), (0.1, -0.02), (0.2, 0)]
+    right_eye = [(-0.6, 0.4), (-0.5, 0.44), (-0.4, 0.44), (-0.3, 0.4), (-0.4, 0.36), (-0.5, 0.36)]
+    left_eye = [(0.3, 0.4), (0.4, 0.44), (0.5, 0.44), (0.6, 0.4), (0.5, 0.36), (0.4, 0.36)]
+    outer = [(np.cos(a) * 0.4, np.sin(a) * 0.15 - 0.4) for a in np.pi - np.arange(12) * np.pi / 6]
+    inner = [(np.cos(a) * 0.3, np.sin(a) * 0.05 - 0.4) for a in np.pi - np.arange(8) * np.pi / 4]
+    face = contour + brow + [(-x, y) for x, y in brow[::-1]] + bridge + base + right_eye + left_eye
+    face = np.array(face + outer + inner)
+    partner = mirror("halpe136")[FACE] - FACE[0]
+    np.testing.assert_allclose(face[partner], face * (-1, 1), atol=1e-9)
+
+
+def test_mirrored_hands_on_their_own_stay_themselves():
+    np.testing.assert_array_equal(mirror("left_hand21"), np.arange(21))

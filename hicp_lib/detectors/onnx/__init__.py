@@ -1,0 +1,1 @@
+"""Detectors that run on the user's own weights, in ONNX files."""

@@ -1,0 +1,68 @@
+"""Where the boxes of the people come from: the annotations, the whole image, or a person detector."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.person_boxes import PersonBoxes
+from hicp_lib.errors import InputError
+
+BOX_SOURCES = ("gt", "image", "detected")
+
+
+class BoxSource:
+    """A source of person boxes.
+
+    Parameters
+    ----------
+    boxes : "gt" (annotated boxes, handed to `detect`), "image" (one person, the whole image) or
+        "detected"; by default detected with a person model, and otherwise the image
+    person_model : ONNX export of YOLOX or RTMDet
+    """
+
+    def __init__(
+        self, boxes: str | None, person_model: str | Path | None, provider: str, threads: int
+    ) -> None:
+        self.kind = boxes or ("detected" if person_model else "image")
+        if self.kind not in BOX_SOURCES:
+            raise InputError(f"boxes {boxes!r}: not known; expected one of: {', '.join(BOX_SOURCES)}")
+        if (self.kind == "detected") != (person_model is not None):
+            raise InputError(
+                f"boxes {self.kind!r}: {'need' if self.kind == 'detected' else 'do not use'} a person model; "
+                "give boxes 'detected' together with person_model (--person-model FILE.onnx), or neither"
+            )
+        self._finder = (
+            PersonBoxes(person_model, provider=provider, threads=threads)
+            if person_model is not None
+            else None
+        )
+        self.settings = {"boxes": self.kind} | (
+            {"person_model": self._finder.settings} if self._finder else {}
+        )
+
+    def find(self, image: np.ndarray, boxes_px: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+        """Boxes (n, 4) and scores (n,) of an RGB image's people; `boxes_px` are the annotated ones."""
+        if self._finder:
+            return self._finder.find(image)
+        if self.kind == "image":
+            return np.array([[0.0, 0.0, image.shape[1], image.shape[0]]]), np.ones(1)
+        if boxes_px is None:
+            raise InputError(
+                "boxes 'gt': need the annotated boxes of each image; give a dataset folder with annotations, "
+                "or boxes 'image' or 'detected'"
+            )
+        boxes_px = np.asarray(boxes_px, dtype=float).reshape(-1, 4)
+        return boxes_px, np.ones(len(boxes_px))
+
+    def describe(self) -> list[Fact]:
+        """What is taken for granted about the boxes."""
+        meaning = {
+            "gt": "the annotated boxes",
+            "image": "one person per image, the whole of it",
+            "detected": "by the person model",
+        }
+        row = Fact("boxes", self.kind, meaning[self.kind])
+        return [row, *(self._finder.describe() if self._finder else [])]

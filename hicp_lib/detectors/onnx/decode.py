@@ -1,0 +1,154 @@
+"""From a top-down network's output to positions and scores; plain NumPy, all people at once.
+
+Positions are in cells of the output's own grid (or SimCC's bins), cell centres at integers, as
+these networks are trained: cell i stands for the input pixel stride * i. A keypoint whose
+score is not a positive number is not given: NaN with score 0.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+# Positions (n, k, 2) and scores (n, k) as the network gives them.
+Decoded = tuple[np.ndarray, np.ndarray]
+
+
+def peaks(maps: np.ndarray) -> Decoded:
+    """The highest cell of each heat map (n, k, h, w) and its value."""
+    flat = maps.reshape(*maps.shape[:2], -1)
+    best = flat.argmax(axis=-1)
+    scores = np.take_along_axis(flat, best[..., None], axis=-1)[..., 0].astype(float)
+    return np.stack([best % maps.shape[3], best // maps.shape[3]], axis=-1).astype(float), scores
+
+
+def decode_quarter(maps: np.ndarray, *, needs_both_axes: bool = False) -> Decoded:
+    """Heat maps (n, k, h, w): the highest cell, moved a quarter cell towards its higher neighbour.
+
+    (Newell et al., "Stacked hourglass networks", ECCV 2016.) Near the border a cell stays: MMPose
+    decides so axis by axis, AlphaPose (`needs_both_axes`) moves along both or none.
+    """
+    cells, scores = peaks(maps)
+    width, height = maps.shape[3], maps.shape[2]
+    x, y = cells[..., 0], cells[..., 1]
+    inner_x, inner_y = (1 < x) & (x < width - 1), (1 < y) & (y < height - 1)
+    if needs_both_axes:
+        moves_x = moves_y = inner_x & inner_y
+    else:
+        moves_x, moves_y = inner_x & (0 < y), inner_y & (0 < x)
+    at = _Neighbours(maps, cells)
+    with np.errstate(invalid="ignore"):
+        step = np.stack([at(1, 0) - at(-1, 0), at(0, 1) - at(0, -1)], axis=-1)
+    moved = cells + 0.25 * np.sign(step) * np.stack([moves_x, moves_y], axis=-1)
+    return _given(moved, scores)
+
+
+def decode_dark(maps: np.ndarray, kernel: int = 11) -> Decoded:
+    """Heat maps (n, k, h, w), decoded aware of their distribution (Zhang et al., DARK, CVPR 2020).
+
+    The maps are blurred and scaled back to their old maximum; the second-order Taylor expansion of
+    their logarithm at the highest cell gives the maximum of the underlying Gaussian.
+    """
+    cells, scores = peaks(maps)
+    # The factor keeps the maximum; it matters only to the floor inside the logarithm.
+    blurred = _blur(maps, kernel)
+    with np.errstate(invalid="ignore"):
+        factor = scores / np.maximum(blurred.max(axis=(2, 3)), np.finfo(np.float32).tiny)
+    neighbours = _Neighbours(blurred, cells)
+
+    def log(dx: int, dy: int) -> np.ndarray:
+        return np.log(np.maximum(neighbours(dx, dy) * factor, 1e-10))
+
+    middle = log(0, 0)
+    gradient = 0.5 * np.stack([log(1, 0) - log(-1, 0), log(0, 1) - log(0, -1)], axis=-1)
+    dxx = 0.25 * (log(2, 0) - 2 * middle + log(-2, 0))
+    dyy = 0.25 * (log(0, 2) - 2 * middle + log(0, -2))
+    dxy = 0.25 * (log(1, 1) - log(1, -1) - log(-1, 1) + log(-1, -1))
+    determinant = dxx * dyy - dxy**2
+    x, y = cells[..., 0], cells[..., 1]
+    inner = (1 < x) & (x < maps.shape[3] - 2) & (1 < y) & (y < maps.shape[2] - 2)
+    moves = inner & (determinant != 0)
+    safe = np.where(moves, determinant, 1.0)
+    offset = -np.stack(
+        [
+            (dyy * gradient[..., 0] - dxy * gradient[..., 1]) / safe,
+            (dxx * gradient[..., 1] - dxy * gradient[..., 0]) / safe,
+        ],
+        axis=-1,
+    )
+    return _given(cells + np.where(moves[..., None], offset, 0.0), scores)
+
+
+def decode_simcc(simcc_x: np.ndarray, simcc_y: np.ndarray) -> Decoded:
+    """SimCC vectors (n, k, bins) of both axes: the highest bins, and the lower of their two values.
+
+    (Li et al., "SimCC", ECCV 2022. MMPose takes the lower value, rtmlib the mean.)
+    """
+    bins = np.stack([simcc_x.argmax(axis=-1), simcc_y.argmax(axis=-1)], axis=-1).astype(float)
+    return _given(bins, np.minimum(simcc_x.max(axis=-1), simcc_y.max(axis=-1)).astype(float))
+
+
+def decode_integral(maps: np.ndarray) -> Decoded:
+    """Maps of logits (n, k, h, w): the expected position under their sigmoid, normalised to sum 1.
+
+    (Fang et al., "AlphaPose", TPAMI 2022: symmetric integral regression.) The score is the
+    sigmoid's maximum.
+    """
+    heat = 1.0 / (1.0 + np.exp(-np.clip(maps, -80, 80), dtype=np.float64))
+    along_x, along_y = heat.sum(axis=2), heat.sum(axis=3)
+    total = along_x.sum(axis=-1)
+    x = along_x @ np.arange(heat.shape[3]) / total
+    y = along_y @ np.arange(heat.shape[2]) / total
+    return _given(np.stack([x, y], axis=-1), heat.max(axis=(2, 3)))
+
+
+def decode_combined(maps: np.ndarray, n_integral: int) -> Decoded:
+    """Maps of which the last `n_integral` (face and hands) are for integral regression."""
+    body = decode_quarter(maps[:, :-n_integral], needs_both_axes=True)
+    rest = decode_integral(maps[:, -n_integral:])
+    return np.concatenate([body[0], rest[0]], axis=1), np.concatenate([body[1], rest[1]], axis=1)
+
+
+def decode_roi_maps(maps: np.ndarray, boxes_px: np.ndarray) -> Decoded:
+    """Keypoint R-CNN's maps of logits (n, k, h, w) over boxes (n, 4: x1, y1, x2, y2), as Detectron2 does.
+
+    Each map is enlarged to its box bicubically and its highest pixel taken. Positions (n, k, 2) have
+    pixel corners at integers; the score is the peak's softmax mass, counted over the small map.
+    """
+    positions, masses = np.zeros((*maps.shape[:2], 2)), np.zeros(maps.shape[:2])
+    for row, (roi, (x1, y1, x2, y2)) in enumerate(zip(maps, boxes_px, strict=True)):
+        size = np.maximum([x2 - x1, y2 - y1], 1.0)
+        pixels = np.ceil(size).astype(int)
+        roi = roi.astype(np.float32)
+        large = cv2.resize(np.moveaxis(roi, 0, -1), tuple(pixels.tolist()), interpolation=cv2.INTER_CUBIC)
+        (cells,), (tops,) = peaks(np.moveaxis(large.reshape(*large.shape[:2], -1), -1, 0)[None])
+        positions[row] = (cells + 0.5) * size / pixels + (x1, y1)
+        masses[row] = 1 / np.exp(roi - tops[:, None, None]).sum(axis=(1, 2))
+    return positions, masses
+
+
+class _Neighbours:
+    """Values of maps (n, k, h, w) beside one cell of each; the border's value beyond the border."""
+
+    def __init__(self, maps: np.ndarray, cells: np.ndarray) -> None:
+        self._maps, self._cells = maps, cells.astype(int)
+        self._rows = np.ogrid[: maps.shape[0], : maps.shape[1]]
+
+    def __call__(self, dx: int, dy: int) -> np.ndarray:
+        x = np.clip(self._cells[..., 0] + dx, 0, self._maps.shape[3] - 1)
+        y = np.clip(self._cells[..., 1] + dy, 0, self._maps.shape[2] - 1)
+        return self._maps[(*self._rows, y, x)].astype(float)
+
+
+def _blur(maps: np.ndarray, kernel: int) -> np.ndarray:
+    """Gaussian blur of each map with zeros around it: all of them as one tall picture."""
+    border = kernel // 2
+    padded = np.pad(maps.astype(np.float32, copy=False), ((0, 0), (0, 0), (border, border), (0, 0)))
+    tall = padded.reshape(-1, maps.shape[3])
+    blurred = cv2.GaussianBlur(tall, (kernel, kernel), 0, borderType=cv2.BORDER_CONSTANT)
+    return blurred.reshape(padded.shape)[:, :, border:-border]
+
+
+def _given(positions: np.ndarray, scores: np.ndarray) -> Decoded:
+    given = (scores > 0) & np.isfinite(scores) & np.isfinite(positions).all(axis=-1)
+    return np.where(given[..., None], positions, np.nan), np.where(given, scores, 0.0)

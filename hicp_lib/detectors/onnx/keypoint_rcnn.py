@@ -1,0 +1,182 @@
+"""Keypoint R-CNN (He et al., "Mask R-CNN", ICCV 2017) exported from Detectron2 or torchvision.
+
+One network finds people and their 17 COCO keypoints. The two programs differ in what goes in and
+in what a keypoint's score is:
+
+- Detectron2 takes BGR 0-255 with the short side at 800 (the long one at most 1333), measures
+  positions with pixel *corners* at integers (half a pixel is taken off here), and scores a
+  keypoint by the softmax mass of its peak over the 56 x 56 map: small numbers, cut off at 1.
+- torchvision takes RGB 0-1 and scales it itself; the score is the raw logit of the peak, made
+  a number in [0, 1] here by a logistic curve with its middle at 2, where Detectron draws points.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hicp_lib.detectors.base import Detections
+from hicp_lib.detectors.onnx.decode import decode_roi_maps
+from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.letterbox import Letterbox, letterbox, planes
+from hicp_lib.detectors.onnx.pose_net import as_detections
+from hicp_lib.detectors.onnx.session import Port, open_model
+from hicp_lib.errors import InputError
+
+_N_KEYPOINTS = 17
+_LOGIT_MIDDLE = 2.0
+_SHORT_PX, _LONG_PX = 800, 1333
+_FAMILIES = ("detectron2", "torchvision")
+# What fills a fixed input beside the image: the mean colour, 0 once the network has normalised it.
+_FILLS = {"detectron2": (124, 116, 104), "torchvision": (124, 116, 104)}
+
+
+class KeypointRcnn:
+    """Keypoint R-CNN on the user's own weights.
+
+    Parameters
+    ----------
+    model : ONNX export of Detectron2's or torchvision's Keypoint R-CNN
+    family : "detectron2" or "torchvision"; told by the number of outputs' keypoint scores if None
+    min_score : least box score of a person
+    provider, threads : see `hicp_lib.detectors.onnx.session.open_model`
+    """
+
+    name = "detectron2"
+
+    def __init__(
+        self,
+        model: str | Path,
+        family: str | None = None,
+        min_score: float = 0.05,
+        provider: str = "cpu",
+        threads: int = 1,
+    ) -> None:
+        self._model = open_model(model, provider, threads)
+        shape = self._model.inputs[0].shape
+        if (
+            len(shape) not in (3, 4)
+            or shape[-3] not in (None, 3)
+            or (len(shape) == 4 and (shape[0] or 1) != 1)
+        ):
+            raise InputError(f"{model}: takes an input of shape {shape}; expected one image, (3, h, w)")
+        self._is_told = family is None
+        self._family = family or _told_family(self._model.outputs)
+        if self._family not in _FAMILIES:
+            raise InputError(f"{model}: family {family!r} is not known; expected {' or '.join(_FAMILIES)}")
+        self._min_score = min_score
+        self.settings = {
+            "model": self._model.settings,
+            "family": self._family,
+            "min_score": min_score,
+            "opencv": cv2.__version__,
+        }
+
+    def detect(self, image: np.ndarray) -> Detections:
+        """Find people in an RGB image, shape (height, width, 3), uint8."""
+        fitted = self._fit(image)
+        boxes_px, person_scores, *rest = self._roles(self._model.run(self._feed(fitted.pixels)))
+        keep = (person_scores >= self._min_score) & np.isfinite(boxes_px).all(axis=1)
+        positions_px, scores = self._keypoints(
+            boxes_px[keep], *(part if part is None else part[keep] for part in rest)
+        )
+        positions_px = positions_px / fitted.scale
+        if self._family == "detectron2":
+            positions_px = positions_px - 0.5
+        is_given = np.isfinite(positions_px).all(axis=-1) & (scores > 0)
+        positions_px = np.where(is_given[..., None], positions_px, np.nan)
+        return as_detections(positions_px, scores, person_scores[keep], "coco17")
+
+    def describe(self) -> list[Fact]:
+        """What is taken for granted about the model."""
+        is_detectron = self._family == "detectron2"
+        told = "told by its outputs" if self._is_told else "given"
+        mass = f"softmax mass of the peak over the map, cut off at 1 ({told})"
+        logit = f"logistic of (logit - {_LOGIT_MIDDLE:g}), 0.5 where Detectron draws points ({told})"
+        height, width = self._model.inputs[0].shape[-2:]
+        return [
+            Fact("model", self._model.path.name, f"SHA-256 {self._model.sha256}"),
+            Fact("runs on", self._model.provider, "option provider"),
+            Fact("family", self._family, f"{told}; option family"),
+            Fact("input", f"{width or 'any'} wide, {height or 'any'} high", "read from the file"),
+            Fact("pixels", "BGR 0-255" if is_detectron else "RGB 0-1", "as the family exports"),
+            Fact("keypoints", "coco17", "pixel corners at integers, half a pixel is taken off"
+                 if is_detectron else "as annotated, nothing is taken off"),
+            Fact("keypoint score", mass if is_detectron else logit, "as the family's networks give it"),
+            Fact("person score", f"box score, >= {self._min_score}", "as the originals; option min_score"),
+        ]  # fmt: skip
+
+    def _fit(self, image: np.ndarray) -> Letterbox:
+        """The image at the size the network takes."""
+        height, width = self._model.inputs[0].shape[-2:]
+        if height and width:
+            return letterbox(image, (width, height), _FILLS[self._family])
+        if self._family == "torchvision":
+            return Letterbox(image, np.ones(2))
+        sides = image.shape[1], image.shape[0]
+        zoom = min(_SHORT_PX / min(sides), _LONG_PX / max(sides))
+        size = tuple(max(1, int(side * zoom + 0.5)) for side in sides)
+        kind = cv2.INTER_AREA if zoom < 1 else cv2.INTER_LINEAR
+        return Letterbox(cv2.resize(image, size, interpolation=kind), np.array(size) / sides)
+
+    def _feed(self, pixels: np.ndarray) -> np.ndarray:
+        feed = np.empty((3, *pixels.shape[:2]), np.float32)
+        if self._family == "detectron2":
+            planes(pixels[..., ::-1], (0.0,) * 3, (1.0,) * 3, feed)
+        else:
+            planes(pixels, (0.0,) * 3, (255.0,) * 3, feed)
+        return feed[None] if len(self._model.inputs[0].shape) == 4 else feed
+
+    def _roles(self, outputs: list[np.ndarray]) -> list[np.ndarray | None]:
+        """Boxes (n, 4), their scores (n,), keypoints (n, 17, 3), logits (n, 17) and maps (n, 17, h, w).
+
+        Exports order and name them differently; ranks and sizes tell them apart.
+        """
+        floats = [output.astype(float) for output in outputs if output.dtype.kind == "f"]
+        wanted = [(4,), (), (_N_KEYPOINTS, 3), (_N_KEYPOINTS,), (_N_KEYPOINTS, None, None)]
+        roles = [next((output for output in floats if _fits(output, tail)), None) for tail in wanted]
+        boxes, scores, keypoints, logits, maps = roles
+        has_points = maps is not None or keypoints is not None
+        if self._family == "torchvision":
+            has_points = keypoints is not None and logits is not None
+        n_people = {len(role) for role in roles if role is not None}
+        if boxes is None or scores is None or not has_points or len(n_people) != 1:
+            raise InputError(
+                f"{self._model.path}: gives outputs of shape {', '.join(str(o.shape) for o in outputs)}; "
+                f"expected {self._family}'s boxes (n, 4), scores (n), keypoints (n, 17, 3)"
+                + (" and keypoint scores (n, 17)" if self._family == "torchvision" else "")
+            )
+        return roles
+
+    def _keypoints(
+        self,
+        boxes_px: np.ndarray,
+        keypoints: np.ndarray | None,
+        logits: np.ndarray | None,
+        maps: np.ndarray | None,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (n, 17, 2) in input pixels and scores (n, 17) in [0, 1]."""
+        if self._family == "torchvision":
+            return keypoints[..., :2], logistic_score(logits)
+        if keypoints is None:
+            positions_px, masses = decode_roi_maps(maps, boxes_px)
+            return positions_px, np.clip(masses, 0, 1)
+        return keypoints[..., :2], np.clip(np.nan_to_num(keypoints[..., 2]), 0, 1)
+
+
+def logistic_score(logits: np.ndarray) -> np.ndarray:
+    """Scores in [0, 1] for raw logits; 0.5 at 2. A logit that is not a number scores 0."""
+    return np.nan_to_num(1 / (1 + np.exp(np.clip(_LOGIT_MIDDLE - logits, -80, 80))))
+
+
+def _fits(array: np.ndarray, tail: tuple[int | None, ...]) -> bool:
+    """Whether an array is (n, *tail), None standing for any size."""
+    sizes = zip(array.shape[1:], tail, strict=False)
+    return array.ndim == 1 + len(tail) and all(want in (None, size) for size, want in sizes)
+
+
+def _told_family(outputs: list[Port]) -> str:
+    """torchvision has two outputs of rank 2, the boxes and the logits; Detectron2 one."""
+    return "torchvision" if sum(len(port.shape) == 2 for port in outputs) == 2 else "detectron2"

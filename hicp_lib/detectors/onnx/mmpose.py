@@ -1,0 +1,122 @@
+"""MMPose's top-down networks on the user's own weights: boxes, one pass per person, one pose each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.detectors.base import Detections
+from hicp_lib.detectors.onnx.affine import Regions
+from hicp_lib.detectors.onnx.box_source import BoxSource
+from hicp_lib.detectors.onnx.decode import decode_dark, decode_quarter
+from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.pose_net import PoseNet, Recipe, as_detections
+from hicp_lib.detectors.onnx.pose_nms import oks_nms
+from hicp_lib.detectors.onnx.session import open_model
+from hicp_lib.errors import InputError
+from hicp_lib.keypoints import SIGMAS, TO_HALPE
+
+# RTMW's head enlarges features by shuffling pixels; the other SimCC heads do not. Its scores go up to ten.
+_RTMW_OPERATOR, _RTMW_SCALE = "DepthToSpace", 10.0
+
+
+class MMPose:
+    """MMPose's top-down networks: heat maps (HRNet) and SimCC (RTMPose, DWPose, RTMW).
+
+    Parameters
+    ----------
+    model : ONNX export, whole body (133 points), Halpe (26, 136), COCO (17) or one hand (21)
+    person_model, boxes : see `BoxSource`
+    dark : decode heat maps aware of their distribution (the "dark" configurations)
+    flip_test : also run the mirrored crops, and average
+    score_scale : network score that counts as 1; if None, 10 for RTMW's head and 1 otherwise
+    hand : "left" or "right", what a one-hand network is shown
+    provider, threads : see `hicp_lib.detectors.onnx.session.open_model`
+    """
+
+    name = "mmpose"
+
+    def __init__(
+        self,
+        model: str | Path,
+        person_model: str | Path | None = None,
+        boxes: str | None = None,
+        dark: bool = True,
+        flip_test: bool = False,
+        score_scale: float | None = None,
+        hand: str = "right",
+        provider: str = "cpu",
+        threads: int = 1,
+    ) -> None:
+        opened = open_model(model, provider, threads)
+        self._dark = dark
+        recipe = Recipe(
+            mean=(123.675, 116.28, 103.53),
+            std=(58.395, 57.12, 57.375),
+            decode_maps=decode_dark if dark else decode_quarter,
+            flip_test=flip_test,
+        )
+        self._net = PoseNet(opened, recipe)
+        is_rtmw = self._net.is_simcc and _RTMW_OPERATOR in opened.operators
+        self._score_scale = score_scale or (_RTMW_SCALE if is_rtmw else 1.0)
+        self._convention = _hand_convention(self._net.convention, hand)
+        self._boxes = BoxSource(boxes, person_model, provider, threads)
+        self.takes_boxes = self._boxes.kind == "gt"
+        self._sigmas = SIGMAS["wholebody"][TO_HALPE[self._convention]]
+        self.settings = {
+            "model": opened.settings,
+            **self._boxes.settings,
+            "dark": dark,
+            "flip_test": flip_test,
+            "score_scale": self._score_scale,
+            "convention": self._convention,
+        }
+
+    def detect(self, image: np.ndarray, boxes_px: np.ndarray | None = None) -> Detections:
+        """Find people in an RGB image, shape (height, width, 3), uint8.
+
+        `boxes_px`, shape (n, 4: x, y, width, height), are used when boxes are "gt".
+        """
+        boxes, box_scores = self._boxes.find(image, boxes_px)
+        if not len(boxes):
+            return Detections.none()
+        regions = Regions.around(boxes, self._net.input_size_px)
+        positions_px, raw_scores = self._net.find(image, regions)
+        scores = np.clip(raw_scores / self._score_scale, 0, 1)
+        person_scores = box_scores * _mean_above(scores, 0.2)
+        areas = regions.sizes_px.prod(axis=1)
+        keep = oks_nms(positions_px, person_scores, areas, self._sigmas)
+        return as_detections(positions_px[keep], scores[keep], person_scores[keep], self._convention)
+
+    def describe(self) -> list[Fact]:
+        """What is taken for granted about the model."""
+        kind = "SimCC" if self._net.is_simcc else "heat maps" + (", DARK" if self._dark else ", quarter cell")
+        why = "told by the outputs" if self._net.is_simcc else "the file does not tell; option dark"
+        return [
+            *self._net.describe(),
+            Fact("pixels", "RGB, mean and deviation of ImageNet", "as MMPose trains"),
+            Fact("decoding", kind, why),
+            Fact(
+                "keypoint score",
+                ("lower of the two maxima" if self._net.is_simcc else "maximum")
+                + f" / {self._score_scale:g}, cut off at 1",
+                "10 if the head shuffles pixels (RTMW), else 1; option score_scale",
+            ),
+            Fact(
+                "person score", "box score x mean of keypoint scores above 0.2", "as MMPose; OKS-NMS at 0.9"
+            ),
+            *self._boxes.describe(),
+        ]
+
+
+def _hand_convention(convention: str, hand: str) -> str:
+    if hand not in ("left", "right"):
+        raise InputError(f"hand {hand!r}: not known; expected left or right")
+    return f"{hand}_hand21" if convention.endswith("hand21") else convention
+
+
+def _mean_above(scores: np.ndarray, least: float) -> np.ndarray:
+    """Mean (n,) of the scores (n, k) above `least`; 0 if there are none."""
+    counts = scores > least
+    return np.where(counts, scores, 0).sum(axis=1) / np.maximum(counts.sum(axis=1), 1)

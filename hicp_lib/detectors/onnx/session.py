@@ -1,0 +1,184 @@
+"""ONNX model files opened with ONNX Runtime: checked, on the processor that was asked for, shared.
+
+A model is opened once per process, however many detectors (one per thread) use it; ONNX
+Runtime allows its sessions to be run from several threads at a time.
+"""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime
+from google.protobuf.message import DecodeError
+
+from hicp_lib.errors import InputError
+from hicp_lib.files import sha256_bytes
+
+_DTYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
+_FATAL_ONLY = 4
+
+
+@dataclass(frozen=True)
+class Port:
+    """An input or output of a model; `shape` has None where the model leaves a size open."""
+
+    name: str
+    shape: tuple[int | None, ...]
+    dtype: str
+
+
+class OnnxModel:
+    """A model ready to run; get one from `open_model`.
+
+    Attributes
+    ----------
+    path, sha256 : the file and its content's hash
+    provider : where it runs, e.g. "cpu"
+    inputs, outputs : its ports
+    operators : the kinds of nodes in its graph
+    first_convolution_channels : input channels of the first convolution, None if there is none
+    """
+
+    def __init__(self, path: Path, content: bytes, provider: str, threads: int) -> None:
+        graph = _read_graph(path, content)
+        self.path, self.sha256, self.provider = path, sha256_bytes(content), provider
+        self.operators = frozenset(node.op_type for node in graph.node)
+        self.first_convolution_channels = _first_convolution_channels(graph)
+        self._session = _start(path, content, provider, threads)
+        self.inputs = [_port(node) for node in self._session.get_inputs()]
+        self.outputs = [_port(node) for node in self._session.get_outputs()]
+        if len(self.inputs) != 1 or self.inputs[0].dtype not in _DTYPES:
+            raise InputError(
+                f"{path}: takes {', '.join(f'{p.name}: {p.dtype}' for p in self.inputs) or 'nothing'}; "
+                "expected a network with one input, an image in floating point"
+            )
+
+    @property
+    def settings(self) -> dict:
+        """What identifies the model's results."""
+        return {"sha256": self.sha256, "provider": self.provider, "onnxruntime": onnxruntime.__version__}
+
+    def run(self, pixels: np.ndarray) -> list[np.ndarray]:
+        """The outputs for one input array, in the model's order.
+
+        Raises
+        ------
+        InputError
+            If the network does not accept the array or fails on it.
+        """
+        port = self.inputs[0]
+        feed = {port.name: pixels.astype(_DTYPES[port.dtype], copy=False)}
+        try:
+            outputs = self._session.run(None, feed)
+        except Exception as error:  # ONNX Runtime's errors share no base class of their own
+            raise InputError(
+                f"{self.path}: the network failed on an input of shape {pixels.shape} "
+                f"({_one_line(error)}); export it again for this input"
+            ) from None
+        return [np.asarray(output) for output in outputs]
+
+    @cached_property
+    def response_to_zeros(self) -> list[np.ndarray]:
+        """The outputs for an input of zeros: their shapes, and what the network says of nobody.
+
+        Sizes that the model leaves open count as 1.
+        """
+        return self.run(np.zeros([size or 1 for size in self.inputs[0].shape], np.float32))
+
+
+_open: weakref.WeakValueDictionary[tuple, OnnxModel] = weakref.WeakValueDictionary()
+_lock = threading.Lock()
+
+
+def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> OnnxModel:
+    """Open an ONNX file, or hand out the model this process has open already.
+
+    Parameters
+    ----------
+    path : the file; weights kept in a second file ("external data") are not followed
+    provider : execution provider by its short name: cpu, cuda, tensorrt, openvino, ...
+    threads : of one inference; images run side by side already, so more rarely helps
+
+    Raises
+    ------
+    InputError
+        If the file is absent or not a network ONNX Runtime can run, or the provider is not to be had.
+    """
+    path = Path(path)
+    if provider not in available_providers():
+        raise InputError(
+            f"{path}: execution provider {provider!r} is not available here; expected one of: "
+            f"{', '.join(available_providers())} (others need another build of onnxruntime)"
+        )
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read ({error.strerror}); give the path of an ONNX file"
+        ) from None
+    key = (sha256_bytes(content), str(path), provider, threads)
+    with _lock:
+        model = _open.get(key)
+        if model is None:
+            model = _open[key] = OnnxModel(path, content, provider, threads)
+        return model
+
+
+def available_providers() -> list[str]:
+    """Short names of the execution providers of this onnxruntime that compute on this machine."""
+    names = [name.removesuffix("ExecutionProvider").lower() for name in onnxruntime.get_available_providers()]
+    return [name for name in names if name != "azure"]
+
+
+def _start(path: Path, content: bytes, provider: str, threads: int) -> onnxruntime.InferenceSession:
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
+    options.log_severity_level = _FATAL_ONLY
+    # Threads that wait by spinning would take the cores from the other images.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    full_names = {
+        name.removesuffix("ExecutionProvider").lower(): name for name in onnxruntime.get_available_providers()
+    }
+    try:
+        session = onnxruntime.InferenceSession(content, options, providers=[full_names[provider]])
+    except Exception as error:  # ONNX Runtime's errors share no base class of their own
+        raise InputError(
+            f"{path}: ONNX Runtime cannot run it ({_one_line(error)}); export it again, in one file"
+        ) from None
+    got = session.get_providers()[0]
+    if got != full_names[provider]:
+        raise InputError(
+            f"{path}: {provider} was asked for, but its libraries did not load and {got} would run; "
+            "install them, or ask for cpu"
+        )
+    return session
+
+
+def _read_graph(path: Path, content: bytes) -> onnx.GraphProto:
+    try:
+        return onnx.load_model_from_string(content).graph
+    except DecodeError:
+        raise InputError(
+            f"{path}: is not an ONNX file or is cut off ({len(content)} bytes); get it again, or export it"
+        ) from None
+
+
+def _first_convolution_channels(graph: onnx.GraphProto) -> int | None:
+    dims = {tensor.name: tensor.dims for tensor in graph.initializer}
+    weights = [node.input[1] for node in graph.node if node.op_type == "Conv" and len(node.input) > 1]
+    return next((int(dims[name][1]) for name in weights if len(dims.get(name, ())) > 1), None)
+
+
+def _port(node: onnxruntime.NodeArg) -> Port:
+    shape = tuple(size if isinstance(size, int) and size > 0 else None for size in node.shape or ())
+    return Port(node.name, shape, node.type)
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:300]

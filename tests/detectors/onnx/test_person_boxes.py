@@ -1,0 +1,115 @@
+"""Person boxes from exports with and without suppression, back in the image."""
+
+import numpy as np
+import pytest
+from onnx import helper
+from onnx_models import constant_model, save
+
+from hicp_lib.detectors.onnx.person_boxes import PersonBoxes
+from hicp_lib.errors import InputError
+
+IMAGE = np.zeros((120, 200, 3), np.uint8)  # into 64 x 64: scale 0.32, 64 x 38 pixels (38.4 cut off)
+SCALE = np.array([64 / 200, 38 / 120])
+
+
+def with_suppression(path, rows, labels=None):
+    outputs = {"dets": np.array([rows], np.float32)}
+    if labels is not None:
+        outputs["labels"] = np.array([labels], np.int64)
+    return constant_model(path, (1, 3, 64, 64), outputs)
+
+
+def raw_rows(boxes, scores, classes=2):
+    """YOLOX rows for a 64 x 64 input (64 + 16 + 4 cells) that hold the given boxes (x, y, w, h), one each."""
+    rows = np.zeros((84, 5 + classes))
+    rows[:, 2:4] = 0
+    cells = [(s, x, y) for s in (8, 16, 32) for y in range(64 // s) for x in range(64 // s)]
+    for (x, y, w, h), score, row in zip(boxes, scores, (0, 27, 70, 83), strict=False):
+        stride, cx, cy = cells[row]
+        rows[row, :2] = (x + w / 2) / stride - cx, (y + h / 2) / stride - cy
+        rows[row, 2:4] = np.log(w / stride), np.log(h / stride)
+        rows[row, 4:6] = score, 1
+    return rows
+
+
+def test_boxes_of_people_come_back_to_the_image(tmp_path):
+    rows = [[6.4, 3.8, 32, 19, 0.9], [0, 0, 64, 38, 0.5], [1, 1, 9, 9, 0.2], [5, 5, 20, 20, 0.8]]
+    path = with_suppression(tmp_path / "p.onnx", rows, labels=[0, 0, 0, 7])
+    boxes, scores = PersonBoxes(path).find(IMAGE)
+    np.testing.assert_allclose(scores, [0.9, 0.5])
+    np.testing.assert_allclose(boxes, [[20, 12, 80, 48], [0, 0, 200, 120]], atol=1e-4)
+
+
+def test_an_export_without_labels_is_all_people(tmp_path):
+    boxes, _ = PersonBoxes(with_suppression(tmp_path / "p.onnx", [[0, 0, 32, 38, 0.9]])).find(IMAGE)
+    np.testing.assert_allclose(boxes, [[0, 0, 100, 120]], atol=1e-4)
+
+
+def test_raw_rows_are_decoded_and_suppressed(tmp_path):
+    truth = np.array([[4, 4, 20, 30], [30, 2, 25, 34], [5, 4, 20, 30]])
+    rows = raw_rows(truth, [0.9, 0.8, 0.7])
+    path = constant_model(tmp_path / "p.onnx", (1, 3, 64, 64), {"output": rows[None].astype(np.float32)})
+    boxes, scores = PersonBoxes(path).find(IMAGE)
+    np.testing.assert_allclose(scores, [0.9, 0.8], rtol=1e-6)
+    np.testing.assert_allclose(boxes, truth[:2] / np.tile(SCALE, 2), rtol=1e-4)
+
+
+def test_an_empty_answer_and_broken_numbers(tmp_path):
+    boxes, scores = PersonBoxes(with_suppression(tmp_path / "a.onnx", np.zeros((0, 5)))).find(IMAGE)
+    assert boxes.shape == (0, 4) and scores.shape == (0,)
+    rows = [[np.nan, 0, 9, 9, 0.9], [9, 9, 1, 1, 0.9], [0, 0, np.inf, 9, 0.9], [0, 0, 9, 9, np.nan]]
+    assert len(PersonBoxes(with_suppression(tmp_path / "b.onnx", rows)).find(IMAGE)[0]) == 0
+
+
+@pytest.mark.parametrize(
+    "output",
+    [np.zeros((1, 84, 3)), np.zeros((2, 84, 7)), np.zeros((84, 7)), np.zeros((1, 83, 7)), np.zeros(3)],
+)
+def test_other_outputs_are_refused_in_one_line(tmp_path, output):
+    path = constant_model(tmp_path / "p.onnx", (1, 3, 64, 64), {"output": output.astype(np.float32)})
+    with pytest.raises(InputError) as caught:
+        PersonBoxes(path).find(IMAGE)
+    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
+
+
+def echo_model(path, channels):
+    """Shows what it was fed: box (0, 0, 60, 60) with the mean of input channel 0's first pixel as score."""
+    make = helper.make_node
+    nodes = [
+        make("Slice", ["image", "start", "stop"], ["pixel"]),
+        make("Reshape", ["pixel", "row"], ["score"]),
+        make("Concat", ["box", "score"], ["dets"], axis=2),
+    ]
+    constants = {
+        "start": np.array([0, 0, 0, 0]), "stop": np.array([1, 1, 1, 1]), "row": np.array([1, 1, 1]),
+        "box": np.array([[[0, 0, 60, 60]]], np.float32),
+        "weights": np.zeros((4, channels, 1, 1), np.float32),
+    }  # fmt: skip
+    outputs = {"dets": [1, 1, 5], "conv": [1, 4, None, None]}
+    if channels == 12:
+        nodes.append(make("SpaceToDepth", ["image"], ["folded"], blocksize=2))
+    nodes.append(make("Conv", ["folded" if channels == 12 else "image", "weights"], ["conv"]))
+    return save(path, nodes, {"image": [1, 3, 64, 64]}, outputs, constants)
+
+
+def test_yolox_sees_raw_bgr_and_rtmdet_normalised_bgr(tmp_path):
+    image = np.full((64, 64, 3), (10, 20, 200), np.uint8)
+    yolox = PersonBoxes(echo_model(tmp_path / "yolox.onnx", 12))
+    rtmdet = PersonBoxes(echo_model(tmp_path / "rtmdet.onnx", 3))
+    assert (yolox.settings["family"], rtmdet.settings["family"]) == ("yolox", "rtmdet")
+    np.testing.assert_allclose(yolox.find(image)[1], [200])
+    np.testing.assert_allclose(rtmdet.find(image)[1], [(200 - 103.53) / 57.375], rtol=1e-6)
+    with pytest.raises(InputError, match="expected yolox or rtmdet"):
+        PersonBoxes(tmp_path / "yolox.onnx", family="detr")
+
+
+def test_what_lies_beside_the_image_is_grey_114(tmp_path):
+    nodes = [
+        helper.make_node("Slice", ["image", "start", "stop"], ["pixel"]),
+        helper.make_node("Reshape", ["pixel", "row"], ["score"]),
+        helper.make_node("Concat", ["box", "score"], ["dets"], axis=2),
+    ]
+    constants = {"start": np.array([0, 0, 63, 63]), "stop": np.array([1, 1, 64, 64]),
+                 "row": np.array([1, 1, 1]), "box": np.array([[[0, 0, 9, 9]]], np.float32)}  # fmt: skip
+    path = save(tmp_path / "p.onnx", nodes, {"image": [1, 3, 64, 64]}, {"dets": [1, 1, 5]}, constants)
+    assert PersonBoxes(path, family="yolox").find(IMAGE)[1] == [114]
