@@ -1,0 +1,108 @@
+"""What importing other tools' predictions costs beside parsing their JSON alone.
+
+    python benchmarks/importers.py [--people 10000] [--json OUT]
+
+Two people an image, with all the keypoints the tool can write, random coordinates in full length. The
+baseline reads the same files with `json.loads` and does nothing with them. `write` is the time to write
+what was imported, with the tool's own scores beside it. All is done by one thread and timed as processor
+time, which other work on the machine hardly lengthens.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.annotations import Annotations, ImageInfo
+from hicp_lib.importers.importing import import_predictions, write_imported
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
+
+from native_files import (  # noqa: E402
+    Person,
+    write_alphapose,
+    write_coco,
+    write_detectron2,
+    write_mmpose,
+    write_openpose,
+)
+
+
+def make_people(n: int) -> tuple[Annotations, dict[str, list[Person]]]:
+    """`n` people, two in each image."""
+    rng = np.random.default_rng(0)
+    images = {i: ImageInfo(i, f"{i:012d}.jpg", 640, 480) for i in range(1, n // 2 + 1)}
+    none = np.zeros(0, dtype=int)
+    annotations = Annotations(
+        images, none, none, np.zeros((0, 4)), np.zeros(0), none.astype(bool), np.zeros((0, 136, 2)),
+        np.zeros((0, 136)), [],
+    )  # fmt: skip
+    found = {
+        image.file_name: [
+            Person(rng.uniform(0, 470, (136, 2)), rng.uniform(0.05, 1, 136), rng.random()) for _ in "ab"
+        ]
+        for image in images.values()
+    }
+    return annotations, found
+
+
+def seconds(work: Callable[[], object], repeats: int = 3) -> float:
+    """The best of some runs."""
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        work()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def parse(path: Path) -> None:
+    """The baseline."""
+    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
+        json.loads(file.read_bytes())
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--people", type=int, default=10_000)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    annotations, found = make_people(options.people)
+    ids = {image.file_name: image.id for image in annotations.images.values()}
+    writers: dict[str, Callable[[Path], None]] = {
+        "openpose": lambda path: write_openpose(path, found),
+        "alphapose": lambda path: write_alphapose(path, found),
+        "mmpose": lambda path: write_mmpose(path, found),
+        "detectron2": lambda path: write_detectron2(path, found, ids),
+        "coco": lambda path: write_coco(path, found, ids),
+    }
+    rows = []
+    for format, write in writers.items():
+        with tempfile.TemporaryDirectory() as folder:
+            path, out = Path(folder) / "native", Path(folder) / "detections.json"
+            write(path)
+            ours = seconds(lambda: import_predictions(format, path, annotations))  # noqa: B023
+            base = seconds(lambda: parse(path))  # noqa: B023
+            imported = import_predictions(format, path, annotations)
+            writing = seconds(lambda: write_imported(out, imported), repeats=1)  # noqa: B023
+        row = {"format": format, "ours_s": ours, "baseline_s": base}
+        rows.append(row | {"ratio": ours / base, "write_s": writing})
+        print(
+            f"{format:11} {options.people} people: {ours:6.2f} s / {base:6.2f} s = {ours / base:.2f}; "
+            f"write {writing:.2f} s"
+        )
+    if options.json:
+        about = {"people": options.people, "python": platform.python_version(), "numpy": np.__version__}
+        options.json.write_text(json.dumps({**about, "rows": rows}, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
