@@ -7,6 +7,8 @@ UV ?= uv
 BIN := .venv/bin
 INSTALLED := .venv/.installed
 INSTALLING := .venv/.installing
+# JupyterLab asks for this word where the only user is root, as in containers.
+AS_ROOT := $(if $(filter 0,$(shell id -u)),--allow-root)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_NO_INPUT := 1
 
@@ -29,7 +31,7 @@ test: setup
 	@$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 lab: setup
-	@$(BIN)/jupyter lab --notebook-dir=. --port=$(PORT) notebooks/00_quickstart.ipynb
+	@$(BIN)/jupyter lab --notebook-dir=. --port=$(PORT) $(AS_ROOT) notebooks/00_quickstart.ipynb
 
 doctor: $(INSTALLED)
 	@$(BIN)/hicp doctor
