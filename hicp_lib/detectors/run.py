@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import cv2
+import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.annotations import read_annotations
@@ -24,7 +25,7 @@ from hicp_lib.detectors.base import Detections, Detector
 from hicp_lib.detectors.cache import Timed, cache_folder, read_result, write_result
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.errors import InputError
-from hicp_lib.files import sha256_file
+from hicp_lib.files import sha256_bytes, sha256_file
 from hicp_lib.images import read_image
 
 Key = TypeVar("Key", bound=Hashable)
@@ -35,7 +36,7 @@ def detect_dataset(
 ) -> dict[int, Detections]:
     """People in every image of a dataset folder (`images/`, `annotations.json`), by image id.
 
-    Parameters as in `detect_images`.
+    Parameters as in `detect_images`; the annotated boxes go to detectors that take them.
     """
     results = time_dataset(name, dataset_dir, workers, progress, **options)
     return {image_id: result.detections for image_id, result in results.items()}
@@ -50,11 +51,18 @@ def time_dataset(
         image_id: Path(dataset_dir) / "images" / image.file_name
         for image_id, image in annotations.images.items()
     }
-    return detect_images(name, paths, workers, progress, **options)
+    people = annotations.take(~annotations.is_crowd)
+    boxes_px = {image_id: people.boxes_px[people.image_ids == image_id] for image_id in paths}
+    return detect_images(name, paths, workers, progress, boxes_px, **options)
 
 
 def detect_images(
-    name: str, paths: Mapping[Key, str | Path], workers: int | None = None, progress: bool = True, **options
+    name: str,
+    paths: Mapping[Key, str | Path],
+    workers: int | None = None,
+    progress: bool = True,
+    boxes_px: Mapping[Key, np.ndarray] | None = None,
+    **options,
 ) -> dict[Key, Timed]:
     """People in every image file.
 
@@ -64,6 +72,7 @@ def detect_images(
     paths : image files by any key
     workers : threads (the cores this process may use, if None)
     progress : show a bar; only ever on a terminal
+    boxes_px : annotated boxes (n, 4: x, y, width, height) of each image, for detectors that take them
     options : options of the detector
 
     Returns
@@ -78,14 +87,15 @@ def detect_images(
     workers = max(1, min(workers or n_cores(), len(paths) or 1))
     pool = _DetectorPool(name, options)
     folder = cache_folder(pool.first)
+    takes_boxes = boxes_px is not None and getattr(pool.first, "takes_boxes", False)
 
-    def process(path: str | Path) -> Timed:
-        return _detect_one(pool, Path(path), folder, workers)
+    def process(key: Key) -> Timed:
+        return _detect_one(pool, Path(paths[key]), boxes_px[key] if takes_boxes else None, folder, workers)
 
     with _single_threaded_opencv(), ThreadPoolExecutor(workers) as executor:
         # disable=None: no bar unless standard error is a terminal.
         results = tqdm(
-            executor.map(process, paths.values()),
+            executor.map(process, paths),
             desc=name,
             total=len(paths),
             disable=None if progress else True,
@@ -112,9 +122,12 @@ class _DetectorPool:
         self._idle.put(detector)
 
 
-def _detect_one(pool: _DetectorPool, path: Path, folder: Path, workers: int) -> Timed:
+def _detect_one(
+    pool: _DetectorPool, path: Path, boxes_px: np.ndarray | None, folder: Path, workers: int
+) -> Timed:
+    boxes_key = "" if boxes_px is None else "-" + sha256_bytes(np.asarray(boxes_px, float).tobytes())[:16]
     try:
-        kept = folder / f"{sha256_file(path)}.bin"
+        kept = folder / f"{sha256_file(path)}{boxes_key}.bin"
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); expected an image file") from None
     result = read_result(kept)
@@ -122,7 +135,7 @@ def _detect_one(pool: _DetectorPool, path: Path, folder: Path, workers: int) -> 
         image = read_image(path)
         with pool.borrow() as detector:
             start = time.perf_counter()
-            found = detector.detect(image)
+            found = detector.detect(image) if boxes_px is None else detector.detect(image, boxes_px)
             result = Timed(found, 1e3 * (time.perf_counter() - start), workers)
         write_result(kept, result)
     return result

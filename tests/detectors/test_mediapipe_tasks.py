@@ -156,6 +156,34 @@ def test_bundles_are_equal_every_time_and_a_bundle_can_be_given(weights, tmp_pat
     )
 
 
+def test_every_model_declares_once_how_pixels_are_scaled(weights):
+    """The pose detector takes [-1, 1], the others [0, 1], as MediaPipe's own graphs feed them."""
+    from mediapipe.tasks.metadata import metadata_schema_py_generated as metadata
+    from mediapipe.tasks.metadata import schema_py_generated as tflite
+
+    from hicp_lib.detectors import mediapipe_bundle
+
+    ranges = {}
+    for task in ("pose", "hand"):
+        with zipfile.ZipFile(io.BytesIO(mediapipe_bundle.assemble(task))) as bundle:
+            models = {
+                name: tflite.ModelT.InitFromPackedBuf(bundle.read(name), 0) for name in bundle.namelist()
+            }
+        for name, model in models.items():
+            (entry,) = (row for row in model.metadata if row.name == b"TFLITE_METADATA")
+            declared = metadata.ModelMetadataT.InitFromPackedBuf(bytes(model.buffers[entry.buffer].data), 0)
+            options = declared.subgraphMetadata[0].inputTensorMetadata[0].processUnits[0].options
+            ranges[name] = {
+                ((0 - m) / s, (255 - m) / s) for m, s in zip(options.mean, options.std, strict=True)
+            }
+    assert ranges == {
+        "pose_detector.tflite": {(-1, 1)},
+        "pose_landmarks_detector.tflite": {(0, 1)},
+        "hand_detector.tflite": {(0, 1)},
+        "hand_landmarks_detector.tflite": {(0, 1)},
+    }
+
+
 def test_a_file_that_is_no_bundle_is_refused(tmp_path):
     path = tmp_path / "hand.task"
     path.write_bytes(b"no zip")
@@ -212,7 +240,7 @@ make_detector("mediapipe-pose")
 
 def run_behind(proxy, before: str = "") -> subprocess.CompletedProcess:
     address = f"http://127.0.0.1:{proxy.server_address[1]}"
-    environment = os.environ | {"https_proxy": address, "no_proxy": "*", "NO_PROXY": ""}
+    environment = os.environ | {"https_proxy": address, "no_proxy": "", "NO_PROXY": ""}
     return subprocess.run(
         [sys.executable, "-c", _RUN.format(before=before)], env=environment, capture_output=True, text=True
     )
@@ -227,6 +255,21 @@ def test_mediapipe_says_nothing_and_contacts_nobody(weights, proxy):
 
 def test_the_proxy_would_have_seen_it(weights, proxy):
     """The control to the test above: without `keep_offline` the library does try."""
-    run = run_behind(proxy, before="native.keep_offline = lambda: os.environ.pop('no_proxy', None)")
+    run = run_behind(proxy, before="native.keep_offline = lambda: None")
     assert run.returncode == 0
     assert any(request.startswith("CONNECT") for request in proxy.requests)
+
+
+def test_no_exception_from_the_proxy_lets_it_out(monkeypatch):
+    from urllib.request import getproxies_environment, proxy_bypass_environment
+
+    from hicp_lib.detectors import native
+
+    monkeypatch.setattr(native, "_before", {})
+    for name, value in {"https_proxy": "http://gate:3128", "no_proxy": "*", "NO_PROXY": "*"}.items():
+        monkeypatch.setenv(name, value)
+    native.keep_offline()
+    assert getproxies_environment()["https"] == "http://127.0.0.1:9"
+    assert not proxy_bypass_environment("metrics.example.com")
+    user = native.user_environment()
+    assert (user["https_proxy"], user["no_proxy"]) == ("http://gate:3128", "*")

@@ -188,6 +188,27 @@ def test_limb_score_is_the_mean_projection_of_a_constant_field():
     assert scores[:, 0] == pytest.approx([0.6, expected])
 
 
+@pytest.mark.parametrize("fraction, passes", [(0.9, False), (0.99, True)])
+def test_nearly_the_whole_line_has_to_agree(fraction, passes):
+    field = np.zeros((2, 30, 50))
+    field[0, :, : int(fraction * 50)] = 1
+    scores = paf.limb_scores(
+        field, np.array([[3.5, 100, 1]]), np.array([[50 * STRIDE - 4.5, 100, 1]]), STRIDE, OPTIONS
+    )
+    assert (scores[0, 0] > 0) == passes
+
+
+def test_people_with_a_part_each_are_not_merged():
+    """Two necks, one head: whichever the nose is given to, nobody gets two necks."""
+    people = []
+    paf._join(people, (0, 0), (1, 0), 1.0, False)
+    paf._join(people, (2, 0), (1, 1), 1.0, False)
+    paf._join(people, (0, 0), (2, 0), 1.0, False)
+    assert [person.peaks for person in people] == [{0: 0, 1: 0}, {2: 0, 1: 1}]
+    paf._join(people, (1, 0), (3, 0), 0.5, False)
+    assert people[0].peaks == {0: 0, 1: 0, 3: 0} and people[0].limb_score == 1.5
+
+
 def test_points_on_top_of_each_other_just_pass_without_a_field():
     point = np.array([[50.0, 50, 1]])
     field = np.zeros((2, 46, 54))
