@@ -19,6 +19,7 @@ from hicp_lib.detectors.registry import DETECTORS
 from hicp_lib.evaluation.bootstrap import bootstrap_difference, bootstrap_intervals
 from hicp_lib.evaluation.coco import evaluate, person_oks
 from hicp_lib.evaluation.engine import METRICS
+from hicp_lib.keypoints import GROUPS, N_KEYPOINTS
 
 Found = Mapping[tuple[str, str], Mapping[int, Detections]]
 
@@ -128,9 +129,21 @@ def only_images(annotations: Annotations, image_ids) -> Annotations:
     )
 
 
+def groups_of(found: Found, detector: str) -> tuple[str, ...]:
+    """The keypoint groups a detector is scored on: its own, or those an imported one gives a keypoint of."""
+    if detector in DETECTORS:
+        return DETECTORS[detector].groups
+    given = np.zeros(N_KEYPOINTS, dtype=bool)
+    for (_, name), images in found.items():
+        if name == detector:
+            for people in images.values():
+                given |= np.isfinite(people.keypoints_px).all(axis=-1).any(axis=0)
+    return tuple(group for group, keypoints in GROUPS.items() if given[keypoints].any())
+
+
 def _cases(found: Found) -> Iterator[tuple[str, str, str]]:
     for subset, detector in found:
-        for group in DETECTORS[detector].groups:
+        for group in groups_of(found, detector):
             yield subset, detector, group
 
 

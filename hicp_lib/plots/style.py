@@ -91,8 +91,9 @@ def new_figure(n_rows: int = 1, n_columns: int = 1, width_in: float = 8.0, heigh
 
 
 def detector_colour(name: str) -> str:
-    """The colour of a detector; combinations and unknown ones take the neutral grey."""
-    return DETECTOR_COLOURS.get(name, OTHER_COLOUR)
+    """The colour of a detector, also of variants such as "mmpose-imported"; others take the neutral grey."""
+    known = [detector for detector in DETECTOR_COLOURS if f"{name}-".startswith(f"{detector}-")]
+    return DETECTOR_COLOURS[max(known, key=len)] if known else OTHER_COLOUR
 
 
 def in_words(items: Sequence[str]) -> str:
