@@ -1,0 +1,36 @@
+"""What is on offer, and how its options are refused."""
+
+import pytest
+
+from hicp_lib.detectors.registry import (
+    DETECTORS,
+    command_to_run,
+    default_detector_names,
+    detector_names,
+    make_detector,
+)
+from hicp_lib.errors import InputError
+
+
+def test_detectors_that_need_a_model_are_not_run_by_default():
+    absent = set(detector_names()) - set(default_detector_names())
+    assert absent == {name for name, entry in DETECTORS.items() if entry.needs_model}
+    assert {"mmpose", "alphapose", "detectron2"} <= absent
+
+
+@pytest.mark.parametrize("name", sorted(set(DETECTORS) - set(default_detector_names())))
+def test_without_its_model_a_detector_says_the_command(name):
+    with pytest.raises(InputError, match=f"hicp detect --detector {name} --model FILE.onnx"):
+        make_detector(name)
+    assert "--model" in command_to_run(name)
+
+
+@pytest.mark.parametrize("name", detector_names())
+def test_an_unknown_option_is_refused(name):
+    with pytest.raises(InputError, match="has no option 'colour'"):
+        make_detector(name, colour="blue", model="m.onnx")
+
+
+def test_an_unknown_detector_is_refused():
+    with pytest.raises(InputError, match="expected one of: mediapipe"):
+        make_detector("openpoze")
