@@ -110,6 +110,13 @@ def versions() -> dict[str, str]:
     }
 
 
+def weights_sha256() -> dict[str, str]:
+    """SHA-256 of each weight file by name, from the registry; a detector loads no file that differs."""
+    registry = DATA_DIR / "detectors.json"
+    weights = json.loads(registry.read_text())["weights"] if registry.is_file() else {}
+    return {name: row["sha256"] for name, row in weights.items()}
+
+
 def machine() -> dict[str, Any]:
     """Processor, cores, system and the thread limits set by the environment."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
@@ -143,6 +150,7 @@ def provenance(parameters: dict[str, Any]) -> dict[str, Any]:
         "library_sha256": library_sha256(),
         "lock_sha256": lock_sha256(),
         "data_sha256": data_sha256(),
+        "weights_sha256": weights_sha256(),
         "versions": versions(),
         "onnx_providers": onnx_providers(),
         "machine": machine(),
@@ -159,6 +167,7 @@ def provenance_html(stamp: dict[str, Any]) -> str:
         ),
         "Commit": git["commit"][:12] + changed,
         "Hashes": ", ".join(f"{k} {stamp[k + '_sha256'][:12]}" for k in ("library", "lock", "data")),
+        "Weights": ", ".join(f"{k} {v[:12]}" for k, v in stamp["weights_sha256"].items()),
         "Versions": ", ".join(f"{k} {v}" for k, v in stamp["versions"].items()),
         "Inference": ", ".join(stamp["onnx_providers"]) or "ONNX Runtime not used",
         "Machine": ", ".join(f"{k} {v}" for k, v in machine.items()),

@@ -10,6 +10,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from hicp_lib.detectors.zoo import list_weights
 from hicp_lib.plots import Figure
 from hicp_lib.provenance import lock_sha256
 from hicp_lib.study import Study
@@ -84,6 +85,7 @@ def test_the_stamp_says_what_was_run(study, shown, tmp_path):
     assert stamp["notebook"] == "07_x"
     assert stamp["parameters"] == {"seed": 3, "images": str(tmp_path)}
     assert stamp["lock_sha256"] == lock_sha256()
+    assert stamp["weights_sha256"] == {row["name"]: row["sha256"] for row in list_weights()}
     assert stamp["versions"]["numpy"] == np.__version__
     assert stamp["machine"]["cores"] >= 1
     assert "seed = 3" in shown[0]
