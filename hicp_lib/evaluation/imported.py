@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 from hicp_lib.annotations import Annotations, read_detections
 from hicp_lib.detectors.base import Detections
 from hicp_lib.errors import InputError
 
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+:-]{0,39}")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,39}")
 
 
 def read_imported(
-    items: Sequence[str], truth: Mapping[str, Annotations]
+    folder: str | Path, truth: Mapping[str, Annotations]
 ) -> dict[tuple[str, str], dict[int, Detections]]:
     """Detections by (subset, "NAME-imported"), as `hicp_lib.evaluation.compare` takes them.
 
@@ -22,23 +22,33 @@ def read_imported(
 
     Parameters
     ----------
-    items : "NAME=DIR" each; DIR holds a file of detections per subset, such as `basic.json` and
-        `headless.json`, as `hicp import` and `hicp detect` write them
+    folder : holds a folder for each detector, of the detector's name, with a file of detections for each
+        subset in it: `mmpose/basic.json`, `mmpose/headless.json`, ..., as `hicp import` and `hicp detect`
+        write them; empty text for none
     truth : subset -> annotations
 
     Raises
     ------
     InputError
-        For items of another form, names used twice, and files that are absent or do not fit.
+        For a folder without such folders, names that are no names, and files that are absent or do not fit.
     """
-    found: dict[tuple[str, str], dict[int, Detections]] = {}
-    for item in items:
-        name, equals, folder = item.partition("=")
-        if not equals or not _NAME.fullmatch(name) or not folder:
-            raise InputError(f"imported {item!r}: expected NAME=DIR, such as mmpose=my_detections/mmpose")
-        for subset, people in truth.items():
-            key = (subset, f"{name}-imported")
-            if key in found:
-                raise InputError(f"imported {item!r}: the name {name!r} is in use; give another")
-            found[key] = read_detections(Path(folder) / f"{subset}.json", people)
-    return found
+    if not folder:
+        return {}
+    try:
+        detectors = sorted(path for path in Path(folder).iterdir() if path.is_dir() and path.name[0] != ".")
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read ({error.strerror}); expected a folder") from None
+    if not detectors:
+        raise InputError(
+            f"{folder}: holds no folder; expected one for each detector, such as mmpose/basic.json"
+        )
+    for path in detectors:
+        if not _NAME.fullmatch(path.name):
+            raise InputError(
+                f"{path}: the folder's name is the detector's; use letters, digits, - and _ only"
+            )
+    return {
+        (subset, f"{path.name}-imported"): read_detections(path / f"{subset}.json", people)
+        for subset, people in truth.items()
+        for path in detectors
+    }
