@@ -94,12 +94,15 @@ def decode_integral(maps: np.ndarray) -> Decoded:
     (Fang et al., "AlphaPose", TPAMI 2022: symmetric integral regression.) The score is the
     sigmoid's maximum.
     """
-    heat = 1.0 / (1.0 + np.exp(-np.clip(maps, -80, 80), dtype=np.float64))
-    along_x, along_y = heat.sum(axis=2), heat.sum(axis=3)
-    total = along_x.sum(axis=-1)
-    x = along_x @ np.arange(heat.shape[3]) / total
-    y = along_y @ np.arange(heat.shape[2]) / total
-    return _given(np.stack([x, y], axis=-1), heat.max(axis=(2, 3)))
+    with np.errstate(over="ignore", invalid="ignore"):
+        heat = np.exp(-maps.astype(np.float32, copy=False))
+        heat += 1
+        np.reciprocal(heat, out=heat)
+        along_x, along_y = heat.sum(axis=2, dtype=float), heat.sum(axis=3, dtype=float)
+        total = along_y.sum(axis=-1)
+        x = along_x @ np.arange(heat.shape[3]) / total
+        y = along_y @ np.arange(heat.shape[2]) / total
+    return _given(np.stack([x, y], axis=-1), heat.max(axis=(2, 3)).astype(float))
 
 
 def decode_combined(maps: np.ndarray, n_integral: int) -> Decoded:
