@@ -59,7 +59,7 @@ def head_loss(
         if subset != "basic":
             continue
         basic, headless = (
-            evaluate(same[s], {i: found[s, detector][i] for i in shared}, group)
+            evaluate(same[s], {i: found[s, detector].get(i, Detections.none()) for i in shared}, group)
             for s in ("basic", "headless")
         )
         clusters = source_images(same["basic"])

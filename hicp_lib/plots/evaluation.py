@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from hicp_lib.detectors.base import Detections
 from hicp_lib.images import read_image
 from hicp_lib.plots.people import detections_grid
 from hicp_lib.plots.style import THRESHOLD_MARKERS, Figure, detector_colour, in_style, in_words, new_figure
@@ -195,7 +196,7 @@ def examples(folders, truth, found, n_people: int, note: str) -> Figure:
     pictures = {
         f"{subset} {i}": (
             read_image(Path(folder) / "images" / truth[subset].images[i].file_name),
-            {detector: found[subset, detector][i] for detector in detectors},
+            {name: found[subset, name].get(i, Detections.none()) for name in detectors},
         )
         for i in shared[:n_people]
         for subset, folder in folders.items()
