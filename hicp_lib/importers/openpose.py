@@ -4,7 +4,8 @@
   An empty list is a part of the model that was not run; a part with confidence 0 was not found.
 - Coordinates are read as source pixels (`--keypoint_scale 0`, OpenPose's default) and refused otherwise.
 - No score of the person is written (OpenPose's own averages parts and limbs, and limbs are not in the
-  file). Here it is the sum of the body parts' confidences over the number of parts, absent ones 0.
+  file). Here it is the sum of the body parts' confidences over the number of parts, absent ones 0;
+  where no body was run, the mean confidence of what was found.
 
 Source: OpenPose's output documentation.
 """
@@ -52,7 +53,10 @@ def read_openpose(path: Path) -> People:
     triples, conventions, n_parts = _triples(rows)
     keypoints, scores = split(triples, triples[..., 2] > 0)
     _refuse_normalised(path, keypoints)
-    person_scores = scores[:, BODY].sum(axis=1) / np.maximum(n_parts, 1)
+    parts, n_counted = scores[:, BODY], n_parts
+    if not n_parts.any():  # only face or hands were run
+        parts, n_counted = scores, (scores > 0).sum(axis=1)
+    person_scores = parts.sum(axis=1) / np.maximum(n_counted, 1)
     return People(
         path, "stem", list(files), np.repeat(np.arange(len(files)), counts), keypoints, scores, person_scores,
         conventions, [{} for _ in rows.rows],

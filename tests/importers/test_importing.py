@@ -114,6 +114,17 @@ def test_openpose_people_are_ranked_by_their_confidence_over_all_parts(tmp_path,
     )
 
 
+def test_hands_alone_are_ranked_by_what_was_found(tmp_path, images):
+    write_openpose(tmp_path, {NAMES[785]: [make_person(scores=np.full(136, 0.6))]})
+    path = next(tmp_path.iterdir())
+    data = json.loads(path.read_text())
+    data["people"][0] |= {"pose_keypoints_2d": [], "face_keypoints_2d": [], "hand_right_keypoints_2d": []}
+    path.write_text(json.dumps(data))
+    people = import_predictions("openpose", tmp_path, images).detections[785]
+    assert np.flatnonzero(np.isfinite(people.keypoints_px[0, :, 0])).tolist() == list(range(94, 115))
+    assert people.person_scores.tolist() == pytest.approx([0.6])
+
+
 def test_openpose_coco_json_has_flags_for_scores(tmp_path, images, found):
     found[NAMES[785]][0].scores[INDEX["nose"]] = 0
     write_openpose_coco(tmp_path / "coco.json", found)
