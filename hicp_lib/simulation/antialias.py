@@ -16,20 +16,18 @@ SAMPLES_PX = np.array([[-0.125, -0.375], [0.375, -0.125], [-0.375, 0.125], [0.12
 
 
 def edge_pixels(trace: Trace, sharp: np.ndarray) -> np.ndarray:
-    """Numbers of the pixels at an outline, a step in depth or a crease, where one side is `sharp`.
+    """Numbers of the pixels at an outline or a step in depth where one side is `sharp`.
 
     `sharp` is a mask of the image's shape, (height, width).
     """
     shape = sharp.shape
     surface, depth = trace.surface.reshape(shape), trace.depth_m.reshape(shape)
-    normals = trace.face_normals.reshape(*shape, 3)
     edge = np.zeros(shape, bool)
     with np.errstate(invalid="ignore"):
         for axis in (0, 1):
             low = tuple(slice(0, -1) if a == axis else slice(None) for a in (0, 1))
             high = tuple(slice(1, None) if a == axis else slice(None) for a in (0, 1))
             step = (surface[low] != surface[high]) | (np.abs(depth[low] - depth[high]) > 0.02 * depth[low])
-            step |= np.einsum("ijk,ijk->ij", normals[low], normals[high]) < 0.3
             step &= sharp[low] | sharp[high]
             edge[low] |= step
             edge[high] |= step

@@ -63,16 +63,20 @@ def pixel_rays(camera: Camera, pixels_px: np.ndarray | None = None) -> np.ndarra
     their camera-frame z component is 1, so a hit at t lies at depth t.
     """
     if pixels_px is None:
-        v, u = np.mgrid[: camera.height_px, : camera.width_px]
-        pixels_px = np.stack([u.ravel(), v.ravel()], axis=1)
-    rays = np.empty((len(pixels_px), 6), np.float32)
-    rays[:, :3] = camera.centre_m
-    x = (pixels_px[:, 0] - camera.cx_px) / camera.fx_px
-    y = (pixels_px[:, 1] - camera.cy_px) / camera.fy_px
+        u = np.arange(camera.width_px, dtype=np.float32)[None, :]
+        v = np.arange(camera.height_px, dtype=np.float32)[:, None]
+        shape = (camera.height_px, camera.width_px)
+    else:
+        u, v = np.asarray(pixels_px, np.float32).T
+        shape = u.shape
+    rays = np.empty((*shape, 6), np.float32)
+    rays[..., :3] = camera.centre_m
+    x = (u - np.float32(camera.cx_px)) / np.float32(camera.fx_px)
+    y = (v - np.float32(camera.cy_px)) / np.float32(camera.fy_px)
     R = camera.T_world_camera[:3, :3].astype(np.float32)
     for axis in range(3):
-        rays[:, 3 + axis] = R[axis, 0] * x + R[axis, 1] * y + R[axis, 2]
-    return rays
+        rays[..., 3 + axis] = R[axis, 0] * x + (R[axis, 1] * y + R[axis, 2])
+    return rays.reshape(-1, 6)
 
 
 def to_camera(camera: Camera, points_m: np.ndarray) -> np.ndarray:

@@ -81,14 +81,14 @@ def _cut_pattern(garment: Garment) -> Pattern:
 
 
 def _top_field(body: Body, garment: Garment) -> np.ndarray:
-    arm, torso, leg = body.field("arm"), body.field("torso"), body.field("leg")
+    arm, torso = body.field("arm"), body.field("torso")
     rest = body.vertices_m[0]
     front = np.clip(rest[:, 0] / 0.08, 0, 1) * np.clip(1 - np.abs(rest[:, 1]) / 0.10, 0, 1)
     trunk = np.minimum(torso - garment.start, garment.end - garment.opening * front - torso)
     on_arm = arm > 0
     trunk = np.where(on_arm, np.maximum(trunk, np.minimum(8 * arm, 0.5)), trunk)
     field = np.minimum(trunk, np.where(on_arm, garment.sleeve - arm, 9))
-    return np.where(_is(body, "hips", "torso", "neck", "upper_arm", "forearm", "hand") | (leg > 0), field, -1)
+    return np.where(_is(body, "hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh"), field, -1)
 
 
 def _bottom_field(body: Body, garment: Garment) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Image-space steps of the renderer: bumps from heights, and means that do not cross edges."""
+"""Image-space steps of the renderer: bumps from heights, and sums that do not cross edges."""
 
 from __future__ import annotations
 
@@ -86,16 +86,15 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-def mean_within(values: np.ndarray, surface: np.ndarray, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Mean over 4 x 4 pixels that lie on the same surface and close to its tangent plane.
+def sum_within(sums: np.ndarray, surface: np.ndarray, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Sum over 4 x 4 pixels that lie on the same surface and close to its tangent plane.
 
     Parameters
     ----------
-    values : array, shape (k, height, width)
+    sums : array, shape (k, height, width)
     surface : array, shape (height, width)
     positions_m, normals : arrays, shape (3, height, width)
     """
-    sums = np.concatenate([values, np.ones((1, *surface.shape), np.float32)])
     for axis in (1, 0):
         total = sums.copy()
         size = surface.shape[axis]
@@ -109,4 +108,4 @@ def mean_within(values: np.ndarray, surface: np.ndarray, positions_m: np.ndarray
             if shift == 1:
                 total[every_high] += sums[every_low] * same
         sums = total
-    return sums[:-1] / sums[-1]
+    return sums

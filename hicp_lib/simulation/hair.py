@@ -65,21 +65,21 @@ def random_style(rng: np.random.Generator, woman: bool, age: float) -> Style | N
         return None
     if kind == "long":
         length = rng.uniform(0.30, 0.48)
-        return Style(length, length * 0.95, 0.06, (-0.5, 0, -0.3), 1.0, wave, 0.014, parting, "", 1000, 12, 0.018)
+        return Style(length, length * 0.95, 0.06, (-0.5, 0, -0.3), 1.0, wave, 0.014, parting, "", 850, 9, 0.020)
     if kind == "bob":
         length = rng.uniform(0.17, 0.25)
-        return Style(length, length * 0.85, 0.06, (-0.3, 0, -0.4), 1.0, wave, 0.016, parting, "", 1000, 8, 0.017)
+        return Style(length, length * 0.85, 0.06, (-0.3, 0, -0.4), 1.0, wave, 0.016, parting, "", 900, 7, 0.018)
     if kind in ("tail", "bun"):
-        return Style(0.3, 0.3, 0.05, (-1, 0, 0.1), 0.0, 0.01, 0.006, 0, kind, 800, 8, 0.012)
+        return Style(0.3, 0.3, 0.05, (-1, 0, 0.1), 0.0, 0.01, 0.006, 0, kind, 700, 7, 0.013)
     if kind == "short":
-        return Style(0.10, 0.07, 0.08, (0.1, 0, -0.5), 0.5, wave, 0.016, parting, "", 1600, 5, 0.010)
+        return Style(0.10, 0.07, 0.08, (0.1, 0, -0.5), 0.5, wave, 0.016, parting, "", 1300, 5, 0.011)
     if kind == "curly":
-        return Style(0.07, 0.05, 0.5, (0, 0, -0.3), 0.1, 0.1, 0.03, 0, "", 1500, 8, 0.009, 0.007)
+        return Style(0.07, 0.05, 0.5, (0, 0, -0.3), 0.1, 0.1, 0.03, 0, "", 1150, 7, 0.010, 0.007)
     if kind == "side":
         length = rng.uniform(0.045, 0.08)
-        return Style(length, rng.uniform(0.012, 0.025), 0.10, (0.45, 0, -0.2), 0.1, wave, 0.014, parting, "", 1900, 4, 0.008)
+        return Style(length, rng.uniform(0.012, 0.025), 0.10, (0.45, 0, -0.2), 0.1, wave, 0.014, parting, "", 1600, 4, 0.009)
     if kind == "quiff":
-        return Style(rng.uniform(0.04, 0.06), 0.014, 0.22, (-0.9, 0, 0.25), 0.05, wave, 0.020, 0, "", 1900, 4, 0.008)
+        return Style(rng.uniform(0.04, 0.06), 0.014, 0.22, (-0.9, 0, 0.25), 0.05, wave, 0.020, 0, "", 1600, 4, 0.009)
     return Style(rng.uniform(0.010, 0.018), 0.009, 0.3, (0.3, 0, -0.1), 0.0, 0.05, 0.010, 0, "", 1900, 2, 0.007)
 
 

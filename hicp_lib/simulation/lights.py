@@ -49,10 +49,13 @@ _STRATA = np.array([0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5])
 
 
 def sample_offsets(row: np.ndarray, column: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Points of the unit square, (2, n): 16 strata that repeat every 4 x 4 pixels, jittered within."""
-    stratum = _STRATA[(row % 4) * 4 + column % 4]
-    jitter = rng.random((2, len(row)), np.float32)
-    return (np.stack([stratum % 4, stratum // 4]) + jitter).astype(np.float32) / 4
+    """Points of the unit square, (2, n): 16 points of a lattice that repeat every 4 x 4 pixels, jittered.
+
+    The pixels of either colour of a chessboard cover the square as well.
+    """
+    number = _STRATA[(row % 4) * 4 + column % 4]
+    places = np.stack([number % 8 * 2 + number // 8, 5 * number % 16])
+    return (places + rng.random((2, len(row)), np.float32)).astype(np.float32) / 16
 
 
 def towards_light(light: Light, positions_m: np.ndarray, offsets: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 # Open3D would announce and start its web viewer in every notebook that renders.
@@ -36,6 +37,11 @@ class Trace:
         """Some of the rays."""
         arrays = (self.depth_m, self.triangle, self.surface, self.barycentric, self.face_normals)
         return Trace(*(array[rows] for array in arrays))
+
+    def put(self, rows: np.ndarray, other: Trace) -> None:
+        """Replace some of the rays' answers."""
+        self.depth_m[rows], self.triangle[rows], self.surface[rows] = other.depth_m, other.triangle, other.surface
+        self.barycentric[rows], self.face_normals[rows] = other.barycentric, other.face_normals
 
 
 class RayScene:
@@ -87,6 +93,51 @@ class RayScene:
         normals *= np.where(away, -1, 1).astype(np.float32) / np.maximum(np.sqrt(dot(normals, normals)), 1e-9)
         positions = rays[rows, :3].T + depth * direction
         return Hits(positions, normals, interpolate(mesh.coords, corners, weights), local, depth * pixel_rad)
+
+
+def trace_image(scene: RayScene, rays: np.ndarray, shape: tuple[int, int], fine: np.ndarray) -> Trace:
+    """Trace an image's rays (height * width, 6), but not where it is plain.
+
+    Every second row and column is traced. Between four of those that meet one and the same
+    triangle the rest is known: 1 / depth is linear over a plane's image. Everything else is
+    traced as well, and so is all that lies near surfaces with a true `fine` (one per surface).
+    """
+    height, width = shape
+    numbers = np.arange(height * width).reshape(shape)
+    corners = numbers[::2, ::2]
+    coarse = scene.trace(rays[corners.ravel()])
+    triangle = coarse.triangle.reshape(corners.shape)
+    plain = (triangle >= 0) & ~np.append(fine, False)[coarse.surface].reshape(corners.shape)
+    plain[:-1, :-1] &= (triangle[:-1, :-1] == triangle[1:, :-1]) & (triangle[:-1, :-1] == triangle[1:, 1:])
+    plain[:-1, :-1] &= triangle[:-1, :-1] == triangle[:-1, 1:]
+    plain[-1], plain[:, -1] = False, False
+    plain = cv2.erode(plain.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool)
+    full = Trace(
+        np.empty(height * width, np.float32),
+        np.empty(height * width, np.int32),
+        np.empty(height * width, np.int16),
+        np.zeros((height * width, 2), np.float32),
+        np.empty((height * width, 3), np.float32),
+    )
+    unknown = np.ones(shape, bool)
+    full.put(corners.ravel(), coarse)
+    unknown[::2, ::2] = False
+    at = np.flatnonzero(plain)
+    row, column = np.divmod(at, corners.shape[1])
+    inverse = 1 / coarse.depth_m
+    down, right = at + corners.shape[1], at + 1
+    for dv, du, value in (
+        (0, 1, (inverse[at] + inverse[right]) / 2),
+        (1, 0, (inverse[at] + inverse[down]) / 2),
+        (1, 1, (inverse[at] + inverse[down + 1]) / 2),
+    ):
+        pixels = (2 * row + dv) * width + 2 * column + du
+        full.depth_m[pixels], full.triangle[pixels] = 1 / value, coarse.triangle[at]
+        full.surface[pixels], full.face_normals[pixels] = coarse.surface[at], coarse.face_normals[at]
+        unknown.ravel()[pixels] = False
+    rest = np.flatnonzero(unknown)
+    full.put(rest, scene.trace(rays[rest]))
+    return full
 
 
 def interpolate(values: np.ndarray, corners: np.ndarray, weights: tuple[np.ndarray, ...]) -> np.ndarray:

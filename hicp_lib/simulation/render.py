@@ -11,7 +11,7 @@ from hicp_lib.simulation import lights
 from hicp_lib.simulation.antialias import edge_pixels, smooth_edges
 from hicp_lib.simulation.camera import Camera, pixel_rays
 from hicp_lib.simulation.filters import Looks, View, tilt_by_height
-from hicp_lib.simulation.raycast import RayScene, Trace, dot
+from hicp_lib.simulation.raycast import RayScene, Trace, dot, trace_image
 from hicp_lib.simulation.shadows import visibility
 from hicp_lib.simulation.surfaces import Look, Surface
 
@@ -51,49 +51,63 @@ class Frame:
 def render(world: World, camera: Camera, rng: np.random.Generator) -> Frame:
     """Render one frame; the random generator scatters the shadow rays.
 
-    Everything is traced at every pixel, but only people are shaded there: they are in focus.
+    Depth and people are exact at every pixel, but only people are shaded there: they are in focus.
     What is around them is shaded at every second row and column, and a little out of focus.
     """
     scene = RayScene(world.surfaces)
     rays = pixel_rays(camera)
-    trace = scene.trace(rays)
     shape = (camera.height_px, camera.width_px)
+    trace = trace_image(scene, rays, shape, np.array([s.person >= 0 for s in world.surfaces]))
     person, part = (labels.reshape(shape) for labels in _labels(scene, trace))
     numbers = np.arange(len(rays)).reshape(shape)
     around = View.of(trace, rays, numbers[::2, ::2], person[::2, ::2] < 0)
-    image = _enlarge(_paint(world, scene, around, camera, 3, rng), around.wanted, shape)
+    image = _enlarge(_paint(world, scene, around, camera, False, rng), around.wanted, trace.surface.reshape(shape))
+    image.reshape(-1, 3)[trace.surface < 0] = world.backdrop
     rows, columns = (np.flatnonzero((person >= 0).any(axis=axis)) for axis in (1, 0))
     if len(rows):
         crop = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
         people = View.of(trace, rays, numbers[crop], person[crop] >= 0)
-        painted = _paint(world, scene, people, camera, 2, rng)
+        painted = _paint(world, scene, people, camera, True, rng)
         image[crop][people.wanted] = np.moveaxis(painted, 0, -1)[people.wanted]
         image = smooth_edges(image, edge_pixels(trace, person >= 0), trace, scene, camera)
     return Frame(image, trace.depth_m.reshape(shape), person, part, scene)
 
 
-def _paint(world: World, scene: RayScene, view: View, camera: Camera, passes: int, rng) -> np.ndarray:
+def _paint(world: World, scene: RayScene, view: View, camera: Camera, sharp: bool, rng) -> np.ndarray:
     """Linear RGB of a view, (3, rows, columns), black where nothing is wanted."""
     looks = _gather_looks(scene, view, 1 / camera.fx_px)
     tilt_by_height(looks, view)
-    seen = visibility(world.lights, scene, view, looks, passes, rng)
+    seen = visibility(world.lights, scene, view, looks, sharp, rng)
     image = np.zeros((3, view.wanted.size), np.float32)
     pixels = np.flatnonzero(view.wanted)
     for start in range(0, len(pixels), _BLOCK):
         block = pixels[start : start + _BLOCK]
         image[:, block] = _shade_block(world, looks.part(block), view.rays[block, 3:].T, seen[:, block])
-    image[:, view.trace.surface < 0] = world.backdrop.astype(np.float32)[:, None]
     return image.reshape(3, *view.wanted.shape)
 
 
-def _enlarge(painted: np.ndarray, wanted: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """From every second pixel to all, (height, width, 3); wanted colours run on under people."""
+def _enlarge(painted: np.ndarray, wanted: np.ndarray, surface: np.ndarray) -> np.ndarray:
+    """From every second pixel to all, (height, width, 3), out of focus; colours run on under people.
+
+    Each pixel takes the colour of the nearest painted one that shows the same surface, so
+    that outlines stay where they are.
+    """
+    height, width = surface.shape
+    columns = painted.shape[2]
+    v, u = (np.arange(size) // 2 for size in (height, width))
+    nearest = v[:, None] * columns + u
+    coarse_surface = np.where(wanted, surface[::2, ::2], -1).ravel()
+    wrong = np.flatnonzero(coarse_surface[nearest.ravel()] != surface.ravel())
+    row, column = v[wrong // width], u[wrong % width]
+    best = nearest.ravel()[wrong]
+    for dv, du in ((-1, -1), (-1, 1), (1, -1), (1, 1), (-1, 0), (0, -1), (1, 0), (0, 1)):
+        near = np.clip(row + dv, 0, painted.shape[1] - 1) * columns + np.clip(column + du, 0, columns - 1)
+        same = coarse_surface[near] == surface.ravel()[wrong]
+        best[same] = near[same]
+    nearest.ravel()[wrong] = best
     weighted = np.dstack([np.moveaxis(painted, 0, -1) * wanted[..., None], wanted]).astype(np.float32)
-    filled = cv2.GaussianBlur(weighted, (0, 0), 0.8) + 1e-4 * cv2.blur(weighted, (9, 9)) + 1e-9
-    to_coarse = np.array([[0.5, 0, 0], [0, 0.5, 0]])
-    full = cv2.warpAffine(
-        filled, to_coarse, shape[::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE
-    )
+    full = weighted.reshape(-1, 4)[nearest]
+    full = cv2.GaussianBlur(full, (0, 0), 1.1) + 1e-4 * cv2.blur(full, (15, 15)) + 1e-9
     return full[..., :3] / full[..., 3:]
 
 

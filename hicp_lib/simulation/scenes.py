@@ -8,8 +8,10 @@ the number of worker processes changes nothing, and a larger data set contains t
 from __future__ import annotations
 
 import multiprocessing
+import multiprocessing.pool
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
@@ -119,9 +121,27 @@ def _in_processes(todo: list[tuple[str, int, int]], workers: int) -> Iterator[No
     if workers == 1 or len(todo) < 3:
         yield from map(_render_one, todo)
         return
-    # A fresh interpreter per worker: Open3D's threads do not survive a fork.
-    with multiprocessing.get_context("spawn").Pool(min(workers, len(todo)), initializer=cv2.setNumThreads, initargs=(1,)) as pool:
-        yield from pool.imap_unordered(_render_one, todo, chunksize=4)
+    with worker_pool(min(workers, len(todo))) as pool:
+        yield from pool.imap_unordered(_render_one, todo, chunksize=2)
+
+
+@contextmanager
+def worker_pool(workers: int) -> Iterator[multiprocessing.pool.Pool]:
+    """Processes that render, with one thread each: more threads than processors only wait for each other.
+
+    Each starts as a fresh interpreter, since Open3D's threads do not survive a fork; the
+    linear algebra library reads its number of threads when it is loaded.
+    """
+    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        context = multiprocessing.get_context("spawn")
+        with context.Pool(workers, initializer=cv2.setNumThreads, initargs=(1,)) as pool:
+            yield pool
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
 def _render_one(job: tuple[str, int, int]) -> None:

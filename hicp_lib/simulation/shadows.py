@@ -5,27 +5,30 @@ from __future__ import annotations
 import numpy as np
 
 from hicp_lib.simulation import lights
-from hicp_lib.simulation.filters import Looks, View, mean_within
+from hicp_lib.simulation.filters import Looks, View, sum_within
 from hicp_lib.simulation.raycast import RayScene, dot
 
 AMBIENT_REACH_M = 0.7
 
 
 def visibility(
-    sources: list[lights.Light], scene: RayScene, view: View, looks: Looks, passes: int, rng: np.random.Generator
+    sources: list[lights.Light], scene: RayScene, view: View, looks: Looks, sharp: bool, rng: np.random.Generator
 ) -> np.ndarray:
     """Visible share of each light and (last) of the surroundings, (n_lights + 1, n) in [0, 1].
 
-    More `passes` of the filter make shadows smoother and their edges softer.
+    In a `sharp` view, with its many pixels, half of them are asked, by turns, and the filter
+    fills in the others; elsewhere all are asked and filtered more.
     """
     shape = view.wanted.shape
-    pixels = np.flatnonzero(view.wanted)
-    row, column = np.divmod(pixels, shape[1])
-    normals = looks.normals[:, pixels]
-    origins = looks.positions_m[:, pixels] + np.float32(0.003) * normals
-    seen = np.ones((len(sources) + 1, view.wanted.size), np.float32)
+    turn = np.indices(shape).sum(axis=0) % 2
+    seen = np.zeros((len(sources) + 1, view.wanted.size), np.float32)
     for kind, source in enumerate([*sources, None]):
-        offsets = lights.sample_offsets(row + kind, column + 2 * kind, rng)
+        pixels = np.flatnonzero(view.wanted & ((turn == kind % 2) | (not sharp)))
+        row, column = np.divmod(pixels, shape[1])
+        offsets = lights.sample_offsets(row + kind, column + 3 * kind, rng)
+        normals = looks.normals[:, pixels]
+        origins = looks.positions_m[:, pixels] + np.float32(0.003) * normals
+        seen[kind, pixels] = 1
         if source is None:
             seen[kind, pixels] = ~scene.occluded(origins.T, lights.hemisphere(normals, offsets).T, AMBIENT_REACH_M)
             continue
@@ -34,7 +37,9 @@ def visibility(
         seen[kind, pixels[facing]] = ~scene.occluded(origins[:, facing].T, towards[:, facing].T, 0.98)
     surface = np.where(view.wanted.ravel(), view.trace.surface, -1).reshape(shape)
     positions, directions = (x.reshape(3, *shape) for x in (looks.positions_m, looks.normals))
-    seen = seen.reshape(-1, *shape)
-    for _ in range(passes):
-        seen = mean_within(seen, surface, positions, directions)
-    return seen.reshape(len(seen), -1)
+    asked = np.stack([(turn == 0) | (not sharp), (turn == 1) | (not sharp)]).astype(np.float32)
+    sums = np.concatenate([seen.reshape(-1, *shape), asked])
+    for _ in range(2 if sharp else 3):
+        sums = sum_within(sums, surface, positions, directions)
+    weights = sums[-2:][np.arange(len(seen)) % 2]
+    return np.where(weights > 0, sums[:-2] / np.maximum(weights, 1e-6), 1).reshape(len(seen), -1)

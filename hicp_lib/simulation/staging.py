@@ -32,7 +32,7 @@ class Stage:
 
 def random_stage(rng: Rng) -> Stage:
     """One to three people, one to five metres from a camera, in a furnished room."""
-    n_people = int(rng.choice([1, 2, 3], p=[0.6, 0.28, 0.12]))
+    n_people = int(rng.choice([1, 2, 3], p=[0.64, 0.26, 0.10]))
     places = _places(rng, n_people)
     people, surfaces = [], []
     for number, place in enumerate(places):
