@@ -125,17 +125,18 @@ def put_on(
     skin, skin_normals = cut.apply(posed.vertices_m), g.unit(cut.apply(posed.normals))
     rest = cut.apply(rest_m.astype(np.float32))
     below = cut.apply(layers_m)
-    cloth = _drape(garment, pattern, skin, skin_normals, rest, folds, below)
+    # Smoothing also slides cloth along the skin: its pattern slides with it.
+    smooth = _smooth(np.concatenate([skin, rest], axis=1), pattern.neighbours, garment.smoothing)
+    smooth, laid = smooth[:, :3], smooth[:, 3:]
+    cloth = _drape(garment, pattern, smooth, skin, skin_normals, rest, folds, below)
     height = np.einsum("ij,ij->i", cloth - skin, skin_normals)
     layers_m[cut.i] = np.maximum(layers_m[cut.i], height)
     normals = g.vertex_normals(cloth, cut.triangles)
-    # Smoothing also slides cloth along the skin: its pattern slides with it.
-    laid = _smooth(rest, pattern.neighbours, garment.smoothing)
     coords = np.column_stack([laid, *(cut.apply(body.field(f)) for f in ("arm", "leg", "torso")), pattern.distance])
     return _with_rim(pattern, g.Mesh(cloth, cut.triangles, normals, coords.astype(np.float32)), skin)
 
 
-def _drape(garment: Garment, pattern: Pattern, skin, skin_normals, rest, folds, below) -> np.ndarray:
+def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, folds, below) -> np.ndarray:
     body = load_body()
     ends = pattern.distance if garment.kind == "top" else garment.start - pattern.cut.apply(body.field("leg"))
     away = garment.thickness_m + garment.ease_m * np.exp(-ends / 0.25)
@@ -143,7 +144,6 @@ def _drape(garment: Garment, pattern: Pattern, skin, skin_normals, rest, folds, 
     if garment.kind == "bottom":  # a waistband is tight
         away = np.where(torso > 0, np.minimum(away, garment.thickness_m), away)
     away = np.maximum(away, below + 0.004 * (below > 0))
-    cloth = _smooth(skin, pattern.neighbours, garment.smoothing)
     cloth = _keep_away(cloth, skin, skin_normals, away)
     heights = sum(h * np.sin(rest @ np.array([x, y, z], np.float32) + p) for x, y, z, p, h in folds)
     cloth = cloth + (heights * np.minimum(away / 0.01, 1.5))[:, None] * skin_normals

@@ -106,8 +106,8 @@ def _enlarge(painted: np.ndarray, wanted: np.ndarray, surface: np.ndarray) -> np
         best[same] = near[same]
     nearest.ravel()[wrong] = best
     weighted = np.dstack([np.moveaxis(painted, 0, -1) * wanted[..., None], wanted]).astype(np.float32)
-    full = weighted.reshape(-1, 4)[nearest]
-    full = cv2.GaussianBlur(full, (0, 0), 1.1) + 1e-4 * cv2.blur(full, (15, 15)) + 1e-9
+    weighted += 1e-4 * cv2.blur(weighted, (9, 9)) + 1e-9
+    full = cv2.GaussianBlur(weighted.reshape(-1, 4)[nearest], (0, 0), 1.1)
     return full[..., :3] / full[..., 3:]
 
 

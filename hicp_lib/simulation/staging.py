@@ -63,12 +63,14 @@ def _places(rng: Rng, n_people: int) -> list[tuple[float, float]]:
 def _person(rng: Rng, place: tuple[float, float], number: int) -> tuple[PosedBody, list[Surface]]:
     appearance = random_appearance(rng)
     # Mostly towards the camera (which lies along -y), less often sideways, sometimes away.
-    turn = rng.choice([rng.normal(0, 0.45), rng.uniform(-1.8, 1.8), rng.uniform(-np.pi, np.pi)], p=[0.7, 0.2, 0.1])
+    turn = rng.choice([rng.normal(0, 0.45), rng.uniform(-1.8, 1.8), rng.uniform(-np.pi, np.pi)], p=[0.76, 0.17, 0.07])
     yaw = -np.pi / 2 + turn
     T_world_body = np.eye(4)
     T_world_body[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
     T_world_body[:2, 3] = place
     kind = str(rng.choice(list(_POSES), p=list(_POSES.values())))
+    if kind == "sitting" and appearance.skirt is not None:  # a skirt would have to drape over the seat
+        kind = "standing"
     body = load_body()
     posed = pose_body(body, appearance.shape, sample_pose(rng, body, kind, appearance.shape), T_world_body)
     surfaces = dress(appearance, posed, number)
