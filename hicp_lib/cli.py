@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -62,6 +63,36 @@ def hicp() -> None:
     """Human keypoint detection at close range: data, detectors, evaluation, report."""
 
 
+def _detector_options(command: Callable) -> Callable:
+    """The options that say which detector runs, on which weights; they arrive as `**chosen`."""
+    for option in (
+        click.option("-o", "--option", "pairs", nargs=2, multiple=True, metavar="NAME VALUE",
+                     help="A further option of the detector; may be repeated."),
+        click.option("--boxes", help="Where people's boxes come from: gt, image or detected."),
+        click.option("--person-model", type=_PATH, help="ONNX file that finds the boxes (YOLOX, RTMDet)."),
+        click.option("--model", type=_PATH, help="The detector's weights, for those that run on yours."),
+        click.option("--detector", required=True, help="Its name; a wrong one lists those there are."),
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
+def _given(model: Path | None, person_model: Path | None, boxes: str | None, pairs) -> dict[str, Any]:
+    """The detector's options out of the command line's."""
+    named = {"model": model, "person_model": person_model, "boxes": boxes}
+    return {name: value for name, value in named.items() if value is not None} | {
+        name: _value(text) for name, text in pairs
+    }
+
+
+def _value(text: str) -> Any:
+    """true, 1 or 0.5 as such, anything else as text."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return text
+
+
 @hicp.group()
 def models() -> None:
     """The detectors' weights."""
@@ -88,6 +119,16 @@ def models_fetch(names: tuple[str, ...]) -> None:
 
     for name in fetch(names or None):
         _say(f"fetched {name}")
+
+
+@models.command("show")
+@_detector_options
+def models_show(detector: str, **chosen) -> None:
+    """Tell everything that is taken for granted about a detector and its model file."""
+    from hicp_lib.detectors.registry import describe, make_detector
+
+    for what, value, why in describe(make_detector(detector, **_given(**chosen))):
+        _say(f"{what:<16} {value}" + (f"  ({why})" if why else ""))
 
 
 @hicp.group()
@@ -127,12 +168,14 @@ def dataset_create(annotations: Path, images: Path, out: Path, min_pixels: int) 
 
 
 @hicp.command()
-@click.option("--detector", required=True, help="Its name; a wrong one lists those there are.")
+@_detector_options
 @click.option("--dataset", "dataset_dir", type=_PATH, help="Folder with images/ and annotations.json.")
 @click.option("--images", "images_dir", type=_PATH, help="Folder of images without annotations.")
 @click.option("--out", type=_PATH, required=True, help="COCO keypoint results to write.")
 @click.option("--workers", type=_WORKERS, help="Threads; all cores if not given.")
-def detect(detector: str, dataset_dir: Path | None, images_dir: Path | None, out: Path, workers) -> None:
+def detect(
+    detector: str, dataset_dir: Path | None, images_dir: Path | None, out: Path, workers, **chosen
+) -> None:
     """Find people and their keypoints in images."""
     from hicp_lib.annotations import write_detections
     from hicp_lib.detectors.run import detect_dataset, detect_images
@@ -140,10 +183,11 @@ def detect(detector: str, dataset_dir: Path | None, images_dir: Path | None, out
     if (dataset_dir is None) == (images_dir is None):
         raise click.UsageError("Give either --dataset DIR or --images DIR.", click.get_current_context())
     if dataset_dir is not None:
-        found = detect_dataset(detector, dataset_dir, workers=workers)
+        found = detect_dataset(detector, dataset_dir, workers=workers, **_given(**chosen))
     else:
         paths = _numbered_images(images_dir)
-        found = {key: result.detections for key, result in detect_images(detector, paths, workers).items()}
+        results = detect_images(detector, paths, workers, **_given(**chosen))
+        found = {key: result.detections for key, result in results.items()}
         _write_names(out, paths)
     write_detections(out, found)
     _say(f"{out}: {sum(len(people) for people in found.values())} people in {len(found)} images")

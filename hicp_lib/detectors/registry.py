@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import import_module
-from inspect import signature
+from typing import get_args, get_type_hints
 
 from hicp_lib.detectors.base import Detector
 from hicp_lib.errors import InputError
@@ -94,10 +94,26 @@ def make_detector(name: str, **options) -> Detector:
             f"detector {name!r} needs a weight file of your own; give it with: {command_to_run(name)}"
         )
     detector_class = getattr(import_module(entry.module), entry.class_name)
-    known = signature(detector_class).parameters
-    for option in options:
-        if option not in known:
-            raise InputError(
-                f"detector {name!r} has no option {option!r}; expected one of: {', '.join(known)}"
-            )
+    _check_options(name, detector_class, options)
     return detector_class(**options)
+
+
+def _check_options(name: str, detector_class: type, options: dict) -> None:
+    kinds = get_type_hints(detector_class.__init__)
+    del kinds["return"]
+    for option, value in options.items():
+        if option not in kinds:
+            raise InputError(
+                f"detector {name!r} has no option {option!r}; expected one of: {', '.join(kinds)}"
+            )
+        kind = kinds[option] | int if float in (kinds[option], *get_args(kinds[option])) else kinds[option]
+        if not isinstance(value, kind) or (isinstance(value, bool) and kinds[option] is not bool):
+            wanted = getattr(kinds[option], "__name__", None) or str(kinds[option])
+            raise InputError(f"detector {name!r}: option {option!r} is {value!r}; expected {wanted}")
+
+
+def describe(detector: Detector) -> list[tuple[str, str, str]]:
+    """What a detector takes for granted: rows of what, its value, and how that is known."""
+    if hasattr(detector, "describe"):
+        return [(fact.what, fact.value, fact.why) for fact in detector.describe()]
+    return [(key, str(value), "") for key, value in detector.settings.items()]

@@ -31,6 +31,16 @@ def test_an_unknown_option_is_refused(name):
         make_detector(name, colour="blue", model="m.onnx")
 
 
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("dark", "yes"), ("threads", 1.5), ("threads", True), ("score_scale", "ten"), ("boxes", 3)],
+)
+def test_an_option_of_another_kind_is_refused(option, value):
+    with pytest.raises(InputError, match=f"option '{option}' is .*; expected") as caught:
+        make_detector("mmpose", **{"model": "m.onnx", option: value})
+    assert "\n" not in str(caught.value)
+
+
 def test_an_unknown_detector_is_refused():
     with pytest.raises(InputError, match="expected one of: mediapipe"):
         make_detector("openpoze")

@@ -116,6 +116,8 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
             f"{path}: execution provider {provider!r} is not available here; expected one of: "
             f"{', '.join(available_providers())} (others need another build of onnxruntime)"
         )
+    if threads < 1:
+        raise InputError(f"{path}: threads {threads}: expected 1 or more")
     try:
         content = path.read_bytes()
     except OSError as error:

@@ -1,0 +1,59 @@
+"""The command on users' models: what is assumed is printed, mistakes are one line, results are written."""
+
+import json
+
+import numpy as np
+import pytest
+from onnx_models import colour_maps_model, constant_model
+from test_mmpose import dots
+
+from hicp_lib import cli
+from hicp_lib.images import write_png
+
+
+@pytest.fixture
+def model(tmp_path, monkeypatch):
+    monkeypatch.setenv("HICP_CACHE", str(tmp_path / "cache"))
+    return str(colour_maps_model(tmp_path / "m.onnx", (192, 256), 133))
+
+
+def mistake(capsys, *arguments):
+    assert cli.run(list(arguments)) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("hicp: ") and error.count("\n") == 1
+    return error
+
+
+@pytest.mark.parametrize("name", ["mmpose", "alphapose"])
+def test_what_is_assumed_is_printed(capsys, model, name):
+    assert cli.run(["models", "show", "--detector", name, "--model", model, "-o", "flip_test", "true"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "input            192 wide, 256 high  (read from the file)" in lines
+    assert any(line.startswith("flip test        yes") for line in lines)
+    assert any(line.startswith("boxes            image") for line in lines)
+
+
+def test_detect_with_a_model_of_ones_own(capsys, model, tmp_path):
+    positions = np.array([[60.0, 70.0], [75.5, 60.25], [66.0, 88.0]])
+    write_png(tmp_path / "images" / "7.png", dots(positions))
+    person = constant_model(
+        tmp_path / "p.onnx", (1, 3, 64, 64), {"dets": np.array([[[5, 5, 50, 48, 0.9]]], np.float32)}
+    )
+    out = tmp_path / "found.json"
+    arguments = ["detect", "--images", str(tmp_path / "images"), "--out", str(out), "--detector", "mmpose"]
+    assert cli.run([*arguments, "--model", model, "--person-model", str(person)]) == 0
+    (row,) = json.loads(out.read_text())
+    assert row["image_id"] == 7
+    found = np.array(row["keypoints"]).reshape(136, 3)
+    assert np.abs(found[:17, :2] - positions[np.arange(17) % 3]).max() < 0.5
+    assert (found[17:20] == 0).all()
+    capsys.readouterr()
+    assert "--model FILE.onnx" in mistake(capsys, *arguments)
+    assert "boxes 'gt'" in mistake(capsys, *arguments, "--model", model, "--boxes", "gt")
+    assert "boxes 'all'" in mistake(capsys, *arguments, "--model", model, "--boxes", "all")
+    assert "cuda" in mistake(capsys, *arguments, "--model", model, "-o", "provider", "cuda")
+    assert "expected bool" in mistake(capsys, *arguments, "--model", model, "-o", "dark", "maybe")
+    assert "/no.onnx: cannot be read" in mistake(capsys, *arguments, "--model", "/no.onnx")
+    assert "no option 'boxes'" in mistake(
+        capsys, *arguments[:-1], "detectron2", "--model", model, "--boxes", "gt"
+    )
