@@ -214,6 +214,41 @@ def _write_names(out: Path, paths: dict[int, Path]) -> None:
     write_json(out.with_suffix(".images.json"), names, indent=1)
 
 
+@hicp.command("import")
+@click.option("--format", "kind", required=True, help="openpose, alphapose, mmpose, detectron2 or coco.")
+@click.option("--predictions", type=_PATH, required=True, help="The folder or file the tool wrote.")
+@click.option("--annotations", type=_PATH, required=True, help="Annotations of the images the tool saw.")
+@click.option("--out", type=_PATH, required=True, help="COCO keypoint results to write.")
+@click.option("--score-scale", type=float, help="Divides keypoint scores; the format's own if not given.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+def import_(kind: str, predictions: Path, annotations: Path, out: Path, score_scale, as_json: bool) -> None:
+    """Read the predictions another tool wrote."""
+    from hicp_lib.annotations import read_annotations
+    from hicp_lib.importers.importing import import_predictions, write_imported
+
+    imported = import_predictions(kind, predictions, read_annotations(annotations), score_scale)
+    write_imported(out, imported)
+    summary = imported.summary
+    for line in [json.dumps(summary.as_dict(), indent=2)] if as_json else summary.lines():
+        _say(line)
+
+
+@hicp.command("export")
+@click.option("--detections", type=_PATH, required=True, help="COCO keypoint results.")
+@click.option("--format", "kind", required=True, help="coco (results) or fiftyone (a COCO data set).")
+@click.option("--layout", default="halpe136", show_default=True, help="Or halpe26, coco17, wholebody133.")
+@click.option("--annotations", type=_PATH, help="Annotations of the images; fiftyone needs them.")
+@click.option("--out", type=_PATH, required=True)
+def export(detections: Path, kind: str, layout: str, annotations: Path | None, out: Path) -> None:
+    """Write detections for other tools."""
+    from hicp_lib.annotations import read_annotations, read_detections
+    from hicp_lib.exporters import export_detections
+
+    people = None if annotations is None else read_annotations(annotations)
+    n = export_detections(kind, read_detections(detections, people), out, people, layout)
+    _say(f"{out}: {n} people")
+
+
 @hicp.command()
 @click.option("--annotations", type=_PATH, required=True, help="Annotations in Halpe's layout.")
 @click.option("--detections", type=_PATH, required=True, help="COCO keypoint results.")
