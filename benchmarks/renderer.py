@@ -58,7 +58,9 @@ def main() -> None:
     parser.add_argument("--json")
     options = parser.parse_args()
     with worker_pool(options.workers) as pool:
-        pool.map(_whole, range(1000, 1000 + 12 * options.workers), chunksize=1)  # workers keep cuts and textures
+        pool.map(
+            _whole, range(1000, 1000 + 12 * options.workers), chunksize=1
+        )  # workers keep cuts and textures
         start = time.perf_counter()
         cpu_s = pool.map(_whole, range(options.frames), chunksize=1)
         wall_s = time.perf_counter() - start

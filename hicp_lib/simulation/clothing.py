@@ -132,7 +132,9 @@ def put_on(
     height = np.einsum("ij,ij->i", cloth - skin, skin_normals)
     layers_m[cut.i] = np.maximum(layers_m[cut.i], height)
     normals = g.vertex_normals(cloth, cut.triangles)
-    coords = np.column_stack([laid, *(cut.apply(body.field(f)) for f in ("arm", "leg", "torso")), pattern.distance])
+    coords = np.column_stack(
+        [laid, *(cut.apply(body.field(f)) for f in ("arm", "leg", "torso")), pattern.distance]
+    )
     return _with_rim(pattern, g.Mesh(cloth, cut.triangles, normals, coords.astype(np.float32)), skin)
 
 
@@ -147,7 +149,12 @@ def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, 
     cloth = _keep_away(cloth, skin, skin_normals, away)
     heights = sum(h * np.sin(rest @ np.array([x, y, z], np.float32) + p) for x, y, z, p, h in folds)
     cloth = cloth + (heights * np.minimum(away / 0.01, 1.5))[:, None] * skin_normals
-    return _keep_away(_smooth(cloth, pattern.neighbours, 1), skin, skin_normals, np.maximum(0.6 * away, below + 0.003 * (below > 0)))
+    return _keep_away(
+        _smooth(cloth, pattern.neighbours, 1),
+        skin,
+        skin_normals,
+        np.maximum(0.6 * away, below + 0.003 * (below > 0)),
+    )
 
 
 def _smooth(points: np.ndarray, neighbours: np.ndarray, steps: int) -> np.ndarray:
@@ -186,7 +193,9 @@ def collar(garment: Garment, mesh: g.Mesh, posed: PosedBody, rise_m: float, open
     """A shirt collar on the edge around the neck: up, then folded out and down; open in front."""
     pattern = cut_pattern(garment)
     n = len(pattern.cut.i)
-    edges = pattern.rim[(mesh.coords[pattern.rim, 5] > 0.8).all(axis=1) & (mesh.coords[pattern.rim, 3] < 0.2).all(axis=1)]
+    edges = pattern.rim[
+        (mesh.coords[pattern.rim, 5] > 0.8).all(axis=1) & (mesh.coords[pattern.rim, 3] < 0.2).all(axis=1)
+    ]
     gap = (mesh.coords[edges, 0] > 0).all(axis=1) & (np.abs(mesh.coords[edges, 1]) < open_m).any(axis=1)
     edges = edges[~gap]
     used, place = np.unique(edges, return_inverse=True)
@@ -233,9 +242,13 @@ def skirt(posed: PosedBody, hip_rotation: np.ndarray, length_m: float, flare: fl
         radius[row] = (near @ ray).max(axis=0) if len(near) > 8 else radius[row - 1]
     below = np.linspace(0, 1, n_rows)[:, None]
     radius = np.maximum.accumulate(radius * 0.97, axis=0) * (1 + flare * below**1.3) + 0.008
-    radius += below * 0.016 * np.sin(9 * angle + phase + 2 * below) + below * 0.008 * np.sin(17 * angle + 3 * phase)
+    radius += below * 0.016 * np.sin(9 * angle + phase + 2 * below) + below * 0.008 * np.sin(
+        17 * angle + 3 * phase
+    )
     radius = (radius + np.roll(radius, 1, 1) + np.roll(radius, -1, 1)) / 3
-    local = np.stack([radius * ray[0], radius * ray[1], np.broadcast_to(heights[:, None], radius.shape)], axis=-1)
+    local = np.stack(
+        [radius * ray[0], radius * ray[1], np.broadcast_to(heights[:, None], radius.shape)], axis=-1
+    )
     grid = np.concatenate([local, local[:, :1]], axis=1)
     vertices = (grid.reshape(-1, 3) @ hip_rotation.T + hips).astype(np.float32)
     triangles = g.grid_triangles(n_rows, n_angles + 1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -97,7 +98,9 @@ def random_fabric(rng: Rng, plain: float = 0.5) -> Fabric:
     if rng.random() < 0.3:  # white, black and grey are what people wear
         colours[0] = linear(np.full(3, rng.choice([0.93, 0.06, 0.15, 0.55])))
     finish = dict(
-        weave_m=rng.choice([0.0, 0.0001, 0.0002]), crease_m=rng.uniform(0.002, 0.006), fuzz=rng.uniform(0.05, 0.3)
+        weave_m=rng.choice([0.0, 0.0001, 0.0002]),
+        crease_m=rng.uniform(0.002, 0.006),
+        fuzz=rng.uniform(0.05, 0.3),
     )
     if rng.random() < plain:
         return Fabric(colours, **finish)
@@ -107,14 +110,15 @@ def random_fabric(rng: Rng, plain: float = 0.5) -> Fabric:
 def _random_pattern(rng: Rng) -> Weights:
     kind = rng.choice(["stripes", "uprights", "checks", "dots", "blobs"], p=[0.3, 0.12, 0.28, 0.12, 0.18])
     if kind == "stripes":
-        return _tiled(lambda t=textures.stripes(rng.choice([0.2, 0.35, 0.5])): t, rng.uniform(0.02, 0.12))
+        return _tiled(partial(textures.stripes, float(rng.choice([0.2, 0.35, 0.5]))), rng.uniform(0.02, 0.12))
     if kind == "uprights":
-        return _tiled(lambda t=textures.stripes(rng.choice([0.12, 0.3])): t, rng.uniform(0.01, 0.05), upright=True)
+        stripes = partial(textures.stripes, float(rng.choice([0.12, 0.3])))
+        return _tiled(stripes, rng.uniform(0.01, 0.05), upright=True)
     if kind == "checks":
-        return _tiled(lambda k=int(rng.integers(3)): textures.checks(k), rng.uniform(0.03, 0.16))
+        return _tiled(partial(textures.checks, int(rng.integers(3))), rng.uniform(0.03, 0.16))
     if kind == "dots":
         return _tiled(textures.dots, rng.uniform(0.015, 0.06))
-    return _tiled(lambda k=int(rng.integers(6)): textures.blobs(k), rng.uniform(0.2, 0.6))
+    return _tiled(partial(textures.blobs, int(rng.integers(6))), rng.uniform(0.2, 0.6))
 
 
 def _tiled(texture: Callable, period_m: float, upright: bool = False) -> Weights:
@@ -161,7 +165,9 @@ def plain_fabric(rng: Rng, dark: bool = False) -> Fabric:
     colour = hsv(rng.uniform(0, 1), rng.uniform(0, 0.35), rng.uniform(0.08, 0.3 if dark else 0.7))
     if rng.random() < 0.4:
         colour = hsv(rng.uniform(0.07, 0.12), rng.uniform(0.15, 0.45), rng.uniform(0.25, 0.8))
-    return Fabric(np.array([colour] * 3), None, 0.0001, rng.uniform(0.003, 0.006), 0.85, 0.02, rng.uniform(0.05, 0.2))
+    return Fabric(
+        np.array([colour] * 3), None, 0.0001, rng.uniform(0.003, 0.006), 0.85, 0.02, rng.uniform(0.05, 0.2)
+    )
 
 
 @dataclass(frozen=True)
@@ -190,7 +196,7 @@ def cloth_material(fabric: Fabric, cuts: Cuts, limbs: str, trim: Trim) -> Materi
         weave = textures.weave().sample(uv, hits.footprint_m)[0]
         soft, creased = textures.wrinkles().sample(uv, hits.footprint_m)
         height = fabric.crease_m * (0.55 * soft + 0.30 * creased)
-        albedo *= (1 + 0.10 * weave * (fabric.weave_m > 0) + 0.04 * soft)
+        albedo *= 1 + 0.10 * weave * (fabric.weave_m > 0) + 0.04 * soft
         height, albedo = _sew(trim, distance, rest, panel, height, albedo)
         height += fabric.weave_m * weave * (hits.footprint_m < 0.002)
         return Look(np.clip(albedo, 0.002, 0.95), height, fabric.gloss, fabric.roughness, fabric.fuzz)

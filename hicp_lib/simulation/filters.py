@@ -86,7 +86,9 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-def sum_within(sums: np.ndarray, surface: np.ndarray, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def sum_within(
+    sums: np.ndarray, surface: np.ndarray, positions_m: np.ndarray, normals: np.ndarray
+) -> np.ndarray:
     """Sum over 4 x 4 pixels that lie on the same surface and close to its tangent plane.
 
     Parameters

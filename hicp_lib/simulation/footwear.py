@@ -31,7 +31,9 @@ SOLE_M = 0.022
 def put_on_shoe(shoes: Shoes, posed: PosedBody, side: str) -> g.Mesh:
     """One shoe; coords are (along from heel 0 to toe 1, across in metres, height above the sole's bottom)."""
     body = load_body()
-    foot = np.isin(body.regions, [REGIONS.index(name) for name in ("foot", "shin", "nail")]) & (body.field("leg") > 1.85)
+    foot = np.isin(body.regions, [REGIONS.index(name) for name in ("foot", "shin", "nail")]) & (
+        body.field("leg") > 1.85
+    )
     foot &= (body.vertices_m[0, :, 1] > 0) == (side == "left")
     points = posed.vertices_m[foot].astype(float)
     frame = _frame(posed, side)
@@ -48,7 +50,8 @@ def put_on_shoe(shoes: Shoes, posed: PosedBody, side: str) -> g.Mesh:
     normals[:, 0] = normals[:, -1] = g.unit(normals[:, 0] + normals[:, -1])
     span = outline[..., 0].min(), outline[..., 0].max()
     coords = np.stack(
-        [(outline[..., 0] - span[0]) / (span[1] - span[0]), outline[..., 1], outline[..., 2] - bottom], axis=-1
+        [(outline[..., 0] - span[0]) / (span[1] - span[0]), outline[..., 1], outline[..., 2] - bottom],
+        axis=-1,
     )
     return g.Mesh(vertices, triangles, normals.reshape(-1, 3), coords.reshape(-1, 3).astype(np.float32))
 
@@ -80,7 +83,9 @@ def _tube(local: np.ndarray, thickness: float) -> np.ndarray:
     mixed = smooth[0] * padded[:-2] + smooth[1] * padded[1:-1] + smooth[2] * padded[2:]
     rows, middles = mixed[:, :-2] + thickness, mixed[:, -2:]
     ends = [(start + 0.003, 0, 0.75), (start, 0, 0.0)], [(stop - 0.003, -1, 0.75), (stop, -1, 0.0)]
-    grid = np.concatenate([places[:, None, None] + 0 * rows[..., None], middles[:, None] + rows[..., None] * ray.T], axis=-1)
+    grid = np.concatenate(
+        [places[:, None, None] + 0 * rows[..., None], middles[:, None] + rows[..., None] * ray.T], axis=-1
+    )
 
     def cap(place: float, row: int, scale: float) -> np.ndarray:
         ring = grid[row].copy()
@@ -119,4 +124,6 @@ def random_shoes(rng: np.random.Generator) -> Shoes:
         colour = rng.choice([dark, white, rng.random(3) * 0.5])
         return Shoes(colour, white if rng.random() < 0.7 else dark, rng.uniform(0.06, 0.09), 0.009, True, 0.7)
     upper = brown if rng.random() < 0.5 else dark
-    return Shoes(upper, dark, 0.065 if kind == 1 else 0.13, 0.007, bool(rng.random() < 0.6), rng.uniform(0.25, 0.5))
+    return Shoes(
+        upper, dark, 0.065 if kind == 1 else 0.13, 0.007, bool(rng.random() < 0.6), rng.uniform(0.25, 0.5)
+    )

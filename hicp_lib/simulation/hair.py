@@ -56,7 +56,9 @@ def random_style(rng: np.random.Generator, woman: bool, age: float) -> Style | N
     """A hair style; None for a shaven or bald head."""
     parting = float(rng.choice([-1, 1]))
     if woman:
-        kind = rng.choice(["long", "bob", "tail", "bun", "short", "curly"], p=[0.30, 0.2, 0.18, 0.12, 0.1, 0.1])
+        kind = rng.choice(
+            ["long", "bob", "tail", "bun", "short", "curly"], p=[0.30, 0.2, 0.18, 0.12, 0.1, 0.1]
+        )
     else:
         odds = [0.42, 0.2, 0.16, 0.08, 0.14] if age < 50 else [0.4, 0.05, 0.25, 0.05, 0.25]
         kind = rng.choice(["side", "quiff", "crop", "curly", "bald"], p=odds)
@@ -65,10 +67,14 @@ def random_style(rng: np.random.Generator, woman: bool, age: float) -> Style | N
         return None
     if kind == "long":
         length = rng.uniform(0.30, 0.48)
-        return Style(length, length * 0.95, 0.06, (-0.5, 0, -0.3), 1.0, wave, 0.014, parting, "", 850, 9, 0.020)
+        return Style(
+            length, length * 0.95, 0.06, (-0.5, 0, -0.3), 1.0, wave, 0.014, parting, "", 850, 9, 0.020
+        )
     if kind == "bob":
         length = rng.uniform(0.17, 0.25)
-        return Style(length, length * 0.85, 0.06, (-0.3, 0, -0.4), 1.0, wave, 0.016, parting, "", 900, 7, 0.018)
+        return Style(
+            length, length * 0.85, 0.06, (-0.3, 0, -0.4), 1.0, wave, 0.016, parting, "", 900, 7, 0.018
+        )
     if kind in ("tail", "bun"):
         return Style(0.3, 0.3, 0.05, (-1, 0, 0.1), 0.0, 0.01, 0.006, 0, kind, 700, 7, 0.013)
     if kind == "short":
@@ -77,10 +83,27 @@ def random_style(rng: np.random.Generator, woman: bool, age: float) -> Style | N
         return Style(0.07, 0.05, 0.5, (0, 0, -0.3), 0.1, 0.1, 0.03, 0, "", 1150, 7, 0.010, 0.007)
     if kind == "side":
         length = rng.uniform(0.045, 0.08)
-        return Style(length, rng.uniform(0.012, 0.025), 0.10, (0.45, 0, -0.2), 0.1, wave, 0.014, parting, "", 1600, 4, 0.009)
+        return Style(
+            length,
+            rng.uniform(0.012, 0.025),
+            0.10,
+            (0.45, 0, -0.2),
+            0.1,
+            wave,
+            0.014,
+            parting,
+            "",
+            1600,
+            4,
+            0.009,
+        )
     if kind == "quiff":
-        return Style(rng.uniform(0.04, 0.06), 0.014, 0.22, (-0.9, 0, 0.25), 0.05, wave, 0.020, 0, "", 1600, 4, 0.009)
-    return Style(rng.uniform(0.010, 0.018), 0.009, 0.3, (0.3, 0, -0.1), 0.0, 0.05, 0.010, 0, "", 1900, 2, 0.007)
+        return Style(
+            rng.uniform(0.04, 0.06), 0.014, 0.22, (-0.9, 0, 0.25), 0.05, wave, 0.020, 0, "", 1600, 4, 0.009
+        )
+    return Style(
+        rng.uniform(0.010, 0.018), 0.009, 0.3, (0.3, 0, -0.1), 0.0, 0.05, 0.010, 0, "", 1900, 2, 0.007
+    )
 
 
 @dataclass(frozen=True)
@@ -168,15 +191,20 @@ def _keep_off(obstacles: Obstacles, points: np.ndarray, layer: np.ndarray) -> np
     shape = obstacles.back_m.shape
     within = ((cell >= 0) & (cell < shape)).all(axis=1)
     cell = np.clip(cell, 0, np.array(shape) - 1)
-    back, front = obstacles.back_m[tuple(cell.T)] - _CLOTH_M - layer, obstacles.front_m[tuple(cell.T)] + _CLOTH_M + layer
+    back, front = (
+        obstacles.back_m[tuple(cell.T)] - _CLOTH_M - layer,
+        obstacles.front_m[tuple(cell.T)] + _CLOTH_M + layer,
+    )
     x = points[:, 0]
     inside = within & (x > back) & (x < front)
     points[:, 0] = np.where(inside, np.where(x < 0.45 * back + 0.55 * front, back, front), x)
     return points
 
 
-def grow(style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, rng: np.random.Generator) -> g.Mesh:
-    """Hair on the body at rest; coords are (across -1..1, length along in metres, random per lock, lying depth)."""
+def grow(
+    style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, rng: np.random.Generator
+) -> g.Mesh:
+    """Hair on the body at rest; coords: across (-1 to 1), metres along, a random number, root 0 to tip 1."""
     head = measure(body, rest_m, landmarks_m)
     roots, normals, inside = _roots(style, body, rest_m, rng)
     points, reach = _strands(style, head, roots, normals, inside, rng)
@@ -216,7 +244,9 @@ def _strands(style: Style, head: Obstacles, roots, normals, inside, rng) -> tupl
     step = (length / style.n_steps)[:, None]
     points = [roots - 0.001 * normals]
     for k in range(style.n_steps):
-        wander = style.curl * (1.5 * np.roll(wave, k, axis=1) * (-1) ** (k // 2) + 0.6 * rng.normal(0, 1, (n, 3)))
+        wander = style.curl * (
+            1.5 * np.roll(wave, k, axis=1) * (-1) ** (k // 2) + 0.6 * rng.normal(0, 1, (n, 3))
+        )
         pull = np.array([0, 0, -style.gravity])
         direction = g.unit(direction + 0.6 * comb + pull + wander)
         here = points[-1]
@@ -235,7 +265,9 @@ def _coil(style: Style, points: np.ndarray, rng: np.random.Generator) -> np.ndar
     if style.coil_m == 0:
         return points
     n, k, _ = points.shape
-    turn = rng.uniform(0, 2 * np.pi, (n, 1)) + np.arange(k) * rng.uniform(1.3, 2.0, (n, 1)) * rng.choice([-1, 1], (n, 1))
+    turn = rng.uniform(0, 2 * np.pi, (n, 1)) + np.arange(k) * rng.uniform(1.3, 2.0, (n, 1)) * rng.choice(
+        [-1, 1], (n, 1)
+    )
     axes = rng.normal(0, 1, (2, n, 1, 3))
     axes = axes / np.linalg.norm(axes, axis=-1, keepdims=True)
     grow = np.minimum(np.arange(k) / 2, 1)[:, None] * style.coil_m
@@ -319,7 +351,9 @@ def _ribbons(style: Style, head: Obstacles, points: np.ndarray, length: np.ndarr
     return g.Mesh(flat[0], triangles, flat[1], flat[2])
 
 
-def carry(hair: g.Mesh, body: Body, posed: PosedBody, rest_heads_m: np.ndarray, landmarks_m: np.ndarray) -> g.Mesh:
+def carry(
+    hair: g.Mesh, body: Body, posed: PosedBody, rest_heads_m: np.ndarray, landmarks_m: np.ndarray
+) -> g.Mesh:
     """Hair at rest brought to the pose: by the head, and from the chin down more and more by the back."""
     head, back = (body.bone_names.index(name) for name in ("head", "spine01"))
     chin = landmarks_m[34, 2]
@@ -331,7 +365,9 @@ def carry(hair: g.Mesh, body: Body, posed: PosedBody, rest_heads_m: np.ndarray, 
         places.append(hair.vertices_m @ R.T + offset)
         normals.append(hair.normals @ R.T)
     vertices = places[0] + share * (places[1] - places[0])
-    return g.Mesh(vertices, hair.triangles, g.unit(normals[0] + share * (normals[1] - normals[0])), hair.coords)
+    return g.Mesh(
+        vertices, hair.triangles, g.unit(normals[0] + share * (normals[1] - normals[0])), hair.coords
+    )
 
 
 def hair_material(colour: np.ndarray) -> Material:

@@ -55,7 +55,11 @@ def glowing(colour: np.ndarray, glow: float) -> Material:
 
 
 def mixed(
-    texture: Callable[[], Texture], colours: np.ndarray, roughness: float, height_m: float = 0.0, gloss: float = 0.04
+    texture: Callable[[], Texture],
+    colours: np.ndarray,
+    roughness: float,
+    height_m: float = 0.0,
+    gloss: float = 0.04,
 ) -> Material:
     """Colours (n + 1, 3) mixed by a texture's n channels; the first channel also lifts the surface."""
     base, extra = np.float32(colours[0])[:, None], (np.float32(colours[1:]) - np.float32(colours[0])).T
@@ -91,7 +95,9 @@ def random_floor(rng: Rng) -> Material:
     kind = rng.choice(4, p=[0.45, 0.2, 0.25, 0.1])
     if kind == 0:
         colour = wood_colour(rng)
-        return mixed(textures.planks, np.array([colour * 0.55, colour * 1.3, colour * 0.15]), rng.uniform(0.25, 0.6))
+        return mixed(
+            textures.planks, np.array([colour * 0.55, colour * 1.3, colour * 0.15]), rng.uniform(0.25, 0.6)
+        )
     if kind == 1:
         colour = hsv(rng.random(), rng.uniform(0, 0.2), rng.uniform(0.35, 0.9))
         grout = linear(np.full(3, rng.uniform(0.3, 0.7)))

@@ -69,7 +69,9 @@ def cut(triangles: np.ndarray, field: np.ndarray) -> Cut:
     inside = field > 0
     count = inside[triangles].sum(axis=1)
     source = [np.flatnonzero(count == 3)]
-    corners = [np.stack([triangles[source[0]]] * 2, axis=-1)]  # each corner an edge (i, j); i == j is a vertex
+    corners = [
+        np.stack([triangles[source[0]]] * 2, axis=-1)
+    ]  # each corner an edge (i, j); i == j is a vertex
     for n_inside in (1, 2):
         rows = np.flatnonzero(count == n_inside)
         # Rotate each triangle so that its odd vertex out comes first.
@@ -96,7 +98,9 @@ def _edges(*corners: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
 
 def neighbours(triangles: np.ndarray, n_vertices: int, most: int = 8) -> np.ndarray:
     """Neighbouring vertices, (n_vertices, most); a row with fewer repeats them, or the vertex itself."""
-    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(np.int64)
+    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(
+        np.int64
+    )
     keys = np.unique(np.concatenate([pairs @ [n_vertices, 1], pairs @ [1, n_vertices]]))
     vertex, other = np.divmod(keys, n_vertices)
     count = np.bincount(vertex, minlength=n_vertices)
@@ -108,7 +112,9 @@ def neighbours(triangles: np.ndarray, n_vertices: int, most: int = 8) -> np.ndar
 
 def boundary_edges(triangles: np.ndarray) -> np.ndarray:
     """Directed edges (n, 2) that belong to one triangle only."""
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(np.int64)
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(
+        np.int64
+    )
     key = np.minimum(edges[:, 0], edges[:, 1]) * (edges.max() + 1) + np.maximum(edges[:, 0], edges[:, 1])
     _, inverse, count = np.unique(key, return_inverse=True, return_counts=True)
     return edges[count[inverse] == 1].astype(np.int32)

@@ -64,7 +64,9 @@ def random_appearance(rng: Rng) -> Appearance:
     if not woman and age > 20 and rng.random() < 0.3:
         complexion = replace(complexion, stubble=0.85)
         length = rng.uniform(0.008, 0.03)
-        beard = hair.Style(length, length, 0.45, (0.2, 0, -0.8), 0.2, 0.35, 0.01, n_locks=900, n_steps=3, width_m=0.0035)
+        beard = hair.Style(
+            length, length, 0.45, (0.2, 0, -0.8), 0.2, 0.35, 0.01, n_locks=900, n_steps=3, width_m=0.0035
+        )
     worn, skirt = _outfit(rng, woman, age)
     shoes = footwear.random_shoes(rng) if rng.random() < 0.93 else None
     return Appearance(weights, complexion, style, beard, worn, skirt, shoes, int(rng.integers(2**31)))
@@ -78,7 +80,11 @@ def _traits() -> dict:
 def _blend(rng: Rng, body: Body, number: int) -> np.ndarray:
     """A shape, with some of another of the same sex and size."""
     name = body.shape_names[number]
-    alike = [k for k, other in enumerate(body.shape_names) if other.split("_")[0] == name.split("_")[0] and k != number]
+    alike = [
+        k
+        for k, other in enumerate(body.shape_names)
+        if other.split("_")[0] == name.split("_")[0] and k != number
+    ]
     weights = np.zeros(len(body.shape_names), np.float32)
     share = rng.uniform(0, 0.4) if alike else 0.0
     weights[number] = 1 - share
@@ -135,7 +141,9 @@ def _top(rng: Rng, kind: str, woman: bool) -> Worn:
 def _bottom(rng: Rng, kind: str) -> Worn:
     waist = rng.choice([0.12, 0.17])
     if kind == "leggings":
-        garment = clothing.Garment("bottom", rng.choice([1.9, 1.5]), waist, thickness_m=0.002, ease_m=0.0, smoothing=2)
+        garment = clothing.Garment(
+            "bottom", rng.choice([1.9, 1.5]), waist, thickness_m=0.002, ease_m=0.0, smoothing=2
+        )
         fabric = replace(fabrics.plain_fabric(rng, dark=True), crease_m=0.0005, gloss=0.03, roughness=0.6)
         return Worn(garment, fabric, fabrics.Trim(0.0), clothing.random_folds(rng, 0.0))
     end = rng.choice([0.7, 0.85, 0.95]) if kind == "shorts" else rng.choice([1.93, 2.0])
@@ -190,7 +198,9 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
 def _skin(appearance, body, posed, rest, landmarks, shown, part, person) -> list[Surface]:
     coords = skin.paint_coords(body, rest, landmarks)
     covered = 0.0 if appearance.style is None else 1.0
-    material = skin.skin_material(appearance.complexion, covered if covered else appearance.complexion.stubble * 0.3)
+    material = skin.skin_material(
+        appearance.complexion, covered if covered else appearance.complexion.stubble * 0.3
+    )
     mesh = g.Mesh(posed.vertices_m, body.triangles[shown], posed.normals, coords)
     return [Surface(mesh, material, person, part[shown])]
 

@@ -40,7 +40,11 @@ class Trace:
 
     def put(self, rows: np.ndarray, other: Trace) -> None:
         """Replace some of the rays' answers."""
-        self.depth_m[rows], self.triangle[rows], self.surface[rows] = other.depth_m, other.triangle, other.surface
+        self.depth_m[rows], self.triangle[rows], self.surface[rows] = (
+            other.depth_m,
+            other.triangle,
+            other.surface,
+        )
         self.barycentric[rows], self.face_normals[rows] = other.barycentric, other.face_normals
 
 

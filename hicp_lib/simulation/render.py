@@ -61,7 +61,9 @@ def render(world: World, camera: Camera, rng: np.random.Generator) -> Frame:
     person, part = (labels.reshape(shape) for labels in _labels(scene, trace))
     numbers = np.arange(len(rays)).reshape(shape)
     around = View.of(trace, rays, numbers[::2, ::2], person[::2, ::2] < 0)
-    image = _enlarge(_paint(world, scene, around, camera, False, rng), around.wanted, trace.surface.reshape(shape))
+    image = _enlarge(
+        _paint(world, scene, around, camera, False, rng), around.wanted, trace.surface.reshape(shape)
+    )
     image.reshape(-1, 3)[trace.surface < 0] = world.backdrop
     rows, columns = (np.flatnonzero((person >= 0).any(axis=axis)) for axis in (1, 0))
     if len(rows):

@@ -59,7 +59,9 @@ def render_dataset(
     stamp = {"renderer": renderer_version(), "seed": seed}
     _prepare(out, stamp)
     todo = [(str(out), seed, index) for index in range(n) if not _is_done(out, index)]
-    bar = tqdm(total=n, initial=n - len(todo), desc="rendering", unit="image", disable=None if progress else True)
+    bar = tqdm(
+        total=n, initial=n - len(todo), desc="rendering", unit="image", disable=None if progress else True
+    )
     for _ in _in_processes(todo, workers or os.cpu_count() or 1):
         bar.update()
     bar.close()
@@ -72,7 +74,11 @@ def render_dataset(
 
 
 def _check(out: Path, n: int, seed: int, workers: int | None) -> None:
-    for name, value, low in (("n", n, 1), ("seed", seed, 0), ("workers", 1 if workers is None else workers, 1)):
+    for name, value, low in (
+        ("n", n, 1),
+        ("seed", seed, 0),
+        ("workers", 1 if workers is None else workers, 1),
+    ):
         if not isinstance(value, int | np.integer) or not low <= value <= MAX_SCENES * 1000:
             raise InputError(f"{name} is {value!r}; expected a whole number of at least {low}")
     if n > MAX_SCENES:
@@ -150,7 +156,9 @@ def _render_one(job: tuple[str, int, int]) -> None:
     bgr = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
     _, encoded = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     write_bytes(_image_path(out, index), encoded.tobytes())
-    write_json(_people_path(out, index), {"width": image.shape[1], "height": image.shape[0], "people": people})
+    write_json(
+        _people_path(out, index), {"width": image.shape[1], "height": image.shape[0], "people": people}
+    )
 
 
 def render_scene(seed: int, index: int) -> tuple[np.ndarray, list[dict]]:
@@ -176,7 +184,12 @@ def annotate(stage: Stage, frame: Frame) -> list[dict]:
         keypoints = np.where(seen[:, None] > 0, np.column_stack([pixels, seen]), 0)
         keypoints = np.clip(keypoints.round(2), 0, [frame.person.shape[1] - 1, frame.person.shape[0] - 1, 2])
         rows.append(
-            {"bbox": box, "area": len(u), "keypoints": keypoints.tolist(), "distance_m": round(distance_m(stage.camera, person), 3)}
+            {
+                "bbox": box,
+                "area": len(u),
+                "keypoints": keypoints.tolist(),
+                "distance_m": round(distance_m(stage.camera, person), 3),
+            }
         )
     return rows
 
@@ -184,7 +197,8 @@ def annotate(stage: Stage, frame: Frame) -> list[dict]:
 def _collect(out: Path, n: int) -> Annotations:
     scenes = [read_json(_people_path(out, index)) for index in range(n)]
     images = {
-        k: ImageInfo(k, _image_path(out, k).name, scene["width"], scene["height"]) for k, scene in enumerate(scenes)
+        k: ImageInfo(k, _image_path(out, k).name, scene["width"], scene["height"])
+        for k, scene in enumerate(scenes)
     }
     people = [(k, person) for k, scene in enumerate(scenes) for person in scene["people"]]
     keypoints = np.array([p["keypoints"] for _, p in people]).reshape(-1, N_KEYPOINTS, 3)

@@ -34,13 +34,17 @@ class Sensor:
     saturation: float = 1.0
 
 
-def expose(radiance: np.ndarray, sensor: Sensor, rng: np.random.Generator, meter: np.ndarray | None = None) -> np.ndarray:
+def expose(
+    radiance: np.ndarray, sensor: Sensor, rng: np.random.Generator, meter: np.ndarray | None = None
+) -> np.ndarray:
     """Develop linear light, shape (height, width, 3), into RGB uint8 of the same shape.
 
     `meter` marks the pixels that count most for the exposure (people: cameras look for faces).
     """
     height, width = radiance.shape[:2]
-    light = radiance * (sensor.white_balance * _auto_exposure(radiance, meter) * sensor.exposure).astype(np.float32)
+    light = radiance * (sensor.white_balance * _auto_exposure(radiance, meter) * sensor.exposure).astype(
+        np.float32
+    )
     y = np.linspace(-1, 1, height, dtype=np.float32)[:, None]
     x = np.linspace(-1, 1, width, dtype=np.float32)[None, :]
     light *= (1 - sensor.vignette * 0.5 * (x * x + y * y))[..., None]
@@ -82,7 +86,9 @@ def _auto_exposure(radiance: np.ndarray, meter: np.ndarray | None) -> float:
 def _tone(light: np.ndarray, contrast: float) -> np.ndarray:
     """Linear light to sRGB with a shoulder that rolls highlights off, through a table."""
     x = np.linspace(0, 4, 4096)
-    shoulder = np.clip(1.156 * x * (1 + x / 36) / (1 + 0.9 * x), 0, 1)  # keeps middle grey, rolls off to white at 4
+    shoulder = np.clip(
+        1.156 * x * (1 + x / 36) / (1 + 0.9 * x), 0, 1
+    )  # keeps middle grey, rolls off to white at 4
     srgb = np.where(shoulder <= 0.0031308, 12.92 * shoulder, 1.055 * shoulder ** (1 / 2.4) - 0.055)
     curved = 0.5 + 0.5 * np.tanh(contrast * 2 * (srgb - 0.46)) / np.tanh(contrast)
     table = np.clip(255 * (0.35 * curved + 0.65 * srgb) + 0.5, 0, 255).astype(np.uint8)

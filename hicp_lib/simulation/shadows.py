@@ -12,7 +12,12 @@ AMBIENT_REACH_M = 0.7
 
 
 def visibility(
-    sources: list[lights.Light], scene: RayScene, view: View, looks: Looks, sharp: bool, rng: np.random.Generator
+    sources: list[lights.Light],
+    scene: RayScene,
+    view: View,
+    looks: Looks,
+    sharp: bool,
+    rng: np.random.Generator,
 ) -> np.ndarray:
     """Visible share of each light and (last) of the surroundings, (n_lights + 1, n) in [0, 1].
 
@@ -30,7 +35,9 @@ def visibility(
         origins = looks.positions_m[:, pixels] + np.float32(0.003) * normals
         seen[kind, pixels] = 1
         if source is None:
-            seen[kind, pixels] = ~scene.occluded(origins.T, lights.hemisphere(normals, offsets).T, AMBIENT_REACH_M)
+            seen[kind, pixels] = ~scene.occluded(
+                origins.T, lights.hemisphere(normals, offsets).T, AMBIENT_REACH_M
+            )
             continue
         towards = lights.towards_light(source, origins, offsets)
         facing = np.flatnonzero(dot(towards, normals) > 0)  # the rest is dark without asking

@@ -58,7 +58,7 @@ def random_complexion(rng: np.random.Generator, tone: float, woman: bool, age: f
         hair=_hair_colour(rng, dark, age),
         iris=iris * rng.uniform(0.7, 1.2),
         lips=rng.uniform(0.3, 0.9) if woman and age > 17 and rng.random() < 0.5 else rng.uniform(0.05, 0.25),
-        brows=rng.uniform(0.6, 0.95),
+        brows=rng.uniform(0.75, 1.0),
         stubble=0.0 if woman or age < 18 else rng.choice([0.0, rng.uniform(0.1, 0.5)]),
         freckles=rng.uniform(0.3, 1) if tone < 0.3 and rng.random() < 0.2 else 0.0,
     )
@@ -71,7 +71,12 @@ def _hair_colour(rng: np.random.Generator, dark: bool, age: float) -> np.ndarray
     if dark or rng.random() < 0.25:
         return hsv(rng.uniform(0.04, 0.09), rng.uniform(0.2, 0.5), rng.uniform(0.09, 0.2))
     kind = rng.choice(4, p=[0.4, 0.25, 0.25, 0.1])
-    value = (rng.uniform(0.26, 0.38), rng.uniform(0.40, 0.55), rng.uniform(0.62, 0.85), rng.uniform(0.45, 0.62))[kind]
+    value = (
+        rng.uniform(0.26, 0.38),
+        rng.uniform(0.40, 0.55),
+        rng.uniform(0.62, 0.85),
+        rng.uniform(0.45, 0.62),
+    )[kind]
     hue, saturation = ((0.07, 0.55), (0.075, 0.55), (0.105, 0.45), (0.045, 0.7))[kind]
     return hsv(hue + rng.normal(0, 0.008), saturation * rng.uniform(0.8, 1.15), value)
 
@@ -91,7 +96,9 @@ def paint_coords(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.
     """
     fields = [body.fields[:, FIELDS.index(name)] for name in _PAINTED]
     eye, mouth = ((body.regions == REGIONS.index(name)).astype(np.float32) for name in ("eye", "mouth"))
-    head = np.isin(body.regions, [REGIONS.index(n) for n in ("face", "scalp", "eyebrow", "lips", "mouth", "neck")])
+    head = np.isin(
+        body.regions, [REGIONS.index(n) for n in ("face", "scalp", "eyebrow", "lips", "mouth", "neck")]
+    )
     flush = np.zeros(len(rest_m), np.float32)
     p = rest_m[head].astype(np.float32)
     face = landmarks_m[26:94].astype(np.float32)
@@ -114,9 +121,15 @@ def _knuckles(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.nda
     red = np.zeros(len(rest_m), np.float32)
     hands = np.isin(body.regions, [REGIONS.index("hand"), REGIONS.index("nail")])
     joints = landmarks_m[[94 + k for k in range(136 - 94) if k % 21 not in (0, 1, 2)]]
-    distance2 = ((rest_m[hands].astype(np.float32)[:, None] - joints[None].astype(np.float32)) ** 2).sum(-1).min(axis=1)
+    distance2 = (
+        ((rest_m[hands].astype(np.float32)[:, None] - joints[None].astype(np.float32)) ** 2)
+        .sum(-1)
+        .min(axis=1)
+    )
     red[hands] = 0.25 + 0.5 * np.exp(-distance2 / 0.010**2)
-    red += 0.4 * np.exp(-(((body.field("arm") - 1) / 0.08) ** 2)) + 0.3 * np.exp(-(((body.field("leg") - 1) / 0.1) ** 2))
+    red += 0.4 * np.exp(-(((body.field("arm") - 1) / 0.08) ** 2)) + 0.3 * np.exp(
+        -(((body.field("leg") - 1) / 0.1) ** 2)
+    )
     return red
 
 
@@ -129,7 +142,9 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
         c = dict(zip(COORDS, hits.coords, strict=True))
         uv = np.stack([c["y"] + 0.5 * c["x"], c["z"] + 0.3 * c["x"]])
         blotches, pores, freckles = textures.skin().sample(uv, hits.footprint_m)
-        flush = np.clip(c["flush"] * (1 + 0.25 * blotches) + 0.07 * blotches, -0.2, 1) * (1 - 0.4 * complexion.tone)
+        flush = np.clip(c["flush"] * (1 + 0.25 * blotches) + 0.07 * blotches, -0.2, 1) * (
+            1 - 0.4 * complexion.tone
+        )
         albedo = _mix(tone, red, flush)
         albedo *= 1 + 0.02 * blotches + 0.025 * pores
         albedo *= 1 - 0.35 * complexion.freckles * freckles * np.clip(2 * c["flush"], 0, 1)
@@ -139,7 +154,9 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
         albedo, roughness = _paint_lips(complexion, tone, albedo, roughness, c)
         albedo = _paint_hair(complexion, scalp, albedo, c, uv, hits.footprint_m)
         nail = 0.7 * _step(c["nail"], 0.3, 0.7)
-        albedo = albedo * (1 - nail) + nail * (tone * np.array([1.08, 0.92, 0.90]))[:, None].astype(np.float32)
+        albedo = albedo * (1 - nail) + nail * (tone * np.array([1.08, 0.92, 0.90]))[:, None].astype(
+            np.float32
+        )
         roughness = roughness * (1 - 0.4 * nail)
         eye = c["eye"] > 0.5
         if eye.any():
@@ -181,17 +198,23 @@ def _paint_hair(complexion: Complexion, scalp: float, albedo, c, uv, footprint) 
     hair = np.float32(complexion.hair)[:, None] * 0.7
     slanted = np.stack([uv[0] + uv[1], uv[1] * 2 - uv[0]])
     fibre = textures.strands().sample(slanted, footprint)[0]
-    brow = complexion.brows * _step(c["brow_m"] + 0.0008 * fibre, -0.0012, 0.0022)
+    brow = complexion.brows * _step(c["brow_m"] + 0.0008 * fibre, -0.0026, 0.0008)
     lash = 0.85 * _step(c["lash_m"], -0.0008, 0.0006)
     roots = scalp * _step(c["hairline_m"] + 0.002 * fibre, -0.001, 0.006)
-    stubble = complexion.stubble * _step(c["beard_m"] + 0.001 * fibre, -0.002, 0.012) * (1 - _step(c["lips"], 0.2, 0.5))
+    stubble = (
+        complexion.stubble
+        * _step(c["beard_m"] + 0.001 * fibre, -0.002, 0.012)
+        * (1 - _step(c["lips"], 0.2, 0.5))
+    )
     cover = 1 - (1 - brow) * (1 - roots) * (1 - stubble * (0.75 + 0.2 * fibre))
     albedo = albedo + (hair * (1 + 0.3 * fibre) - albedo) * np.clip(cover, 0, 1)
     return np.clip(albedo * (1 - lash) + 0.012 * lash, 0.001, 1)
 
 
 def _eye(complexion: Complexion, angle: np.ndarray) -> np.ndarray:
-    iris = np.float32(complexion.iris)[:, None] * (0.55 + 0.9 * _step(angle, 0.2, 0.5) - 0.8 * _step(angle, 0.42, 0.52))
+    iris = np.float32(complexion.iris)[:, None] * (
+        0.55 + 0.9 * _step(angle, 0.2, 0.5) - 0.8 * _step(angle, 0.42, 0.52)
+    )
     white = np.float32([[0.60], [0.56], [0.53]]) * (1 - 0.25 * _step(angle, 0.6, 1.1))
     edge = _step(angle, 0.46, 0.56)
     colour = iris * (1 - edge) + white * edge

@@ -9,11 +9,12 @@ import numpy as np
 from hicp_lib.simulation import lights
 from hicp_lib.simulation.body import PosedBody, load_body, pose_body
 from hicp_lib.simulation.camera import Camera, look_at, project
+from hicp_lib.simulation.furniture import stool
 from hicp_lib.simulation.materials import hsv
 from hicp_lib.simulation.people import dress, random_appearance
 from hicp_lib.simulation.poses import sample_pose
 from hicp_lib.simulation.render import World
-from hicp_lib.simulation.room import Room, make_room, stool
+from hicp_lib.simulation.room import Room, make_room
 from hicp_lib.simulation.sensor import Sensor
 from hicp_lib.simulation.surfaces import Surface
 
@@ -32,7 +33,7 @@ class Stage:
 
 def random_stage(rng: Rng) -> Stage:
     """One to three people, one to five metres from a camera, in a furnished room."""
-    n_people = int(rng.choice([1, 2, 3], p=[0.64, 0.26, 0.10]))
+    n_people = int(rng.choice([1, 2, 3], p=[0.68, 0.24, 0.08]))
     places = _places(rng, n_people)
     people, surfaces = [], []
     for number, place in enumerate(places):
@@ -42,8 +43,10 @@ def random_stage(rng: Rng) -> Stage:
     camera = _camera(rng, people[0])
     centre = camera.centre_m
     clear = [(x, y, 0.55) for x, y in places] + [(centre[0], centre[1], 0.7)]
-    if rng.random() < 0.75:  # the rest of the time something may stand before people
-        clear += [(*(centre[:2] + t * (np.array(p) - centre[:2])), 0.3) for p in places for t in (0.3, 0.5, 0.7)]
+    if rng.random() < 0.88:  # the rest of the time something may stand before people
+        clear += [
+            (*(centre[:2] + t * (np.array(p) - centre[:2])), 0.3) for p in places for t in (0.3, 0.5, 0.7)
+        ]
     room = make_room(rng, np.array(clear))
     world = World(room.surfaces + surfaces, *_lighting(rng, room, places, centre), backdrop=np.zeros(3))
     return Stage(world, camera, _sensor(rng), people)
@@ -53,7 +56,7 @@ def _places(rng: Rng, n_people: int) -> list[tuple[float, float]]:
     """Spots on the floor; the camera looks along y from the origin's negative side."""
     places = [(rng.normal(0, 0.1), 0.0)]
     while len(places) < n_people:
-        side, far = rng.uniform(0.55, 1.1) * rng.choice([-1, 1]), rng.uniform(-0.5, 1.2)
+        side, far = rng.uniform(0.6, 1.0) * rng.choice([-1, 1]), rng.uniform(-0.5, 1.2)
         spot = (places[0][0] + side, far)
         if all(np.hypot(spot[0] - x, spot[1] - y) > 0.6 for x, y in places):
             places.append(spot)
@@ -63,7 +66,9 @@ def _places(rng: Rng, n_people: int) -> list[tuple[float, float]]:
 def _person(rng: Rng, place: tuple[float, float], number: int) -> tuple[PosedBody, list[Surface]]:
     appearance = random_appearance(rng)
     # Mostly towards the camera (which lies along -y), less often sideways, sometimes away.
-    turn = rng.choice([rng.normal(0, 0.45), rng.uniform(-1.8, 1.8), rng.uniform(-np.pi, np.pi)], p=[0.76, 0.17, 0.07])
+    turn = rng.choice(
+        [rng.normal(0, 0.45), rng.uniform(-1.8, 1.8), rng.uniform(-np.pi, np.pi)], p=[0.76, 0.17, 0.07]
+    )
     yaw = -np.pi / 2 + turn
     T_world_body = np.eye(4)
     T_world_body[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
@@ -99,14 +104,18 @@ def _camera(rng: Rng, person: PosedBody) -> Camera:
     middle = np.array([person.keypoints_m[19, 0], person.keypoints_m[19, 1], (ceiling + bottom) / 2])
     eye_height = np.clip(rng.normal(1.45, 0.22), 0.8, 2.0)
     azimuth = rng.normal(0, 0.25)
-    eye = np.array([middle[0] + np.sin(azimuth) * distance, middle[1] - np.cos(azimuth) * distance, eye_height])
+    eye = np.array(
+        [middle[0] + np.sin(azimuth) * distance, middle[1] - np.cos(azimuth) * distance, eye_height]
+    )
     target = middle + np.array([rng.normal(0, 0.10) * distance * width / focal, 0, 0])
     pose = look_at(eye, target, roll_rad=rng.normal(0, 0.02))
     return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, pose)
 
 
-def _lighting(rng: Rng, room: Room, places: list, eye: np.ndarray) -> tuple[list[lights.Light], lights.Ambient]:
-    """A key light (window, lamp or ceiling) and mostly a weaker second one, over soft light from all around."""
+def _lighting(
+    rng: Rng, room: Room, places: list, eye: np.ndarray
+) -> tuple[list[lights.Light], lights.Ambient]:
+    """A key light (window, lamp or ceiling), mostly a second one, over soft light from all around."""
     daylight, lamp = _temperature(rng.uniform(0, 1)), _temperature(rng.uniform(-1.2, -0.2))
     found = []
     if room.windows and rng.random() < 0.7:
@@ -120,12 +129,18 @@ def _lighting(rng: Rng, room: Room, places: list, eye: np.ndarray) -> tuple[list
         found.append(_ceiling(spot, height, size, lamp * rng.uniform(2.5, 6)))
     if len(found) < 2 and rng.random() < 0.6:  # light from where the photographer stands
         side = rng.uniform(-1.5, 1.5)
-        centre = np.clip([eye[0] + side, eye[1], rng.uniform(1.6, 2.2)], [*(-room.half_m), 0], [*room.half_m, 3])
-        soft = lights.Light(centre, np.array([0.35, 0, 0]), np.array([0, 0, 0.35]), daylight * rng.uniform(1.5, 5))
+        centre = np.clip(
+            [eye[0] + side, eye[1], rng.uniform(1.6, 2.2)], [*(-room.half_m), 0], [*room.half_m, 3]
+        )
+        soft = lights.Light(
+            centre, np.array([0.35, 0, 0]), np.array([0, 0, 0.35]), daylight * rng.uniform(1.5, 5)
+        )
         found.append(soft)
     base = daylight * rng.uniform(0.25, 0.6)
     side = np.array([rng.normal(), rng.normal() - 1, 0.2])
-    ambient = lights.Ambient(base * 1.1, base * rng.uniform(0.45, 0.8), base * 0.6, side / np.linalg.norm(side))
+    ambient = lights.Ambient(
+        base * 1.1, base * rng.uniform(0.45, 0.8), base * 0.6, side / np.linalg.norm(side)
+    )
     return found, ambient
 
 
@@ -135,7 +150,9 @@ def _ceiling(spot: np.ndarray, height: float, size: float, power: np.ndarray) ->
 
 def _temperature(warm_to_cool: float) -> np.ndarray:
     """Linear RGB of light from incandescent (-1.2) over neutral (0) to the blue sky (1)."""
-    return np.array([1 - 0.10 * warm_to_cool, 1.0, 1 + 0.16 * warm_to_cool]) ** (1.5 if warm_to_cool < 0 else 1)
+    return np.array([1 - 0.10 * warm_to_cool, 1.0, 1 + 0.16 * warm_to_cool]) ** (
+        1.5 if warm_to_cool < 0 else 1
+    )
 
 
 def _sensor(rng: Rng) -> Sensor:

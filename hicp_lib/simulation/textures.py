@@ -74,7 +74,11 @@ def make_texture(tile: np.ndarray, width_m: float) -> Texture:
 
 
 def noise(
-    size: int, rng: np.random.Generator, slope: float = 1.5, low: float = 1, stretch: tuple[float, float] = (1, 1)
+    size: int,
+    rng: np.random.Generator,
+    slope: float = 1.5,
+    low: float = 1,
+    stretch: tuple[float, float] = (1, 1),
 ) -> np.ndarray:
     """Periodic Gaussian noise, shape (size, size), mean 0, standard deviation 1.
 
@@ -100,12 +104,6 @@ def cloud() -> Texture:
 
 
 @cache
-def grain() -> Texture:
-    """Fine noise, one channel; 0.25 m at half a millimetre."""
-    return make_texture(noise(512, _rng(3), 0.6, 24), 0.25)
-
-
-@cache
 def planks() -> Texture:
     """Wooden boards: (light to dark, gap between boards); 1.2 m, boards along v."""
     size, boards = 512, 8
@@ -115,7 +113,10 @@ def planks() -> Texture:
     end = np.mod(v + shift, 1)
     tone = _rng(5).random((boards, 2))[board.astype(int), (end > 0.5).astype(int)]
     fibre = noise(size, _rng(6), 1.1, 4, (14, 1))
-    gap = np.minimum(np.abs(np.mod(u * boards + 0.5, 1) - 0.5) / boards, np.minimum(np.abs(end - 0.5), np.minimum(end, 1 - end)))
+    gap = np.minimum(
+        np.abs(np.mod(u * boards + 0.5, 1) - 0.5) / boards,
+        np.minimum(np.abs(end - 0.5), np.minimum(end, 1 - end)),
+    )
     return make_texture(np.dstack([np.clip(0.5 * tone + 0.25 + 0.12 * fibre, 0, 1), gap < 0.0025]), 1.2)
 
 
@@ -134,7 +135,9 @@ def tiles() -> Texture:
     v, u = np.mgrid[:size, :size] / size * count
     tone = _rng(9).random((count, count))[v.astype(int), u.astype(int)]
     edge = np.minimum(np.abs(np.mod(u + 0.5, 1) - 0.5), np.abs(np.mod(v + 0.5, 1) - 0.5))
-    return make_texture(np.dstack([0.35 + 0.3 * tone + 0.08 * noise(size, _rng(10), 1.2, 3), edge < 0.012]), 1.2)
+    return make_texture(
+        np.dstack([0.35 + 0.3 * tone + 0.08 * noise(size, _rng(10), 1.2, 3), edge < 0.012]), 1.2
+    )
 
 
 @cache
@@ -160,7 +163,15 @@ def bricks() -> Texture:
     edge_u = np.abs(np.mod(x + 0.5, 1) - 0.5) / across
     edge_v = np.abs(np.mod(v * courses + 0.5, 1) - 0.5) / courses
     rough = noise(size, _rng(16), 1.0, 8)
-    return make_texture(np.dstack([np.clip(tone * 0.7 + 0.15 + 0.1 * rough, 0, 1), np.minimum(edge_u, edge_v) < 0.006 + 0.001 * rough]), 1.0)
+    return make_texture(
+        np.dstack(
+            [
+                np.clip(tone * 0.7 + 0.15 + 0.1 * rough, 0, 1),
+                np.minimum(edge_u, edge_v) < 0.006 + 0.001 * rough,
+            ]
+        ),
+        1.0,
+    )
 
 
 @cache
@@ -199,18 +210,15 @@ def skin() -> Texture:
 
 
 @cache
-def stripes(duty: float = 0.5, soft: int = 0) -> Texture:
+def stripes(duty: float = 0.5) -> Texture:
     """Stripes along u, 0 and 1; one period per metre (scale the coordinates)."""
-    v = (np.arange(256) + 0.5) / 256
-    profile = (v < duty).astype(np.float32)
-    if soft:
-        profile = np.fft.ifft(np.fft.fft(profile) * np.exp(-0.5 * (np.fft.fftfreq(256, 1 / soft)) ** 2 * 4)).real
+    profile = ((np.arange(256) + 0.5) / 256 < duty).astype(np.float32)
     return make_texture(np.repeat(profile[:, None], 256, axis=1), 1.0)
 
 
 @cache
 def checks(kind: int) -> Texture:
-    """Checked cloth, weights of (second, third) colour; one period per metre. Kinds: gingham, tartan, window pane."""
+    """Gingham, tartan or window pane: weights of (second, third) colour; one period per metre."""
     t = (np.arange(256) + 0.5) / 256
     if kind == 0:
         a = (t < 0.5) * 0.5
@@ -234,13 +242,16 @@ def dots() -> Texture:
 @cache
 def blobs(number: int) -> Texture:
     """Flower-, leaf- or camouflage-like blobs: weights of (second, third) colour; one period per metre."""
-    a, b = (noise(256, _rng(30 + 2 * number + k), (2.5, 1.2, 3.5)[number % 3], (4, 9, 2)[number % 3]) for k in (0, 1))
+    a, b = (
+        noise(256, _rng(30 + 2 * number + k), (2.5, 1.2, 3.5)[number % 3], (4, 9, 2)[number % 3])
+        for k in (0, 1)
+    )
     return make_texture(np.dstack([a > 0.6, (b > 0.8) & (a <= 0.6)]), 1.0)
 
 
 @cache
 def prints(number: int) -> Texture:
-    """What is printed on a shirt's chest: (second, third colour); one print per 0.3 m, not periodic in use."""
+    """What is printed on a shirt's chest: weights of (second, third) colour; one print per 0.3 m."""
     rng, size = _rng(60 + number), 256
     ink = np.zeros((2, size, size), np.uint8)
     kind = number % 4
@@ -273,6 +284,8 @@ def picture(number: int) -> Texture:
     for _ in range(rng.integers(3, 12)):
         colour = tuple(int(c) for c in rng.integers(0, 256, 3))
         centre, axes = rng.integers(0, 256, 2), rng.integers(8, 90, 2)
-        cv2.ellipse(tile, centre.tolist(), axes.tolist(), float(rng.integers(180)), 0, 360, colour, -1, cv2.LINE_AA)
+        cv2.ellipse(
+            tile, centre.tolist(), axes.tolist(), float(rng.integers(180)), 0, 360, colour, -1, cv2.LINE_AA
+        )
     blurred = 0.6 * tile + 0.4 * cv2.GaussianBlur(tile, (0, 0), 6)
     return make_texture(np.clip(blurred / 255, 0.02, 0.95), 1.0)

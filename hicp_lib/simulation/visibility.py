@@ -33,7 +33,12 @@ def _rule(name: str) -> tuple[tuple[str, ...], float]:
     for ending, rule in _BODY_RULES.items():
         if name.endswith(ending):
             return rule
-    is_hand = name.split("_", 1)[0] in ("left", "right") and name not in ("left_eye", "right_eye", "left_ear", "right_ear")
+    is_hand = name.split("_", 1)[0] in ("left", "right") and name not in (
+        "left_eye",
+        "right_eye",
+        "left_ear",
+        "right_ear",
+    )
     return _HAND_RULE if is_hand else _FACE_RULE
 
 
@@ -44,7 +49,11 @@ def _tables() -> tuple[np.ndarray, np.ndarray]:
         parts, depth_m[index] = _rule(name)
         for part in parts:
             number = REGIONS.index(part)
-            left, right = (not name.startswith("right_"), not name.startswith("left_")) if part in _SIDED else (True, True)
+            left, right = (
+                (not name.startswith("right_"), not name.startswith("left_"))
+                if part in _SIDED
+                else (True, True)
+            )
             allowed[index, number], allowed[index, number + RIGHT] = left, right
     return allowed, depth_m
 

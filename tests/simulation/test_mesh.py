@@ -23,7 +23,9 @@ def test_a_cut_follows_its_mesh_into_another_pose():
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     cut = g.cut(np.array([[0, 1, 2]]), np.array([1.0, -1.0, -3.0]))
     moved = vertices @ np.array([[0, -1, 0], [1, 0, 0], [0, 0, 2.0]]) + 5
-    assert np.allclose(cut.apply(moved), cut.apply(vertices) @ np.array([[0, -1, 0], [1, 0, 0], [0, 0, 2.0]]) + 5)
+    assert np.allclose(
+        cut.apply(moved), cut.apply(vertices) @ np.array([[0, -1, 0], [1, 0, 0], [0, 0, 2.0]]) + 5
+    )
 
 
 def test_boxes_are_closed_and_face_outwards():
