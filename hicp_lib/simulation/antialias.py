@@ -27,7 +27,7 @@ def edge_pixels(trace: Trace, sharp: np.ndarray) -> np.ndarray:
         for axis in (0, 1):
             low = tuple(slice(0, -1) if a == axis else slice(None) for a in (0, 1))
             high = tuple(slice(1, None) if a == axis else slice(None) for a in (0, 1))
-            step = (surface[low] != surface[high]) | (np.abs(depth[low] - depth[high]) > 0.02 * depth[low])
+            step = (surface[low] != surface[high]) | (np.abs(depth[low] - depth[high]) > 0.03 * depth[low])
             step &= sharp[low] | sharp[high]
             edge[low] |= step
             edge[high] |= step

@@ -21,14 +21,14 @@ def visibility(
 ) -> np.ndarray:
     """Visible share of each light and (last) of the surroundings, (n_lights + 1, n) in [0, 1].
 
-    In a `sharp` view, with its many pixels, half of them are asked, by turns, and the filter
-    fills in the others; elsewhere all are asked and filtered more.
+    Half of the pixels are asked, by turns, and the filter fills in the others; in a `sharp`
+    view it reaches less far.
     """
     shape = view.wanted.shape
     turn = np.indices(shape).sum(axis=0) % 2
     seen = np.zeros((len(sources) + 1, view.wanted.size), np.float32)
     for kind, source in enumerate([*sources, None]):
-        pixels = np.flatnonzero(view.wanted & ((turn == kind % 2) | (not sharp)))
+        pixels = np.flatnonzero(view.wanted & (turn == kind % 2))
         row, column = np.divmod(pixels, shape[1])
         offsets = lights.sample_offsets(row + kind, column + 3 * kind, rng)
         normals = looks.normals[:, pixels]
@@ -44,7 +44,7 @@ def visibility(
         seen[kind, pixels[facing]] = ~scene.occluded(origins[:, facing].T, towards[:, facing].T, 0.98)
     surface = np.where(view.wanted.ravel(), view.trace.surface, -1).reshape(shape)
     positions, directions = (x.reshape(3, *shape) for x in (looks.positions_m, looks.normals))
-    asked = np.stack([(turn == 0) | (not sharp), (turn == 1) | (not sharp)]).astype(np.float32)
+    asked = np.stack([turn == 0, turn == 1]).astype(np.float32)
     sums = np.concatenate([seen.reshape(-1, *shape), asked])
     for _ in range(2 if sharp else 3):
         sums = sum_within(sums, surface, positions, directions)
