@@ -54,16 +54,29 @@ class NetInput:
         return (positions_px + 0.5) / self.scale - 0.5
 
 
-def fit(image: np.ndarray, height_px: int) -> NetInput:
-    """Scale an RGB image to the network's height with its aspect kept; pad the right with black to 16 px."""
-    width_px = max(1, round(image.shape[1] * height_px / image.shape[0]))
-    shrinks = height_px < image.shape[0]
-    resized = cv2.resize(
-        image, (width_px, height_px), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_CUBIC
+def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> NetInput:
+    """Scale an RGB image to the network's height with its aspect kept; pad the right with black to 16 px.
+
+    With a `width_px`, it is scaled to fit into both, and the right or the bottom padded.
+    """
+    height, width = image.shape[:2]
+    zoom = height_px / height if width_px is None else min(height_px / height, width_px / width)
+    size = max(1, round(width * zoom)), max(1, round(height * zoom))
+    resized = cv2.resize(image, size, interpolation=cv2.INTER_AREA if zoom < 1 else cv2.INTER_CUBIC)
+    pixels = np.zeros((height_px, width_px or -(-size[0] // 16) * 16, 3), np.uint8)
+    pixels[: size[1], : size[0]] = resized
+    return NetInput(pixels, np.array(size) / (width, height))
+
+
+def as_detections(
+    parts: np.ndarray, person_scores: np.ndarray, net_input: NetInput, convention: str
+) -> Detections:
+    """People from their parts (n, n_parts, 3: x, y in input pixels, score), NaN where missing."""
+    return Detections(
+        to_halpe(net_input.to_image_px(parts[..., :2]), convention, axis=-2),
+        to_halpe(np.clip(parts[..., 2], 0, 1), convention, axis=-1, fill=0.0),
+        np.clip(person_scores, 0, 1),
     )
-    pixels = np.zeros((height_px, -(-width_px // 16) * 16, 3), np.uint8)
-    pixels[:, :width_px] = resized
-    return NetInput(pixels, np.array([width_px / image.shape[1], height_px / image.shape[0]]))
 
 
 class OpenPoseMobileNet:
@@ -102,9 +115,4 @@ class OpenPoseMobileNet:
         net_input = fit(image, self._height_px)
         maps = self.maps(net_input)
         parts, person_scores = assemble(maps[:18], maps[19:], COCO_18, STRIDE, self._options)
-        positions_px = net_input.to_image_px(parts[..., :2])
-        return Detections(
-            to_halpe(positions_px, COCO_18.convention, axis=-2),
-            to_halpe(np.clip(parts[..., 2], 0, 1), COCO_18.convention, axis=-1, fill=0.0),
-            np.clip(person_scores, 0, 1),
-        )
+        return as_detections(parts, person_scores, net_input, COCO_18.convention)

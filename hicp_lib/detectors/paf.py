@@ -12,6 +12,7 @@ the logarithms of its neighbours, exact for the Gaussians the maps are trained o
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -68,6 +69,9 @@ class _Person:
     n_limbs: int = 0
 
 
+# Values of maps (c, h, w) at input positions (..., 2), given the stride: (c, ...).
+Sampler = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
+
 MAX_PEAKS = 64
 _LEAST = 1e-4
 
@@ -123,7 +127,12 @@ def _vertex(before: np.ndarray, middle: np.ndarray, after: np.ndarray) -> np.nda
 
 
 def limb_scores(
-    limb_field: np.ndarray, starts: np.ndarray, ends: np.ndarray, stride: int, options: PafOptions
+    limb_field: np.ndarray,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    stride: int,
+    options: PafOptions,
+    sample: Sampler | None = None,
 ) -> np.ndarray:
     """How well an affinity field supports a limb between every start and every end.
 
@@ -135,6 +144,7 @@ def limb_scores(
     limb_field : array, shape (2, h, w), x and y component
     starts, ends : arrays (n, >= 2) and (m, >= 2), positions in input pixels
     stride : input pixels per cell
+    sample : how the field is read between cells; bilinearly if None
 
     Returns
     -------
@@ -148,7 +158,7 @@ def limb_scores(
     step = np.arange(25)
     taken = step < n_samples[..., None]
     along = start[..., None, :] + vector[..., None, :] * (step / n_samples[..., None])[..., None]
-    projected = np.einsum("cijk,ijc->ijk", _sample(limb_field, along, stride), direction)
+    projected = np.einsum("cijk,ijc->ijk", (sample or _sample)(limb_field, along, stride), direction)
     agree = taken & (projected > options.min_sample)
     count = agree.sum(axis=-1)
     mean = np.where(agree, projected, 0).sum(axis=-1) / np.maximum(count, 1)
@@ -201,10 +211,23 @@ def assemble(
     scores : array, shape (n_people,): (sum of part and limb scores) / (parts + limbs)
     """
     peaks = find_peaks(heat_maps, stride, options.min_peak)
+    return assemble_peaks(peaks, fields, model, stride, options)
+
+
+def assemble_peaks(
+    peaks: list[np.ndarray],
+    fields: np.ndarray,
+    model: PartModel,
+    stride: int,
+    options: PafOptions,
+    sample: Sampler | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """As `assemble`, from the peaks (n, 3: x, y in input pixels, value) of each part."""
     people: list[_Person] = []
     for index, (a, b) in enumerate(model.pairs):
         if len(peaks[a]) and len(peaks[b]):
-            limbs = connect(limb_scores(fields[model.fields[index]], peaks[a], peaks[b], stride, options))
+            limb_field = fields[model.fields[index]]
+            limbs = connect(limb_scores(limb_field, peaks[a], peaks[b], stride, options, sample))
             for start, end, score in limbs:
                 _join(people, (int(a), start), (int(b), end), score, index in model.completing)
     return _keep(people, peaks, model, options)

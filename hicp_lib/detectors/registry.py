@@ -47,6 +47,10 @@ _ENTRIES = [
         "openpose-mobilenet", _OPENPOSE_LABEL, "bodies, 18 parts", ("body",), _OPENPOSE, "OpenPoseMobileNet"
     ),
     Entry(
+        "openpose", "OpenPose", "bodies, 18 or 25 parts, and hands", ("body", "hand"),
+        f"{_ONNX}.openpose", "OpenPose", needs_model=True,
+    ),
+    Entry(
         "mmpose", "MMPose", "bodies, feet, faces, hands, 133 points", ("body", "hand"),
         f"{_ONNX}.mmpose", "MMPose", needs_model=True,
     ),

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import onnx
 import onnxruntime
-from google.protobuf.message import DecodeError
 
 from hicp_lib.errors import InputError
 from hicp_lib.files import sha256_bytes
@@ -165,7 +164,7 @@ def _start(path: Path, content: bytes, provider: str, threads: int) -> onnxrunti
 def _read_graph(path: Path, content: bytes) -> onnx.GraphProto:
     try:
         return onnx.load_model_from_string(content).graph
-    except DecodeError:
+    except Exception:  # protobuf's error for what it cannot decode, which onnx gives no name of its own
         raise InputError(
             f"{path}: is not an ONNX file or is cut off ({len(content)} bytes); get it again, or export it"
         ) from None

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from onnx_models import ALPHAPOSE_PIXELS, colour_maps_model, colour_simcc_model, constant_model
-from test_mmpose import back_to_image, dots, heat_maps
 
 from hicp_lib.detectors.onnx.alphapose import AlphaPose
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import COCO_17
+
+from .onnx_models import ALPHAPOSE_PIXELS, colour_maps_model, colour_simcc_model, constant_model
+from .test_mmpose import back_to_image, dots, heat_maps
 
 BLACK = np.zeros((160, 200, 3), np.uint8)
 BOX = (20.0, 30.0, 60.0, 80.0)

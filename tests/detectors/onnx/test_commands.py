@@ -4,11 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from onnx_models import colour_maps_model, constant_model
-from test_mmpose import dots
 
 from hicp_lib import cli
 from hicp_lib.images import write_png
+
+from .onnx_models import colour_maps_model, constant_model
+from .test_mmpose import dots
 
 
 @pytest.fixture

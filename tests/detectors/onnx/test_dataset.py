@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
-from onnx_models import colour_maps_model
-from test_mmpose import dots
 
 from hicp_lib.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.detectors.run import detect_dataset, detect_images
 from hicp_lib.errors import InputError
 from hicp_lib.images import write_png
 from hicp_lib.keypoints import COCO_17, N_KEYPOINTS
+
+from .onnx_models import colour_maps_model
+from .test_mmpose import dots
 
 POSITIONS = [
     np.array([[60.0, 70.0], [75.5, 60.25], [66.0, 88.0]]),

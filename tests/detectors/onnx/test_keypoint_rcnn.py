@@ -5,11 +5,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from onnx import TensorProto, helper
-from onnx_models import constant_model, save
 
 from hicp_lib.detectors.onnx.keypoint_rcnn import KeypointRcnn, logistic_score
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import COCO_17
+
+from .onnx_models import constant_model, save
 
 RNG = np.random.default_rng(0)
 POINTS = RNG.uniform(5, 70, (2, 17, 2)).astype(np.float32)

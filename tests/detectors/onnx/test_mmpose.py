@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from onnx_models import colour_maps_model, colour_simcc_model, constant_model
 
 from hicp_lib.detectors.onnx.mmpose import MMPose
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import COCO_17, LEFT_HAND, RIGHT_HAND, TO_HALPE
+
+from .onnx_models import colour_maps_model, colour_simcc_model, constant_model
 
 SIZE = (48, 64)
 BOXES = [(20.0, 30.0, 60.0, 80.0), (10.5, 7.25, 200.0, 33.0), (-20, -10, 70.5, 90), (150.5, 100, 49.5, 60.0)]
@@ -202,7 +203,8 @@ def test_outputs_of_any_shape_are_used_or_refused_in_one_line(data, tmp_path):
 @pytest.mark.parametrize("shape", [(1, 3, None, 48), (1, 1, 64, 48), (3, 64, 48), (1, 64, 48, 3)])
 def test_inputs_that_are_not_crops_are_refused(tmp_path, shape):
     from onnx import helper
-    from onnx_models import save
+
+    from .onnx_models import save
 
     path = save(tmp_path / "m.onnx", [helper.make_node("Identity", ["image"], ["o"])], {"image": list(shape)},
                 {"o": list(shape)}, {})  # fmt: skip

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from onnx import helper
-from onnx_models import constant_model, save
 
 from hicp_lib.detectors.onnx.person_boxes import PersonBoxes
 from hicp_lib.errors import InputError
+
+from .onnx_models import constant_model, save
 
 IMAGE = np.zeros((120, 200, 3), np.uint8)  # into 64 x 64: scale 0.32, 64 x 38 pixels (38.4 cut off)
 SCALE = np.array([64 / 200, 38 / 120])

@@ -7,11 +7,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from onnx import TensorProto, helper
-from onnx_models import colour_maps_model, constant_model, save
 
 from hicp_lib.detectors.onnx.session import available_providers, open_model
 from hicp_lib.errors import InputError
 from hicp_lib.files import sha256_file
+
+from .onnx_models import colour_maps_model, constant_model, save
 
 
 @pytest.fixture
