@@ -38,17 +38,14 @@ def read_mmpose(path: Path) -> People:
         For anything malformed, and for predictions of a video.
     """
     files = json_files(path, ".json", "the folder MMPoseInferencer wrote with pred_out_dir")
-    people = [_instances(file) for file in files.values()]
-    counts = [len(found) for found in people]
-    places = [(file, i) for file, count in zip(files.values(), counts, strict=True) for i in range(count)]
-    rows = FileRows(path, "instances", [person for found in people for person in found], places=places)
+    rows, source_of = FileRows.joined(path, "instances", {file: _instances(file) for file in files.values()})
     triples, conventions = _triples(rows)
     keypoints, scores = split(triples, triples[..., 2] > 0)
     counted = scores > _COUNTED_FROM
     means = np.where(counted, scores, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
     return People(
-        path, "stem", list(files), np.repeat(np.arange(len(files)), counts), keypoints, scores,
-        _box_scores(rows) * means, conventions, _extras(rows),
+        path, "stem", list(files), source_of, keypoints, scores, _box_scores(rows) * means, conventions,
+        _extras(rows),
     )  # fmt: skip
 
 

@@ -46,10 +46,7 @@ def read_openpose(path: Path) -> People:
     if path.is_file():
         return read_results(path, OPENPOSE)
     files = json_files(path, _ENDING, "the folder OpenPose wrote with --write_json")
-    people = [_people(file) for file in files.values()]
-    counts = [len(found) for found in people]
-    places = [(file, i) for file, count in zip(files.values(), counts, strict=True) for i in range(count)]
-    rows = FileRows(path, "people", [person for found in people for person in found], places=places)
+    rows, source_of = FileRows.joined(path, "people", {file: _people(file) for file in files.values()})
     triples, conventions, n_parts = _triples(rows)
     keypoints, scores = split(triples, triples[..., 2] > 0)
     _refuse_normalised(path, keypoints)
@@ -58,8 +55,8 @@ def read_openpose(path: Path) -> People:
         parts, n_counted = scores, (scores > 0).sum(axis=1)
     person_scores = parts.sum(axis=1) / np.maximum(n_counted, 1)
     return People(
-        path, "stem", list(files), np.repeat(np.arange(len(files)), counts), keypoints, scores, person_scores,
-        conventions, [{} for _ in rows.rows],
+        path, "stem", list(files), source_of, keypoints, scores, person_scores, conventions,
+        [{} for _ in rows.rows],
     )  # fmt: skip
 
 

@@ -58,6 +58,14 @@ class FileRows(Rows):
 
     places: list[tuple[Path, int]] = field(default_factory=list)
 
+    @classmethod
+    def joined(cls, folder: Path, label: str, by_file: dict[Path, list[dict]]) -> tuple[FileRows, np.ndarray]:
+        """The objects of each file one after the other, and the index of each one's file, shape (n,)."""
+        objects = [row for rows in by_file.values() for row in rows]
+        places = [(file, i) for file, rows in by_file.items() for i in range(len(rows))]
+        counts = [len(rows) for rows in by_file.values()]
+        return cls(folder, label, objects, places=places), np.repeat(np.arange(len(counts)), counts)
+
     def error(self, i: int, problem: str) -> InputError:
         path, entry = self.places[i]
         return InputError(f"{path}: {self.label}[{entry}]: {problem}")
