@@ -5,8 +5,8 @@ Both are checked where they enter. Conventions of this module, where formats in 
 - People come in the Halpe-136 layout whatever the file has (17, 26, 133 or 136 keypoints).
 - A keypoint is labelled when its flag v > 0; flags are floats and kept as they are (Halpe and
   COCO-WholeBody files hold values other than 0, 1 and 2), except that v <= 0 becomes 0.
-- `num_keypoints` is not read (in Halpe it counts the body, or nothing); it is written as
-  the number of labelled keypoints out of 136.
+- `num_keypoints` is not read (in Halpe's files it counts the body, or nothing); it is written as in
+  Halpe's validation set, the number of labelled keypoints out of COCO's 17.
 - Detections keep the scores they come with, which need not lie in [0, 1]. A keypoint 0, 0, 0 is
   one the detector does not give. Equal detections are allowed: the second is a false positive.
 """
@@ -24,7 +24,7 @@ from hicp_lib.coco_rows import PART_KEYS, Rows, shown
 from hicp_lib.detectors.base import Detections
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json, write_json
-from hicp_lib.keypoints import NAMES
+from hicp_lib.keypoints import COCO_17, NAMES
 
 PERSON_CATEGORY = 1
 MAX_SIDE_PX = 100_000
@@ -166,7 +166,7 @@ def write_annotations(path: str | Path, annotations: Annotations) -> None:
         }
         for extra, i, image, box, area, crowd, count, keypoints in zip(
             a.extras, a.ids.tolist(), a.image_ids.tolist(), a.boxes_px.tolist(), a.areas_px2.tolist(),
-            a.is_crowd.astype(int).tolist(), (a.visibility > 0).sum(axis=1).tolist(),
+            a.is_crowd.astype(int).tolist(), (a.visibility[:, COCO_17] > 0).sum(axis=1).tolist(),
             _triples(a.keypoints_px, a.visibility), strict=True,
         )
     ]  # fmt: skip

@@ -112,7 +112,7 @@ def test_what_is_written_is_read_again(write, tmp_path):
             name
         )
     written = json.loads((tmp_path / "again.json").read_text())
-    assert [row["num_keypoints"] for row in written["annotations"]] == [136, 17]
+    assert [row["num_keypoints"] for row in written["annotations"]] == [17, 17]
 
 
 def test_detections_are_read_in_the_order_of_the_file(write):
