@@ -63,6 +63,10 @@ _ENTRIES = [
         f"{_ONNX}.keypoint_rcnn", "KeypointRcnn", needs_model=True,
     ),
 ]  # fmt: skip
+COMBINED = "combined:"
+# Within a combination the body vouches for the hands: the hand model may be less sure, and others' hands
+# in a square must not use up the number.
+_HANDS_WITHIN: dict[str, dict] = {"mediapipe-hands": {"num_hands": 4, "min_score": 0.2}}
 DETECTORS: dict[str, Entry] = {entry.name: entry for entry in _ENTRIES}
 
 
@@ -85,11 +89,16 @@ def command_to_run(name: str) -> str:
 def make_detector(name: str, **options) -> Detector:
     """A detector ready to run; `options` are the parameters of its class.
 
+    `combined:BODY+HANDS` puts two detectors together (see `hicp_lib.detectors.combined`): its own options,
+    those of the hand detector with `hands_` before their names, and all others the body detector's.
+
     Raises
     ------
     InputError
         If the name or an option is unknown, or a weight file is absent or damaged.
     """
+    if name.startswith(COMBINED):
+        return _make_combined(name, options)
     if name not in DETECTORS:
         raise InputError(f"detector {name!r} is not known; expected one of: {', '.join(DETECTORS)}")
     entry = DETECTORS[name]
@@ -100,6 +109,28 @@ def make_detector(name: str, **options) -> Detector:
     detector_class = getattr(import_module(entry.module), entry.class_name)
     _check_options(name, detector_class, options)
     return detector_class(**options)
+
+
+def _make_combined(name: str, options: dict) -> Detector:
+    body, plus, hands = name.removeprefix(COMBINED).partition("+")
+    if not (plus and body in DETECTORS and hands in DETECTORS):
+        raise InputError(
+            f"detector {name!r} is not known; expected {COMBINED}BODY+HANDS of: {', '.join(DETECTORS)}"
+        )
+    for part, group in ((body, "body"), (hands, "hand")):
+        if group not in DETECTORS[part].groups:
+            raise InputError(f"detector {name!r}: {part} finds no {group}; give another in its place")
+    combined_class = import_module(f"{__package__}.combined").Combined
+    known = get_type_hints(combined_class.__init__).keys() - {"body", "hands", "return"}
+    own = {key: value for key, value in options.items() if key in known}
+    _check_options(name, combined_class, own)
+    for_hands, for_body = dict(_HANDS_WITHIN.get(hands, {})), {}
+    for key, value in options.items():
+        if key.startswith("hands_"):
+            for_hands[key.removeprefix("hands_")] = value
+        elif key not in own:
+            for_body[key] = value
+    return combined_class(make_detector(body, **for_body), make_detector(hands, **for_hands), **own)
 
 
 def _check_options(name: str, detector_class: type, options: dict) -> None:
