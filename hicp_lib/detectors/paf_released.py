@@ -40,7 +40,9 @@ def centroid_peaks(heat_map: np.ndarray, min_peak: float) -> np.ndarray:
     neighbours are allowed.
     """
     height, width = heat_map.shape
-    rows, columns = np.nonzero(heat_map > min_peak)
+    # Nothing below its neighbours can be a peak: few pixels are left to look at closely.
+    highest = cv2.dilate(heat_map, np.ones((3, 3), np.uint8))
+    rows, columns = np.nonzero((heat_map > min_peak) & (heat_map >= highest))
     value = heat_map[rows, columns]
     around = _windows(heat_map, rows, columns, 1, min_peak).reshape(-1, 9)
     others = np.delete(around, 4, axis=1)
