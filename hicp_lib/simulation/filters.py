@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from hicp_lib.simulation.raycast import Trace, dot
+from hicp_lib.simulation.raycast import Trace, dot, part_of_image
 
 
 @dataclass(frozen=True)
@@ -21,11 +21,16 @@ class View:
     trace: Trace
 
     @classmethod
-    def of(cls, trace: Trace, rays: np.ndarray, pixels: np.ndarray, wanted: np.ndarray) -> View:
-        """The view of pixel numbers (rows, columns); where nothing was hit, nothing is wanted."""
-        chosen = pixels.ravel()
-        met = trace.take(chosen)
-        return cls(wanted & (met.surface >= 0).reshape(wanted.shape), rays[chosen], met)
+    def of(cls, trace: Trace, rays: np.ndarray, pixels: tuple[slice, slice], wanted: np.ndarray) -> View:
+        """The view of some rows and columns of an image; `wanted` has the whole image's shape.
+
+        Where nothing was hit, nothing is wanted.
+        """
+        met = trace.part(wanted.shape, pixels)
+        chosen = wanted[pixels]
+        return cls(
+            chosen & (met.surface >= 0).reshape(chosen.shape), part_of_image(rays, wanted.shape, pixels), met
+        )
 
 
 @dataclass
@@ -87,9 +92,9 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def sum_within(
-    sums: np.ndarray, surface: np.ndarray, positions_m: np.ndarray, normals: np.ndarray
+    sums: np.ndarray, surface: np.ndarray, positions_m: np.ndarray, normals: np.ndarray, rounds: int
 ) -> np.ndarray:
-    """Sum over 4 x 4 pixels that lie on the same surface and close to its tangent plane.
+    """Sum over 4 x 4 pixels that lie on the same surface and close to its tangent plane, several times.
 
     Parameters
     ----------
@@ -97,17 +102,34 @@ def sum_within(
     surface : array, shape (height, width)
     positions_m, normals : arrays, shape (3, height, width)
     """
-    for axis in (1, 0):
+    alike = {
+        (axis, shift): _alike(surface, positions_m, normals, axis, shift)
+        for axis in (0, 1)
+        for shift in (1, 2)
+    }
+    for axis in (1, 0) * rounds:
         total = sums.copy()
-        size = surface.shape[axis]
         for shift in (1, 2):
-            low = tuple(slice(0, size - shift) if a == axis else slice(None) for a in (0, 1))
-            high = tuple(slice(shift, size) if a == axis else slice(None) for a in (0, 1))
-            every_low, every_high = (slice(None), *low), (slice(None), *high)
-            off_plane = dot(positions_m[every_high] - positions_m[every_low], normals[every_low])
-            same = ((surface[low] == surface[high]) & (np.abs(off_plane) < 0.012)).astype(np.float32)
-            total[every_low] += sums[every_high] * same
+            low, high = _apart(axis, shift)
+            total[low] += sums[high] * alike[axis, shift]
             if shift == 1:
-                total[every_high] += sums[every_low] * same
+                total[high] += sums[low] * alike[axis, shift]
         sums = total
     return sums
+
+
+def _alike(surface, positions_m, normals, axis: int, shift: int) -> np.ndarray:
+    """1 where the pixel `shift` further along an axis continues a pixel's surface, else 0; float32."""
+    low, high = _apart(axis, shift)
+    off_plane = dot(positions_m[high] - positions_m[low], normals[low])
+    return ((surface[low[1:]] == surface[high[1:]]) & (np.abs(off_plane) < 0.012)).astype(np.float32)
+
+
+def _apart(axis: int, shift: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+    """Indices (component, row, column) of the nearer and the further pixel of all pairs along an axis."""
+    whole, near, far = slice(None), slice(None, -shift), slice(shift, None)
+    return (
+        ((whole, near, whole), (whole, far, whole))
+        if axis == 0
+        else ((whole, whole, near), (whole, whole, far))
+    )

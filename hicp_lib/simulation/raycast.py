@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import cv2
 import numpy as np
@@ -33,19 +33,14 @@ class Trace:
     barycentric: np.ndarray
     face_normals: np.ndarray
 
-    def take(self, rows: np.ndarray) -> Trace:
-        """Some of the rays."""
-        arrays = (self.depth_m, self.triangle, self.surface, self.barycentric, self.face_normals)
-        return Trace(*(array[rows] for array in arrays))
+    def part(self, shape: tuple[int, int], pixels: tuple[slice, slice]) -> Trace:
+        """Rows and columns of an image's rays; `shape` is the image's (height, width)."""
+        return Trace(*(part_of_image(getattr(self, f.name), shape, pixels) for f in fields(self)))
 
     def put(self, rows: np.ndarray, other: Trace) -> None:
         """Replace some of the rays' answers."""
-        self.depth_m[rows], self.triangle[rows], self.surface[rows] = (
-            other.depth_m,
-            other.triangle,
-            other.surface,
-        )
-        self.barycentric[rows], self.face_normals[rows] = other.barycentric, other.face_normals
+        for field in fields(self):
+            getattr(self, field.name)[rows] = getattr(other, field.name)
 
 
 class RayScene:
@@ -107,11 +102,11 @@ def trace_image(scene: RayScene, rays: np.ndarray, shape: tuple[int, int], fine:
     traced as well, and so is all that lies near surfaces with a true `fine` (one per surface).
     """
     height, width = shape
-    numbers = np.arange(height * width).reshape(shape)
-    corners = numbers[::2, ::2]
-    coarse = scene.trace(rays[corners.ravel()])
-    triangle = coarse.triangle.reshape(corners.shape)
-    plain = (triangle >= 0) & ~np.append(fine, False)[coarse.surface].reshape(corners.shape)
+    every_second = (slice(None, None, 2), slice(None, None, 2))
+    coarse = scene.trace(part_of_image(rays, shape, every_second))
+    coarse_shape = (-(-height // 2), -(-width // 2))
+    triangle = coarse.triangle.reshape(coarse_shape)
+    plain = (triangle >= 0) & ~np.append(fine, False)[coarse.surface].reshape(coarse_shape)
     plain[:-1, :-1] &= (triangle[:-1, :-1] == triangle[1:, :-1]) & (triangle[:-1, :-1] == triangle[1:, 1:])
     plain[:-1, :-1] &= triangle[:-1, :-1] == triangle[:-1, 1:]
     plain[-1], plain[:, -1] = False, False
@@ -124,12 +119,16 @@ def trace_image(scene: RayScene, rays: np.ndarray, shape: tuple[int, int], fine:
         np.empty((height * width, 3), np.float32),
     )
     unknown = np.ones(shape, bool)
-    full.put(corners.ravel(), coarse)
-    unknown[::2, ::2] = False
+    for field in fields(full):
+        values = getattr(coarse, field.name)
+        components = values.shape[1:]
+        image = getattr(full, field.name).reshape(*shape, *components)
+        image[every_second] = values.reshape(*coarse_shape, *components)
+    unknown[every_second] = False
     at = np.flatnonzero(plain)
-    row, column = np.divmod(at, corners.shape[1])
+    row, column = np.divmod(at, coarse_shape[1])
     inverse = 1 / coarse.depth_m
-    down, right = at + corners.shape[1], at + 1
+    down, right = at + coarse_shape[1], at + 1
     for dv, du, value in (
         (0, 1, (inverse[at] + inverse[right]) / 2),
         (1, 0, (inverse[at] + inverse[down]) / 2),
@@ -142,6 +141,12 @@ def trace_image(scene: RayScene, rays: np.ndarray, shape: tuple[int, int], fine:
     rest = np.flatnonzero(unknown)
     full.put(rest, scene.trace(rays[rest]))
     return full
+
+
+def part_of_image(values: np.ndarray, shape: tuple[int, int], pixels: tuple[slice, slice]) -> np.ndarray:
+    """Rows and columns of an image kept as one row per pixel, (height * width, ...), kept the same way."""
+    chosen = values.reshape(*shape, *values.shape[1:])[pixels]
+    return np.ascontiguousarray(chosen).reshape(-1, *values.shape[1:])
 
 
 def interpolate(values: np.ndarray, corners: np.ndarray, weights: tuple[np.ndarray, ...]) -> np.ndarray:

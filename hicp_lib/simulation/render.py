@@ -59,8 +59,7 @@ def render(world: World, camera: Camera, rng: np.random.Generator) -> Frame:
     shape = (camera.height_px, camera.width_px)
     trace = trace_image(scene, rays, shape, np.array([s.person >= 0 for s in world.surfaces]))
     person, part = (labels.reshape(shape) for labels in _labels(scene, trace))
-    numbers = np.arange(len(rays)).reshape(shape)
-    around = View.of(trace, rays, numbers[::2, ::2], person[::2, ::2] < 0)
+    around = View.of(trace, rays, (slice(None, None, 2), slice(None, None, 2)), person < 0)
     image = _enlarge(
         _paint(world, scene, around, camera, False, rng), around.wanted, trace.surface.reshape(shape)
     )
@@ -68,7 +67,7 @@ def render(world: World, camera: Camera, rng: np.random.Generator) -> Frame:
     rows, columns = (np.flatnonzero((person >= 0).any(axis=axis)) for axis in (1, 0))
     if len(rows):
         crop = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-        people = View.of(trace, rays, numbers[crop], person[crop] >= 0)
+        people = View.of(trace, rays, crop, person >= 0)
         painted = _paint(world, scene, people, camera, True, rng)
         image[crop][people.wanted] = np.moveaxis(painted, 0, -1)[people.wanted]
         image = smooth_edges(image, edge_pixels(trace, person >= 0), trace, scene, camera)
@@ -94,23 +93,29 @@ def _enlarge(painted: np.ndarray, wanted: np.ndarray, surface: np.ndarray) -> np
     Each pixel takes the colour of the nearest painted one that shows the same surface, so
     that outlines stay where they are.
     """
-    height, width = surface.shape
     columns = painted.shape[2]
-    v, u = (np.arange(size) // 2 for size in (height, width))
-    nearest = v[:, None] * columns + u
-    coarse_surface = np.where(wanted, surface[::2, ::2], -1).ravel()
-    wrong = np.flatnonzero(coarse_surface[nearest.ravel()] != surface.ravel())
-    row, column = v[wrong // width], u[wrong % width]
-    best = nearest.ravel()[wrong]
+    coarse_surface = np.where(wanted, surface[::2, ::2], np.int16(-1))
+    wrong = np.flatnonzero(_doubled(coarse_surface, surface.shape) != surface)
+    row, column = (numbers // 2 for numbers in np.divmod(wrong, surface.shape[1]))
+    best = row * columns + column
+    coarse_surface = coarse_surface.ravel()
     for dv, du in ((-1, -1), (-1, 1), (1, -1), (1, 1), (-1, 0), (0, -1), (1, 0), (0, 1)):
         near = np.clip(row + dv, 0, painted.shape[1] - 1) * columns + np.clip(column + du, 0, columns - 1)
         same = coarse_surface[near] == surface.ravel()[wrong]
         best[same] = near[same]
-    nearest.ravel()[wrong] = best
     weighted = np.dstack([np.moveaxis(painted, 0, -1) * wanted[..., None], wanted]).astype(np.float32)
     weighted += 1e-4 * cv2.blur(weighted, (9, 9)) + 1e-9
-    full = cv2.GaussianBlur(weighted.reshape(-1, 4)[nearest], (0, 0), 1.1)
+    full = _doubled(weighted, surface.shape)
+    full.reshape(-1, 4)[wrong] = weighted.reshape(-1, 4)[best]
+    full = cv2.GaussianBlur(full, (0, 0), 1.1)
     return full[..., :3] / full[..., 3:]
+
+
+def _doubled(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Each pixel as two by two, cut to `shape` (height, width)."""
+    height, width = image.shape[:2]
+    doubled = cv2.resize(image, (2 * width, 2 * height), interpolation=cv2.INTER_NEAREST)
+    return np.ascontiguousarray(doubled[: shape[0], : shape[1]])
 
 
 def _labels(scene: RayScene, trace: Trace) -> tuple[np.ndarray, np.ndarray]:

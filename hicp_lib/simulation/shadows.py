@@ -46,7 +46,6 @@ def visibility(
     positions, directions = (x.reshape(3, *shape) for x in (looks.positions_m, looks.normals))
     asked = np.stack([turn == 0, turn == 1]).astype(np.float32)
     sums = np.concatenate([seen.reshape(-1, *shape), asked])
-    for _ in range(2 if sharp else 3):
-        sums = sum_within(sums, surface, positions, directions)
+    sums = sum_within(sums, surface, positions, directions, 2 if sharp else 3)
     weights = sums[-2:][np.arange(len(seen)) % 2]
     return np.where(weights > 0, sums[:-2] / np.maximum(weights, 1e-6), 1).reshape(len(seen), -1)
