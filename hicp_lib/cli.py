@@ -173,20 +173,26 @@ def dataset_create(annotations: Path, images: Path, out: Path, min_pixels: int) 
 @click.option("--images", "images_dir", type=_PATH, help="Folder of images without annotations.")
 @click.option("--out", type=_PATH, required=True, help="COCO keypoint results to write.")
 @click.option("--workers", type=_WORKERS, help="Threads; all cores if not given.")
+@click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster, which then does the work.")
 def detect(
-    detector: str, dataset_dir: Path | None, images_dir: Path | None, out: Path, workers, **chosen
+    detector: str, dataset_dir: Path | None, images_dir: Path | None, out: Path, workers, dask, **chosen
 ) -> None:
-    """Find people and their keypoints in images."""
+    """Find people and their keypoints in images.
+
+    What was found in an image is kept: after an interruption, the same command does only the rest.
+    """
     from hicp_lib.annotations import write_detections
     from hicp_lib.detectors.run import detect_dataset, detect_images
 
     if (dataset_dir is None) == (images_dir is None):
         raise click.UsageError("Give either --dataset DIR or --images DIR.", click.get_current_context())
+    if workers and dask:
+        raise click.UsageError("Give either --workers N or --dask ADDRESS.", click.get_current_context())
     if dataset_dir is not None:
-        found = detect_dataset(detector, dataset_dir, workers=workers, **_given(**chosen))
+        found = detect_dataset(detector, dataset_dir, workers, dask=dask, **_given(**chosen))
     else:
         paths = _numbered_images(images_dir)
-        results = detect_images(detector, paths, workers, **_given(**chosen))
+        results = detect_images(detector, paths, workers, dask=dask, **_given(**chosen))
         found = {key: result.detections for key, result in results.items()}
         _write_names(out, paths)
     write_detections(out, found)

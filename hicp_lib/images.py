@@ -23,6 +23,12 @@ def read_image(path: str | Path) -> np.ndarray:
         content = np.fromfile(path, dtype=np.uint8)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); expected an image file") from None
+    return decode_image(content, path)
+
+
+def decode_image(content: bytes | np.ndarray, path: str | Path) -> np.ndarray:
+    """An image out of a file's content, as `read_image` does; `path` is for the error's message."""
+    content = np.frombuffer(content, dtype=np.uint8)
     flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
     bgr = cv2.imdecode(content, flags) if content.size else None
     if bgr is None:

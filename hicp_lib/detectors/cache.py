@@ -20,6 +20,7 @@ import numpy as np
 
 from hicp_lib import keypoints
 from hicp_lib.detectors.base import Detections, Detector
+from hicp_lib.errors import InputError
 from hicp_lib.files import cache_dir, sha256_bytes, sha256_file, write_bytes
 from hicp_lib.keypoints import N_KEYPOINTS
 
@@ -49,15 +50,34 @@ def code_sha256() -> str:
     return sha256_bytes("".join(sha256_file(source) for source in sources).encode())
 
 
-def cache_folder(detector: Detector) -> Path:
-    """Folder of this detector's results under its present settings."""
-    identity = {
+def identity(detector: Detector) -> dict:
+    """All that this detector's results depend on, besides the image."""
+    return {
         "settings": detector.settings,
         "code": code_sha256(),
         "libraries": {"numpy": np.__version__, "opencv": cv2.__version__},
     }
-    key = sha256_bytes(json.dumps(identity, sort_keys=True).encode())
+
+
+def cache_folder(detector: Detector) -> Path:
+    """Folder of this detector's results under its present settings."""
+    key = sha256_bytes(json.dumps(identity(detector), sort_keys=True).encode())
     return cache_dir() / "detections" / detector.name / key[:32]
+
+
+def result_path(folder: Path, image_path: Path, boxes_px: np.ndarray | None) -> Path:
+    """Where the result of an image file is kept; boxes (n, 4) count if they were given.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    boxes_key = "" if boxes_px is None else "-" + sha256_bytes(np.asarray(boxes_px, float).tobytes())[:16]
+    try:
+        return folder / f"{sha256_file(image_path)}{boxes_key}.bin"
+    except OSError as error:
+        raise InputError(f"{image_path}: cannot be read ({error.strerror}); expected an image file") from None
 
 
 def read_result(path: Path) -> Timed | None:

@@ -1,4 +1,6 @@
-"""Run a detector over many images: all cores, a progress bar, results kept on disk.
+"""Run a detector over many images: all cores or a cluster, a progress bar, results kept on disk.
+
+Each result is kept as soon as it is there, so a run that was cut off goes on where it was.
 
 The work is spread over threads, not processes: the networks run outside Python's global lock,
 and threads need no start-up. Every thread has its own detector, and OpenCV is held to one
@@ -8,42 +10,46 @@ thread in each, so the results do not depend on how many there are.
 from __future__ import annotations
 
 import os
-import queue
-import time
 from collections.abc import Hashable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
-import cv2
 import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.annotations import read_annotations
-from hicp_lib.detectors.base import Detections, Detector
-from hicp_lib.detectors.cache import Timed, cache_folder, read_result, write_result
-from hicp_lib.detectors.registry import make_detector
-from hicp_lib.errors import InputError
-from hicp_lib.files import sha256_bytes, sha256_file
+from hicp_lib.detectors.base import Detections
+from hicp_lib.detectors.cache import Timed, cache_folder, read_result, result_path, write_result
+from hicp_lib.detectors.pool import DetectorPool, single_threaded_opencv
 from hicp_lib.images import read_image
 
 Key = TypeVar("Key", bound=Hashable)
 
 
 def detect_dataset(
-    name: str, dataset_dir: str | Path, workers: int | None = None, progress: bool = True, **options
+    name: str,
+    dataset_dir: str | Path,
+    workers: int | None = None,
+    progress: bool = True,
+    dask: str | None = None,
+    **options,
 ) -> dict[int, Detections]:
     """People in every image of a dataset folder (`images/`, `annotations.json`), by image id.
 
     Parameters as in `detect_images`; the annotated boxes go to detectors that take them.
     """
-    results = time_dataset(name, dataset_dir, workers, progress, **options)
+    results = time_dataset(name, dataset_dir, workers, progress, dask, **options)
     return {image_id: result.detections for image_id, result in results.items()}
 
 
 def time_dataset(
-    name: str, dataset_dir: str | Path, workers: int | None = None, progress: bool = True, **options
+    name: str,
+    dataset_dir: str | Path,
+    workers: int | None = None,
+    progress: bool = True,
+    dask: str | None = None,
+    **options,
 ) -> dict[int, Timed]:
     """As `detect_dataset`, each with the time it took."""
     annotations = read_annotations(Path(dataset_dir) / "annotations.json")
@@ -53,7 +59,7 @@ def time_dataset(
     }
     people = annotations.take(~annotations.is_crowd)
     boxes_px = {image_id: people.boxes_px[people.image_ids == image_id] for image_id in paths}
-    return detect_images(name, paths, workers, progress, boxes_px, **options)
+    return detect_images(name, paths, workers, progress, boxes_px, dask, **options)
 
 
 def detect_images(
@@ -62,6 +68,7 @@ def detect_images(
     workers: int | None = None,
     progress: bool = True,
     boxes_px: Mapping[Key, np.ndarray] | None = None,
+    dask: str | None = None,
     **options,
 ) -> dict[Key, Timed]:
     """People in every image file.
@@ -73,6 +80,7 @@ def detect_images(
     workers : threads (the cores this process may use, if None)
     progress : show a bar; only ever on a terminal
     boxes_px : annotated boxes (n, 4: x, y, width, height) of each image, for detectors that take them
+    dask : address of a Dask scheduler, whose workers do what threads do otherwise
     options : options of the detector
 
     Returns
@@ -84,71 +92,39 @@ def detect_images(
     InputError
         If an image cannot be read, or the detector cannot be made.
     """
-    workers = max(1, min(workers or n_cores(), len(paths) or 1))
-    pool = _DetectorPool(name, options)
-    folder = cache_folder(pool.first)
+    pool = DetectorPool(name, options)
     takes_boxes = boxes_px is not None and getattr(pool.first, "takes_boxes", False)
+    jobs = {key: (Path(path), boxes_px[key] if takes_boxes else None) for key, path in paths.items()}
+    if dask is None:
+        results = _in_threads(pool, jobs, workers)
+    else:
+        from hicp_lib.detectors.cluster import detect_on_cluster  # the library is an extra
 
-    def process(key: Key) -> Timed:
-        return _detect_one(pool, Path(paths[key]), boxes_px[key] if takes_boxes else None, folder, workers)
-
-    with _single_threaded_opencv(), ThreadPoolExecutor(workers) as executor:
-        # disable=None: no bar unless standard error is a terminal.
-        results = tqdm(
-            executor.map(process, paths),
-            desc=name,
-            total=len(paths),
-            disable=None if progress else True,
-        )
-        return dict(zip(paths, results, strict=True))
+        results = detect_on_cluster(dask, name, options, pool.first, jobs)
+    # disable=None: no bar unless standard error is a terminal.
+    done = dict(tqdm(results, desc=name, total=len(jobs), disable=None if progress else True))
+    return {key: done[key] for key in paths}
 
 
-class _DetectorPool:
-    """Detectors of one kind, made when a thread needs one and none is idle."""
-
-    def __init__(self, name: str, options: dict) -> None:
-        self._name, self._options = name, options
-        self.first = make_detector(name, **options)
-        self._idle: queue.SimpleQueue[Detector] = queue.SimpleQueue()
-        self._idle.put(self.first)
-
-    @contextmanager
-    def borrow(self) -> Iterator[Detector]:
-        try:
-            detector = self._idle.get_nowait()
-        except queue.Empty:
-            detector = make_detector(self._name, **self._options)
-        yield detector
-        self._idle.put(detector)
+def _in_threads(
+    pool: DetectorPool, jobs: dict[Key, tuple[Path, np.ndarray | None]], workers: int | None
+) -> Iterator[tuple[Key, Timed]]:
+    workers = max(1, min(workers or n_cores(), len(jobs) or 1))
+    folder = cache_folder(pool.first)
+    with single_threaded_opencv(), ThreadPoolExecutor(workers) as executor:
+        calls = executor.map(lambda job: _detect_one(pool, *job, folder, workers), jobs.values())
+        yield from zip(jobs, calls, strict=True)
 
 
 def _detect_one(
-    pool: _DetectorPool, path: Path, boxes_px: np.ndarray | None, folder: Path, workers: int
+    pool: DetectorPool, path: Path, boxes_px: np.ndarray | None, folder: Path, workers: int
 ) -> Timed:
-    boxes_key = "" if boxes_px is None else "-" + sha256_bytes(np.asarray(boxes_px, float).tobytes())[:16]
-    try:
-        kept = folder / f"{sha256_file(path)}{boxes_key}.bin"
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); expected an image file") from None
+    kept = result_path(folder, path, boxes_px)
     result = read_result(kept)
     if result is None:
-        image = read_image(path)
-        with pool.borrow() as detector:
-            start = time.perf_counter()
-            found = detector.detect(image) if boxes_px is None else detector.detect(image, boxes_px)
-            result = Timed(found, 1e3 * (time.perf_counter() - start), workers)
+        result = pool.detect(read_image(path), boxes_px, workers)
         write_result(kept, result)
     return result
-
-
-@contextmanager
-def _single_threaded_opencv() -> Iterator[None]:
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        yield
-    finally:
-        cv2.setNumThreads(before)
 
 
 def n_cores() -> int:

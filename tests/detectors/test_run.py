@@ -2,13 +2,14 @@
 
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
-from hicp_lib.detectors import cache, run
+from hicp_lib.detectors import cache, pool, run
 from hicp_lib.detectors.base import Detections
 from hicp_lib.errors import InputError
 from hicp_lib.images import write_png
@@ -34,7 +35,7 @@ class Counting:
 @pytest.fixture
 def counting(monkeypatch, tmp_path):
     monkeypatch.setenv("HICP_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(run, "make_detector", lambda name, **options: Counting(**options))
+    monkeypatch.setattr(pool, "make_detector", lambda name, **options: Counting(**options))
     Counting.calls = 0
     return Counting
 
@@ -205,3 +206,24 @@ def test_two_processes_at_once_agree(own_cache, photographs):
     (first, errors), (second, _) = (process.communicate() for process in processes)
     assert errors == b"" and len(first) > 1000
     assert first == second
+
+
+def test_a_run_that_was_killed_goes_on_where_it_was(slow):
+    killed = slow.detect("out.json", "--workers", "2")
+    while slow.n_kept() < 15:
+        assert killed.poll() is None, killed.communicate()
+        time.sleep(0.01)
+    killed.kill()
+    killed.communicate()
+    kept = slow.n_kept()
+    assert 15 <= kept < slow.n_images and not (slow.folder / "out.json").exists()
+
+    resumed = slow.detect("out.json", "--workers", "2")
+    assert resumed.communicate() == (f"out.json: 40 people in {slow.n_images} images\n", "")
+    assert len(slow.computed(resumed)) == slow.n_images - kept
+    assert set(slow.computed()) == set(range(slow.n_images))
+
+    whole = slow.detect("whole.json", "--workers", "1", HICP_CACHE=str(slow.folder / "other"))
+    whole.communicate()
+    assert len(slow.computed(whole)) == slow.n_images
+    assert (slow.folder / "out.json").read_bytes() == (slow.folder / "whole.json").read_bytes()
