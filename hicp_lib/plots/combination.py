@@ -15,7 +15,7 @@ _GROUPS = {"body": "body", "hand": "hands"}
 def ingredients(table: pd.DataFrame, note: str) -> Figure:
     """Average precision and hands found per variant and subset; `table` from `compare_hands`."""
     variants = list(dict.fromkeys(table["variant"]))
-    figure, axes = new_figure(1, 2, 10.0, 0.9 + 0.5 * len(variants), sharey=True)
+    figure, axes = new_figure(1, 2, 10.0, 1.2 + 0.5 * len(variants), sharey=True)
     for axis, (measure, label) in zip(axes, _MEASURES.items(), strict=True):
         for k, (subset, rows) in enumerate(table.groupby("subset", sort=False)):
             y = np.array([variants.index(variant) for variant in rows["variant"]]) + 0.2 * (k - 0.5)
@@ -26,7 +26,8 @@ def ingredients(table: pd.DataFrame, note: str) -> Figure:
             )
         axis.set(xlabel=label, xlim=(0, None))
     axes[0].set(yticks=range(len(variants)), yticklabels=variants, ylim=(len(variants) - 0.5, -0.5))
-    axes[1].legend(loc="lower right")
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
     said = [f"{row.variant} {row.AP:.2f} on {row.subset}" for row in table.itertuples()]
     caption = (
         "What each ingredient buys: average precision of hands, and the share of labelled hands found, "
