@@ -1,0 +1,196 @@
+"""Calibration: hits counted where the truth is known, monotone curves, and no image on both sides."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import make_annotations, make_detections
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hicp_lib.detectors.base import Detections
+from hicp_lib.errors import InputError
+from hicp_lib.evaluation.calibration import (
+    Calibration,
+    all_hits,
+    calibration_error,
+    calibration_study,
+    keypoint_hits,
+    reliability,
+    split_half,
+)
+from hicp_lib.keypoints import COCO_17, SIGMAS
+
+AREA = 20_000.0
+POINTS = np.random.default_rng(0).uniform(50, 400, (3, 136, 2))
+
+
+def hit_radius_px(keypoint: int) -> float:
+    """Distance at which the OKS term is one half: 2 sigma sqrt(2 A ln 2)."""
+    return 2 * SIGMAS["halpe"][keypoint] * np.sqrt(2 * AREA * np.log(2))
+
+
+@pytest.mark.parametrize("share, hit", [(0.99, True), (1.01, False)])
+def test_a_hit_lies_within_the_distance_at_which_the_term_is_one_half(share, hit):
+    found = POINTS[:1].copy()
+    found[0, COCO_17, 0] += [share * hit_radius_px(k) for k in COCO_17]
+    hits = keypoint_hits(make_annotations(POINTS[:1], [0]), {0: make_detections(found)})
+    assert hits["keypoint"].tolist() == COCO_17.tolist()
+    assert (hits["hit"] == hit).all() and (hits["score"] == 0.5).all()
+
+
+def test_points_without_a_label_or_not_given_are_left_out():
+    visibility = np.full((1, 136), 2.0)
+    visibility[0, 3] = 0
+    found = POINTS[:1].copy()
+    found[0, 7] = np.nan
+    hits = keypoint_hits(
+        make_annotations(POINTS[:1], [0], visibility=visibility), {0: make_detections(found)}
+    )
+    assert set(COCO_17) - set(hits["keypoint"]) == {3, 7}
+
+
+def test_people_who_do_not_count_are_left_out():
+    extras = [{}, {"other": True}, {}]
+    people = make_annotations(POINTS, [0, 0, 0], crowd=[2], extras=extras)
+    hits = keypoint_hits(people, {0: make_detections(POINTS)})
+    assert len(hits) == 17 and hits["hit"].all()
+
+
+def test_a_second_detection_of_a_person_and_one_of_nobody_are_wrong():
+    people = make_annotations(POINTS[:1], [0])
+    found = np.stack([POINTS[0], POINTS[0] + 1, POINTS[0] + 50_000])
+    hits = keypoint_hits(people, {0: make_detections(found, [0.9, 0.8, 0.7])})
+    assert hits["hit"].tolist() == [True] * 17 + [False] * 34
+
+
+def test_the_surer_detection_takes_the_person_first():
+    people = make_annotations(POINTS[:1], [0])
+    found = make_detections(np.stack([POINTS[0], POINTS[0] + 1]), [0.1, 0.9])
+    found.scores[0, COCO_17], found.scores[1, COCO_17] = 0.3, 0.7
+    hits = keypoint_hits(people, {0: found})
+    assert hits.groupby("score")["hit"].all().to_dict() == {0.3: False, 0.7: True}
+
+
+scored = st.lists(st.tuples(st.floats(0, 1), st.booleans()), min_size=1, max_size=60)
+
+
+@given(scored, st.lists(st.floats(0, 1), min_size=2, max_size=20))
+@settings(deadline=None)
+def test_a_higher_score_never_becomes_a_lower_one(rows, asked):
+    scores, hits = np.array([row[0] for row in rows]), np.array([row[1] for row in rows], float)
+    values = Calibration.fit(scores, hits)(np.sort(asked))
+    assert (np.diff(values) >= 0).all()
+    assert ((values >= 0) & (values <= 1)).all()
+
+
+@given(scored)
+@settings(deadline=None)
+def test_the_curve_is_the_best_monotone_one(rows):
+    """Pool-adjacent-violators by its min-max formula, and the mean is kept."""
+    scores, hits = np.array([row[0] for row in rows]), np.array([row[1] for row in rows], float)
+    levels, place = np.unique(scores, return_inverse=True)
+    n = len(levels)
+    sums, counts = np.bincount(place, hits), np.bincount(place)
+    best = [
+        max(min(sums[a : b + 1].sum() / counts[a : b + 1].sum() for b in range(i, n)) for a in range(i + 1))
+        for i in range(n)
+    ]
+    fitted = Calibration.fit(scores, hits)
+    np.testing.assert_allclose(fitted(levels), best, atol=1e-9)
+    assert fitted(scores).mean() == pytest.approx(hits.mean())
+
+
+@given(scored, st.randoms(use_true_random=False))
+@settings(deadline=None)
+def test_the_order_of_rows_changes_nothing(rows, random):
+    shuffled = random.sample(rows, len(rows))
+    one, other = (
+        Calibration.fit(np.array([row[0] for row in r]), np.array([row[1] for row in r], float))
+        for r in (rows, shuffled)
+    )
+    np.testing.assert_allclose(one(np.linspace(0, 1, 50)), other(np.linspace(0, 1, 50)), atol=1e-12)
+
+
+def test_nothing_to_fit_to_is_an_error_in_words():
+    with pytest.raises(InputError, match="more images"):
+        Calibration.fit(np.zeros(0), np.zeros(0))
+
+
+def test_applied_scores_are_new_and_the_raw_ones_stay():
+    found = make_detections(POINTS[:1])
+    found.keypoints_px[0, 4], found.scores[0, 4] = np.nan, 0.0
+    raw = found.scores.copy()
+    done = Calibration(np.array([0.0, 1.0]), np.array([0.4, 1.0])).apply(found, "body")
+    assert done.scores[0, 0] == pytest.approx(0.7)
+    assert done.scores[0, 4] == 0 and np.isnan(done.keypoints_px[0, 4]).all()
+    np.testing.assert_array_equal(done.scores[0, 17:], raw[0, 17:])
+    np.testing.assert_array_equal(found.scores, raw)
+
+
+@given(st.lists(st.integers(0, 12), min_size=1, max_size=80), st.integers(0, 5))
+def test_no_source_image_is_on_both_sides_of_the_split(groups, seed):
+    groups = pd.Series(groups)
+    fits_on = split_half(groups, seed)
+    assert not set(groups[fits_on]) & set(groups[~fits_on])
+    assert len(set(groups[fits_on])) == (groups.nunique() + 1) // 2
+
+
+def test_calibration_error_by_hand():
+    scores, hits = np.array([0.95, 0.95, 0.15, 0.15]), np.array([1, 0, 0, 0])
+    assert calibration_error(scores, hits) == pytest.approx((2 * 0.45 + 2 * 0.15) / 4)
+    assert calibration_error(np.array([1.0, 0.0]), np.array([1, 0])) == 0
+
+
+def test_reliability_has_a_row_per_bin_in_use():
+    scores = np.array([0.05, 0.05, 0.55, 1.0])
+    table = reliability(scores, np.array([0, 1, 1, 1]), np.arange(4), n_resamples=50)
+    assert table["bin"].tolist() == [0, 5, 9] and table["count"].tolist() == [2, 1, 1]
+    assert table["rate"].tolist() == [0.5, 1, 1]
+    assert (table["low"] <= table["rate"]).all() and (table["rate"] <= table["high"]).all()
+
+
+def crooked(n: int = 4000, seed: int = 0) -> pd.DataFrame:
+    """A detector that is right with the square root of its score."""
+    rng = np.random.default_rng(seed)
+    score = rng.random(n)
+    labels = {"detector": "d", "group": "body", "image_id": np.arange(n), "keypoint": 0}
+    return pd.DataFrame(
+        {
+            **labels,
+            "source_image": rng.integers(0, 100, n),
+            "score": score,
+            "hit": rng.random(n) < np.sqrt(score),
+        }
+    )
+
+
+def test_calibration_mends_a_crooked_scale_on_images_it_has_not_seen():
+    errors, curves, calibrations = calibration_study(crooked(), n_resamples=100)
+    row = errors.iloc[0]
+    assert row["raw"] == pytest.approx(1 / 6, abs=0.02)  # the mean of sqrt(s) - s
+    assert row["calibrated_high"] < row["raw_low"] and row["change_high"] < 0
+    assert calibrations["d", "body"](np.array(0.25)) == pytest.approx(0.5, abs=0.06)
+    assert set(curves["scores"]) == {"raw", "calibrated"}
+
+
+def test_hits_of_the_images_judged_on_do_not_reach_the_calibration():
+    hits = crooked()
+    judged = ~split_half(hits["source_image"])
+    other = hits.assign(hit=np.where(judged, ~hits["hit"], hits["hit"]))
+    curves = [calibration_study(table, n_resamples=2)[2]["d", "body"] for table in (hits, other)]
+    np.testing.assert_array_equal(curves[0].rates, curves[1].rates)
+    np.testing.assert_array_equal(curves[0].scores, curves[1].scores)
+
+
+def test_hits_of_all_cases_carry_their_labels():
+    people = make_annotations(POINTS[:2], [0, 1])
+    found = {i: make_detections(POINTS[i : i + 1]) for i in range(2)}
+    table = all_hits(
+        {"basic": people}, {("basic", "d"): found}, {"d": ("body", "hand")}, {"basic": {0: 7, 1: 9}}
+    )
+    assert table.groupby("group").size().to_dict() == {"body": 34, "hand": 84}
+    assert set(table["source_image"]) == {7, 9} and (table["detector"] == "d").all()
+    nobody = all_hits(
+        {"basic": people}, {("basic", "d"): {0: Detections.none()}}, {"d": ("body",)}, {"basic": {}}
+    )
+    assert nobody.empty
