@@ -178,12 +178,9 @@ def pose_bones(
     for level in _levels(tuple(body.bone_parents)):
         rotations[level] = rotations[body.bone_parents[level]] @ rotations[level]
     rotations = rotations @ to_reference
-    posed = np.zeros_like(heads)
-    offsets = heads - heads[body.bone_parents]
-    for level in _levels(tuple(body.bone_parents)):
-        parent = body.bone_parents[level]
-        posed[level] = posed[parent] + np.einsum("bij,bj->bi", rotations[parent], offsets[level])
-    return rotations, posed
+    parents = body.bone_parents
+    steps = np.einsum("bij,bj->bi", rotations[parents], heads - heads[parents])
+    return rotations, _chains(tuple(parents)) @ steps
 
 
 def shape_weights(body: Body, shape: int | str | np.ndarray) -> np.ndarray:
@@ -249,6 +246,16 @@ def _levels(parents: tuple[int, ...]) -> list[np.ndarray]:
     for bone, parent in enumerate(parents[1:], start=1):
         depth[bone] = depth[parent] + 1
     return [np.flatnonzero(depth == d) for d in range(1, depth.max() + 1)]
+
+
+@lru_cache(maxsize=4)
+def _chains(parents: tuple[int, ...]) -> np.ndarray:
+    """Which bones lead from the root to each bone, itself included, the root not: (n, n), 0 or 1."""
+    chains = np.zeros((len(parents), len(parents)))
+    for bone, parent in enumerate(parents[1:], start=1):
+        chains[bone] = chains[parent]
+        chains[bone, bone] = 1
+    return chains
 
 
 def _skin(body: Body, vertices, rotations, translations) -> np.ndarray:

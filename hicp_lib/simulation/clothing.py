@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy import sparse
 
 from hicp_lib.simulation import mesh as g
 from hicp_lib.simulation.body import REGIONS, Body, PosedBody, load_body
@@ -46,12 +47,13 @@ class Garment:
 class Pattern:
     """A garment cut out, ready to be put on (n vertices).
 
+    `smoothing` (n, n) moves each vertex most of the way to the middle of its neighbours;
     `distance` is how far inside the garment's edge each vertex is, in its field's units;
     `rim` are the boundary's directed edges; `hidden` marks body triangles well underneath.
     """
 
     cut: g.Cut
-    neighbours: np.ndarray
+    smoothing: sparse.csr_array
     distance: np.ndarray
     rim: np.ndarray
     hidden: np.ndarray
@@ -73,7 +75,7 @@ def _cut_pattern(garment: Garment) -> Pattern:
     deep = field > 0.03
     return Pattern(
         cut=cut,
-        neighbours=g.neighbours(cut.triangles, len(cut.i)),
+        smoothing=_smoothing(g.neighbours(cut.triangles, len(cut.i))),
         distance=np.maximum(cut.apply(field.astype(np.float32)), 0),
         rim=g.boundary_edges(cut.triangles),
         hidden=deep[body.triangles].all(axis=1),
@@ -126,11 +128,14 @@ def put_on(
     rest = cut.apply(rest_m.astype(np.float32))
     below = cut.apply(layers_m)
     # Smoothing also slides cloth along the skin: its pattern slides with it.
-    smooth = _smooth(np.concatenate([skin, rest], axis=1), pattern.neighbours, garment.smoothing)
+    smooth = np.concatenate([skin, rest], axis=1)
+    for _ in range(garment.smoothing):
+        smooth = pattern.smoothing @ smooth
     smooth, laid = smooth[:, :3], smooth[:, 3:]
     cloth = _drape(garment, pattern, smooth, skin, skin_normals, rest, folds, below)
     height = np.einsum("ij,ij->i", cloth - skin, skin_normals)
-    layers_m[cut.i] = np.maximum(layers_m[cut.i], height)
+    for corners in (cut.i, cut.j):  # a cut edge lies between two of the body's vertices
+        np.maximum.at(layers_m, corners, height)
     normals = g.vertex_normals(cloth, cut.triangles)
     coords = np.column_stack(
         [laid, *(cut.apply(body.field(f)) for f in ("arm", "leg", "torso")), pattern.distance]
@@ -150,21 +155,19 @@ def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, 
     heights = sum(h * np.sin(rest @ np.array([x, y, z], np.float32) + p) for x, y, z, p, h in folds)
     cloth = cloth + (heights * np.minimum(away / 0.01, 1.5))[:, None] * skin_normals
     return _keep_away(
-        _smooth(cloth, pattern.neighbours, 1),
+        pattern.smoothing @ cloth.astype(np.float32),
         skin,
         skin_normals,
         np.maximum(0.6 * away, below + 0.003 * (below > 0)),
     )
 
 
-def _smooth(points: np.ndarray, neighbours: np.ndarray, steps: int) -> np.ndarray:
-    columns, share = np.ascontiguousarray(neighbours.T), np.float32(0.6 / neighbours.shape[1])
-    for _ in range(steps):
-        total = points[columns[0]]
-        for column in columns[1:]:
-            total += points[column]
-        points = np.float32(0.4) * points + share * total
-    return points
+def _smoothing(neighbours: np.ndarray) -> sparse.csr_array:
+    """One step of smoothing as a matrix, from each vertex's neighbours (n, k)."""
+    n, k = neighbours.shape
+    rows = np.repeat(np.arange(n), k)
+    mean = sparse.csr_array((np.full(n * k, 1 / k, np.float32), (rows, neighbours.ravel())), shape=(n, n))
+    return sparse.csr_array(np.float32(0.4) * sparse.eye_array(n, dtype=np.float32) + np.float32(0.6) * mean)
 
 
 def _keep_away(cloth: np.ndarray, skin: np.ndarray, normals: np.ndarray, away: np.ndarray) -> np.ndarray:

@@ -35,8 +35,12 @@ class View:
 
 @dataclass
 class Looks:
-    """How things look at every pixel; components first, (3, n) or (n,). See `surfaces.Look`."""
+    """How things look at a view's wanted pixels, surface by surface; components first, (3, n) or (n,).
 
+    `pixels` are their numbers in the view's grid. For the others see `surfaces.Look`.
+    """
+
+    pixels: np.ndarray
     positions_m: np.ndarray
     normals: np.ndarray
     albedo: np.ndarray
@@ -47,24 +51,32 @@ class Looks:
     softness: np.ndarray
 
     @classmethod
-    def empty(cls, n: int) -> Looks:
+    def empty(cls, pixels: np.ndarray) -> Looks:
         """Black, flat and matt all over."""
+        n = len(pixels)
         vectors = [np.zeros((3, n), np.float32) for _ in range(4)]
-        return cls(*vectors, *(np.zeros(n, np.float32) for _ in range(4)))
+        return cls(pixels, *vectors, *(np.zeros(n, np.float32) for _ in range(4)))
 
-    def part(self, block: np.ndarray) -> Looks:
+    def part(self, block: slice) -> Looks:
         """Some of the pixels."""
         return Looks(*(getattr(self, field.name)[..., block] for field in fields(self)))
 
+    def on_grid(self, name: str, view: View) -> np.ndarray:
+        """One of the arrays for all of the view's pixels in order, zero where nothing is wanted."""
+        values = getattr(self, name)
+        grid = np.zeros((*values.shape[:-1], view.wanted.size), np.float32)
+        grid[..., self.pixels] = values
+        return grid
 
-def tilt_by_height(looks: Looks, view: View) -> None:
-    """Tilt `looks.normals` in place by the slope of `looks.height_m`, from differences between pixels.
+
+def tilt_by_height(normals: np.ndarray, positions_m: np.ndarray, height_m: np.ndarray, view: View) -> None:
+    """Tilt a view's normals (3, n) in place by the slope of heights (n,), from differences between pixels.
 
     Mikkelsen, "Bump mapping unparametrized surfaces on the GPU" (2010); pixels on the last
     row and column, or beside another surface, keep their normals.
     """
     shape = view.wanted.shape
-    height = looks.height_m.reshape(shape)
+    height = height_m.reshape(shape)
     surface, depth = view.trace.surface.reshape(shape), view.trace.depth_m.reshape(shape)
     here, corner = slice(None, -1), (slice(None, -1), slice(None, -1))
     with np.errstate(invalid="ignore"):
@@ -77,14 +89,14 @@ def tilt_by_height(looks: Looks, view: View) -> None:
     r, c = np.nonzero(inner)
     at = r * shape[1] + c
     right, below = at + 1, at + shape[1]
-    n = looks.normals[:, at]
-    position = looks.positions_m[:, at]
-    dx, dy = looks.positions_m[:, right] - position, looks.positions_m[:, below] - position
-    hx, hy = looks.height_m[right] - looks.height_m[at], looks.height_m[below] - looks.height_m[at]
+    n = normals[:, at]
+    position = positions_m[:, at]
+    dx, dy = positions_m[:, right] - position, positions_m[:, below] - position
+    hx, hy = height_m[right] - height_m[at], height_m[below] - height_m[at]
     rx, ry = _cross(dy, n), _cross(n, dx)
     area = dot(dx, rx)
     tilted = np.abs(area) * n - np.sign(area) * (hx * rx + hy * ry)
-    looks.normals[:, at] = tilted / np.maximum(np.sqrt(dot(tilted, tilted)), 1e-20)
+    normals[:, at] = tilted / np.maximum(np.sqrt(dot(tilted, tilted)), 1e-20)
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -223,7 +223,7 @@ def _roots(style: Style, body: Body, rest_m: np.ndarray, rng: np.random.Generato
     a, b = np.sqrt(rng.random(len(rows))), rng.random(len(rows))
     weights = np.stack([1 - a, a * (1 - b), a * b], axis=1)
     roots = np.einsum("nk,nkj->nj", weights, corners[rows])
-    normals = g.vertex_normals(rest_m.astype(np.float32), body.triangles)[triangles[rows]]
+    normals = g.vertex_normals(rest_m.astype(np.float32), triangles)[triangles[rows]]
     inside = np.einsum("nk,nk->n", weights, field[triangles[rows]])
     return roots, g.unit(np.einsum("nk,nkj->nj", weights, normals)), inside
 

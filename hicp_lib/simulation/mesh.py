@@ -85,8 +85,9 @@ def cut(triangles: np.ndarray, field: np.ndarray) -> Cut:
             source += [rows, rows]
     edges = np.concatenate(corners)
     edges = np.where((edges[..., :1] > edges[..., 1:]), edges[..., ::-1], edges)
-    unique, inverse = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True)
-    i, j = unique.T
+    n = len(field)
+    unique, inverse = np.unique(edges[..., 0].astype(np.int64) * n + edges[..., 1], return_inverse=True)
+    i, j = np.divmod(unique, n)
     gap = field[i] - field[j]
     t = np.where(i == j, 0.0, field[i] / np.where(gap == 0, 1.0, gap))
     return Cut(i, j, t.astype(np.float32), inverse.reshape(-1, 3).astype(np.int32), np.concatenate(source))
@@ -173,7 +174,7 @@ def boxes(lows_m: np.ndarray, highs_m: np.ndarray) -> Mesh:
     lows, highs = np.asarray(lows_m, np.float32), np.asarray(highs_m, np.float32)
     corners, normals, triangles, axes = _CUBE
     scaled = corners * (highs - lows)[:, None]
-    coords = np.take_along_axis(scaled, np.broadcast_to(axes, (len(lows), *axes.shape)), axis=2)
+    coords = scaled[:, np.arange(len(axes))[:, None], axes]
     all_triangles = triangles + 24 * np.arange(len(lows), dtype=np.int32)[:, None, None]
     return Mesh(
         (scaled + lows[:, None]).reshape(-1, 3),

@@ -37,6 +37,10 @@ class Trace:
         """Rows and columns of an image's rays; `shape` is the image's (height, width)."""
         return Trace(*(part_of_image(getattr(self, f.name), shape, pixels) for f in fields(self)))
 
+    def take(self, rows: np.ndarray | slice) -> Trace:
+        """Some of the rays."""
+        return Trace(*(getattr(self, field.name)[rows] for field in fields(self)))
+
     def put(self, rows: np.ndarray, other: Trace) -> None:
         """Replace some of the rays' answers."""
         for field in fields(self):
@@ -78,19 +82,19 @@ class RayScene:
             o3d.core.Tensor(rays), tnear=0.0, tfar=end, nthreads=N_THREADS
         ).numpy()
 
-    def hits(self, trace: Trace, rays: np.ndarray, rows: np.ndarray, number: int, pixel_rad: float) -> Hits:
-        """Interpolate surface `number`'s mesh at the rays `rows` that met it."""
+    def hits(self, trace: Trace, rays: np.ndarray, number: int, pixel_rad: float) -> Hits:
+        """Interpolate surface `number`'s mesh where rays (n, 6) met it."""
         mesh = self.surfaces[number].mesh
-        local = trace.triangle[rows] - self.first_triangle[number]
-        corners = mesh.triangles[local].T.astype(np.intp)
-        second, third = trace.barycentric[rows].T
+        local = trace.triangle - self.first_triangle[number]
+        corners = np.ascontiguousarray(mesh.triangles[local].T, np.intp)
+        second, third = np.ascontiguousarray(trace.barycentric.T)
         weights = (1 - second - third, second, third)
-        depth, direction = trace.depth_m[rows], rays[rows, 3:].T
+        depth, direction = trace.depth_m, np.ascontiguousarray(rays[:, 3:].T)
         normals = interpolate(mesh.normals, corners, weights)
         # Cloth and leaves are seen from both sides.
-        away = dot(trace.face_normals[rows].T, direction) > 0
+        away = dot(trace.face_normals.T, direction) > 0
         normals *= np.where(away, -1, 1).astype(np.float32) / np.maximum(np.sqrt(dot(normals, normals)), 1e-9)
-        positions = rays[rows, :3].T + depth * direction
+        positions = rays[:, :3].T + depth * direction
         return Hits(positions, normals, interpolate(mesh.coords, corners, weights), local, depth * pixel_rad)
 
 

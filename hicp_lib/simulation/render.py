@@ -77,13 +77,17 @@ def render(world: World, camera: Camera, rng: np.random.Generator) -> Frame:
 def _paint(world: World, scene: RayScene, view: View, camera: Camera, sharp: bool, rng) -> np.ndarray:
     """Linear RGB of a view, (3, rows, columns), black where nothing is wanted."""
     looks = _gather_looks(scene, view, 1 / camera.fx_px)
-    tilt_by_height(looks, view)
-    seen = visibility(world.lights, scene, view, looks, sharp, rng)
+    positions, normals, heights = (
+        looks.on_grid(name, view) for name in ("positions_m", "normals", "height_m")
+    )
+    tilt_by_height(normals, positions, heights, view)
+    looks.normals = normals[:, looks.pixels]
+    seen = visibility(world.lights, scene, view, positions, normals, sharp, rng)
     image = np.zeros((3, view.wanted.size), np.float32)
-    pixels = np.flatnonzero(view.wanted)
-    for start in range(0, len(pixels), _BLOCK):
-        block = pixels[start : start + _BLOCK]
-        image[:, block] = _shade_block(world, looks.part(block), view.rays[block, 3:].T, seen[:, block])
+    for start in range(0, len(looks.pixels), _BLOCK):
+        block = looks.part(slice(start, start + _BLOCK))
+        direction = view.rays[block.pixels, 3:].T
+        image[:, block.pixels] = _shade_block(world, block, direction, seen[:, block.pixels])
     return image.reshape(3, *view.wanted.shape)
 
 
@@ -126,15 +130,15 @@ def _labels(scene: RayScene, trace: Trace) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _gather_looks(scene: RayScene, view: View, pixel_rad: float) -> Looks:
-    surface = np.where(view.wanted.ravel(), view.trace.surface, -1)
-    order = np.argsort(surface, kind="stable")
-    bounds = np.searchsorted(surface[order], np.arange(len(scene.surfaces) + 1))
-    looks = Looks.empty(len(surface))
-    for number, (start, stop) in enumerate(zip(bounds[:-1], bounds[1:], strict=True)):
-        if start == stop:
-            continue
-        rows = order[start:stop]
-        hits = scene.hits(view.trace, view.rays, rows, number, pixel_rad)
+    wanted = np.flatnonzero(view.wanted)
+    # Sorted by surface, each one's hits lie side by side.
+    pixels = wanted[np.argsort(view.trace.surface[wanted], kind="stable")]
+    bounds = np.searchsorted(view.trace.surface[pixels], np.arange(len(scene.surfaces) + 1))
+    looks = Looks.empty(pixels)
+    trace, rays = view.trace.take(pixels), view.rays[pixels]
+    for number in np.flatnonzero(np.diff(bounds)):
+        rows = slice(bounds[number], bounds[number + 1])
+        hits = scene.hits(trace.take(rows), rays[rows], number, pixel_rad)
         look: Look = scene.surfaces[number].material(hits)
         looks.positions_m[:, rows] = hits.positions_m
         looks.normals[:, rows] = hits.normals if look.normals is None else look.normals

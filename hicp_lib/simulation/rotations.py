@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import cos, sin, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +19,19 @@ def rotations_from_vectors(vectors: np.ndarray) -> np.ndarray:
 
 def rotation(vector: ArrayLike) -> np.ndarray:
     """Rotation matrix (3, 3) of one rotation vector (3,) in radians."""
-    return rotations_from_vectors(np.asarray(vector, float)[None])[0]
+    # Written out: poses are made of thousands of single rotations, and arrays of three are slow.
+    x, y, z = map(float, vector)
+    angle = sqrt(x * x + y * y + z * z)
+    if angle == 0:
+        return np.eye(3)
+    s, c = sin(angle) / angle, (1 - cos(angle)) / angle**2
+    return np.array(
+        [
+            [1 - c * (y * y + z * z), c * x * y - s * z, c * x * z + s * y],
+            [c * x * y + s * z, 1 - c * (x * x + z * z), c * y * z - s * x],
+            [c * x * z - s * y, c * y * z + s * x, 1 - c * (x * x + y * y)],
+        ]
+    )
 
 
 def about(axis: int, angle_rad: float) -> np.ndarray:

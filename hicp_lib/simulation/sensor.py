@@ -8,6 +8,8 @@ from functools import cache
 import cv2
 import numpy as np
 
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of linear sRGB
+
 
 @dataclass(frozen=True)
 class Sensor:
@@ -49,11 +51,12 @@ def expose(
     x = np.linspace(-1, 1, width, dtype=np.float32)[None, :]
     light *= (1 - sensor.vignette * 0.5 * (x * x + y * y))[..., None]
     light = cv2.GaussianBlur(light, (0, 0), max(sensor.blur_px, 0.2))
-    sigma = np.sqrt(sensor.shot_noise**2 * np.maximum(light, 0) + sensor.read_noise**2)
-    light += sigma * _noise(height, width, rng)
-    grey = light @ np.array([0.2126, 0.7152, 0.0722], np.float32)
-    light = grey[..., None] + sensor.saturation * (light - grey[..., None])
-    return _tone(light, sensor.contrast)
+    variance = np.maximum(light, 0)
+    variance *= np.float32(sensor.shot_noise**2)
+    variance += np.float32(sensor.read_noise**2)
+    light += cv2.sqrt(variance) * _noise(height, width, rng)
+    saturate = sensor.saturation * np.eye(3) + (1 - sensor.saturation) * _LUMINANCE
+    return _tone(cv2.transform(light, saturate.astype(np.float32)), sensor.contrast)
 
 
 @cache
@@ -75,7 +78,7 @@ def _noise(height: int, width: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def _auto_exposure(radiance: np.ndarray, meter: np.ndarray | None) -> float:
-    grey = radiance[::4, ::4] @ np.array([0.2126, 0.7152, 0.0722], np.float32)
+    grey = radiance[::4, ::4] @ _LUMINANCE
     log = np.log(np.maximum(grey, 1e-4))
     level = log.mean()
     if meter is not None and meter[::4, ::4].any():
@@ -92,4 +95,4 @@ def _tone(light: np.ndarray, contrast: float) -> np.ndarray:
     srgb = np.where(shoulder <= 0.0031308, 12.92 * shoulder, 1.055 * shoulder ** (1 / 2.4) - 0.055)
     curved = 0.5 + 0.5 * np.tanh(contrast * 2 * (srgb - 0.46)) / np.tanh(contrast)
     table = np.clip(255 * (0.35 * curved + 0.65 * srgb) + 0.5, 0, 255).astype(np.uint8)
-    return table[np.clip(light * (4095 / 4), 0, 4095).astype(np.int16)]
+    return table[np.clip(light * np.float32(4095 / 4), 0, 4095).astype(np.int16)]

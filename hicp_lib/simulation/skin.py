@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from hicp_lib.simulation import textures
 from hicp_lib.simulation.body import FIELDS, REGIONS, Body
@@ -121,12 +122,8 @@ def _knuckles(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.nda
     red = np.zeros(len(rest_m), np.float32)
     hands = np.isin(body.regions, [REGIONS.index("hand"), REGIONS.index("nail")])
     joints = landmarks_m[[94 + k for k in range(136 - 94) if k % 21 not in (0, 1, 2)]]
-    distance2 = (
-        ((rest_m[hands].astype(np.float32)[:, None] - joints[None].astype(np.float32)) ** 2)
-        .sum(-1)
-        .min(axis=1)
-    )
-    red[hands] = 0.25 + 0.5 * np.exp(-distance2 / 0.010**2)
+    distance_m, _ = KDTree(joints).query(rest_m[hands])
+    red[hands] = 0.25 + 0.5 * np.exp(-((distance_m / 0.010) ** 2))
     red += 0.4 * np.exp(-(((body.field("arm") - 1) / 0.08) ** 2)) + 0.3 * np.exp(
         -(((body.field("leg") - 1) / 0.1) ** 2)
     )

@@ -46,4 +46,6 @@ def test_opposite_directions(axis):
 
 def test_many_at_once():
     vectors = np.random.default_rng(0).normal(size=(7, 3))
-    assert rotations_from_vectors(vectors) == pytest.approx(np.array([rotation(v) for v in vectors]), abs=0)
+    assert rotations_from_vectors(vectors) == pytest.approx(
+        np.array([rotation(v) for v in vectors]), abs=1e-14
+    )
