@@ -100,7 +100,9 @@ def make_detector(name: str, **options) -> Detector:
     if name.startswith(COMBINED):
         return _make_combined(name, options)
     if name not in DETECTORS:
-        raise InputError(f"detector {name!r} is not known; expected one of: {', '.join(DETECTORS)}")
+        raise InputError(
+            f"detector {name!r} is not known; expected one of: {', '.join(DETECTORS)}, {COMBINED}BODY+HANDS"
+        )
     entry = DETECTORS[name]
     if entry.needs_model and not options.get("model"):
         raise InputError(

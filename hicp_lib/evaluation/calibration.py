@@ -1,11 +1,11 @@
 """Scores that mean the same: how often a keypoint of a given score is right, and scores made to say so.
 
-A keypoint is a *hit* when its term of OKS is at least .5 (see `oks`). The reliability of a detector's
-scores is their hit rate against the score (Niculescu-Mizil and Caruana, "Predicting good probabilities
-with supervised learning", ICML 2005); the expected calibration error is the mean distance between the
-two over bins of the score, weighted with the keypoints in them (Guo et al., "On calibration of modern
-neural networks", ICML 2017). The calibration is isotonic regression, the best monotone curve in the
-least-squares sense, so it never changes which of two keypoints of a detector is the surer one.
+The reliability of a detector's scores is the hit rate of its keypoints (see `keypoint_hits`) against the
+score (Niculescu-Mizil and Caruana, "Predicting good probabilities with supervised learning", ICML 2005);
+the expected calibration error is the mean distance between the two over bins of the score, weighted with
+the keypoints in them (Guo et al., "On calibration of modern neural networks", ICML 2017). The calibration
+is isotonic regression, the best monotone curve in the least-squares sense, so it never turns round which
+of two keypoints of a detector is the surer one.
 
 It is fitted on one half of the source images and judged on the other. Raw scores stay as they are, for
 thresholds as the paper has them; `Calibration.apply` makes new detections.
@@ -13,21 +13,17 @@ thresholds as the paper has them; `Calibration.apply` makes new detections.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from scipy.optimize import isotonic_regression
 
-from hicp_lib.annotations import Annotations
 from hicp_lib.detectors.base import Detections
 from hicp_lib.errors import InputError
-from hicp_lib.evaluation.coco import check_detections
-from hicp_lib.evaluation.oks import oks, oks_terms
-from hicp_lib.keypoints import GROUPS, SIGMAS
+from hicp_lib.keypoints import GROUPS
 
-HIT_TERM = 0.5
 N_BINS = 10
 _PERCENTILES = (2.5, 97.5)
 
@@ -77,76 +73,6 @@ class Calibration:
         return replace(found, scores=scores)
 
 
-def keypoint_hits(
-    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body", sigmas: str = "halpe"
-) -> pd.DataFrame:
-    """Which found keypoints are hits, for those whose truth is known.
-
-    Detections, best first, take the free annotated person they fit best by OKS. Keypoints without a label
-    there have no truth and are left out, and so are detections of people who do not count (crowds,
-    others, nobody labelled). A detection that fits nobody at all is wrong with every keypoint.
-
-    Returns
-    -------
-    DataFrame, columns `image_id, keypoint` (Halpe index), `score, hit` (bool)
-
-    Raises
-    ------
-    InputError
-        As `hicp_lib.evaluation.coco.evaluate`.
-    """
-    check_detections(dict(detections), annotations)
-    keypoints = GROUPS[group]
-    constants = SIGMAS[sigmas][keypoints]
-    columns: dict[str, list] = {"image_id": [], "keypoint": [], "score": [], "hit": []}
-    for image_id, found in detections.items():
-        people = annotations.take(annotations.image_ids == image_id)
-        for row, person in _pairs(people, found, keypoints, constants):
-            known, hits = _hits(people, person, found.keypoints_px[row, keypoints], keypoints, constants)
-            columns["image_id"] += [image_id] * int(known.sum())
-            columns["keypoint"] += keypoints[known].tolist()
-            columns["score"] += found.scores[row, keypoints[known]].tolist()
-            columns["hit"] += hits[known].tolist()
-    return pd.DataFrame(columns).astype({"image_id": int, "keypoint": int, "score": float, "hit": bool})
-
-
-def _pairs(
-    people: Annotations, found: Detections, keypoints: np.ndarray, sigmas: np.ndarray
-) -> Iterator[tuple[int, int | None]]:
-    """Rows of detections with the row of their person; None for those that fit nobody."""
-    points = found.keypoints_px[:, keypoints]
-    labelled = people.visibility[:, keypoints] > 0
-    fit = oks(
-        people.keypoints_px[:, None, keypoints], labelled[:, None], people.boxes_px[:, None],
-        people.areas_px2[:, None], points[None], sigmas,
-    )  # fmt: skip
-    free = np.ones(len(people), dtype=bool)
-    given = np.isfinite(points).all(axis=-1).any(axis=-1)
-    for row in np.argsort(-found.person_scores, kind="stable"):
-        if given[row]:
-            fits = np.where(free, fit[:, row], 0.0)
-            person = int(fits.argmax()) if fits.max(initial=0.0) > 0 else None
-            if person is not None:
-                free[person] = False
-            yield int(row), person
-
-
-def _hits(
-    people: Annotations, person: int | None, points: np.ndarray, keypoints: np.ndarray, sigmas: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Which keypoints (k,) of a detection have a known truth, and which are hits."""
-    given = np.isfinite(points).all(axis=-1)
-    if person is None:
-        return given, np.zeros(len(points), dtype=bool)
-    labelled = (people.visibility[person, keypoints] > 0) & (not _is_ignored(people, person))
-    terms = oks_terms(people.keypoints_px[person, keypoints], points, people.areas_px2[person], sigmas)
-    return given & labelled, terms >= HIT_TERM
-
-
-def _is_ignored(people: Annotations, person: int) -> bool:
-    return bool(people.is_crowd[person] or people.extras[person].get("other"))
-
-
 def split_half(groups: pd.Series, seed: int = 0) -> np.ndarray:
     """A random half of the groups (source images): True for rows (n,) to fit on, False for the other half.
 
@@ -164,7 +90,7 @@ def calibration_study(
 
     Parameters
     ----------
-    hits : rows of `keypoint_hits` with columns `detector, group, source_image`
+    hits : `keypoint_hits.all_hits`, or rows of `keypoint_hits` with columns `detector, group, source_image`
 
     Returns
     -------
@@ -191,6 +117,24 @@ def calibration_study(
         f"{kind}{end}" for kind in ("raw", "calibrated", "change") for end in ("", "_low", "_high")
     ]
     return pd.DataFrame(errors, columns=names), pd.concat(curves, ignore_index=True), calibrations
+
+
+def calibration_table(calibrations: Mapping[tuple[str, str], Calibration]) -> pd.DataFrame:
+    """Calibrations to be saved: columns `detector, group, score, rate`, a row per corner of a curve."""
+    rows = [
+        (*case, score, rate)
+        for case, calibration in calibrations.items()
+        for score, rate in zip(calibration.scores, calibration.rates, strict=True)
+    ]
+    return pd.DataFrame(rows, columns=["detector", "group", "score", "rate"])
+
+
+def calibrations_of(table: pd.DataFrame) -> dict[tuple[str, str], Calibration]:
+    """Calibrations by (detector, group) from a saved `calibration_table`."""
+    return {
+        case: Calibration(rows["score"].to_numpy(), rows["rate"].to_numpy())
+        for case, rows in table.groupby(["detector", "group"], sort=False)
+    }
 
 
 def _counts(rows: pd.DataFrame) -> tuple[int, int, float]:
@@ -267,30 +211,3 @@ def _error(sums: np.ndarray) -> np.ndarray:
     """Expected calibration error of sums (..., 3, 10)."""
     count, score_sum, hit_sum = np.moveaxis(sums, -2, 0)
     return np.abs(hit_sum - score_sum).sum(axis=-1) / count.sum(axis=-1)
-
-
-def all_hits(
-    truth: Mapping[str, Annotations],
-    found: Mapping[tuple[str, str], Mapping[int, Detections]],
-    groups: Mapping[str, tuple[str, ...]],
-    sources: Mapping[str, Mapping[int, Hashable]],
-) -> pd.DataFrame:
-    """`keypoint_hits` of every case: columns `subset, detector, group, source_image` and its own.
-
-    Parameters
-    ----------
-    truth : subset -> annotations
-    found : (subset, detector) -> detections by image id
-    groups : detector -> its groups of keypoints
-    sources : subset -> image id -> source image
-    """
-    tables = []
-    for subset, detector in found:
-        for group in groups[detector]:
-            table = keypoint_hits(truth[subset], found[subset, detector], group)
-            labels = {"subset": subset, "detector": detector, "group": group}
-            source = table["image_id"].map(sources[subset])
-            tables.append(
-                table.assign(**labels, source_image=source)[[*labels, "source_image", *table.columns]]
-            )
-    return pd.concat(tables, ignore_index=True)
