@@ -14,6 +14,8 @@ from hicp_lib.simulation.raycast import RayScene, Trace
 # Rotated grid: four sub-pixel positions with distinct rows and columns.
 SAMPLES_PX = np.array([[-0.125, -0.375], [0.375, -0.125], [-0.375, 0.125], [0.125, 0.375]])
 
+AROUND = [(dv, du) for dv in (-1, 0, 1) for du in (-1, 0, 1) if dv or du]  # the eight neighbours
+
 
 def edge_pixels(trace: Trace, sharp: np.ndarray) -> np.ndarray:
     """Numbers of the pixels at an outline or a step in depth where one side is `sharp`.
@@ -45,15 +47,15 @@ def smooth_edges(
     where = (np.stack([u, v], axis=1)[:, None] + SAMPLES_PX).astype(np.float32)
     found = scene.trace(pixel_rays(camera, where.reshape(-1, 2)))
     best = np.repeat(edges, len(SAMPLES_PX))
-    cost = _difference(trace, best, found, slice(None))
+    cost = _difference(trace, best, found)
     open_rows = np.flatnonzero(cost > 0.012)  # the others show what their pixel's middle shows
     v, u, cost = (np.repeat(v, 4)[open_rows], np.repeat(u, 4)[open_rows], cost[open_rows])
-    for dv in (-1, 0, 1):
-        for du in (-1, 0, 1):
-            near = np.clip(v + dv, 0, height - 1) * width + np.clip(u + du, 0, width - 1)
-            other = _difference(trace, near, found, open_rows) + np.float32(0.002)
-            better = other < cost
-            cost[better], best[open_rows[better]] = other[better], near[better]
+    found = found.take(open_rows)
+    for dv, du in AROUND:
+        near = np.clip(v + dv, 0, height - 1) * width + np.clip(u + du, 0, width - 1)
+        other = _difference(trace, near, found) + np.float32(0.002)
+        better = np.flatnonzero(other < cost)
+        cost[better], best[open_rows[better]] = other[better], near[better]
     flat = image.reshape(-1, 3)
     # Averaged after compression: a bright window does not eat its frame.
     mixed = flat[best] / (1 + flat[best])
@@ -62,10 +64,10 @@ def smooth_edges(
     return image
 
 
-def _difference(trace: Trace, pixels: np.ndarray, found: Trace, rows: np.ndarray | slice) -> np.ndarray:
+def _difference(trace: Trace, pixels: np.ndarray, found: Trace) -> np.ndarray:
     """How little pixels show what samples found: another surface, another depth, another slant."""
-    depth = np.minimum(found.depth_m[rows], 1e3)
+    depth = np.minimum(found.depth_m, 1e3)
     cost = np.abs(np.minimum(trace.depth_m[pixels], 1e3) - depth) / depth
-    cost += 10 * (trace.surface[pixels] != found.surface[rows])
-    slant = np.einsum("ij,ij->i", trace.face_normals[pixels], found.face_normals[rows])
+    cost += 10 * (trace.surface[pixels] != found.surface)
+    slant = np.einsum("ij,ij->i", trace.face_normals[pixels], found.face_normals)
     return cost + np.float32(0.04) * (1 - slant)

@@ -46,6 +46,8 @@ class Ambient:
 
 # Bayer's matrix: neighbours take samples that lie far apart.
 _STRATA = np.array([0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5])
+# Where in the square each pixel of the pattern samples, in sixteenths.
+_PLACES = np.stack([_STRATA % 8 * 2 + _STRATA // 8, 5 * _STRATA % 16]).astype(np.float32)
 
 
 def sample_offsets(row: np.ndarray, column: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -53,9 +55,8 @@ def sample_offsets(row: np.ndarray, column: np.ndarray, rng: np.random.Generator
 
     The pixels of either colour of a chessboard cover the square as well.
     """
-    number = _STRATA[(row % 4) * 4 + column % 4]
-    places = np.stack([number % 8 * 2 + number // 8, 5 * number % 16])
-    return (places + rng.random((2, len(row)), np.float32)).astype(np.float32) / 16
+    places = _PLACES[:, (row & 3) * 4 + (column & 3)]
+    return (places + rng.random((2, len(row)), np.float32)) * np.float32(1 / 16)
 
 
 def towards_light(light: Light, positions_m: np.ndarray, offsets: np.ndarray) -> np.ndarray:

@@ -112,7 +112,8 @@ def _enlarge(painted: np.ndarray, wanted: np.ndarray, surface: np.ndarray) -> np
     full = _doubled(weighted, surface.shape)
     full.reshape(-1, 4)[wrong] = weighted.reshape(-1, 4)[best]
     full = cv2.GaussianBlur(full, (0, 0), 1.1)
-    return full[..., :3] / full[..., 3:]
+    weight = np.ascontiguousarray(full[..., 3])
+    return cv2.merge([full[..., channel] / weight for channel in range(3)])
 
 
 def _doubled(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

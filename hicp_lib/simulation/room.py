@@ -141,14 +141,13 @@ def _window(rng: Rng, wall: _Wall, span: tuple[float, float], windows: list) -> 
     windows.append(
         (centre, wall.u * (span[1] - span[0]) / 2, np.array([0, 0, (high - low) / 2]), wall.inward)
     )
-    frame = []
     bars = [span[0], *np.linspace(*span, rng.integers(2, 4))[1:-1], span[1]]
-    frame += [wall.box((b - 0.03, b + 0.03), (low - 0.03, high + 0.03), (0, 0.04)) for b in bars]
-    frame += [wall.box(span, (b - 0.03, b + 0.03), (0, 0.04)) for b in (low, high)]
-    frame.append(wall.box((span[0] - 0.08, span[1] + 0.08), (low - 0.06, low - 0.03), (0, 0.16)))
+    frame = [((b - 0.03, b + 0.03), (low - 0.03, high + 0.03), (0, 0.04)) for b in bars]
+    frame += [(span, (b - 0.03, b + 0.03), (0, 0.04)) for b in (low, high)]
+    frame.append(((span[0] - 0.08, span[1] + 0.08), (low - 0.06, low - 0.03), (0, 0.16)))
     surfaces = [
         Surface(pane, m.outside(rng)),
-        Surface(g.concatenate(frame), m.plain(m.off_white(rng), 0.35)),
+        Surface(wall.boxes(frame), m.plain(m.off_white(rng), 0.35)),
     ]
     if rng.random() < 0.5:
         surfaces += _curtains(rng, wall, span, high)
@@ -173,14 +172,14 @@ def _curtains(rng: Rng, wall: _Wall, span: tuple[float, float], high: float) -> 
 def _door(rng: Rng, wall: _Wall, span: tuple[float, float]) -> list[Surface]:
     top = 2.05
     leaf = wall.panel(span, (0, top), 0.012)
-    frame = [wall.box((b - 0.04, b + 0.04), (0, top + 0.04), (0, 0.04)) for b in span]
-    frame.append(wall.box((span[0] - 0.04, span[1] + 0.04), (top, top + 0.08), (0, 0.04)))
+    parts = [((b - 0.04, b + 0.04), (0, top + 0.04), (0, 0.04)) for b in span]
+    parts.append(((span[0] - 0.04, span[1] + 0.04), (top, top + 0.08), (0, 0.04)))
     inset = (span[0] + 0.13, span[1] - 0.13)
-    panels = [wall.box(inset, v, (0.012, 0.022)) for v in ((0.2, 0.85), (1.05, 1.9))]
+    parts += [(inset, v, (0.012, 0.022)) for v in ((0.2, 0.85), (1.05, 1.9))]
     handle = wall.box((span[1] - 0.13, span[1] - 0.03), (1.02, 1.04), (0.04, 0.07))
     material = m.plain(m.off_white(rng), 0.35) if rng.random() < 0.5 else m.wooden(rng)
     return [
-        Surface(g.concatenate([leaf, *frame, *panels]), material),
+        Surface(g.concatenate([leaf, wall.boxes(parts)]), material),
         Surface(handle, m.plain(np.full(3, 0.35), 0.25, 0.5)),
     ]
 
@@ -207,10 +206,10 @@ def _shelf(rng: Rng, wall: _Wall, span: tuple[float, float]) -> list[Surface]:
     depth = rng.uniform(0.22, 0.35)
     low, high = (0.0, rng.uniform(1.2, 2.1)) if standing else (rng.uniform(1.1, 1.4), rng.uniform(1.7, 2.1))
     levels = np.linspace(low + 0.03, high, int(np.ceil((high - low) / 0.36)) + 1)
-    boards = [wall.box(span, (v - 0.012, v + 0.012), (0, depth)) for v in levels]
+    boards = [(span, (v - 0.012, v + 0.012), (0, depth)) for v in levels]
     if standing:
-        boards += [wall.box((b - 0.012, b + 0.012), (0, high), (0, depth)) for b in span]
-        boards.append(wall.box(span, (0, high), (0, 0.01)))
+        boards += [((b - 0.012, b + 0.012), (0, high), (0, depth)) for b in span]
+        boards.append((span, (0, high), (0, 0.01)))
     groups: dict[int, list] = {k: [] for k in range(5)}
     for v in levels[:-1]:
         u = span[0] + 0.03
@@ -226,7 +225,7 @@ def _shelf(rng: Rng, wall: _Wall, span: tuple[float, float]) -> list[Surface]:
             groups[int(rng.integers(5))].append(book)
             u += thick + 0.002
     wood = m.wooden(rng) if rng.random() < 0.6 else m.plain(m.off_white(rng), 0.4)
-    surfaces = [Surface(g.concatenate(boards), wood)]
+    surfaces = [Surface(wall.boxes(boards), wood)]
     for books in groups.values():
         if books:
             surfaces.append(Surface(wall.boxes(books), m.plain(m.any_colour(rng), 0.55)))

@@ -44,12 +44,11 @@ def expose(
     `meter` marks the pixels that count most for the exposure (people: cameras look for faces).
     """
     height, width = radiance.shape[:2]
-    light = radiance * (sensor.white_balance * _auto_exposure(radiance, meter) * sensor.exposure).astype(
-        np.float32
-    )
+    gains = np.diag(sensor.white_balance * _auto_exposure(radiance, meter) * sensor.exposure)
+    light = cv2.transform(radiance, gains.astype(np.float32))
     y = np.linspace(-1, 1, height, dtype=np.float32)[:, None]
     x = np.linspace(-1, 1, width, dtype=np.float32)[None, :]
-    light *= (1 - sensor.vignette * 0.5 * (x * x + y * y))[..., None]
+    light *= cv2.merge([1 - np.float32(sensor.vignette * 0.5) * (x * x + y * y)] * 3)
     light = cv2.GaussianBlur(light, (0, 0), max(sensor.blur_px, 0.2))
     variance = np.maximum(light, 0)
     variance *= np.float32(sensor.shot_noise**2)

@@ -27,11 +27,11 @@ def visibility(
     view it reaches less far.
     """
     shape = view.wanted.shape
-    turn = np.indices(shape).sum(axis=0) % 2
+    turn = (np.arange(shape[0])[:, None] + np.arange(shape[1])) & 1
     seen = np.zeros((len(sources) + 1, view.wanted.size), np.float32)
     for kind, source in enumerate([*sources, None]):
-        pixels = np.flatnonzero(view.wanted & (turn == kind % 2))
-        row, column = np.divmod(pixels, shape[1])
+        row, column = np.nonzero(view.wanted & (turn == kind % 2))
+        pixels = row * shape[1] + column
         offsets = lights.sample_offsets(row + kind, column + 3 * kind, rng)
         facing_out = normals[:, pixels]
         origins = positions_m[:, pixels] + np.float32(0.003) * facing_out
