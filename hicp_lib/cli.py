@@ -270,11 +270,13 @@ def evaluate(
     from hicp_lib.annotations import read_annotations, read_detections
     from hicp_lib.evaluation.bootstrap import bootstrap_intervals
     from hicp_lib.evaluation.coco import evaluate as evaluate_detections
+    from hicp_lib.evaluation.compare import source_images
 
     people = read_annotations(annotations)
     found = read_detections(detections, people)
     evaluation = evaluate_detections(people, found, group, sigmas=sigmas, area=area)
-    rows = bootstrap_intervals(evaluation, seed=seed).to_dict("records")
+    clusters = source_images(people)  # crops of one image are drawn together
+    rows = bootstrap_intervals(evaluation, seed=seed, clusters=clusters).to_dict("records")
     if as_json:
         figures = {row["metric"]: _finite({k: row[k] for k in ("value", "low", "high")}) for row in rows}
         _say(json.dumps(_finite(evaluation.row()) | {"metrics": figures, "seed": seed}, indent=2))
