@@ -57,7 +57,8 @@ def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, note: str) ->
         lower.set(xlabel="score", xlim=(-0.02, 1.02))
     axes[0, 0].set(ylabel="share of hits", ylim=(-0.02, 1.02))
     axes[1, 0].set(ylabel="keypoints")
-    axes[0, 0].legend(loc="upper left")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
     said = [
         f"{row.detector} {_GROUPS.get(row.group, row.group)} {row.raw:.2f} to {row.calibrated:.2f}"
         for row in errors.itertuples()

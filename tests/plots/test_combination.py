@@ -34,7 +34,7 @@ def test_reliability_is_drawn_for_raw_and_calibrated_scores():
     )  # fmt: skip
     errors, curves, _ = calibration_study(hits, n_resamples=20)
     figure = combination.reliability_curves(curves, errors, "made up")
-    upper, lower = figure.figure.axes
-    assert [text.get_text() for text in upper.get_legend().get_texts()] == ["raw", "calibrated"]
+    _, lower = figure.figure.axes
+    assert [text.get_text() for text in figure.figure.legends[0].get_texts()] == ["raw", "calibrated"]
     assert sum(bar.get_height() for bar in lower.patches) == 2 * errors["n_keypoints"].iloc[0]
     assert f"{errors['raw'].iloc[0]:.2f} to {errors['calibrated'].iloc[0]:.2f}" in figure.alt
