@@ -51,7 +51,7 @@ def outline(body: Body, shape: int | str | np.ndarray) -> Outline:
     parts = [trunk & (z >= low) & (z <= high) for low, high in zip(edges[:-1], edges[1:], strict=True)]
     parts.append(_in(body, "face") | _in(body, "scalp"))
     bones = np.array([body.skin_weights[part].sum(axis=0).argmax() for part in parts])
-    low, high = np.stack([np.percentile(vertices[part], (3, 97), axis=0) for part in parts], axis=1)
+    low, high = np.stack([np.percentile(vertices.T[:, part], (3, 97), axis=1) for part in parts], axis=1)
     half_axes = (high - low) / 2
     half_axes[:-1, 2] = (edges[1] - edges[0]) / 2
     radii = {limb[0]: _radius(body, vertices, heads, limb) for limb in (_UPPER_ARM, _FOREARM, _HAND, _THIGH)}

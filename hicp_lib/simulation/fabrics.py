@@ -198,7 +198,7 @@ def cloth_material(fabric: Fabric, cuts: Cuts, limbs: str, trim: Trim) -> Materi
         height = fabric.crease_m * (0.55 * soft + 0.30 * creased)
         albedo *= 1 + 0.10 * weave * (fabric.weave_m > 0) + 0.04 * soft
         height, albedo = _sew(trim, distance, rest, panel, height, albedo)
-        height += fabric.weave_m * weave * (hits.footprint_m < 0.002)
+        height += np.float32(fabric.weave_m) * weave * (hits.footprint_m < 0.002)
         return Look(np.clip(albedo, 0.002, 0.95), height, fabric.gloss, fabric.roughness, fabric.fuzz)
 
     return look
@@ -207,19 +207,20 @@ def cloth_material(fabric: Fabric, cuts: Cuts, limbs: str, trim: Trim) -> Materi
 def _sew(trim: Trim, distance, rest, panel, height, albedo) -> tuple[np.ndarray, np.ndarray]:
     band = distance < trim.hem
     seam = np.abs(distance - trim.hem) < 0.006
-    albedo = albedo * np.where(band, trim.band, 1) * np.where(seam, 0.8, 1)
-    height = height * np.where(band, 0.4, 1) + np.where(band, 0.0006, 0)
+    one = np.float32(1)  # with Python's numbers alone, np.where would compute in double precision
+    albedo = albedo * (np.where(band, np.float32(trim.band), one) * np.where(seam, np.float32(0.8), one))
+    height = height * np.where(band, np.float32(0.4), one) + np.float32(0.0006) * band
     if trim.line == "none":
         return height, albedo
     front = (rest[0] > 0) & (panel == 0)
     across = np.abs(rest[1])
     placket = front & (across < 0.016)
-    albedo *= np.where(front & (np.abs(across - 0.016) < 0.0015), 0.75, 1)
-    height = height + np.where(placket, 0.001, 0)
+    albedo *= np.where(front & (np.abs(across - 0.016) < 0.0015), np.float32(0.75), one)
+    height = height + np.float32(0.001) * placket
     if trim.line == "zip":
-        albedo = np.where(front & (across < 0.004), 0.25, albedo)
+        albedo = np.where(front & (across < 0.004), np.float32(0.25), albedo)
     else:
         along = np.mod(rest[2], 0.085) - 0.04
         button = front & (rest[1] ** 2 + along**2 < 0.0042**2)
         albedo = np.where(button, 0.55 * albedo + 0.25, albedo)
-    return height.astype(np.float32), albedo.astype(np.float32)
+    return height, albedo

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -30,12 +31,7 @@ SOLE_M = 0.022
 
 def put_on_shoe(shoes: Shoes, posed: PosedBody, side: str) -> g.Mesh:
     """One shoe; coords are (along from heel 0 to toe 1, across in metres, height above the sole's bottom)."""
-    body = load_body()
-    foot = np.isin(body.regions, [REGIONS.index(name) for name in ("foot", "shin", "nail")]) & (
-        body.field("leg") > 1.85
-    )
-    foot &= (body.vertices_m[0, :, 1] > 0) == (side == "left")
-    points = posed.vertices_m[foot].astype(float)
+    points = posed.vertices_m[_foot(side)].astype(float)
     frame = _frame(posed, side)
     local = (points - posed.keypoints_m[24 if side == "left" else 25]) @ frame.T  # along, across, up
     bottom = np.percentile(local[:, 2], 1)
@@ -54,6 +50,15 @@ def put_on_shoe(shoes: Shoes, posed: PosedBody, side: str) -> g.Mesh:
         axis=-1,
     )
     return g.Mesh(vertices, triangles, normals.reshape(-1, 3), coords.reshape(-1, 3).astype(np.float32))
+
+
+@cache
+def _foot(side: str) -> np.ndarray:
+    """Numbers of the vertices that a shoe goes around."""
+    body = load_body()
+    foot = np.isin(body.regions, [REGIONS.index(name) for name in ("foot", "shin", "nail")])
+    left = body.vertices_m[0, :, 1] > 0
+    return np.flatnonzero(foot & (body.field("leg") > 1.85) & (left == (side == "left")))
 
 
 def _frame(posed: PosedBody, side: str) -> np.ndarray:

@@ -37,8 +37,12 @@ class Trace:
         """Rows and columns of an image's rays; `shape` is the image's (height, width)."""
         return Trace(*(part_of_image(getattr(self, f.name), shape, pixels) for f in fields(self)))
 
-    def take(self, rows: np.ndarray | slice) -> Trace:
+    def take(self, rows: np.ndarray) -> Trace:
         """Some of the rays."""
+        return Trace(*(getattr(self, field.name).take(rows, axis=0) for field in fields(self)))
+
+    def between(self, rows: slice) -> Trace:
+        """Rays that follow one another, without a copy."""
         return Trace(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def put(self, rows: np.ndarray, other: Trace) -> None:
@@ -131,7 +135,7 @@ def trace_image(scene: RayScene, rays: np.ndarray, shape: tuple[int, int], fine:
     unknown[every_second] = False
     at = np.flatnonzero(plain)
     row, column = np.divmod(at, coarse_shape[1])
-    inverse = 1 / coarse.depth_m
+    inverse, met = 1 / coarse.depth_m, coarse.take(at)
     down, right = at + coarse_shape[1], at + 1
     for dv, du, value in (
         (0, 1, (inverse[at] + inverse[right]) / 2),
@@ -139,11 +143,11 @@ def trace_image(scene: RayScene, rays: np.ndarray, shape: tuple[int, int], fine:
         (1, 1, (inverse[at] + inverse[down + 1]) / 2),
     ):
         pixels = (2 * row + dv) * width + 2 * column + du
-        full.depth_m[pixels], full.triangle[pixels] = 1 / value, coarse.triangle[at]
-        full.surface[pixels], full.face_normals[pixels] = coarse.surface[at], coarse.face_normals[at]
+        full.depth_m[pixels], full.triangle[pixels] = 1 / value, met.triangle
+        full.surface[pixels], full.face_normals[pixels] = met.surface, met.face_normals
         unknown.ravel()[pixels] = False
     rest = np.flatnonzero(unknown)
-    full.put(rest, scene.trace(rays[rest]))
+    full.put(rest, scene.trace(rays.take(rest, axis=0)))
     return full
 
 

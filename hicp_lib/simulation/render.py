@@ -136,10 +136,10 @@ def _gather_looks(scene: RayScene, view: View, pixel_rad: float) -> Looks:
     pixels = wanted[np.argsort(view.trace.surface[wanted], kind="stable")]
     bounds = np.searchsorted(view.trace.surface[pixels], np.arange(len(scene.surfaces) + 1))
     looks = Looks.empty(pixels)
-    trace, rays = view.trace.take(pixels), view.rays[pixels]
+    trace, rays = view.trace.take(pixels), view.rays.take(pixels, axis=0)
     for number in np.flatnonzero(np.diff(bounds)):
         rows = slice(bounds[number], bounds[number + 1])
-        hits = scene.hits(trace.take(rows), rays[rows], number, pixel_rad)
+        hits = scene.hits(trace.between(rows), rays[rows], number, pixel_rad)
         look: Look = scene.surfaces[number].material(hits)
         looks.positions_m[:, rows] = hits.positions_m
         looks.normals[:, rows] = hits.normals if look.normals is None else look.normals

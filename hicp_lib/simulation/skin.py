@@ -60,7 +60,7 @@ def random_complexion(rng: np.random.Generator, tone: float, woman: bool, age: f
         iris=iris * rng.uniform(0.7, 1.2),
         lips=rng.uniform(0.3, 0.9) if woman and age > 17 and rng.random() < 0.5 else rng.uniform(0.05, 0.25),
         brows=rng.uniform(0.75, 1.0),
-        stubble=0.0 if woman or age < 18 else rng.choice([0.0, rng.uniform(0.1, 0.5)]),
+        stubble=0.0 if woman or age < 18 else float(rng.choice([0.0, rng.uniform(0.1, 0.5)])),
         freckles=rng.uniform(0.3, 1) if tone < 0.3 and rng.random() < 0.2 else 0.0,
     )
 
