@@ -140,7 +140,7 @@ def _radii(offset: np.ndarray) -> np.ndarray:
     row, column = (x.astype(int) for x in _place(offset))
     radius = np.zeros(_GRID)
     np.maximum.at(radius, (np.clip(row, 0, _GRID[0] - 1), column % _GRID[1]), np.linalg.norm(offset, axis=1))
-    for _ in range(12):  # directions no vertex lies in take their neighbours'
+    while not radius.all():  # directions no vertex lies in take their neighbours'
         padded = np.pad(radius, ((1, 1), (0, 0)), mode="edge")
         around = [np.roll(radius, s, axis=1) for s in (-1, 1)] + [padded[2:], padded[:-2]]
         radius = np.where(radius == 0, np.max(around, axis=0), radius)

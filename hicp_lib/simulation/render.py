@@ -69,7 +69,7 @@ def render(world: World, camera: Camera, rng: np.random.Generator) -> Frame:
         crop = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
         people = View.of(trace, rays, crop, person >= 0)
         painted = _paint(world, scene, people, camera, True, rng)
-        image[crop][people.wanted] = np.moveaxis(painted, 0, -1)[people.wanted]
+        cv2.copyTo(cv2.merge(list(painted)), people.wanted.astype(np.uint8), image[crop])
         image = smooth_edges(image, edge_pixels(trace, person >= 0), trace, scene, camera)
     return Frame(image, trace.depth_m.reshape(shape), person, part, scene)
 
