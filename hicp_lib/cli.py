@@ -101,11 +101,17 @@ def models() -> None:
 @models.command("list")
 def models_list() -> None:
     """List the weight files, their licences, and whether they are here."""
+    from hicp_lib.detectors.published import published, status
     from hicp_lib.detectors.zoo import list_weights
 
     for row in list_weights():
         size = f"{row['size_bytes'] / 1e6:5.1f} MB"
         _say(f"{row['name']:<32} {row['status']:<8} {size}  {row['licence']:<12} {', '.join(row['used_by'])}")
+    _say("\npublished, fetched by name:")
+    for model in published().values():
+        size = "     ? MB" if model.size_bytes is None else f"{model.size_bytes / 1e6:6.1f} MB"
+        row = f"{model.name:<32} {status(model):<10} {size}  {model.licence or 'licence ?':<12}"
+        _say(f"{row} {model.use or 'not run here'}: {model.note}")
 
 
 @models.command("fetch")
@@ -113,12 +119,21 @@ def models_list() -> None:
 def models_fetch(names: tuple[str, ...]) -> None:
     """Get the weight files that are not here, and check each against its hash.
 
-    NAME is a weight file or a detector; without any, all are fetched.
+    NAME is a weight file, a detector, or a published model; without any, all weight files are fetched,
+    and no published model.
     """
+    from hicp_lib.detectors.published import fetch_published, published
     from hicp_lib.detectors.zoo import fetch
 
-    for name in fetch(names or None):
-        _say(f"fetched {name}")
+    by_name = [name for name in names if name in published()]
+    others = [name for name in names if name not in by_name]
+    if others or not names:
+        for name in fetch(others or None):
+            _say(f"fetched {name}")
+    for name in by_name:
+        model = fetch_published(name)
+        how = f"hicp detect --detector {model.use} {model.path} ..." if model.use else model.note
+        _say(f"fetched {name}: {model.path} ({how})")
 
 
 @models.command("show")

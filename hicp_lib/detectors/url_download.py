@@ -1,0 +1,49 @@
+"""Get one file from a web address: whole or not at all, and never waiting without end."""
+
+from __future__ import annotations
+
+from http.client import HTTPException
+from pathlib import Path
+from urllib.parse import urlsplit
+from urllib.request import OpenerDirector, ProxyHandler, Request, build_opener, proxy_bypass_environment
+
+from hicp_lib.detectors.native import user_environment
+
+# Without an answer for so long, the server is given up.
+TIMEOUT_S = 30.0
+
+
+def download(url: str, target: Path, max_bytes: int) -> str | None:
+    """Write what `url` gives to `target`.
+
+    Returns
+    -------
+    None when the file is there and whole, otherwise one line saying what went wrong; `target` is then
+    not to be used.
+    """
+    request = Request(url, headers={"User-Agent": "hicp"})
+    try:
+        with _opener(url).open(request, timeout=TIMEOUT_S) as response, open(target, "wb") as file:
+            if urlsplit(response.url).scheme != urlsplit(url).scheme:
+                return f"led to {response.url}"
+            # Without the announced size, a connection that broke off would pass for a whole file.
+            announced = int(response.headers["Content-Length"] or -1)
+            if not 0 < announced <= max_bytes:
+                return f"size announced: {announced} bytes, expected up to {max_bytes}"
+            while chunk := response.read(1 << 20):
+                file.write(chunk)
+            if file.tell() != announced:
+                return f"broke off after {file.tell()} of {announced} bytes"
+    except (OSError, HTTPException, ValueError) as error:
+        return " ".join(str(error).split()).strip("<>") or type(error).__name__
+    return None
+
+
+def _opener(url: str) -> OpenerDirector:
+    """An opener with the user's proxies, also in a process that `keep_offline` has cut off."""
+    # Sorted, so that a variable in small letters wins over the same one in capitals.
+    variables = sorted(user_environment().items())
+    proxies = {k.lower().removesuffix("_proxy"): v for k, v in variables if k.lower().endswith("_proxy")}
+    if proxy_bypass_environment(urlsplit(url).hostname or "", proxies):
+        proxies = {}
+    return build_opener(ProxyHandler({scheme: proxy for scheme, proxy in proxies.items() if proxy}))
