@@ -21,6 +21,7 @@ import numpy as np
 from hicp_lib import keypoints
 from hicp_lib.detectors.base import Detections, Detector
 from hicp_lib.errors import InputError
+from hicp_lib.evaluation import oks
 from hicp_lib.files import cache_dir, sha256_bytes, sha256_file, write_bytes
 from hicp_lib.keypoints import N_KEYPOINTS
 
@@ -46,7 +47,7 @@ class Timed:
 @cache
 def code_sha256() -> str:
     """SHA-256 over the sources that turn network output into keypoints."""
-    sources = sorted(Path(__file__).parent.rglob("*.py")) + [Path(keypoints.__file__)]
+    sources = sorted(Path(__file__).parent.rglob("*.py")) + [Path(keypoints.__file__), Path(oks.__file__)]
     return sha256_bytes("".join(sha256_file(source) for source in sources).encode())
 
 
