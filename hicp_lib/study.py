@@ -75,7 +75,7 @@ class Study:
     def figure(self, name: str, figure: Figure) -> None:
         """Save a figure and show it with its caption, alt text and downloads.
 
-        A drawing is saved as PNG and SVG with its numbers as CSV, a picture (without numbers) as WebP.
+        A drawing is saved as PNG and SVG with its numbers, a picture (without any) as WebP.
         """
         kind = "webp" if figure.table is None else "png"
         content = _rendered(figure.figure, kind)
@@ -83,8 +83,9 @@ class Study:
         downloads = [kind]
         if figure.table is not None:
             write_bytes(self.folder / f"{name}.svg", _rendered(figure.figure, "svg"))
+            self.save(name, figure.table)
             _write_csv(self.folder / f"{name}.csv", figure.table)
-            downloads += ["svg", "csv"]
+            downloads += ["svg", "parquet", "csv"]
         self._captions[name] = {"file": f"{name}.{kind}", "caption": figure.caption, "alt": figure.alt}
         source = f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
         image = f'<img src="{source}" alt="{html.escape(figure.alt)}">'
