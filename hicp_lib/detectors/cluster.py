@@ -12,6 +12,7 @@ Dask's workers execute what its clients send them: connect only to a cluster you
 from __future__ import annotations
 
 import logging
+import re
 import threading
 import warnings
 from collections.abc import Callable, Hashable, Iterator
@@ -33,6 +34,8 @@ from hicp_lib.images import decode_image
 if TYPE_CHECKING:
     from distributed import Client, Future
 
+# Checked here, since Dask starts threads, and for an empty address a cluster, before it looks.
+_ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+:\d{1,5}")
 Key = TypeVar("Key", bound=Hashable)
 Answer = TypeVar("Answer")
 # How long to wait for the scheduler, and for workers where there are none.
@@ -86,6 +89,8 @@ def _connected(address: str) -> Iterator[Client]:
         raise InputError(
             "Dask is not installed here; install this package's extra 'dask': pip install distributed"
         ) from None
+    if not _ADDRESS.fullmatch(address):
+        raise InputError(f"{address}: no Dask scheduler answers (no address); give one's, tcp://HOST:PORT")
     with _quiet("distributed.client"):
         try:
             client = Client(address, timeout=PATIENCE_S)

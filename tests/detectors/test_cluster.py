@@ -15,6 +15,8 @@ from hicp_lib.detectors import cluster, registry, run
 from hicp_lib.errors import InputError
 from hicp_lib.images import write_png
 
+pytestmark = pytest.mark.cluster
+
 
 @contextmanager
 def dask_cluster(slow, n_workers=2, *arguments, **environment):
@@ -28,7 +30,7 @@ def dask_cluster(slow, n_workers=2, *arguments, **environment):
         worker = ("-m", "dask", "worker", *local, *named, *options, *arguments)
         processes.append(slow.start(*worker, **environment))
     try:
-        while not file.exists():
+        while not (file.exists() and file.read_text().endswith("}")):
             assert processes[0].poll() is None, processes[0].communicate()
             time.sleep(0.02)
         yield json.loads(file.read_text())["address"], processes
