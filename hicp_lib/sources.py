@@ -11,8 +11,8 @@ from hicp_lib.files import cache_dir, read_json, sha256_file
 from hicp_lib.hicp_dataset import create_hicp
 from hicp_lib.provenance import DATA_DIR, LIBRARY_DIR, digest, files_sha256, input_sha256
 
-# What crops are made by: a change there makes them anew.
-_CROP_MODULES = (
+# What annotations and crops are written by: a change there makes scenes and crops anew.
+_WRITING_MODULES = (
     "annotations.py",
     "coco_rows.py",
     "files.py",
@@ -90,7 +90,8 @@ def open_source(
 
 def _rendered(n_scenes: int, seed: int) -> tuple[Path, Path]:
     renderer = files_sha256((LIBRARY_DIR / "simulation").glob("*.py"), LIBRARY_DIR)
-    key = digest([n_scenes, seed, renderer, files_sha256(DATA_DIR.glob("body*"), DATA_DIR)])
+    body = files_sha256(DATA_DIR.glob("body*"), DATA_DIR)
+    key = digest([n_scenes, seed, renderer, body, _writing_rules()])
     folder = cache_dir() / "scenes" / key[:16]
     if not (folder / "annotations.json").is_file():
         from hicp_lib.simulation.scenes import render_dataset  # Open3D takes a second to load
@@ -99,13 +100,17 @@ def _rendered(n_scenes: int, seed: int) -> tuple[Path, Path]:
     return folder / "annotations.json", folder / "images"
 
 
+def _writing_rules() -> str:
+    return files_sha256((LIBRARY_DIR / name for name in _WRITING_MODULES), LIBRARY_DIR)
+
+
 def _crops(annotations: Path, images: Path, min_pixels: int) -> Path:
     if not annotations.is_file():
         raise InputError(f"{annotations}: is not there; give the path of the annotation file")
     if not images.is_dir():
         raise InputError(f"{images}: is not there; give the folder that holds the annotated images")
-    rules = files_sha256((LIBRARY_DIR / name for name in _CROP_MODULES), LIBRARY_DIR)
-    key = digest([sha256_file(annotations), str(images.resolve()), input_sha256(images), min_pixels, rules])
+    made_of = [sha256_file(annotations), str(images.resolve()), input_sha256(images), min_pixels]
+    key = digest([*made_of, _writing_rules()])
     folder = cache_dir() / "hicp" / key[:16]
     if not (folder / "summary.json").is_file():
         create_hicp(annotations, images, folder, min_pixels=min_pixels, progress=sys.stderr.isatty())

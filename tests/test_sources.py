@@ -45,7 +45,7 @@ def test_a_changed_image_limit_or_rule_makes_new_crops(halpe, monkeypatch, tmp_p
     folders.add(open_source("halpe", *halpe, min_pixels=30_000).basic)
     cv2.imwrite(str(halpe[1] / "1.png"), np.full((300, 300, 3), 81, np.uint8))
     folders.add(open_source("halpe", *halpe).basic)
-    monkeypatch.setattr(sources, "_CROP_MODULES", sources._CROP_MODULES[:-1])
+    monkeypatch.setattr(sources, "_WRITING_MODULES", sources._WRITING_MODULES[:-1])
     folders.add(open_source("halpe", *halpe).basic)
     assert len(folders) == 4
 
