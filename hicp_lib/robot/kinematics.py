@@ -1,0 +1,197 @@
+"""Kinematics of the iCub: where its links, its camera and points of its skin are.
+
+Root frame: origin on the axis of torso pitch, between the legs; metres, x backward, y to the robot's
+right, z up. Angles in radians, without clamping to the limits. Every chain begins at the root with the
+three joints of the torso, in the order pitch, roll, yaw (motor boards report another one: see `boards`).
+Poses and Jacobians are Pinocchio's, on models built from the tables in data/icub.json.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from hicp_lib.errors import InputError
+from hicp_lib.robot.tables import Cable, Row, Tables, read_tables
+
+TORSO_JOINTS = ("torso_pitch", "torso_roll", "torso_yaw")
+HEAD_JOINTS = (*TORSO_JOINTS, "neck_pitch", "neck_roll", "neck_yaw")
+ARM_JOINTS = (
+    *TORSO_JOINTS, "shoulder_pitch", "shoulder_roll", "shoulder_yaw",
+    "elbow", "wrist_prosup", "wrist_pitch", "wrist_yaw",
+)  # fmt: skip
+"""Joints of the head chain, and of either arm's; the angles of a chain come in this order."""
+
+
+class Chain:
+    """A chain of joints from the root to a hand, the head centre or an eye.
+
+    One object serves one thread at a time: Pinocchio keeps its intermediate results in it.
+
+    Attributes
+    ----------
+    name : "head", "left", "right", "left_eye" or "right_eye"
+    joints : names of the joints, n of them, in the order of the angles
+    links : names of the frames after each row of the table
+    limits_rad : (n, 2), lowest and highest angle of every joint
+    cables : (k, n), lower_rad (k,), upper_rad (k,): `lower <= cables @ q <= upper` (arms only, else k = 0)
+    """
+
+    def __init__(self, name: str, tables: Tables, rows: Sequence[Row], limits: str):
+        self.name = name
+        self.joints = tuple(row.joint for row in rows if row.joint)
+        self.links = tuple(row.link for row in rows)
+        self.limits_rad = np.array([tables.limits_rad[limits][joint] for joint in self.joints])
+        self.cables, self.cables_lower_rad, self.cables_upper_rad = _cables(tables.cables, self.joints)
+        self._model = _model(tables.T_root_base, rows)
+        self._data = self._model.createData()
+        self._frames = {link: self._model.getFrameId(link) for link in self.links}
+
+    def T_root_link(self, link: str, q_rad: np.ndarray) -> np.ndarray:
+        """Poses of a link in the root frame.
+
+        Parameters
+        ----------
+        link : one of `links`
+        q_rad : (..., n) angles in the order of `joints`
+
+        Returns
+        -------
+        (..., 4, 4)
+        """
+        q = np.asarray(q_rad, dtype=float)
+        frame = self._frame(link)
+        poses = np.empty((*q.shape[:-1], 4, 4))
+        for index in np.ndindex(q.shape[:-1]):
+            pin.forwardKinematics(self._model, self._data, q[index])
+            poses[index] = pin.updateFramePlacement(self._model, self._data, frame).homogeneous
+        return poses
+
+    def T_root_links(self, q_rad: np.ndarray) -> dict[str, np.ndarray]:
+        """Poses (4, 4) of all links in the root frame at the angles (n,)."""
+        pin.framesForwardKinematics(self._model, self._data, np.asarray(q_rad, dtype=float))
+        return {link: self._data.oMf[frame].homogeneous for link, frame in self._frames.items()}
+
+    def jacobian(self, link: str, q_rad: np.ndarray, points_link_m: np.ndarray | None = None) -> np.ndarray:
+        """How points fixed to a link move with the joints.
+
+        Parameters
+        ----------
+        link : one of `links`
+        q_rad : (n,) angles
+        points_link_m : (..., 3) points in the link's frame; its origin when left out
+
+        Returns
+        -------
+        (..., 3, n), metres per radian along the axes of the root frame
+        """
+        frame = self._frame(link)
+        full = pin.computeFrameJacobian(
+            self._model, self._data, np.asarray(q_rad, dtype=float), frame, pin.LOCAL_WORLD_ALIGNED
+        )
+        if points_link_m is None:
+            return full[:3].copy()
+        # v = v_origin + w x r, with r from the link's origin to the point, in root axes
+        arms = np.asarray(points_link_m) @ self._data.oMf[frame].rotation.T
+        return full[:3] + np.cross(full[3:].T, arms[..., None, :]).swapaxes(-1, -2)
+
+    def _frame(self, link: str) -> int:
+        if link not in self._frames:
+            raise ValueError(f"the {self.name} chain has no link {link!r}; it has {', '.join(self.links)}")
+        return self._frames[link]
+
+
+@dataclass(frozen=True, eq=False)
+class ICub:
+    """An iCub: its chains, its camera holders and where the parts of its skin are fixed.
+
+    Attributes
+    ----------
+    chains : "head" (6 joints), "left" and "right" (10), "left_eye" and "right_eye" (8)
+    T_head_camera : name of the camera holder -> (4, 4), colour camera in the frame of link "head"
+    parts : part of the skin -> (chain, link)
+    """
+
+    chains: dict[str, Chain]
+    T_head_camera: dict[str, np.ndarray]
+    parts: dict[str, tuple[str, str]]
+
+    def T_root_camera(self, head_rad: np.ndarray, mount: str = "level") -> np.ndarray:
+        """Poses of the colour camera (x right, y down, z forward) in the root frame.
+
+        Parameters
+        ----------
+        head_rad : (..., 6) angles of `HEAD_JOINTS`
+        mount : camera holder, "level" (looks 5.9 degrees down) or "tilted" (44.8 degrees)
+
+        Returns
+        -------
+        (..., 4, 4)
+
+        Raises
+        ------
+        ValueError
+            For an unknown holder.
+        """
+        if mount not in self.T_head_camera:
+            raise ValueError(f"no camera holder {mount!r}; there are {', '.join(self.T_head_camera)}")
+        return self.chains["head"].T_root_link("head", head_rad) @ self.T_head_camera[mount]
+
+
+def load_icub(head: str = "v2", arm: str = "v1", limits: str = "table") -> ICub:
+    """An iCub of the given versions.
+
+    Which versions the paper's robot has is not published: head "v2" (the one the camera holders were
+    measured on) and arm "v1" (the one whose table reproduces logged positions of a real robot) are assumed.
+
+    Parameters
+    ----------
+    head : "v1" or "v2"
+    arm : "v1", "v1.7" or "v2"
+    limits : "table", the mechanical ones, or "software", the tighter ones of the robot's firmware
+
+    Raises
+    ------
+    InputError
+        For an unknown version or set of limits.
+    """
+    tables = read_tables()
+    for name, known in ((head, tables.heads), (arm, tables.arms), (limits, tables.limits_rad)):
+        if name not in known:
+            raise InputError(f"no {name!r} in the robot's tables; choose one of {', '.join(known)}")
+    neck = tables.torso + tables.heads[head]
+    rows = {name: neck + eyes for name, eyes in tables.eyes.items()}
+    rows |= {side: tables.torso + table for side, table in tables.arms[arm].items()}
+    chains = {name: Chain(name, tables, table, limits) for name, table in rows.items()}
+    return ICub(chains, tables.T_head_camera, tables.parts)
+
+
+def _model(T_root_base: np.ndarray, rows: Sequence[Row]) -> pin.Model:
+    """A serial model with a joint about z for each row that has one, and a frame after every row."""
+    model = pin.Model()
+    joint, placement = 0, pin.SE3(T_root_base)
+    for row in rows:
+        if row.joint:
+            joint = model.addJoint(joint, pin.JointModelRZ(), placement, row.joint)
+            placement = pin.SE3.Identity()
+        placement = placement * _after_joint(row)
+        model.addFrame(pin.Frame(row.link, joint, 0, placement, pin.FrameType.OP_FRAME))
+    return model
+
+
+def _after_joint(row: Row) -> pin.SE3:
+    turn = pin.SE3(pin.utils.rotate("z", row.offset_rad), np.array([0.0, 0.0, row.d_m]))
+    return turn * pin.SE3(pin.utils.rotate("x", row.alpha_rad), np.array([row.a_m, 0.0, 0.0]))
+
+
+def _cables(cables: Sequence[Cable], joints: Sequence[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    mine = [cable for cable in cables if set(cable.joints) <= set(joints)]
+    factors = np.array([[cable.joints.get(joint, 0.0) for joint in joints] for cable in mine])
+    return (
+        factors.reshape(len(mine), len(joints)),
+        np.array([cable.lower_rad for cable in mine]),
+        np.array([cable.upper_rad for cable in mine]),
+    )
