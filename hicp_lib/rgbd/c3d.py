@@ -28,7 +28,7 @@ except (ImportError, ValueError, OSError):  # no such limit on this system
     pass
 import ezc3d, numpy
 file = ezc3d.c3d(sys.argv[1])
-point, header = file["parameters"]["POINT"], file["header"]["points"]
+point = file["parameters"]["POINT"]
 labels = sorted((key for key in point if key.startswith("LABELS")), key=lambda key: int(key[6:] or 1))
 numpy.savez(
     sys.argv[2],
@@ -37,7 +37,6 @@ numpy.savez(
     names=numpy.array([name for key in labels for name in point[key]["value"]], dtype=str),
     rate=numpy.ravel(point["RATE"]["value"])[:1],
     units=numpy.array(point["UNITS"]["value"], dtype=str),
-    n_stated=header["last_frame"] - header["first_frame"] + 1,
 )
 """
 
@@ -61,10 +60,10 @@ def read_points(path: Path) -> Points:
     """
     try:
         with open(path, "rb") as file:
-            magic = file.read(2)
+            head = file.read(10)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a C3D file") from None
-    if magic[1:] != b"\x50":
+    if len(head) < 10 or head[1:2] != b"\x50":
         raise InputError(f"{path}: is not a C3D file (its second byte is not 80); export it again")
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "points.npz"
@@ -76,17 +75,15 @@ def read_points(path: Path) -> Points:
         if not done:
             raise InputError(f"{path}: cannot be read as C3D; it may be cut off, export it again")
         with np.load(out, allow_pickle=False) as stored:
-            return _checked(path, **{key: stored[key] for key in stored.files})
+            points = _checked(path, **{key: stored[key] for key in stored.files})
+    _refuse_cut_off(path, head, len(points[0]))
+    return points
 
 
-def _checked(path: Path, points, residuals, names, rate, units, n_stated) -> Points:
+def _checked(path: Path, points, residuals, names, rate, units) -> Points:
     names = tuple(str(name).strip() for name in names[: points.shape[1]])
     if not names or len(names) != points.shape[1] or len(set(names)) != len(names) or "" in names:
         raise InputError(f"{path}: POINT:LABELS does not name every marker once; name them in Qualisys")
-    if points.shape[2] < n_stated:
-        raise InputError(
-            f"{path}: holds {points.shape[2]} of {n_stated} frames; it is cut off, export it again"
-        )
     if not len(rate) or not 0 < rate[0] <= _MAX_RATE_HZ:
         raise InputError(f"{path}: POINT:RATE is missing or wrong; expected frames per second")
     if not len(units) or str(units[0]) not in _UNITS_M:
@@ -94,6 +91,13 @@ def _checked(path: Path, points, residuals, names, rate, units, n_stated) -> Poi
     points_m = np.moveaxis(points, 0, -1).swapaxes(0, 1) * _UNITS_M[str(units[0])]
     valid = (residuals.T >= 0) & np.isfinite(points_m).all(axis=2)
     return np.where(valid[..., None], points_m, np.nan), names, float(rate[0])
+
+
+def _refuse_cut_off(path: Path, head: bytes, n_frames: int) -> None:
+    """ezc3d keeps quiet about frames that are missing at the end; the fourth and fifth word number them."""
+    first, last = np.frombuffer(head, "<u2")[3:5].astype(int)
+    if n_frames < last - first + 1:
+        raise InputError(f"{path}: holds {n_frames} of {last - first + 1} frames: cut off, export it again")
 
 
 def write_points(path: str | Path, points_m: np.ndarray, names: tuple[str, ...], rate_hz: float) -> None:

@@ -170,11 +170,11 @@ def test_any_bytes_are_read_or_answered_with_an_input_error(tmp_path, content):
 
 
 def test_damaged_c3d_is_answered_in_one_line(tmp_path):
-    mocap = MotionCapture(np.arange(16) / 100, ("a", "b"), np.ones((16, 2, 3)), 100.0)
+    mocap = MotionCapture(np.arange(99) / 100, ("a", "b"), np.ones((99, 2, 3)), 100.0)
     whole, path = tmp_path / "whole.c3d", tmp_path / "mocap.c3d"
     write_c3d(whole, mocap)
     raw = whole.read_bytes()
-    for content in (b"", b"\x02", b"no C3D", raw[:600], raw[:-300], b"\x02\x50" + bytes(2000)):
+    for content in (b"", b"\x02", b"no C3D", raw[:600], raw[:-1000], b"\x02\x50" + bytes(2000)):
         path.write_bytes(content)
         with pytest.raises(InputError, match="C3D|cut off") as caught:
             read_mocap(path)
