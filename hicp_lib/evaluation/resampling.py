@@ -1,0 +1,53 @@
+"""Resampling of images by how often each is drawn: medians and shares in every draw at once.
+
+The first draw is the sample itself, each image once; the others are the bootstrap's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+_PERCENTILES = (2.5, 97.5)
+
+
+def draw_counts(n: int, n_resamples: int, seed: int) -> np.ndarray:
+    """How often each of `n` images is drawn, shape (1 + n_resamples, n); the first row is once each."""
+    drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), size=n_resamples)
+    return np.concatenate([np.ones((1, n), dtype=int), drawn])
+
+
+def with_interval(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The value in the first draw, and the bounds of the 95 % percentile interval of the others.
+
+    `draws` has the draws along its first axis. Draws in which nothing counts (NaN) are left out; NaN where
+    no draw is left.
+    """
+    others = draws[1:]
+    bounds = np.full((2, *draws.shape[1:]), np.nan)
+    some = np.isfinite(others).any(axis=0)
+    bounds[:, some] = np.nanpercentile(others[:, some], _PERCENTILES, axis=0)
+    return draws[0], *bounds
+
+
+def weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Medians of values that are each counted as often as its weight says; NaN is left out.
+
+    Parameters
+    ----------
+    values : array, shape (n,), or (draws, n) when every draw has its own
+    weights : array, shape (draws, n), whole numbers
+
+    Returns
+    -------
+    array, shape (draws,): what `np.nanmedian` of the repeated values is; NaN where none was drawn
+    """
+    rows = np.atleast_2d(values)
+    order = np.argsort(rows, axis=1)  # NaN last
+    ordered = np.take_along_axis(rows, order, axis=1)
+    ordered, order = (np.broadcast_to(array, weights.shape) for array in (ordered, order))
+    counts = np.cumsum(np.where(np.isfinite(ordered), np.take_along_axis(weights, order, axis=1), 0), axis=1)
+    total = counts[:, -1:]
+    ranks = ((total + 1) // 2, total // 2 + 1)  # the two in the middle, or the one twice
+    places = [np.minimum((counts < rank).sum(axis=1), weights.shape[1] - 1)[:, None] for rank in ranks]
+    lower, upper = (np.take_along_axis(ordered, place, axis=1)[:, 0] for place in places)
+    return np.where(total[:, 0] > 0, (lower + upper) / 2, np.nan)
