@@ -57,7 +57,7 @@ def arun(points_a_m: np.ndarray, points_b_m: np.ndarray) -> RigidFit:
     if a.shape != b.shape or a.ndim != 2 or a.shape[1] != 3:
         raise ValueError(f"matched points (n, 3) are needed, not {a.shape} and {b.shape}")
     if len(a) < 3:
-        raise InputError(f"{len(a)} matched points do not fix a rigid transform; give at least 3 off one line")
+        raise InputError(f"{len(a)} matched points do not fix a rigid transform; 3 off one line are needed")
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
         raise InputError("matched points must be finite; leave out those without a position")
     ratio = min(_spread_ratio(a), _spread_ratio(b))

@@ -1,0 +1,216 @@
+"""Errors of lifted keypoints against motion capture (paper section IV-C, Tables III and IV).
+
+The reference of a joint is the mean of its two markers, as in the paper. Simulated recordings also know
+the joint's centre, which no marker can sit on; errors against it are reported beside.
+
+Throughout, `errors` is the table of `mocap_errors`: one row per detector, method, joint and *frame*, also
+where nothing was found, so that what is missing counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.errors import InputError
+from hicp_lib.evaluation.resampling import weighted_median, with_interval
+from hicp_lib.evaluation.time_blocks import block_length, draw_blocks
+from hicp_lib.files import read_json
+from hicp_lib.provenance import DATA_DIR
+from hicp_lib.rgbd.camera import transform
+from hicp_lib.rgbd.qualisys import MotionCapture
+from hicp_lib.rgbd.synchronisation import interpolate_mocap
+
+# Elbows and wrists are in the paper's tables; shoulders are reported apart.
+TABLE_JOINTS = ("left_elbow", "right_elbow", "left_wrist", "right_wrist")
+JOINTS = (*TABLE_JOINTS, "left_shoulder", "right_shoulder")
+MARKERS: dict[str, tuple[str, str]] = {
+    joint: (f"{part}_{side}_1", f"{part}_{side}_2") for joint in JOINTS for side, part in [joint.split("_")]
+}
+MIN_SCORES = (0.3, 0.1)
+THRESHOLDS_M = (0.025, 0.05, 0.1)
+POSITION = ["x_m", "y_m", "z_m"]
+_CASE = ["detector", "method", "keypoint"]
+
+
+def marker_means(
+    mocap: MotionCapture, stamps_s: np.ndarray, T_base_mocap: np.ndarray, joints: Sequence[str] = JOINTS
+) -> pd.DataFrame:
+    """Where motion capture has the joints at the camera's stamps: the mean of each joint's two markers.
+
+    Parameters
+    ----------
+    stamps_s : array, shape (n,), on the motion capture's clock
+    T_base_mocap : array, shape (4, 4)
+
+    Returns
+    -------
+    DataFrame, n rows per joint, columns `frame, keypoint, x_m, y_m, z_m` (base frame); NaN where one of
+    the two markers is missing
+
+    Raises
+    ------
+    InputError
+        If a joint's markers are not among the names.
+    """
+    missing = [name for joint in joints for name in MARKERS[joint] if name not in mocap.names]
+    if missing:
+        raise InputError(
+            f"motion capture has no marker {missing[0]!r}; name the markers {MARKERS['left_elbow'][0]}, "
+            f"{MARKERS['left_elbow'][1]} and so on, two per joint"
+        )
+    columns = [mocap.names.index(name) for joint in joints for name in MARKERS[joint]]
+    points_m = interpolate_mocap(mocap.times_s, mocap.points_m[:, columns], stamps_s)
+    means_m = transform(T_base_mocap, points_m.reshape(len(stamps_s), -1, 2, 3).mean(axis=2))
+    frame, joint = np.divmod(np.arange(means_m.shape[0] * len(joints)), len(joints))
+    table = pd.DataFrame(means_m.reshape(-1, 3), columns=POSITION)
+    return table.assign(frame=frame, keypoint=np.array(joints)[joint])[["frame", "keypoint", *POSITION]]
+
+
+def mocap_errors(
+    points: pd.DataFrame, reference: pd.DataFrame, truth: pd.DataFrame | None = None
+) -> pd.DataFrame:
+    """Distances of the lifted joints from motion capture, and from the true joint centres.
+
+    Parameters
+    ----------
+    points : `lift_recording`'s table with columns `detector, method` before its own; the person with the
+        best score of a frame counts
+    reference : as from `marker_means`
+    truth : as from `read_truth`; None where it is not known
+
+    Returns
+    -------
+    DataFrame, a row per detector, method and row of `reference`: columns `detector, method, frame,
+    keypoint, x_m, y_m, z_m, score` (0 where not detected), `reference_x_m, reference_y_m, reference_z_m,
+    error_m` (NaN where not lifted or the reference is missing), `centre_error_m` (NaN without truth)
+    """
+    keys = ["frame", "keypoint"]
+    at = reference.rename(columns={name: f"reference_{name}" for name in POSITION})
+    centres = pd.DataFrame(columns=[*keys, *POSITION]) if truth is None else truth[[*keys, *POSITION]]
+    at = at.merge(centres.rename(columns={name: f"centre_{name}" for name in POSITION}), on=keys, how="left")
+    tables = []
+    for (detector, method), rows in points[points["person"] == 0].groupby(["detector", "method"], sort=False):
+        table = at.merge(rows[[*keys, *POSITION, "score"]], on=keys, how="left").fillna({"score": 0.0})
+        for name, column in (("reference", "error_m"), ("centre", "centre_error_m")):
+            other = table[[f"{name}_{axis}" for axis in POSITION]].to_numpy(float)
+            table[column] = np.linalg.norm(table[POSITION].to_numpy(float) - other, axis=1)
+        table = table.drop(columns=[f"centre_{axis}" for axis in POSITION])
+        tables.append(table.assign(detector=detector, method=method))
+    result = pd.concat(tables, ignore_index=True)
+    return result[["detector", "method", *result.columns.drop(["detector", "method"])]]
+
+
+def median_errors(
+    errors: pd.DataFrame,
+    min_scores: Sequence[float] = MIN_SCORES,
+    n_resamples: int = 1000,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Count and median distance of the keypoints above a score: Tables III and IV.
+
+    Returns
+    -------
+    DataFrame, columns `detector, method, keypoint, min_score, count` (frames with the keypoint above the
+    score, lifted, and motion capture), `n_frames` (with motion capture), `median_m, low_m, high_m` (95 %
+    moving block bootstrap), `centre_median_m` (against the joint's centre), `block_frames`
+    """
+    rows = []
+    length = _block_length(errors)
+    for case, part in errors.groupby(_CASE, sort=False):
+        weights = draw_blocks(len(part), length, n_resamples, seed)
+        for min_score in min_scores:
+            values = np.where(part["score"] > min_score, part["error_m"], np.nan)
+            centre = part.loc[part["score"] > min_score, "centre_error_m"].median()
+            numbers = with_interval(weighted_median(values, weights))
+            counts = (int(np.isfinite(values).sum()), int(part["reference_x_m"].notna().sum()))
+            rows.append((*case, min_score, *counts, *map(float, numbers), centre, length))
+    columns = [*_CASE, "min_score", "count", "n_frames", "median_m", "low_m", "high_m"]
+    return pd.DataFrame(rows, columns=[*columns, "centre_median_m", "block_frames"])
+
+
+def fractions_within(
+    errors: pd.DataFrame,
+    thresholds_m: Sequence[float] = THRESHOLDS_M,
+    min_score: float = 0.1,
+    n_resamples: int = 1000,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Fraction of the frames with motion capture in which a joint was found within a distance of it.
+
+    Returns
+    -------
+    DataFrame, columns `detector, method, keypoint, threshold_m, value, low, high` (95 % moving block
+    bootstrap)
+    """
+    rows = []
+    length = _block_length(errors)
+    for case, part in errors.groupby(_CASE, sort=False):
+        weights = draw_blocks(len(part), length, n_resamples, seed) * part["reference_x_m"].notna().to_numpy()
+        total = np.maximum(weights.sum(axis=1), 1)
+        found_m = np.where(part["score"] > min_score, part["error_m"], np.nan)
+        for threshold_m in thresholds_m:
+            shares = (weights * (found_m <= threshold_m)).sum(axis=1) / total
+            rows.append((*case, threshold_m, *map(float, with_interval(shares))))
+    return pd.DataFrame(rows, columns=[*_CASE, "threshold_m", "value", "low", "high"])
+
+
+def errors_by(
+    errors: pd.DataFrame, column: str, edges: Sequence[float], min_score: float = 0.1
+) -> pd.DataFrame:
+    """Median and quartiles of the error over bins of another column (distance, score).
+
+    Returns
+    -------
+    DataFrame, columns `detector, method, keypoint, left, right` (the bin, closed on the left), `n,
+    median_m, lower_m, upper_m`
+    """
+    found = errors[(errors["score"] > min_score) & errors["error_m"].notna()]
+    bins = pd.cut(found[column], list(edges), right=False).rename("bin")
+    grouped = found.groupby([*_CASE, bins], sort=False, observed=True)["error_m"]
+    table = grouped.quantile([0.25, 0.5, 0.75]).unstack().set_axis(["lower_m", "median_m", "upper_m"], axis=1)
+    table = table.assign(n=grouped.size()).reset_index()
+    ends = {"left": [b.left for b in table["bin"]], "right": [b.right for b in table["bin"]]}
+    columns = [*_CASE, "left", "right", "n", "median_m", "lower_m", "upper_m"]
+    return table.assign(**ends)[columns].sort_values([*_CASE, "left"], ignore_index=True)
+
+
+def paper_medians() -> pd.DataFrame:
+    """The paper's Tables III and IV: columns `detector, keypoint, min_score, count, median_m`."""
+    table = read_json(DATA_DIR / "paper.json")["mocap"]
+    frame = pd.DataFrame(table["rows"], columns=table["columns"])
+    return frame.assign(median_m=frame.pop("median_cm") / 100)
+
+
+def beside_paper(medians: pd.DataFrame, min_score: float) -> pd.DataFrame:
+    """One of the paper's two tables, what was measured here above the paper's own rows, for showing.
+
+    Returns
+    -------
+    DataFrame, columns `detector` and one per joint, as text: count / median [cm], and here the 95 % interval
+    """
+    here = medians[medians["keypoint"].isin(TABLE_JOINTS)]
+    paper = paper_medians()
+    rows = pd.concat([here, paper.assign(detector=paper["detector"] + " (paper)")])
+    rows = rows[rows["min_score"] == min_score]
+    cells = rows.assign(cell=[_cell(row) for row in rows.to_dict("records")])
+    table = cells.pivot(index="detector", columns="keypoint", values="cell").loc[
+        list(dict.fromkeys(rows["detector"])), list(TABLE_JOINTS)
+    ]
+    return table.rename(columns=lambda name: name.replace("_", " ")).reset_index().rename_axis(columns=None)
+
+
+def _cell(row: dict) -> str:
+    if row["count"] == 0:
+        return "0"
+    given = np.isfinite(row["low_m"])
+    interval = f" ({100 * row['low_m']:.1f}–{100 * row['high_m']:.1f})" if given else ""
+    return f"{row['count']:.0f} / {100 * row['median_m']:.1f}{interval}"
+
+
+def _block_length(errors: pd.DataFrame) -> int:
+    """One length for the whole table, so that its rows are comparable."""
+    series = errors.pivot_table(index="frame", columns=_CASE, values="error_m", dropna=False)
+    return block_length(series.to_numpy(float))
