@@ -10,7 +10,15 @@ import pandas as pd
 from hicp_lib.detectors.base import Detections
 from hicp_lib.images import read_image
 from hicp_lib.plots.people import detections_grid
-from hicp_lib.plots.style import THRESHOLD_MARKERS, Figure, detector_colour, in_style, in_words, new_figure
+from hicp_lib.plots.style import (
+    THRESHOLD_MARKERS,
+    Figure,
+    detector_colour,
+    in_style,
+    in_words,
+    legend_entries,
+    new_figure,
+)
 
 _GROUP_TITLES = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
 _THRESHOLDS = {".5": ("AP50", "AR50"), ".75": ("AP75", "AR75"), ".5:.95": ("AP", "AR")}
@@ -165,20 +173,13 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
             axis.set_xlabel("OKS of the best detection")
         if j == 0:
             axis.set_ylabel("share of people at least as good")
-    handles, labels = _all_handles(axes)
+    handles, labels = legend_entries(axes)
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9)
     caption = (
         f"Share of annotated people whose best-fitting detection reaches a given OKS, on {data_note}; "
         "a person nobody found counts with OKS 0."
     )
     return Figure(figure, caption, f"Curves per detector. Median OKS: {in_words(medians)}.", table)
-
-
-def _all_handles(axes):
-    found = {}
-    for axis in axes.flat:
-        found.update({label: handle for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)})
-    return list(found.values()), list(found)
 
 
 def examples(folders, truth, found, n_people: int, note: str) -> Figure:

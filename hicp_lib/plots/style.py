@@ -96,6 +96,14 @@ def detector_colour(name: str) -> str:
     return DETECTOR_COLOURS[max(known, key=len)] if known else OTHER_COLOUR
 
 
+def legend_entries(axes) -> tuple[list, list[str]]:
+    """Handles and labels of all axes of an array, each label once: what `figure.legend` takes."""
+    found = {}
+    for axis in axes.flat:
+        found.update({label: handle for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)})
+    return list(found.values()), list(found)
+
+
 def in_words(items: Sequence[str]) -> str:
     """'a', 'a and b', 'a, b and c'."""
     items = list(items)

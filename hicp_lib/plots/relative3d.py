@@ -1,0 +1,178 @@
+"""Figures of the relative 3D test: what the robot saw, median skeletons, stability, accuracy, causes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.detectors.base import Detections
+from hicp_lib.keypoints import HANDS, INDEX, LIMBS, N_KEYPOINTS
+from hicp_lib.plots.people import detections_grid
+from hicp_lib.plots.style import Figure, detector_colour, in_style, in_words, legend_entries, new_figure
+from hicp_lib.rgbd.recording import Recording, read_rgb
+
+TRUTH_COLOUR = "#111111"
+_LOOKS = {"from the front": ("y_m", "z_m"), "from its right": ("x_m", "z_m"), "from above": ("y_m", "x_m")}
+# Fewer images than this say little about a spread.
+MIN_IMAGES = 5
+_CAUSE_STYLES = (
+    ("#888888", "o"), ("#0072B2", "s"), ("#D55E00", "^"),
+    ("#009E73", "D"), ("#CC79A7", "v"), ("#111111", "*"),
+)  # fmt: skip
+_PART_MARKERS = {"shoulder": "^", "elbow": "s", "wrist": "o", "hand": "*"}
+
+
+def camera_views(
+    recordings: Mapping[str, Recording],
+    found: Mapping[tuple[str, str], Sequence[Detections]],
+    frames: Sequence[int],
+    min_score: float,
+    note: str,
+) -> Figure:
+    """Some frames of every view, as each detector sees them.
+
+    Parameters
+    ----------
+    recordings : view -> recording
+    found : (view, detector) -> detections of each frame
+    """
+    detectors = list(dict.fromkeys(detector for _, detector in found))
+    pictures = {
+        f"{view} {frame}": (
+            read_rgb(recording, frame),
+            {name: found[view, name][frame] for name in detectors},
+        )
+        for view, recording in recordings.items()
+        for frame in frames
+        if frame < len(recording)
+    }
+    return detections_grid(pictures, min_score, f"Rows: view and number of the image. Data: {note}.")
+
+
+@in_style
+def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | None, note: str) -> Figure:
+    """Median skeletons of every detector in the base frame, seen along its axes; dashed: the true one.
+
+    Parameters
+    ----------
+    medians : table of `hicp_lib.evaluation.stability.median_positions`, one method
+    truth : view -> table with `keypoint, x_m, y_m, z_m` of one frame; None where it is not known
+    """
+    views = list(dict.fromkeys(medians["view"]))
+    figure, axes = new_figure(len(views), 3, 10.5, 3.7 * len(views), squeeze=False)
+    for row, view in zip(axes, views, strict=True):
+        skeletons = dict(list(medians[medians["view"] == view].groupby("detector", sort=False)))
+        lines = [(name, rows, detector_colour(name), "-") for name, rows in skeletons.items()]
+        if truth is not None:
+            lines.insert(0, ("truth", truth[view], TRUTH_COLOUR, "--"))
+        for axis, (look, columns) in zip(row, _LOOKS.items(), strict=True):
+            for name, rows, colour, style in lines:
+                _draw_skeleton(axis, rows, columns, colour, style, name)
+            axis.set(aspect="equal", title=f"{view} · {look}")
+            axis.set(xlabel=f"{columns[0][0]} [m]", ylabel=f"{columns[1][0]} [m]")
+    figure.legend(*legend_entries(axes), loc="outside lower center", ncols=4, fontsize=9)
+    caption = (
+        "Median skeletons: coordinate-wise median of every keypoint over the images, in the robot's base "
+        "frame (x backward, y to its right, z up)"
+        f"{'; dashed: the true skeleton' if truth is not None else ''}: {note}."
+    )
+    counts = medians.groupby(["detector", "view"], sort=False).size()
+    said = in_words([f"{detector} {n} ({view})" for (detector, view), n in counts.items()])
+    return Figure(
+        figure, caption, f"Skeletons from three directions. Keypoints with a median: {said}.", medians
+    )
+
+
+def _draw_skeleton(axis, rows: pd.DataFrame, columns: tuple[str, str], colour, style, label) -> None:
+    points = np.full((N_KEYPOINTS, 2), np.nan)
+    points[[INDEX[name] for name in rows["keypoint"]]] = rows[list(columns)]
+    for a, b in LIMBS:
+        width = 0.7 if a in HANDS else 1.6
+        axis.plot(*points[[a, b]].T, style, color=colour, lw=width, alpha=0.9, label=label)
+        label = None
+
+
+@in_style
+def spread_against_bias(table: pd.DataFrame, note: str) -> Figure:
+    """How far apart the views are against how far off their median is, per part, detector and view.
+
+    `table` from `hicp_lib.evaluation.stability.spread_and_bias` with truth, one method.
+    """
+    table = table[(table["n"] >= MIN_IMAGES) & table["bias_m"].notna()]
+    views = list(dict.fromkeys(table["view"]))
+    figure, axes = new_figure(
+        1, len(views), max(4.6 * len(views), 6), 4.9, sharex=True, sharey=True, squeeze=False
+    )
+    for view, axis in zip(views, axes[0], strict=True):
+        for row in table[table["view"] == view].itertuples():
+            side, kind = row.part.split()
+            colour = detector_colour(row.detector)
+            whiskers = {
+                "xerr": [
+                    [100 * (row.spread_m - row.spread_m_low)],
+                    [100 * (row.spread_m_high - row.spread_m)],
+                ],
+                "yerr": [[100 * (row.bias_m - row.bias_m_low)], [100 * (row.bias_m_high - row.bias_m)]],
+            }
+            axis.errorbar(
+                100 * row.spread_m, 100 * row.bias_m, **{k: np.maximum(v, 0) for k, v in whiskers.items()},
+                fmt=_PART_MARKERS[kind], color=colour, mfc=colour if side == "left" else "white",
+                markersize=8, elinewidth=0.7,
+            )  # fmt: skip
+        axis.set(xscale="log", yscale="log", title=view, xlabel="spread: distance to the median [cm]")
+        axis.axline((1, 1), (2, 2), color="#888888", lw=1, ls="--")
+    axes[0, 0].set(ylabel="bias: median to truth [cm]")
+    _part_legend(figure, axes[0, 0], list(dict.fromkeys(table["detector"])))
+    worse = table.assign(mostly=np.where(table["bias_m"] > table["spread_m"], "bias", "spread"))
+    counts = worse.groupby(["detector", "mostly"], sort=False).size()
+    said = in_words([f"{detector} {n} with more {kind}" for (detector, kind), n in counts.items()])
+    caption = (
+        "Stability against accuracy: median distance of the images to their median position, and how far "
+        "that position is from the true one; above the dashed line a keypoint is more off than unsteady. "
+        f"Whiskers are 95 % bootstrap intervals over images: {note}."
+    )
+    return Figure(figure, caption, f"Scatter of spread and bias on logarithmic axes. Parts: {said}.", table)
+
+
+def _part_legend(figure, axis, detectors: Sequence[str]) -> None:
+    colours = [axis.plot([], [], "-", lw=4, color=detector_colour(name), label=name)[0] for name in detectors]
+    shapes = [
+        axis.plot([], [], marker, color="#444444", ls="", label=kind)[0]
+        for kind, marker in _PART_MARKERS.items()
+    ]
+    sides = [
+        axis.plot([], [], "o", color="#444444", mfc=fill, label=side)[0]
+        for side, fill in (("left", "#444444"), ("right", "white"))
+    ]
+    figure.legend(handles=[*colours, *shapes, *sides], loc="outside lower center", ncols=5, fontsize=9)
+
+
+@in_style
+def spread_causes(table: pd.DataFrame, note: str) -> Figure:
+    """Spread of every part with one cause at a time.
+
+    `table` from `hicp_lib.evaluation.spread_sources.spread_sources` with the columns `view` and `detector`.
+    """
+    cases = list(dict.fromkeys(zip(table["view"], table["detector"], strict=True)))
+    parts, causes = (list(dict.fromkeys(table[column])) for column in ("part", "cause"))
+    size = {"width_in": max(3.1 * len(cases), 7), "height_in": 1.6 + 0.42 * len(parts)}
+    figure, axes = new_figure(1, len(cases), sharey=True, sharex=True, squeeze=False, **size)
+    for (view, detector), axis in zip(cases, axes[0], strict=True):
+        rows = table[(table["view"] == view) & (table["detector"] == detector)]
+        for k, (cause, part) in enumerate(rows.groupby("cause", sort=False)):
+            colour, marker = _CAUSE_STYLES[causes.index(cause) % len(_CAUSE_STYLES)]
+            y = np.array([parts.index(item) for item in part["part"]]) + 0.13 * (k - (len(causes) - 1) / 2)
+            axis.hlines(y, 100 * part["spread_m"], 100 * part["p90_m"], color=colour, lw=1.2)
+            axis.plot(100 * part["spread_m"], y, marker, color=colour, markersize=6, label=cause)
+        axis.set(title=f"{view}\n{detector}", xlabel="distance to the median [cm]", xscale="log")
+    axes[0, 0].set(yticks=range(len(parts)), yticklabels=parts, ylim=(len(parts) - 0.5, -0.5))
+    figure.legend(*legend_entries(axes), loc="outside lower center", ncols=3, fontsize=9)
+    caption = (
+        "Where the spread over the images comes from: median (marker) and 90th percentile (end of the line) "
+        f"of the distance to the median position, with one cause at a time and with all: {note}."
+    )
+    medians = table.groupby("cause", sort=False)["spread_m"].median()
+    said = in_words([f"{cause} {100 * value:.1f} cm" for cause, value in medians.items()])
+    return Figure(figure, caption, f"Dots per part and cause. Median over the parts: {said}.", table)

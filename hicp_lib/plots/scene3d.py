@@ -1,0 +1,113 @@
+"""One interactive 3D scene: what a camera saw as a point cloud, the robot, its cameras, the skeletons.
+
+All in the robot's base frame (x backward, y to its right, z up), metres. Kept light: every kind of thing is
+one line or one cloud for Plotly, in single precision, so the page stays small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+import plotly.graph_objects as go
+
+from hicp_lib.keypoints import INDEX, LIMBS, N_KEYPOINTS
+from hicp_lib.plots.style import detector_colour
+from hicp_lib.rgbd.camera import Intrinsics, deproject, transform
+from hicp_lib.rgbd.recording import Recording, read_depth_m, read_rgb
+from hicp_lib.robot.segments import Segment
+
+ROBOT_COLOUR = "#5F6B7A"
+TRUTH_COLOUR = "#111111"
+VIEW_COLOURS = ("#56B4E9", "#E69F00", "#009E73")
+_FRUSTUM_DEPTH_M = 0.05
+_EYE = {"x": -1.1, "y": 1.3, "z": 0.7}  # from in front of the robot, to its right
+_PEN_UP = np.full((1, 3), np.nan)
+
+
+def scene(
+    cloud: go.Scatter3d,
+    robot: Sequence[Segment],
+    recordings: Mapping[str, Recording],
+    skeletons: Mapping[str, pd.DataFrame],
+    truth: pd.DataFrame | None = None,
+) -> go.Figure:
+    """The scene; every entry of its legend can be switched off.
+
+    Parameters
+    ----------
+    cloud : from `point_cloud`
+    robot : body segments in the base frame; empty where the joints are not known
+    recordings : view -> recording, whose camera poses are drawn
+    skeletons : "<detector>, <view>" -> table with `keypoint, x_m, y_m, z_m`, coloured by the detector
+    truth : such a table of the true positions, if they are known
+    """
+    traces = [cloud]
+    if robot:
+        traces.append(_robot(robot))
+    for (view, recording), colour in zip(recordings.items(), VIEW_COLOURS, strict=False):
+        lines = _frusta(recording.intrinsics, recording.T_base_cam)
+        traces.append(_line(lines, f"cameras, {view}", colour, 1))
+    for name, rows in skeletons.items():
+        traces.append(_line(_limbs(rows), name, detector_colour(name.split(",")[0]), 5))
+    if truth is not None:
+        traces.append(_line(_limbs(truth), "true skeleton", TRUTH_COLOUR, 3))
+    figure = go.Figure(traces)
+    axes = {f"{axis}axis": {"title": f"{axis} [m]", "backgroundcolor": "#FAFAFA"} for axis in "xyz"}
+    figure.update_layout(
+        scene={**axes, "aspectmode": "data", "camera": {"eye": _EYE}},
+        margin={"l": 0, "r": 0, "t": 0, "b": 0}, height=560, legend={"itemsizing": "constant"},
+        template="plotly_white",
+    )  # fmt: skip
+    return figure
+
+
+def point_cloud(
+    recording: Recording, frame: int, n_points: int = 12_000, max_depth_m: float = 3.0
+) -> go.Scatter3d:
+    """What the camera saw in one frame, as at most `n_points` coloured points on a regular grid of pixels."""
+    depth_m, rgb = read_depth_m(recording, frame), read_rgb(recording, frame)
+    step = max(1, int(np.ceil(np.sqrt(depth_m.size / n_points))))
+    v, u = np.mgrid[0 : depth_m.shape[0] : step, 0 : depth_m.shape[1] : step]
+    depth_m, colours = depth_m[v, u], rgb[v, u]
+    near = depth_m < max_depth_m  # False where there is no depth
+    pixels_px = np.stack([u[near], v[near]], axis=-1)
+    in_camera = deproject(recording.intrinsics, pixels_px, depth_m[near])
+    x, y, z = transform(recording.T_base_cam[frame], in_camera).astype(np.float32).T
+    marker = {"size": 2, "color": [f"#{bytes(colour).hex()}" for colour in colours[near]]}
+    return go.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name="point cloud", hoverinfo="skip")
+
+
+def _line(points_m: np.ndarray, name: str, colour: str, width: float) -> go.Scatter3d:
+    """A line through points (n, 3), interrupted where they are NaN."""
+    x, y, z = points_m.astype(np.float32).T
+    line = {"color": colour, "width": width}
+    return go.Scatter3d(
+        x=x, y=y, z=z, mode="lines", line=line, name=name, hoverinfo="name", connectgaps=False
+    )
+
+
+def _robot(segments: Sequence[Segment]) -> go.Scatter3d:
+    ends = [np.concatenate([[segment.start_m, segment.end_m], _PEN_UP]) for segment in segments]
+    return _line(np.concatenate(ends), "robot", ROBOT_COLOUR, 14)
+
+
+def _frusta(intrinsics: Intrinsics, T_base_cam: np.ndarray) -> np.ndarray:
+    """Lines of a small pyramid per camera pose, shape (n, 3)."""
+    right, bottom = intrinsics.width_px - 0.5, intrinsics.height_px - 0.5
+    pixels_px = np.array([(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom)])
+    corners = deproject(intrinsics, pixels_px, np.full(4, _FRUSTUM_DEPTH_M))
+    apex = np.zeros(3)
+    outline = [*corners, corners[0], apex, corners[1], corners[2], apex, corners[3]]
+    lines = np.concatenate([outline, _PEN_UP])
+    return transform(T_base_cam, lines).reshape(-1, 3)
+
+
+def _limbs(rows: pd.DataFrame) -> np.ndarray:
+    """Lines of a skeleton's limbs whose both ends are known, shape (n, 3)."""
+    points = np.full((N_KEYPOINTS, 3), np.nan)
+    points[[INDEX[name] for name in rows["keypoint"]]] = rows[["x_m", "y_m", "z_m"]]
+    limbs = points[np.array(LIMBS)]
+    limbs = limbs[np.isfinite(limbs).all(axis=(1, 2))]
+    return np.concatenate([limbs, np.full((len(limbs), 1, 3), np.nan)], axis=1).reshape(-1, 3)
