@@ -10,6 +10,7 @@ for units, range and alignment; the book's page on simulated sensors has the for
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from statistics import NormalDist
 
 import cv2
 import numpy as np
@@ -18,10 +19,11 @@ from hicp_lib.simulation.body import REGIONS
 from hicp_lib.simulation.camera import Camera, pixel_rays
 from hicp_lib.simulation.people import RIGHT
 from hicp_lib.simulation.raycast import RayScene
+from hicp_lib.simulation.sensors.depth_alignment import align_to_colour
 
 Rng = np.random.Generator
 
-_CURVED_PX = 0.04  # disparities whose second difference is larger are not interpolated
+_CURVED_PX = 0.08  # disparities whose second difference is larger are not interpolated
 _STEP_PX = 1.0  # neighbours whose disparities differ by more lie on different surfaces
 _EDGE_JITTER = 0.12  # how far texture moves the edges of matching, as a share of the window
 _EDGE_GROWTH = 0.06  # and how far near surfaces, which stand out, spread over far ones
@@ -121,47 +123,6 @@ def left_imager(colour: Camera, settings: DepthCamera) -> Camera:
     return Camera(settings.width_px, settings.height_px, *focal, *centre, pose)
 
 
-def align_to_colour(depth_m: np.ndarray, left: Camera, colour: Camera) -> np.ndarray:
-    """Depth of the left imager, moved to where the colour camera sees it.
-
-    As librealsense does: each depth pixel fills the rectangle of colour pixels from the one that holds
-    its first corner to the one that holds its last; of depths that fall on one pixel the nearest stays.
-
-    Parameters
-    ----------
-    depth_m : (left.height_px, left.width_px), NaN for none
-    left, colour : cameras beside each other: the same orientation, a shift along x
-    """
-    shift_m = float(colour.T_world_camera[:3, 0] @ (left.centre_m - colour.centre_m))
-    row, column = np.nonzero(np.isfinite(depth_m))
-    z = depth_m[row, column]
-    shift = np.float32(colour.fx_px * shift_m) / z
-    scale = np.float32(colour.fx_px / left.fx_px)
-    middle = scale * (column.astype(np.float32) - np.float32(left.cx_px)) + shift + np.float32(colour.cx_px)
-    first, last = (np.rint(middle + side * scale / 2).astype(np.int32) for side in (-1, 1))
-    wide = np.full((left.height_px, colour.width_px + 2), np.inf, np.float32)  # a column for each side's rest
-    for step in range(int(np.ceil(scale)) + 1):
-        at = np.clip(np.minimum(first + step, last), -1, colour.width_px) + 1
-        np.minimum.at(wide.ravel(), row * wide.shape[1] + at, z)
-    return _stretch_rows(wide[:, 1:-1], left, colour)
-
-
-def _stretch_rows(wide: np.ndarray, left: Camera, colour: Camera) -> np.ndarray:
-    """Rows of depth (infinite: none) as rows of the colour image, NaN for none."""
-    scale = colour.fy_px / left.fy_px
-    middle = scale * (np.arange(left.height_px) - left.cy_px) + colour.cy_px
-    first, last = (np.rint(middle + side * scale / 2).astype(int) for side in (-1, 1))
-    aligned = np.full((colour.height_px, wide.shape[1]), np.inf, np.float32)
-    for step in range(int(np.ceil(scale)) + 1):
-        rows = np.minimum(first + step, last)
-        inside = np.flatnonzero((rows >= 0) & (rows < colour.height_px))
-        # Two rows at most meet on one: every second is put down at a time.
-        for part in (inside[::2], inside[1::2]):
-            aligned[rows[part]] = np.minimum(aligned[rows[part]], wide[part])
-    aligned[np.isinf(aligned)] = np.nan
-    return aligned
-
-
 def _crop(left: Camera, colour: Camera, settings: DepthCamera) -> tuple[int, Camera]:
     """The part of the left imager's view that alignment and shadows need: its first column, a camera."""
     nearest_m = settings.focal_baseline / (settings.searched_px or settings.width_px)
@@ -196,7 +157,7 @@ def _measure(scene: RayScene, view: Camera, first_column: int, settings: DepthCa
         valid &= measured_px <= column
     if settings.shadow:
         valid &= ~_hidden_from_right(true_px)
-    if settings.hair_holes:
+    if settings.hair_holes and hair.any():
         valid &= ~(hair & _patches(hair.shape, settings.hair_holes, settings.window_px, rng))
     return _to_depth(measured_px, valid, settings)
 
@@ -273,7 +234,8 @@ def _edges(true_px: np.ndarray, settings: DepthCamera, rng: Rng) -> tuple[np.nda
     measured, clear = true_px.copy(), np.ones(true_px.shape, bool)
     measured[rows, columns] = low + share * (high - low)
     between = (share > 0) & (share < 1)
-    clear[rows[between], columns[between]] = rng.random(between.sum()) >= settings.edge_holes
+    holes = _patches(true_px.shape, settings.edge_holes, settings.window_px, rng)
+    clear[rows[between], columns[between]] = ~holes[rows[between], columns[between]]
     return measured, clear
 
 
@@ -303,5 +265,6 @@ def _correlated_noise(shape: tuple[int, int], window_px: int, rng: Rng) -> np.nd
 
 def _patches(shape: tuple[int, int], share: float, window_px: int, rng: Rng) -> np.ndarray:
     """Patches as large as a matching window that cover a share of the image."""
-    rank = cv2.blur(_correlated_noise(shape, window_px, rng), (3, 3))
-    return rank > np.quantile(rank, 1 - share)
+    if not 0 < share < 1:
+        return np.full(shape, share >= 1)
+    return _correlated_noise(shape, window_px, rng) > NormalDist().inv_cdf(1 - share)
