@@ -158,23 +158,30 @@ def fractions_within(
 
 
 def errors_by(
-    errors: pd.DataFrame, column: str, edges: Sequence[float], min_score: float = 0.1
+    errors: pd.DataFrame, column: str, edges: Sequence[float] | None = None, min_score: float = 0.1
 ) -> pd.DataFrame:
-    """Median and quartiles of the error over bins of another column (distance, score).
+    """Median and quartiles of the error by another column: distance, score, sight.
+
+    Parameters
+    ----------
+    edges : bins of a number, each closed on the left; None where the column holds labels
 
     Returns
     -------
-    DataFrame, columns `detector, method, keypoint, left, right` (the bin, closed on the left), `n,
-    median_m, lower_m, upper_m`
+    DataFrame, columns `detector, method, part` ("elbow", both sides together), `by` (the column), `bin`
+    (as text), `middle` (of the bin; NaN for labels), `n, median_m, lower_m, upper_m`
     """
     found = errors[(errors["score"] > min_score) & errors["error_m"].notna()]
-    bins = pd.cut(found[column], list(edges), right=False).rename("bin")
-    grouped = found.groupby([*_CASE, bins], sort=False, observed=True)["error_m"]
+    part = found["keypoint"].str.split("_").str[1].rename("part")
+    bins = found[column] if edges is None else pd.cut(found[column], list(edges), right=False)
+    keys = [found["detector"], found["method"], part, bins.rename("bin")]
+    grouped = found["error_m"].groupby(keys, sort=False, observed=True)
     table = grouped.quantile([0.25, 0.5, 0.75]).unstack().set_axis(["lower_m", "median_m", "upper_m"], axis=1)
-    table = table.assign(n=grouped.size()).reset_index()
-    ends = {"left": [b.left for b in table["bin"]], "right": [b.right for b in table["bin"]]}
-    columns = [*_CASE, "left", "right", "n", "median_m", "lower_m", "upper_m"]
-    return table.assign(**ends)[columns].sort_values([*_CASE, "left"], ignore_index=True)
+    table = table.assign(n=grouped.size(), by=column).reset_index().sort_values("bin", kind="stable")
+    table["middle"] = np.nan if edges is None else np.array([b.mid for b in table["bin"]], dtype=float)
+    table["bin"] = [str(b) if edges is None else f"{b.left:g} to {b.right:g}" for b in table["bin"]]
+    columns = ["detector", "method", "part", "by", "bin", "middle", "n", "median_m", "lower_m", "upper_m"]
+    return table[columns].sort_values(["detector", "method", "part"], kind="stable", ignore_index=True)
 
 
 def paper_medians() -> pd.DataFrame:

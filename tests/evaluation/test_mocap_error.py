@@ -116,12 +116,21 @@ def test_fractions_are_of_the_frames_with_motion_capture(reference):
     )
 
 
-def test_errors_are_binned_by_another_column(reference):
+def test_errors_are_binned_by_another_column_sides_together(reference):
     errors = me.mocap_errors(lifted(reference, 0.01 + reference["frame"] / 1000), reference)
-    table = me.errors_by(errors, "frame", [0, 20, 40, 100]).query("keypoint == 'left_wrist'")
-    assert table["left"].tolist() == [0, 20, 40] and table["n"].tolist() == [20, 20, 20]
+    table = me.errors_by(errors, "frame", [0, 20, 40, 100]).query("part == 'wrist'")
+    assert table["bin"].tolist() == ["0 to 20", "20 to 40", "40 to 100"]
+    assert table["middle"].tolist() == [10, 30, 70] and table["n"].tolist() == [40, 40, 40]
     assert table["median_m"].to_numpy() == pytest.approx([0.0195, 0.0395, 0.0595])
     assert (table["lower_m"] < table["median_m"]).all() and (table["median_m"] < table["upper_m"]).all()
+
+
+def test_errors_are_grouped_by_labels(reference):
+    errors = me.mocap_errors(lifted(reference, 0.01 + (reference["frame"] >= 50) * 0.1), reference)
+    errors["sight"] = np.where(errors["frame"] >= 50, "hidden", "clear")
+    table = me.errors_by(errors, "sight").query("part == 'elbow'").set_index("bin")
+    assert table.loc["clear", ["n", "median_m"]].tolist() == pytest.approx([100, 0.01])
+    assert table.loc["hidden", ["n", "median_m"]].tolist() == pytest.approx([20, 0.11])
 
 
 def test_the_papers_tables_are_whole_and_stand_beside_what_was_measured(reference):
