@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_filter
+from scipy.signal import fftconvolve, savgol_filter
 
 from hicp_lib.errors import InputError
 
@@ -18,6 +18,7 @@ _CAMERA_GAP_S = 0.25
 # No wrist of a person who is not throwing anything is faster: such speeds are wrong detections.
 _MAX_SPEED_M_S = 4.0
 _MIN_OVERLAP_S = 2.0
+_MAX_DRIFT_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -77,51 +78,45 @@ def interpolate_mocap(
 
 
 def clock_offset(
-    times_a_s: np.ndarray,
-    points_a_m: np.ndarray,
-    times_b_s: np.ndarray,
-    points_b_m: np.ndarray,
-    max_offset_s: float = 1.0,
+    times_a_s: np.ndarray, points_a_m: np.ndarray, times_b_s: np.ndarray, points_b_m: np.ndarray
 ) -> ClockOffset:
     """The offset of clock b, from the same points seen on both clocks.
 
     The *speeds* of the points do not depend on the frame they are given in. They are smoothed
     (Savitzky-Golay over a quarter of a second), and the offset is where their normalised
-    cross-correlation is largest, refined by a parabola through its peak.
+    cross-correlation is largest, refined by a parabola through its peak. All offsets are tried at which
+    half of what was seen of the points on the one clock was also seen on the other.
 
     Parameters
     ----------
-    times_a_s, times_b_s : arrays, shapes (n,) and (k,), increasing
+    times_a_s, times_b_s : arrays, shapes (n,) and (k,), increasing; may start at any number
     points_a_m, points_b_m : arrays, shapes (n, m, 3) and (k, m, 3); NaN where missing; any two frames
-    max_offset_s : offsets up to this are tried, in both directions
 
     Raises
     ------
     InputError
-        If the two never move at the same time, so that nothing can be compared, or the best offset
-        is the largest tried.
+        If no offset makes the two move together.
     """
-    start_s, end_s = times_a_s[0], times_a_s[-1]
-    grid_s = start_s + np.arange(0, end_s - start_s, 1 / _RATE_HZ)
-    n_lags = int(np.ceil(max_offset_s * _RATE_HZ))
-    wide_s = start_s + np.arange(-n_lags, len(grid_s) + n_lags) / _RATE_HZ
-    speed_a = _speeds(times_a_s, points_a_m, grid_s, _CAMERA_GAP_S)
-    speed_b = _speeds(times_b_s, points_b_m, wide_s, _CAMERA_GAP_S)
-    offset_s, correlation = _best_offset(speed_a, speed_b, n_lags)
-    if not np.isfinite(offset_s):
+    speeds_a, speeds_b = _speeds(times_a_s, points_a_m), _speeds(times_b_s, points_b_m)
+    half = len(speeds_a) // 2
+    early, late = speeds_a.copy(), speeds_a.copy()
+    early[half:], late[:half] = np.nan, np.nan
+    lag, correlation = _best_lag(speeds_a, speeds_b)
+    if not np.isfinite(lag):
         raise InputError(
-            f"no clock offset within {max_offset_s:g} s makes the two recordings move together; "
-            "record a clear movement that both see, or allow a larger offset"
+            "no clock offset makes camera and motion capture move together; record at least some seconds of "
+            "clear movement that both see"
         )
-    half = len(grid_s) // 2
-    early, _ = _best_offset(speed_a[:half], speed_b[: half + 2 * n_lags], n_lags)
-    late, _ = _best_offset(speed_a[half:], speed_b[half:], n_lags)
-    return ClockOffset(offset_s, correlation, (early, late))
+    halves = [_best_lag(part, speeds_b, near=lag)[0] for part in (early, late)]
+    start_s = float(times_a_s[0] - times_b_s[0])
+    offset_s, *halves_s = (start_s + value / _RATE_HZ for value in (lag, *halves))
+    return ClockOffset(offset_s, correlation, tuple(halves_s))
 
 
-def _speeds(times_s: np.ndarray, points_m: np.ndarray, grid_s: np.ndarray, max_gap_s: float) -> np.ndarray:
-    """Smoothed speed (n, m) on an even grid; NaN where positions around are missing."""
-    positions = interpolate_mocap(times_s, points_m, grid_s, max_gap_s)
+def _speeds(times_s: np.ndarray, points_m: np.ndarray) -> np.ndarray:
+    """Smoothed speeds (n, m) [m/s] at an even rate from the first time on; NaN where not known."""
+    grid_s = np.arange(times_s[0], times_s[-1], 1 / _RATE_HZ)
+    positions = interpolate_mocap(times_s, points_m, grid_s, _CAMERA_GAP_S)
     window = int(_SMOOTHING_S * _RATE_HZ) | 1
     if len(positions) < window:
         return np.full(positions.shape[:2], np.nan)
@@ -131,27 +126,41 @@ def _speeds(times_s: np.ndarray, points_m: np.ndarray, grid_s: np.ndarray, max_g
     return np.minimum(np.linalg.norm(velocity, axis=-1), _MAX_SPEED_M_S)
 
 
-def _best_offset(speed_a: np.ndarray, speed_b: np.ndarray, n_lags: int) -> tuple[float, float]:
-    """Offset [s] and correlation at the peak; row i + n_lags of `speed_b` is at the time of row i of a."""
-    n = len(speed_a)
-    values = np.array([_correlation(speed_a, speed_b[lag : lag + n]) for lag in range(2 * n_lags + 1)])
+def _best_lag(a: np.ndarray, b: np.ndarray, near: float | None = None) -> tuple[float, float]:
+    """Rows by which b must be moved to be most like a, and the correlation then; NaN where nothing is."""
+    values = _correlations(a, b)
+    lags = np.arange(len(values)) - (len(b) - 1)
+    if near is not None:
+        values[np.abs(lags - near) > _MAX_DRIFT_S * _RATE_HZ] = np.nan
     if not np.isfinite(values).any():
         return np.nan, np.nan
     peak = int(np.nanargmax(values))
-    if peak in (0, 2 * n_lags) or not np.isfinite(values[peak - 1 : peak + 2]).all():
+    around = values[max(peak - 1, 0) : peak + 2]
+    if len(around) < 3 or not np.isfinite(around).all():
         return np.nan, np.nan
-    before, top, after = values[peak - 1 : peak + 2]
-    shift = 0.5 * (before - after) / (before - 2 * top + after)
-    return float((n_lags - peak - shift) / _RATE_HZ), float(top)
+    before, top, after = around
+    return float(lags[peak] + 0.5 * (before - after) / (before - 2 * top + after)), float(top)
 
 
-def _correlation(a: np.ndarray, b: np.ndarray) -> float:
-    """Pearson's correlation over what both have, each track about its own mean."""
-    both = np.isfinite(a) & np.isfinite(b)
-    if both.sum() < _MIN_OVERLAP_S * _RATE_HZ:
-        return np.nan
-    n = np.maximum(both.sum(axis=0), 1)
-    a, b = np.where(both, a, 0.0), np.where(both, b, 0.0)
-    a, b = np.where(both, a - a.sum(axis=0) / n, 0.0), np.where(both, b - b.sum(axis=0) / n, 0.0)
-    scale = np.sqrt((a**2).sum() * (b**2).sum())
-    return float((a * b).sum() / scale) if scale > 0 else np.nan
+def _correlations(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Pearson's correlation at every lag over what both have, each track about its own mean there.
+
+    NaN where they have too little together.
+    """
+    seen_a, seen_b = np.isfinite(a), np.isfinite(b)
+    a, b = np.where(seen_a, a, 0.0), np.where(seen_b, b, 0.0)
+    n = _sums(seen_a, seen_b)
+    mean_n = np.maximum(n, 1)
+    sum_a, sum_b = _sums(a, seen_b), _sums(seen_a, b)
+    covariance = (_sums(a, b) - sum_a * sum_b / mean_n).sum(axis=1)
+    variance_a = (_sums(a**2, seen_b) - sum_a**2 / mean_n).sum(axis=1)
+    variance_b = (_sums(seen_a, b**2) - sum_b**2 / mean_n).sum(axis=1)
+    enough = n.sum(axis=1) >= max(_MIN_OVERLAP_S * _RATE_HZ, 0.5 * min(seen_a.sum(), seen_b.sum()))
+    enough &= np.minimum(variance_a, variance_b) > 1e-6  # m^2/s^2 summed: standing still
+    scale = np.sqrt(np.where(enough, variance_a * variance_b, 1.0))
+    return np.where(enough, covariance / scale, np.nan)
+
+
+def _sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Sums over i of a[i + lag] b[i], per track, for every lag from 1 - len(b) on."""
+    return fftconvolve(a.astype(float), b[::-1].astype(float), axes=0)

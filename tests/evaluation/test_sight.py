@@ -14,7 +14,7 @@ SIGHT_OF = {
     "in front of the wall": ((0.3, 0.0, 1.95), "clear"),
     "just inside the post": ((0.0, 0.0, 1.05), "clear"),
     "behind the post": ((0.0, 0.1, 1.5), "hidden"),
-    "in the hole": ((-0.4, 0.0, 1.5), "no depth"),
+    "in the hole": ((-0.7, 0.0, 1.5), "no depth"),
     "beside the image": ((3.0, 0.0, 1.5), "outside"),
     "behind the camera": ((0.0, 0.0, -1.0), "outside"),
     "not known": ((np.nan, np.nan, np.nan), "unknown"),

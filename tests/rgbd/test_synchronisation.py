@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from hicp_lib.errors import InputError
-from hicp_lib.rgbd.synchronisation import MAX_GAP_S, clock_offset, interpolate_mocap
+from hicp_lib.rgbd.synchronisation import MAX_GAP_S, _speeds, clock_offset, interpolate_mocap
 
 
 def test_between_samples_positions_lie_on_the_line():
@@ -47,16 +47,16 @@ def walk(times_s):
     return np.stack([wave, 0.5 * wave[:, ::-1] + 0.2 * np.sin(1.3 * t)], axis=1)
 
 
-@settings(max_examples=12)
-@given(st.floats(-0.9, 0.9), st.integers(0, 1000))
+@settings(max_examples=25)
+@given(st.floats(-500, 500), st.integers(0, 1000))
 def test_the_offset_is_found_in_any_frame_with_noise_and_gaps(offset, seed):
     rng = np.random.default_rng(seed)
-    camera_s, mocap_s = np.arange(0, 16, 1 / 30), np.arange(-1, 17, 0.01)
+    camera_s, mocap_s = np.arange(0, 16, 1 / 15), np.arange(-2, 19, 0.01)
     seen = Rotation.random(rng=rng).apply(walk(camera_s).reshape(-1, 3)).reshape(-1, 2, 3) + 5
     seen += rng.normal(0, 0.005, seen.shape)
     seen[rng.random(seen.shape[:2]) < 0.05] = np.nan
     found = clock_offset(camera_s, seen, mocap_s - offset, walk(mocap_s))
-    assert found.offset_s == pytest.approx(offset, abs=0.01)
+    assert found.offset_s == pytest.approx(offset, abs=0.012)
     assert found.halves_s == pytest.approx((offset, offset), abs=0.02)
     assert found.correlation > 0.8
 
@@ -69,15 +69,28 @@ def test_exact_positions_give_the_offset_to_a_millisecond():
 
 
 def test_a_clock_that_drifts_shows_in_the_halves():
-    camera_s = np.arange(0, 20, 1 / 30)
-    mocap_s = np.arange(-1, 22, 0.01)
+    camera_s, mocap_s = np.arange(0, 20, 1 / 30), np.arange(-1, 22, 0.01)
     found = clock_offset(camera_s, walk(camera_s * 1.01), mocap_s, walk(mocap_s))
     assert found.halves_s[1] - found.halves_s[0] == pytest.approx(-0.1, abs=0.03)
 
 
-@pytest.mark.parametrize("shift_s", [3.0, 40.0])
-def test_recordings_that_never_move_together_are_refused(shift_s):
-    camera_s = np.arange(0, 10, 1 / 30)
-    still = np.zeros((len(camera_s), 2, 3))
-    with pytest.raises(InputError, match="no clock offset within 1 s"):
-        clock_offset(camera_s, still, camera_s + shift_s, walk(camera_s))
+def test_it_is_the_correlation_numpy_finds_at_that_offset():
+    times_s = np.arange(0, 10, 0.01)
+    rng = np.random.default_rng(0)
+    a, b = walk(times_s), walk(times_s) + np.cumsum(rng.normal(0, 0.003, (1000, 2, 3)), axis=0)
+    b[300:400, 1] = np.nan
+    found = clock_offset(times_s, a, times_s, b)
+    lag = round(found.offset_s * 100)
+    va, vb = _speeds(times_s, a), _speeds(times_s, b)
+    va, vb = (va[lag:], vb[: len(vb) - lag]) if lag >= 0 else (va[:lag], vb[-lag:])
+    both = np.isfinite(va) & np.isfinite(vb)
+    va, vb = (np.concatenate([v[m, k] - v[m, k].mean() for k, m in enumerate(both.T)]) for v in (va, vb))
+    assert found.correlation == pytest.approx(va @ vb / np.sqrt(va @ va * (vb @ vb)))
+
+
+@pytest.mark.parametrize("seconds, moves", [(10, False), (1, True), (0.1, True)])
+def test_without_enough_movement_there_is_no_offset(seconds, moves):
+    camera_s = np.arange(0, seconds, 1 / 30)
+    seen = walk(camera_s) if moves else np.zeros((len(camera_s), 2, 3))
+    with pytest.raises(InputError, match="no clock offset"):
+        clock_offset(camera_s, seen, np.arange(0, 10, 0.01), walk(np.arange(0, 10, 0.01)))
