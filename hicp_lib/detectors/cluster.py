@@ -40,6 +40,7 @@ Key = TypeVar("Key", bound=Hashable)
 Answer = TypeVar("Answer")
 # How long to wait for the scheduler, and for workers where there are none.
 PATIENCE_S = 30.0
+_LOGGERS = ("distributed", "distributed.client", "tornado.application", "asyncio")
 
 
 def detect_on_cluster(
@@ -76,7 +77,7 @@ def detect_on_cluster(
     if missing:
         todo = ((key, (jobs[key][0].read_bytes(), str(jobs[key][0]), jobs[key][1])) for key in missing)
         with _connected(address) as client:
-            for key, result in _spread(client, address, todo, (name, options, identity(detector))):
+            for key, result in _spread(client, todo, (name, options, identity(detector))):
                 write_result(kept[key], result)
                 yield key, result
 
@@ -91,15 +92,15 @@ def _connected(address: str) -> Iterator[Client]:
         ) from None
     if not _ADDRESS.fullmatch(address):
         raise InputError(f"{address}: no Dask scheduler answers (no address); give one's, tcp://HOST:PORT")
-    with _quiet("distributed.client"):
+    with _quiet():
         try:
             client = Client(address, timeout=PATIENCE_S)
-        except (OSError, ValueError, RuntimeError) as error:
+        except (OSError, ValueError, RuntimeError, AssertionError) as error:  # its thread is late
             raise InputError(
                 f"{address}: no Dask scheduler answers ({_one_line(error)}); "
                 "give one's address, tcp://HOST:PORT"
             ) from None
-        with client:
+        with _explained(address), client:
             try:
                 client.wait_for_workers(1, timeout=PATIENCE_S)
             except TimeoutError:
@@ -108,50 +109,66 @@ def _connected(address: str) -> Iterator[Client]:
 
 
 @contextmanager
-def _quiet(logger: str) -> Iterator[None]:
-    """Keep Dask from telling at length, while it reconnects and closes, what is told in one line."""
-    log = logging.getLogger(logger)
-    level = log.level
-    log.setLevel(logging.CRITICAL)
+def _quiet() -> Iterator[None]:
+    """Keep Dask from telling at length, while it reconnects and closes, what is told in one line.
+
+    Which of its parts notices first that a scheduler is gone depends on what was under way, so all are
+    kept quiet: its own loggers, of which some have a level to themselves, and those of the loop it runs in.
+    """
+    logs = [logging.getLogger(name) for name in _LOGGERS]
+    levels = [log.level for log in logs]
+    for log in logs:
+        log.setLevel(logging.CRITICAL)
     try:
         yield
     finally:
-        log.setLevel(level)
+        for log, level in zip(logs, levels, strict=True):
+            log.setLevel(level)
 
 
 def _spread(
-    client: Client, address: str, todo: Iterator[tuple[Key, tuple]], detector: tuple
+    client: Client, todo: Iterator[tuple[Key, tuple]], detector: tuple
 ) -> Iterator[tuple[Key, Timed]]:
     """Results as they come in; no more images travel than keep all workers busy."""
     running: dict[Future, tuple[Key, str]] = {}
-    with _explained(address):
-        for key, (content, path, boxes_px) in todo:
-            with warnings.catch_warnings():
-                # Dask would have large arguments scattered; but scattered data is lost with its worker.
-                warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
-                future = client.submit(_detect_here, *detector, content, path, boxes_px, pure=False)
-            running[future] = key, path
-            while len(running) >= 2 * sum(client.nthreads().values()) > 0:
-                yield from _finished(client, running)
-        while running:
+    for key, (content, path, boxes_px) in todo:
+        with warnings.catch_warnings():
+            # Dask would have large arguments scattered; but scattered data is lost with its worker.
+            warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
+            future = client.submit(_detect_here, *detector, content, path, boxes_px, pure=False)
+        running[future] = key, path
+        while len(running) >= 2 * sum(client.nthreads().values()) > 0:
             yield from _finished(client, running)
+    while running:
+        yield from _finished(client, running)
 
 
 def _finished(client: Client, running: dict[Future, tuple[Key, str]]) -> Iterator[tuple[Key, Timed]]:
     """The results that are there, at least one; they leave `running`."""
-    from distributed import KilledWorker, wait
+    from distributed import wait
 
     def first_ones(timeout_s: float) -> set[Future]:
         return wait(list(running), timeout=timeout_s, return_when="FIRST_COMPLETED").done
 
     for future in _patiently(client, first_ones):
         key, path = running.pop(future)
-        try:
-            yield key, _patiently(client, future.result)
-        except KilledWorker as error:
-            raise InputError(
-                f"{path}: every worker that took this image died, lately {_last(error)}"
-            ) from None
+        if future.status == "error":
+            raise _told(future.exception(PATIENCE_S), path)
+        yield key, _patiently(client, future.result)
+
+
+def _told(error: Exception, path: str) -> Exception:
+    """What went wrong where an image was worked on, in one line."""
+    from distributed import KilledWorker
+
+    if isinstance(error, KilledWorker):
+        return InputError(f"{path}: every worker that took this image died, lately {_last(error)}")
+    if isinstance(error, (ImportError, AttributeError, RuntimeError)):
+        return InputError(
+            f"the Dask cluster cannot run this detector ({_one_line(error)}); "
+            "install the same environment and weights on scheduler and workers"
+        )
+    return error
 
 
 def _patiently(client: Client, ask: Callable[[float], Answer]) -> Answer:
@@ -166,21 +183,16 @@ def _patiently(client: Client, ask: Callable[[float], Answer]) -> Answer:
 
 @contextmanager
 def _explained(address: str) -> Iterator[None]:
-    """Tell in one line what went wrong between here and the cluster."""
+    """Tell in one line that the connection is lost, however Dask comes to notice."""
+    from distributed.client import ClosedClientError
+
     try:
         yield
-    except InputError:
-        raise
-    except (CancelledError, OSError) as error:
+    except (CancelledError, OSError, ClosedClientError, RuntimeError, AttributeError) as error:
         if getattr(error, "filename", None):  # an image here, not the connection
             raise
         raise InputError(
             f"{address}: the Dask cluster is gone ({_one_line(error)}); run the same command again to go on"
-        ) from None
-    except (ImportError, AttributeError, RuntimeError) as error:
-        raise InputError(
-            f"{address}: the Dask cluster cannot run this detector ({_one_line(error)}); "
-            "install the same environment and weights on scheduler and workers"
         ) from None
 
 

@@ -209,14 +209,14 @@ def test_two_processes_at_once_agree(own_cache, photographs):
 
 
 def test_a_run_that_was_killed_goes_on_where_it_was(slow):
-    killed = slow.detect("out.json", "--workers", "2")
-    while slow.n_kept() < 15:
+    killed = slow.detect("out.json", "--workers", "2", SLOW_GATE="20")
+    while slow.n_kept() < 20:
         assert killed.poll() is None, killed.communicate()
-        time.sleep(0.01)
+        time.sleep(0.02)
     killed.kill()
     killed.communicate()
     kept = slow.n_kept()
-    assert 15 <= kept < slow.n_images and not (slow.folder / "out.json").exists()
+    assert kept == 20 and not (slow.folder / "out.json").exists()
 
     resumed = slow.detect("out.json", "--workers", "2")
     assert resumed.communicate() == (f"out.json: 40 people in {slow.n_images} images\n", "")
