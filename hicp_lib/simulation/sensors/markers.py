@@ -1,0 +1,106 @@
+"""Reflective markers of motion capture: where a lab tapes them, and where they are in a pose.
+
+Two on each shoulder, elbow and wrist, on opposite sides, so that their mean is near the joint
+(the paper's section IV-C takes that mean for the joint); one on the depth camera.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from hicp_lib.keypoints import INDEX
+from hicp_lib.simulation.body import Body, PosedBody, load_body, pose_body
+from hicp_lib.simulation.mesh import Mesh
+from hicp_lib.simulation.raycast import RayScene
+from hicp_lib.simulation.surfaces import Hits, Look, Surface
+
+SIDES = {
+    "shoulder": ((1, 0, 0), (-1, 0, 0)),  # front and back, through the head of the upper arm
+    "elbow": ((0, 1, 0), (0, -1, 0)),  # outer and inner epicondyle, the ends of the hinge's axis
+    "wrist": ((1, 0, 0), (-1, 0, 0)),  # styloid processes: thumb's side, little finger's side
+}
+"""Directions from each joint to its two markers when the left arm hangs and its palm faces the thigh,
+in body axes; mirrored for the right."""
+
+JOINT_MARKERS: tuple[str, ...] = tuple(
+    f"{joint}_{side}_{number}" for joint in SIDES for side in ("left", "right") for number in (1, 2)
+)
+"""Names of the twelve markers on a person, in the order used throughout."""
+
+CAMERA_MARKER = "camera"
+CAMERA_MARKER_M = (0.0325, -0.0185, -0.008)
+"""The marker on the depth camera in the colour camera's frame: in the middle of the D435's top. The
+colour camera lies 32.5 mm beside that middle, 12.5 mm below the top and 4 mm behind the front of the
+housing, which is 25 mm deep; the marker's own radius is 6 mm."""
+
+_BELOW_SHOULDER = 0.3  # of the way from shoulder to elbow
+
+STANDOFF_M = 0.012
+"""From the skin to a marker's centre: cloth or tape, the marker's base, and its radius of 6 mm."""
+
+
+def markers_m(person: PosedBody, vertices: np.ndarray) -> np.ndarray:
+    """Centres of the markers on a posed person, (12, 3), in the frame the person is posed in.
+
+    `vertices` (12,) are those of `marker_vertices` for the person's shape.
+    """
+    return (person.vertices_m[vertices] + STANDOFF_M * person.normals[vertices]).astype(float)
+
+
+def camera_marker_m(T_world_camera: np.ndarray) -> np.ndarray:
+    """The marker on the depth camera, (..., 3), from poses (..., 4, 4) of the colour camera."""
+    T = np.asarray(T_world_camera, float)
+    return T[..., :3, :3] @ np.array(CAMERA_MARKER_M) + T[..., :3, 3]
+
+
+def marker_vertices(shape: int | str | np.ndarray) -> np.ndarray:
+    """Vertices of the body model that the markers are taped to, (12,), in the order of `JOINT_MARKERS`.
+
+    In the reference stance, the skin that a line from the joint's centre comes out through.
+    `shape` as in `pose_body`.
+    """
+    body = load_body()
+    key = shape if isinstance(shape, str | int) else np.asarray(shape, np.float32).tobytes()
+    return _marker_vertices(body, key)
+
+
+@lru_cache(maxsize=64)
+def _marker_vertices(body: Body, key: int | str | bytes) -> np.ndarray:
+    person = pose_body(body, np.frombuffer(key, np.float32) if isinstance(key, bytes) else key, {})
+    arm = (body.field("arm") > _BELOW_SHOULDER)[body.triangles].all(axis=1)
+    parts = [_place(body, person, "shoulder", np.ones_like(arm))]
+    # A heavy person's trunk may touch the hanging arm: the trunk is no place for the elbow's marker.
+    parts += [_place(body, person, joint, arm) for joint in ("elbow", "wrist")]
+    vertices = np.concatenate(parts)
+    vertices.flags.writeable = False
+    return vertices
+
+
+def _place(body: Body, person: PosedBody, joint: str, chosen: np.ndarray) -> np.ndarray:
+    """Vertices for a joint's four markers, on some of the triangles: left 1, left 2, right 1, right 2."""
+    mirrors = {"left": np.array([1, 1, 1]), "right": np.array([1, -1, 1])}
+    directions = np.concatenate([mirror * np.array(SIDES[joint]) for mirror in mirrors.values()])
+    centres = np.repeat([person.keypoints_m[INDEX[f"{side}_{joint}"]] for side in mirrors], 2, axis=0)
+    triangles = body.triangles[chosen]
+    trace = RayScene([_bare(person, triangles)]).trace(np.hstack([centres, directions]).astype(np.float32))
+    out = centres + trace.depth_m[:, None] * directions
+    corners = triangles[trace.triangle]
+    nearest = np.linalg.norm(person.vertices_m[corners] - out[:, None], axis=2).argmin(axis=1)
+    return corners[np.arange(len(corners)), nearest]
+
+
+def body_scene(person: PosedBody, obstacles: tuple[Mesh, ...] = ()) -> RayScene:
+    """What may hide markers: the person's skin, and other meshes. Markers lie on clothes, not under them."""
+    skin = _bare(person, load_body().triangles)
+    return RayScene([skin, *(Surface(mesh, _unseen) for mesh in obstacles)])
+
+
+def _bare(person: PosedBody, triangles: np.ndarray) -> Surface:
+    no_coords = np.zeros((len(person.vertices_m), 0))
+    return Surface(Mesh(person.vertices_m, triangles, person.normals, no_coords), _unseen)
+
+
+def _unseen(hits: Hits) -> Look:
+    raise NotImplementedError("this scene is only for casting rays")

@@ -1,0 +1,147 @@
+"""A motion capture system like Qualisys': cameras around the room, markers, noise and dropouts.
+
+A marker is measured while at least two cameras see it; where its centre is, is known to a fraction
+of a millimetre. Trajectories too short to be recognised again are lost. The system's world
+frame is its own: z up, its origin and heading wherever the calibration frame lay on the floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from hicp_lib.rgbd.camera import transform
+from hicp_lib.rgbd.qualisys import MotionCapture
+from hicp_lib.simulation.body import PosedBody
+from hicp_lib.simulation.mesh import Mesh
+from hicp_lib.simulation.raycast import RayScene
+from hicp_lib.simulation.rotations import rotation
+from hicp_lib.simulation.sensors.markers import body_scene, markers_m
+
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True)
+class MocapSystem:
+    """The system and its errors.
+
+    Attributes
+    ----------
+    rate_hz : measurements per second
+    noise_m : standard deviation of each coordinate; 0 for none
+    min_cameras : that must see a marker
+    shortest_s : trajectories between dropouts that are shorter are lost; 0 keeps them
+    n_cameras, ring_m, height_m : cameras stand on a ring of this radius, at this height
+    """
+
+    rate_hz: float = 100.0
+    noise_m: float = 0.0003
+    min_cameras: int = 2
+    shortest_s: float = 0.05
+    n_cameras: int = 8
+    ring_m: float = 3.0
+    height_m: float = 2.4
+
+
+QUALISYS = MocapSystem()
+"""Eight cameras, 100 measurements a second, 0.3 mm."""
+
+
+def room_cameras_m(system: MocapSystem, middle_m: np.ndarray) -> np.ndarray:
+    """Positions of the system's cameras, (n_cameras, 3), around a place on the floor (x, y)."""
+    angle = 2 * np.pi * (np.arange(system.n_cameras) + 0.5) / system.n_cameras
+    ring = np.c_[np.cos(angle), np.sin(angle)] * system.ring_m + np.asarray(middle_m, float)[:2]
+    return np.c_[ring, np.full(system.n_cameras, system.height_m)]
+
+
+def count_seeing(scene: RayScene, points_m: np.ndarray, cameras_m: np.ndarray) -> np.ndarray:
+    """How many cameras see each marker (m, 3) past what is in the scene, (m,)."""
+    m, c = len(points_m), len(cameras_m)
+    start = np.repeat(points_m, c, axis=0)
+    hidden = scene.occluded(start, np.tile(cameras_m, (m, 1)) - start)
+    return (~hidden).reshape(m, c).sum(axis=1)
+
+
+def watch(
+    person_at: Callable[[float], PosedBody],
+    vertices: np.ndarray,
+    fixed_m: np.ndarray,
+    times_s: np.ndarray,
+    cameras_m: np.ndarray,
+    every: int = 4,
+    obstacles: tuple[Mesh, ...] = (),
+) -> tuple[np.ndarray, np.ndarray]:
+    """Follow the markers of a moving person, and others that stay where they are.
+
+    Parameters
+    ----------
+    person_at : seconds -> the person, posed in the world
+    vertices : (12,), where the markers are on the person's skin
+    fixed_m : (k, 3), markers that do not move
+    times_s : (n,), increasing
+    every : the person is posed at every so many times; splines lead from one to the next
+    obstacles : what hides markers besides the person
+
+    Returns
+    -------
+    markers_m : (n, 12 + k, 3), true centres in the world
+    n_seeing : (n, 12 + k), how many cameras see each
+    """
+    at = np.unique(np.append(np.arange(0, len(times_s), every), len(times_s) - 1))
+    found, seeing = [], []
+    for time_s in times_s[at]:
+        person = person_at(float(time_s))
+        found.append(np.concatenate([markers_m(person, vertices), np.reshape(fixed_m, (-1, 3))]))
+        seeing.append(count_seeing(body_scene(person, obstacles), found[-1], cameras_m))
+    nearest = np.rint(np.interp(np.arange(len(times_s)), at, np.arange(len(at)))).astype(int)
+    followed = CubicSpline(times_s[at], found)(times_s) if len(at) > 1 else np.array(found)
+    return followed, np.array(seeing)[nearest]
+
+
+def mocap_frame(rng: Rng) -> np.ndarray:
+    """T_mocap_world (4, 4): where a calibration frame laid down by hand put the system's world frame."""
+    T_mocap_world = np.eye(4)
+    tilt = rng.normal(0, np.radians(0.2), 3) * [1, 1, 0]  # of the floor
+    T_mocap_world[:3, :3] = rotation(tilt) @ rotation([0, 0, rng.uniform(-np.pi, np.pi)])
+    T_mocap_world[:3, 3] = rng.normal(0, [1.0, 1.0, 0.003])
+    return T_mocap_world
+
+
+def measure(
+    times_s: np.ndarray,
+    names: tuple[str, ...],
+    points_m: np.ndarray,
+    n_seeing: np.ndarray,
+    T_mocap_world: np.ndarray,
+    system: MocapSystem,
+    rng: Rng,
+) -> MotionCapture:
+    """What the system exports of markers that move.
+
+    Parameters
+    ----------
+    times_s : (n,), on the system's clock, 1 / system.rate_hz apart
+    names : of the m markers
+    points_m : (n, m, 3), their true centres in the world
+    n_seeing : (n, m), how many cameras see each
+    T_mocap_world : (4, 4), into the system's frame
+    """
+    measured = np.asarray(n_seeing) >= system.min_cameras
+    measured = _without_short_runs(measured, int(round(system.shortest_s * system.rate_hz)))
+    in_mocap_m = transform(T_mocap_world, np.reshape(points_m, (-1, 3))).reshape(np.shape(points_m))
+    in_mocap_m = in_mocap_m + system.noise_m * rng.standard_normal(in_mocap_m.shape)
+    in_mocap_m[~measured] = np.nan
+    return MotionCapture(np.asarray(times_s, float), tuple(names), in_mocap_m, system.rate_hz)
+
+
+def _without_short_runs(measured: np.ndarray, shortest: int) -> np.ndarray:
+    """Columns of (n, m) with runs of true that are shorter than `shortest` made false."""
+    kept = np.zeros_like(measured)
+    for column in range(measured.shape[1]):
+        change = np.diff(measured[:, column].astype(int), prepend=0, append=0)
+        for start, stop in zip(np.flatnonzero(change > 0), np.flatnonzero(change < 0), strict=True):
+            kept[start:stop, column] = stop - start >= shortest
+    return kept
