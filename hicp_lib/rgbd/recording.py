@@ -13,7 +13,7 @@ simulated recording holds more, as parquet and images: what is true (`read_truth
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -96,6 +96,25 @@ def open_recording(folder: str | Path) -> Recording:
     )
 
 
+def first_frames(recording: Recording, n: int) -> Recording:
+    """The first `n` frames of a recording, all if it has fewer.
+
+    Raises
+    ------
+    InputError
+        If `n` is not at least 1.
+    """
+    if n < 1:
+        raise InputError(f"{recording.folder}: {n} frames were asked for; expected at least 1")
+    return replace(
+        recording,
+        times_s=recording.times_s[:n],
+        rgb_paths=recording.rgb_paths[:n],
+        depth_paths=recording.depth_paths[:n],
+        T_base_cam=recording.T_base_cam[:n],
+    )
+
+
 def associate_frames(
     rgb_s: np.ndarray, depth_s: np.ndarray, pose_s: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -146,7 +165,7 @@ def read_truth(recording: Recording) -> pd.DataFrame | None:
     InputError
         If the file is there but is not such a table.
     """
-    return _read_table(recording.folder / TRUTH_FILE, _TRUTH_COLUMNS)
+    return _read_table(recording, TRUTH_FILE, _TRUTH_COLUMNS)
 
 
 def read_joints(recording: Recording) -> pd.DataFrame | None:
@@ -157,7 +176,7 @@ def read_joints(recording: Recording) -> pd.DataFrame | None:
     InputError
         If the file is there but is not such a table.
     """
-    return _read_table(recording.folder / JOINTS_FILE, ("frame", "t_s"))
+    return _read_table(recording, JOINTS_FILE, ("frame", "t_s"))
 
 
 def read_simulation(recording: Recording) -> dict | None:
@@ -187,7 +206,8 @@ def _check_size(path: Path, image: np.ndarray, intrinsics: Intrinsics) -> None:
         raise InputError(f"{path}: is {width} x {height} pixels; {CAMERA_FILE} says {expected}")
 
 
-def _read_table(path: Path, columns: tuple[str, ...]) -> pd.DataFrame | None:
+def _read_table(recording: Recording, name: str, columns: tuple[str, ...]) -> pd.DataFrame | None:
+    path = recording.folder / name
     if not path.is_file():
         return None
     try:
@@ -197,4 +217,4 @@ def _read_table(path: Path, columns: tuple[str, ...]) -> pd.DataFrame | None:
     missing = [name for name in columns if name not in table.columns]
     if missing:
         raise InputError(f"{path}: has no column {missing[0]!r}; expected {', '.join(columns)}")
-    return table
+    return table[table["frame"] < len(recording)].reset_index(drop=True)

@@ -1,0 +1,42 @@
+"""The recordings the study's notebooks look at: a lab's own, or simulated once and kept in the cache."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from hicp_lib.files import cache_dir
+from hicp_lib.provenance import digest
+from hicp_lib.rgbd.recording import RGB_LIST, Recording, first_frames, open_recording
+
+
+def open_experiment(
+    scenario: str, recording: str | Path = "", n_frames: int | None = None, seed: int = 0
+) -> Recording:
+    """Open the recording of an experiment.
+
+    Parameters
+    ----------
+    scenario : "relative-upper", "relative-lower" or "mocap"; simulated when no folder is given
+    recording : folder of a lab's own recording
+    n_frames : how many frames, from the first; all of them when left out
+    seed : of the simulation
+
+    Raises
+    ------
+    InputError
+        For an unknown scenario, or a folder that does not hold a recording.
+    """
+    if recording:
+        opened = open_recording(recording)
+        return opened if n_frames is None else first_frames(opened, n_frames)
+    # Open3D takes a second to load.
+    from hicp_lib.simulation.experiments.scenarios import scenario as known
+    from hicp_lib.simulation.experiments.simulate import simulate_recording, simulation_version
+
+    n = known(scenario).n_frames if n_frames is None else n_frames
+    key = digest([scenario, n, seed, simulation_version()])
+    folder = cache_dir() / "recordings" / key[:16]
+    if (folder / RGB_LIST).is_file():
+        return open_recording(folder)
+    return simulate_recording(folder, scenario, n_frames=n, seed=seed, progress=sys.stderr.isatty())

@@ -1,0 +1,105 @@
+"""The recordings that can be simulated: who is before the robot, and how either of them moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.errors import InputError
+from hicp_lib.provenance import DATA_DIR
+from hicp_lib.robot.kinematics import HEAD_JOINTS
+from hicp_lib.simulation.body import PosedBody
+from hicp_lib.simulation.experiments.moving import HEAD_RAD, moving
+from hicp_lib.simulation.experiments.seated import VIEWS, seated
+from hicp_lib.simulation.render import World
+
+POSES_FILE = DATA_DIR / "relative_poses.csv"
+
+Stage = Callable[[float], tuple[World, PosedBody]]
+"""What is to be seen at a time (seconds from the first frame), and the person in it."""
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A recording to be simulated.
+
+    Attributes
+    ----------
+    name : as the command line and the notebooks call it
+    n_frames, max_frames : by default, and at most
+    rate_hz : frames per second
+    mount : holder of the camera on the robot's head
+    head_rad : number of frames -> (n, 6) joint angles of the robot, `HEAD_JOINTS`
+    stage : seed -> `Stage`
+    has_mocap : whether motion capture watches
+    """
+
+    name: str
+    n_frames: int
+    max_frames: int
+    rate_hz: float
+    mount: str
+    head_rad: Callable[[int], np.ndarray]
+    stage: Callable[[int], Stage]
+    has_mocap: bool = False
+
+    def times_s(self, n: int) -> np.ndarray:
+        """Times (n,) of the frames, the first at 0."""
+        return np.arange(n) / self.rate_hz
+
+
+def scenario(name: str) -> Scenario:
+    """A scenario by its name.
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+    """
+    if name not in SCENARIOS:
+        raise InputError(f"no scenario {name!r}; choose one of {', '.join(SCENARIOS)}")
+    return SCENARIOS[name]
+
+
+@cache
+def relative_poses_rad(view: str) -> np.ndarray:
+    """The robot's poses of a view, (n, 6) in the order of `HEAD_JOINTS`, from data/relative_poses.csv."""
+    table = pd.read_csv(POSES_FILE)
+    columns = [f"{joint}_deg" for joint in HEAD_JOINTS]
+    return np.radians(table.loc[table["view"] == view, columns].to_numpy(float))
+
+
+def _relative(view: str) -> Scenario:
+    poses_rad = relative_poses_rad(view)
+    return Scenario(
+        name=f"relative-{view}",
+        n_frames=len(poses_rad),
+        max_frames=len(poses_rad),
+        rate_hz=0.5,  # the robot moves and settles between two frames
+        mount=VIEWS[view],
+        head_rad=lambda n: poses_rad[:n],
+        stage=_still,
+    )
+
+
+def _still(seed: int) -> Stage:
+    scene = seated(seed)
+    return lambda time_s: (scene.world, scene.person)
+
+
+SCENARIOS = {f"relative-{view}": _relative(view) for view in VIEWS} | {
+    "mocap": Scenario(
+        name="mocap",
+        n_frames=480,
+        max_frames=100_000,
+        rate_hz=15.0,
+        mount="level",
+        head_rad=lambda n: np.tile(HEAD_RAD, (n, 1)),
+        stage=moving,
+        has_mocap=True,
+    )
+}
