@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from hicp_lib.detectors.base import Detections
 from hicp_lib.keypoints import HANDS, INDEX, LIMBS, N_KEYPOINTS
@@ -14,7 +15,8 @@ from hicp_lib.plots.style import Figure, detector_colour, in_style, in_words, le
 from hicp_lib.rgbd.recording import Recording, read_rgb
 
 TRUTH_COLOUR = "#111111"
-_LOOKS = {"from the front": ("y_m", "z_m"), "from its right": ("x_m", "z_m"), "from above": ("y_m", "x_m")}
+# Seen by the robot, which looks along -x; the axis that is not drawn is the one looked along.
+_LOOKS = {"as the robot looks": ("y_m", "z_m"), "from its left": ("x_m", "z_m"), "from above": ("y_m", "x_m")}
 # Fewer images than this say little about a spread.
 MIN_IMAGES = 5
 _CAUSE_STYLES = (
@@ -58,7 +60,7 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
     Parameters
     ----------
     medians : table of `hicp_lib.evaluation.stability.median_positions`, one method
-    truth : view -> table with `keypoint, x_m, y_m, z_m` of one frame; None where it is not known
+    truth : view -> table with `keypoint, x_m, y_m, z_m`; None where it is not known
     """
     views = list(dict.fromkeys(medians["view"]))
     figure, axes = new_figure(len(views), 3, 10.5, 3.7 * len(views), squeeze=False)
@@ -72,6 +74,7 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
                 _draw_skeleton(axis, rows, columns, colour, style, name)
             axis.set(aspect="equal", title=f"{view} · {look}")
             axis.set(xlabel=f"{columns[0][0]} [m]", ylabel=f"{columns[1][0]} [m]")
+            axis.yaxis.set_inverted(columns[1] == "x_m")  # forward is up
     figure.legend(*legend_entries(axes), loc="outside lower center", ncols=4, fontsize=9)
     caption = (
         "Median skeletons: coordinate-wise median of every keypoint over the images, in the robot's base "
@@ -87,7 +90,8 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
 
 def _draw_skeleton(axis, rows: pd.DataFrame, columns: tuple[str, str], colour, style, label) -> None:
     points = np.full((N_KEYPOINTS, 2), np.nan)
-    points[[INDEX[name] for name in rows["keypoint"]]] = rows[list(columns)]
+    rows = rows.drop_duplicates("keypoint")  # of a table with many frames, the first
+    points[rows["keypoint"].map(INDEX)] = rows[list(columns)]
     for a, b in LIMBS:
         width = 0.7 if a in HANDS else 1.6
         axis.plot(*points[[a, b]].T, style, color=colour, lw=width, alpha=0.9, label=label)
@@ -95,12 +99,12 @@ def _draw_skeleton(axis, rows: pd.DataFrame, columns: tuple[str, str], colour, s
 
 
 @in_style
-def spread_against_bias(table: pd.DataFrame, note: str) -> Figure:
+def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
     """How far apart the views are against how far off their median is, per part, detector and view.
 
-    `table` from `hicp_lib.evaluation.stability.spread_and_bias` with truth, one method.
+    `table` from `hicp_lib.evaluation.stability.spread_and_bias` with truth, of which `method` is drawn.
     """
-    table = table[(table["n"] >= MIN_IMAGES) & table["bias_m"].notna()]
+    table = table[(table["method"] == method) & (table["n"] >= MIN_IMAGES) & table["bias_m"].notna()]
     views = list(dict.fromkeys(table["view"]))
     figure, axes = new_figure(
         1, len(views), max(4.6 * len(views), 6), 4.9, sharex=True, sharey=True, squeeze=False
@@ -122,6 +126,8 @@ def spread_against_bias(table: pd.DataFrame, note: str) -> Figure:
                 markersize=8, elinewidth=0.7,
             )  # fmt: skip
         axis.set(xscale="log", yscale="log", title=view, xlabel="spread: distance to the median [cm]")
+        for scale in (axis.xaxis, axis.yaxis):
+            _plain_ticks(scale)
         axis.axline((1, 1), (2, 2), color="#888888", lw=1, ls="--")
     axes[0, 0].set(ylabel="bias: median to truth [cm]")
     _part_legend(figure, axes[0, 0], list(dict.fromkeys(table["detector"])))
@@ -134,6 +140,13 @@ def spread_against_bias(table: pd.DataFrame, note: str) -> Figure:
         f"Whiskers are 95 % bootstrap intervals over images: {note}."
     )
     return Figure(figure, caption, f"Scatter of spread and bias on logarithmic axes. Parts: {said}.", table)
+
+
+def _plain_ticks(axis) -> None:
+    """Ticks of a logarithmic axis at 1, 2 and 5, written as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _part_legend(figure, axis, detectors: Sequence[str]) -> None:
@@ -167,6 +180,7 @@ def spread_causes(table: pd.DataFrame, note: str) -> Figure:
             axis.hlines(y, 100 * part["spread_m"], 100 * part["p90_m"], color=colour, lw=1.2)
             axis.plot(100 * part["spread_m"], y, marker, color=colour, markersize=6, label=cause)
         axis.set(title=f"{view}\n{detector}", xlabel="distance to the median [cm]", xscale="log")
+        _plain_ticks(axis.xaxis)
     axes[0, 0].set(yticks=range(len(parts)), yticklabels=parts, ylim=(len(parts) - 0.5, -0.5))
     figure.legend(*legend_entries(axes), loc="outside lower center", ncols=3, fontsize=9)
     caption = (

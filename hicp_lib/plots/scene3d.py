@@ -13,7 +13,7 @@ import pandas as pd
 import plotly.graph_objects as go
 
 from hicp_lib.keypoints import INDEX, LIMBS, N_KEYPOINTS
-from hicp_lib.plots.style import detector_colour
+from hicp_lib.plots.style import detector_colour, in_words
 from hicp_lib.rgbd.camera import Intrinsics, deproject, transform
 from hicp_lib.rgbd.recording import Recording, read_depth_m, read_rgb
 from hicp_lib.robot.segments import Segment
@@ -27,32 +27,32 @@ _PEN_UP = np.full((1, 3), np.nan)
 
 
 def scene(
-    cloud: go.Scatter3d,
-    robot: Sequence[Segment],
     recordings: Mapping[str, Recording],
-    skeletons: Mapping[str, pd.DataFrame],
-    truth: pd.DataFrame | None = None,
+    medians: pd.DataFrame,
+    robot: Sequence[Segment] = (),
+    truth: Mapping[str, pd.DataFrame] | None = None,
 ) -> go.Figure:
     """The scene; every entry of its legend can be switched off.
 
     Parameters
     ----------
-    cloud : from `point_cloud`
+    recordings : view -> recording; all camera poses are drawn, and what the first saw in its first frame
+    medians : table of `hicp_lib.evaluation.stability.median_positions`, one method; one skeleton per view
+        and detector
     robot : body segments in the base frame; empty where the joints are not known
-    recordings : view -> recording, whose camera poses are drawn
-    skeletons : "<detector>, <view>" -> table with `keypoint, x_m, y_m, z_m`, coloured by the detector
-    truth : such a table of the true positions, if they are known
+    truth : view -> table with `keypoint, x_m, y_m, z_m`, the first view's is drawn; None where not known
     """
-    traces = [cloud]
+    first = next(iter(recordings))
+    traces = [point_cloud(recordings[first], 0)]
     if robot:
         traces.append(_robot(robot))
     for (view, recording), colour in zip(recordings.items(), VIEW_COLOURS, strict=False):
         lines = _frusta(recording.intrinsics, recording.T_base_cam)
         traces.append(_line(lines, f"cameras, {view}", colour, 1))
-    for name, rows in skeletons.items():
-        traces.append(_line(_limbs(rows), name, detector_colour(name.split(",")[0]), 5))
+    for (view, detector), rows in medians.groupby(["view", "detector"], sort=False):
+        traces.append(_line(_limbs(rows), f"{detector}, {view}", detector_colour(detector), 5))
     if truth is not None:
-        traces.append(_line(_limbs(truth), "true skeleton", TRUTH_COLOUR, 3))
+        traces.append(_line(_limbs(truth[first]), "true skeleton", TRUTH_COLOUR, 3))
     figure = go.Figure(traces)
     axes = {f"{axis}axis": {"title": f"{axis} [m]", "backgroundcolor": "#FAFAFA"} for axis in "xyz"}
     figure.update_layout(
@@ -107,7 +107,14 @@ def _frusta(intrinsics: Intrinsics, T_base_cam: np.ndarray) -> np.ndarray:
 def _limbs(rows: pd.DataFrame) -> np.ndarray:
     """Lines of a skeleton's limbs whose both ends are known, shape (n, 3)."""
     points = np.full((N_KEYPOINTS, 3), np.nan)
-    points[[INDEX[name] for name in rows["keypoint"]]] = rows[["x_m", "y_m", "z_m"]]
+    rows = rows.drop_duplicates("keypoint")  # of a table with many frames, the first
+    points[rows["keypoint"].map(INDEX)] = rows[["x_m", "y_m", "z_m"]]
     limbs = points[np.array(LIMBS)]
     limbs = limbs[np.isfinite(limbs).all(axis=(1, 2))]
     return np.concatenate([limbs, np.full((len(limbs), 1, 3), np.nan)], axis=1).reshape(-1, 3)
+
+
+def describe(figure: go.Figure) -> str:
+    """What the scene holds, for readers who cannot see it."""
+    names = in_words([trace.name for trace in figure.data])
+    return f"Interactive 3D scene in the robot's base frame with: {names}."

@@ -42,7 +42,8 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
             axis.vlines([100 * distance for distance in marked_m], 0, 1, color="#AAAAAA", lw=0.8)
             axis.set(title=f"{view} · {kind}s", ylim=(0, 1.02), xlim=(0, None))
         row[0].set(ylabel="share of images")
-    figure.supxlabel("distance [cm]", fontsize=10)
+    for axis in axes[-1]:
+        axis.set(xlabel="distance [cm]")
     figure.legend(*legend_entries(axes), loc="outside lower center", ncols=3, fontsize=9)
     caption = (
         "Share of images in which a keypoint was found within a distance of "

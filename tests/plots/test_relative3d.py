@@ -99,7 +99,7 @@ def test_spread_and_bias_are_in_centimetres_and_rare_parts_left_out():
             for part, n in (("left wrist", 50), ("right wrist", 2))]  # fmt: skip
     names = [f"{name}{end}" for name in ("spread_m", "bias_m", "error_m") for end in ("", "_low", "_high")]
     figure = relative3d.spread_against_bias(
-        pd.DataFrame(rows, columns=["view", "detector", "method", "part", "n", *names]), "made up"
+        pd.DataFrame(rows, columns=["view", "detector", "method", "part", "n", *names]), "robust", "made up"
     )
     assert figure.table["part"].tolist() == ["left wrist"]
     marker = figure.figure.axes[0].get_lines()[0]

@@ -18,6 +18,8 @@ SKELETON = pd.DataFrame(
     columns=["keypoint", "x_m", "y_m", "z_m"],
 )
 
+NOBODY = SKELETON[:0].assign(view="own", detector="mediapipe")
+
 
 @pytest.fixture
 def recording(tmp_path):
@@ -47,10 +49,8 @@ def test_the_cloud_is_thinned(recording):
 
 
 def test_the_scene_holds_robot_cameras_skeletons_and_truth(recording):
-    figure = scene3d.scene(
-        scene3d.point_cloud(recording, 0), body_segments(load_icub()), {"upper": recording},
-        {"mediapipe, upper": SKELETON}, SKELETON,
-    )  # fmt: skip
+    medians = SKELETON.assign(view="upper", detector="mediapipe")
+    figure = scene3d.scene({"upper": recording}, medians, body_segments(load_icub()), {"upper": SKELETON})
     traces = {trace.name: trace for trace in figure.data}
     assert list(traces) == ["point cloud", "robot", "cameras, upper", "mediapipe, upper", "true skeleton"]
     arm = traces["mediapipe, upper"]
@@ -64,5 +64,5 @@ def test_the_scene_holds_robot_cameras_skeletons_and_truth(recording):
 
 
 def test_without_joints_and_truth_there_is_no_robot_and_no_true_skeleton(recording):
-    figure = scene3d.scene(scene3d.point_cloud(recording, 0), [], {"own": recording}, {})
+    figure = scene3d.scene({"own": recording}, NOBODY)
     assert [trace.name for trace in figure.data] == ["point cloud", "cameras, own"]

@@ -1,0 +1,56 @@
+"""Tables of the relative 3D test for reading: one line per view, detector and keypoint.
+
+What a recording has nothing for is said in the table's place.
+"""
+
+from __future__ import annotations
+
+import pandas as pd
+
+_ROW = ["view", "detector", "part"]
+_DISTANCES = {"spread_m": "spread [cm]", "bias_m": "bias [cm]", "error_m": "error [cm]"}
+
+
+def shares_text(table: pd.DataFrame | None, threshold_m: float) -> pd.DataFrame:
+    """Shares within a distance as "0.71 [0.65, 0.77]", a column per method; `table` of `within_distance`."""
+    if table is None:
+        return _not_available("true positions (truth.parquet)")
+    rows = table[table["threshold_m"] == threshold_m]
+    text = [
+        _with_bounds(*numbers)
+        for numbers in rows[["value", "low", "high"]].itertuples(index=False, name=None)
+    ]
+    return _wide(rows.assign(text=text), "method")
+
+
+def distances_text(table: pd.DataFrame) -> pd.DataFrame:
+    """Spread, bias and error in centimetres as "1.2 [1.1, 1.4]"; `table` of `spread_and_bias`."""
+    shown = table[[*_ROW, "method", "n"]].copy()
+    for name, title in _DISTANCES.items():
+        if name in table:
+            numbers_cm = 100 * table[[name, f"{name}_low", f"{name}_high"]]
+            shown[title] = [_with_bounds(*row, digits=1) for row in numbers_cm.itertuples(index=False)]
+    return shown
+
+
+def causes_text(table: pd.DataFrame) -> pd.DataFrame:
+    """Spread per cause in centimetres as "1.2 (3.4)", the 90th percentile in brackets, a column per cause."""
+    if table.empty:
+        return _not_available("what a simulated recording has: truth, depth without errors, joints")
+    text = [f"{100 * s:.1f} ({100 * p:.1f})" for s, p in zip(table["spread_m"], table["p90_m"], strict=True)]
+    return _wide(table.assign(text=text), "cause")
+
+
+def _not_available(needed: str) -> pd.DataFrame:
+    return pd.DataFrame({"needs": [needed], "here": "not available for this recording"})
+
+
+def _with_bounds(value: float, low: float, high: float, digits: int = 2) -> str:
+    return f"{value:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]" if value == value else "–"
+
+
+def _wide(rows: pd.DataFrame, columns: str) -> pd.DataFrame:
+    """`text` of every row and value of `columns`, both in the order they come in."""
+    wide = rows.pivot(index=_ROW, columns=columns, values="text")
+    wide = wide.reindex(list(dict.fromkeys(rows[_ROW].itertuples(index=False, name=None))))
+    return wide[list(dict.fromkeys(rows[columns]))].rename_axis(columns=None).reset_index()
