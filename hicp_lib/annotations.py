@@ -189,16 +189,14 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     """Read COCO keypoint results (a list of `image_id, category_id, keypoints, score`).
 
     With `annotations`, every image id must be among theirs, and images without a detection
-    come back with none. People keep the order of the file.
+    come back with none. People keep the order of the file. An empty list is a result: nobody was found.
 
     Raises
     ------
     InputError
-        For anything malformed: an empty list, NaN, a wrong number of keypoints, an unknown image, ...
+        For anything malformed: NaN, a wrong number of keypoints, an unknown image, ...
     """
     rows = Rows.of(Path(path), "results", read_json(path), name_key="image_id")
-    if not rows.rows:
-        raise InputError(f"{path}: holds no detections; if nobody was found AP is 0, else write it again")
     image_ids, person_scores = rows.integers("image_id"), rows.numbers("score")
     _check_references(rows, image_ids, None if annotations is None else annotations.images)
     triples = rows.keypoints()
@@ -206,7 +204,7 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     found = {} if annotations is None else dict.fromkeys(annotations.images, Detections.none())
     order = np.argsort(image_ids, kind="stable")
     starts = np.flatnonzero(np.diff(image_ids[order])) + 1
-    for chosen in np.split(order, starts):
+    for chosen in np.split(order, starts) if len(order) else ():
         found[int(image_ids[chosen[0]])] = Detections(
             keypoints[chosen], triples[chosen, :, 2], person_scores[chosen]
         )

@@ -299,6 +299,8 @@ def evaluate(
     _say(
         f"{group}: {evaluation.n_people} people in {evaluation.n_images} images; {sigmas} sigmas, {area} area"
     )
+    if not any(map(len, found.values())):
+        _say(f"{detections}: an empty list: nobody was found in any image")
     for row in rows:
         _say(f"{row['metric']:<5} {row['value']:.3f}  [{row['low']:.3f}, {row['high']:.3f}]")
 

@@ -126,6 +126,13 @@ def test_detections_are_read_in_the_order_of_the_file(write):
     assert list(read_detections(write(lines[:1]))) == [9]
 
 
+def test_an_empty_list_of_detections_is_nobody_found(write):
+    truth = read_annotations(write(file(person(1))))
+    found = read_detections(write([]), truth)
+    assert list(found) == [7, 9] and not any(map(len, found.values()))
+    assert read_detections(write([])) == {}
+
+
 def test_the_order_is_kept_among_many(write):
     scores = np.arange(200.0)
     lines = [result(7 + 2 * (i % 2), score=score, n=17) for i, score in enumerate(scores.tolist())]
@@ -221,7 +228,6 @@ def test_file_names_cannot_lead_out_of_the_folder(write, name):
 @pytest.mark.parametrize(
     ("results", "expected"),
     [
-        ([], "holds no detections"),
         (
             [result(), changed(result(9), ELBOW_Y, math.nan)],
             r"\(image_id 9\): keypoints\[22\] \(left_elbow y\) is nan",

@@ -115,3 +115,9 @@ def test_evaluation_of_perfect_detections(capsys, tmp_path):
     assert cli.run(arguments) == 0
     assert "AP    1.000  [1.000, 1.000]" in capsys.readouterr().out
     assert "group" in mistake(capsys, *arguments[:-1], "feet")
+
+    found.write_text("[]")
+    assert cli.run(arguments) == 0
+    printed = capsys.readouterr().out
+    assert f"{found}: an empty list: nobody was found in any image" in printed
+    assert "AP    0.000  [0.000, 0.000]" in printed

@@ -84,7 +84,7 @@ class MMPose:
         regions = Regions.around(boxes, self._net.input_size_px)
         positions_px, raw_scores = self._net.find(image, regions)
         scores = np.clip(raw_scores / self._score_scale, 0, 1)
-        person_scores = box_scores * _mean_above(scores, 0.2)
+        person_scores = box_scores * _mean_above(raw_scores, 0.2)
         areas = regions.sizes_px.prod(axis=1)
         keep = oks_nms(positions_px, person_scores, areas, self._sigmas)
         return as_detections(positions_px[keep], scores[keep], person_scores[keep], self._convention)
@@ -104,7 +104,9 @@ class MMPose:
                 "10 if the head shuffles pixels (RTMW), else 1; option score_scale",
             ),
             Fact(
-                "person score", "box score x mean of keypoint scores above 0.2", "as MMPose; OKS-NMS at 0.9"
+                "person score",
+                "box score x mean of the scores above 0.2, before they are divided",
+                "as MMPose; OKS-NMS at 0.9",
             ),
             *self._boxes.describe(),
         ]

@@ -138,6 +138,11 @@ def test_scores_of_rtmw_are_scaled_to_one(tmp_path):
     scores = [detector.detect(image).scores[0, COCO_17] for detector in (plain, given_scale, rtmw)]
     np.testing.assert_allclose(scores[1], scores[2] * 2, rtol=1e-6)
     assert all((score >= 0).all() and (score <= 1).all() for score in scores)
+    # MMPose itself ranks people by the network's own scores, as predictions it wrote are imported.
+    raw = plain.detect(image).scores[0, COCO_17]
+    assert raw.max() < 1
+    for detector in (plain, given_scale, rtmw):
+        np.testing.assert_allclose(detector.detect(image).person_scores, raw[raw > 0.2].mean(), rtol=1e-6)
 
 
 def test_person_boxes_detected_given_and_missing(tmp_path):
