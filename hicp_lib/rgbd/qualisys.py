@@ -89,7 +89,8 @@ def write_tsv(path: str | Path, mocap: MotionCapture) -> None:
 def write_c3d(path: str | Path, mocap: MotionCapture) -> None:
     """Write C3D in millimetres, single precision; missing markers have the residual -1.
 
-    C3D has no column of times: the first frame is at 0, as `read_mocap` reads it.
+    C3D has no column of times: the first frame is at 0, as `read_mocap` reads it. `InputError` for
+    more frames than the format counts to.
     """
     c3d.write_points(path, mocap.points_m, mocap.names, mocap.rate_hz)
 

@@ -59,6 +59,14 @@ def test_written_c3d_is_read_back_in_single_precision(tmp_path):
     assert np.allclose(found.points_m, points_m, rtol=1e-6, atol=1e-6, equal_nan=True)
 
 
+def test_c3d_refuses_more_frames_than_the_format_counts_to(tmp_path):
+    n = 65535
+    mocap = MotionCapture(np.arange(n) / 100, ("a",), np.zeros((n, 1, 3)), 100.0)
+    with pytest.raises(InputError, match="write TSV"):
+        write_c3d(tmp_path / "mocap.c3d", mocap)
+    assert not (tmp_path / "mocap.c3d").exists()
+
+
 def test_a_real_header_with_repeated_and_unknown_keys_and_no_titles(tmp_path):
     extra = ["FILE_VERSION\t2.0.0", "EVENT\tstart\t17\t0.085", "COLOURS\tred\tblue"]
     found = read_mocap(_file(tmp_path, extra + HEADER + ROWS))
