@@ -96,7 +96,7 @@ def simulate_depth(scene: RayScene, colour: Camera, settings: DepthCamera, rng: 
     Parameters
     ----------
     scene : what is there, such as `Frame.rays` of a rendered frame
-    colour : the colour camera, upright or not, anywhere
+    colour : the colour camera; what lies outside the left imager's view has no depth
 
     Returns
     -------
