@@ -5,6 +5,7 @@ touches the table between them, steps aside. The robot stands still.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,12 +13,15 @@ from hicp_lib.simulation.arms import Joints
 from hicp_lib.simulation.body import Body, PosedBody, load_body, pose_body
 from hicp_lib.simulation.clearance import Outline, clearance_m, outline
 from hicp_lib.simulation.experiments.laboratory import adult, facing_robot, furnished, table
+from hicp_lib.simulation.experiments.mocap import marker_balls
 from hicp_lib.simulation.experiments.motion import Motion, Move, Posture, between
 from hicp_lib.simulation.joints import pose_from_joints, within_limits
-from hicp_lib.simulation.people import dress
+from hicp_lib.simulation.people import Appearance, dress
 from hicp_lib.simulation.poses import sample_joints
 from hicp_lib.simulation.reach import reach
 from hicp_lib.simulation.render import World
+from hicp_lib.simulation.sensors.markers import marker_vertices
+from hicp_lib.simulation.surfaces import Surface
 
 Rng = np.random.Generator
 
@@ -147,18 +151,31 @@ def posed(body: Body, shape: np.ndarray, posture: Posture) -> PosedBody:
     return pose_body(body, shape, pose_from_joints(posture.joints), facing_robot(y, x))
 
 
-def moving(seed: int) -> Callable[[float], tuple[World, PosedBody]]:
-    """The scene of a seed: at every time (seconds) the world, and the person in it."""
+@dataclass(frozen=True)
+class Moving:
+    """A person who moves in a room, with markers on; times in seconds from the first frame."""
+
+    room: World  # without the person
+    table: Surface
+    appearance: Appearance
+    motion: Motion
+
+    def person_at(self, time_s: float) -> PosedBody:
+        """The person, not dressed."""
+        return posed(load_body(), self.appearance.shape, self.motion.at(time_s))
+
+    def at(self, time_s: float) -> tuple[World, PosedBody]:
+        """All there is to see, and the person in it."""
+        person, vertices = self.person_at(time_s), marker_vertices(self.appearance.shape)
+        worn = [*dress(self.appearance, person, 0), *marker_balls(person, vertices, 0)]
+        return replace(self.room, surfaces=[*self.room.surfaces, *worn]), person
+
+
+def moving(seed: int) -> Moving:
+    """The scene of a seed: who moves how, in what room. The same in every process."""
     rng = np.random.default_rng(np.random.SeedSequence([seed, 2]))
-    body, appearance = load_body(), adult(rng)
+    appearance = adult(rng)
     top = table(rng, *_TABLE_M, TABLE_HEIGHT_M)
     room = furnished(rng, [top], [(0.0, DISTANCE_M, 0.8), (0.0, 0.9, 0.8)])
-    mover = _Mover(rng, body, appearance.shape)
-    motion = Motion(mover.now, mover.moves())
-
-    def at(time_s: float) -> tuple[World, PosedBody]:
-        person = posed(body, appearance.shape, motion.at(time_s))
-        surfaces = [*room.surfaces, *dress(appearance, person, 0)]
-        return World(surfaces, room.lights, room.ambient, room.backdrop), person
-
-    return at
+    mover = _Mover(rng, load_body(), appearance.shape)
+    return Moving(room, top, appearance, Motion(mover.now, mover.moves()))

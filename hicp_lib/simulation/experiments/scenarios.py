@@ -13,9 +13,11 @@ from hicp_lib.errors import InputError
 from hicp_lib.provenance import DATA_DIR
 from hicp_lib.robot.kinematics import HEAD_JOINTS
 from hicp_lib.simulation.body import PosedBody
+from hicp_lib.simulation.experiments.mocap import Capture, capture
 from hicp_lib.simulation.experiments.moving import HEAD_RAD, moving
 from hicp_lib.simulation.experiments.seated import VIEWS, seated
 from hicp_lib.simulation.render import World
+from hicp_lib.simulation.sensors.markers import marker_vertices
 
 POSES_FILE = DATA_DIR / "relative_poses.csv"
 
@@ -35,7 +37,7 @@ class Scenario:
     mount : holder of the camera on the robot's head
     head_rad : number of frames -> (n, 6) joint angles of the robot, `HEAD_JOINTS`
     stage : seed -> `Stage`
-    has_mocap : whether motion capture watches
+    capture : (seed, duration in seconds, T_world_camera) -> motion capture of it; None where there is none
     """
 
     name: str
@@ -45,7 +47,7 @@ class Scenario:
     mount: str
     head_rad: Callable[[int], np.ndarray]
     stage: Callable[[int], Stage]
-    has_mocap: bool = False
+    capture: Callable[[int, float, np.ndarray], Capture] | None = None
 
     def times_s(self, n: int) -> np.ndarray:
         """Times (n,) of the frames, the first at 0."""
@@ -91,15 +93,21 @@ def _still(seed: int) -> Stage:
     return lambda time_s: (scene.world, scene.person)
 
 
+def _capture_moving(seed: int, duration_s: float, T_world_camera: np.ndarray) -> Capture:
+    scene = moving(seed)
+    vertices = marker_vertices(scene.appearance.shape)
+    return capture(scene.person_at, vertices, T_world_camera, (scene.table.mesh,), duration_s, seed)
+
+
 SCENARIOS = {f"relative-{view}": _relative(view) for view in VIEWS} | {
     "mocap": Scenario(
         name="mocap",
         n_frames=480,
         max_frames=100_000,
-        rate_hz=15.0,
+        rate_hz=12.0,
         mount="level",
         head_rad=lambda n: np.tile(HEAD_RAD, (n, 1)),
-        stage=moving,
-        has_mocap=True,
+        stage=lambda seed: moving(seed).at,
+        capture=_capture_moving,
     )
 }
