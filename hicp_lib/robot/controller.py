@@ -1,0 +1,147 @@
+"""The reactive controller: one hand stays at its post, and all joints give way to obstacles.
+
+Every 20 ms a quadratic program chooses the velocities of the ten joints of torso and arm: the hand is
+drawn to its post and the joints to a rest posture, smoothly, within the bounds of `velocity_bounds` and
+those of the shoulder's cables. After Nguyen et al. (2018), with the costs of the version the authors used
+in 2022 (robotology/react-control); solved by DAQP. This is no safety function.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from qpsolvers import Problem, solve_problem
+
+from hicp_lib.robot.kinematics import ARM_JOINTS, ICub
+from hicp_lib.robot.peripersonal_space import Obstacle
+from hicp_lib.robot.posture import Posture
+from hicp_lib.robot.velocity_bounds import guarded_bounds, retreat_velocities, shape_bounds
+
+
+class NoSolution(Exception):
+    """There are no velocities that satisfy all bounds; the message says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """How the controller behaves; defaults from the published code unless said otherwise.
+
+    Attributes
+    ----------
+    period_s : time between two commands
+    fastest_rad_s : of every joint (30 degrees per second in 2022, 20 in 2018)
+    retreat_rad_s : velocity `v_a` of the retreat per metre of lever arm (50 degrees per second)
+    gain : factor on the magnitudes of what is seen (0.5; 1.5 was for touch)
+    guard : part of a joint's range in which it slows down towards its limit
+    post_weight, rest_weight, smooth_weight : costs of the hand's velocity error (m/s)^2, of the joints'
+        from the way to rest (rad/s)^2, and of changes of velocity (rad/s)^2
+    approach_s : the hand wants to be at its post in this time, ... (ours)
+    approach_m_s : ... but no faster than this (ours)
+    """
+
+    period_s: float = 0.02
+    fastest_rad_s: float = np.deg2rad(30.0)
+    retreat_rad_s: float = np.deg2rad(50.0)
+    gain: float = 0.5
+    guard: float = 0.025
+    post_weight: float = 10.0
+    rest_weight: float = 0.01
+    smooth_weight: float = 1.0
+    approach_s: float = 0.3
+    approach_m_s: float = 0.3
+
+
+@dataclass(eq=False)
+class Controller:
+    """Chooses joint velocities for torso and one arm; remembers the last ones.
+
+    Attributes
+    ----------
+    icub : the robot
+    post_m : (3,) where the palm wants to be, root frame
+    rest_rad : (10,) angles the joints are drawn to
+    side : "left" or "right", the arm that is controlled
+    """
+
+    icub: ICub
+    post_m: np.ndarray
+    rest_rad: np.ndarray
+    side: str = "left"
+    settings: Settings = field(default_factory=Settings)
+    _last: np.ndarray = field(default_factory=lambda: np.zeros(len(ARM_JOINTS)), repr=False)
+
+    def velocities(self, posture: Posture, obstacles: list[Obstacle]) -> np.ndarray:
+        """Velocities (10,) rad/s of `ARM_JOINTS` for the next period.
+
+        Raises
+        ------
+        NoSolution
+            If the angles are not finite, or no velocities satisfy all bounds. The next call starts from rest.
+        """
+        q = posture.angles(self.side)
+        last, self._last = self._last, np.zeros_like(self._last)
+        if not np.isfinite(q).all():
+            raise NoSolution("joint angles are not finite")
+        lowest, highest = self._bounds(posture, q, obstacles)
+        chosen = solve_problem(self._problem(q, last, lowest, highest), solver="daqp").x
+        if chosen is None or not np.isfinite(chosen).all():
+            raise NoSolution("no velocities satisfy the bounds of joints and cables")
+        # The solver keeps bounds to its tolerance only.
+        self._last = np.clip(chosen, lowest, highest)
+        return self._last.copy()
+
+    def _bounds(
+        self, posture: Posture, q: np.ndarray, obstacles: list[Obstacle]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        limits, settings = self.icub.chains[self.side].limits_rad, self.settings
+        lowest, highest = guarded_bounds(q, limits, settings.fastest_rad_s, settings.guard, settings.period_s)
+        retreats = [self._retreat(posture, obstacle) for obstacle in obstacles]
+        return self._within_cables(q, *shape_bounds(lowest, highest, retreats))
+
+    def _retreat(self, posture: Posture, obstacle: Obstacle) -> np.ndarray:
+        """What an obstacle wants of the controlled joints: those of another limb do not move."""
+        chain, link = self.icub.parts[obstacle.part]
+        q = posture.angles(chain)
+        jacobian = self.icub.chains[chain].jacobian(link, q, obstacle.point_m)
+        shared = np.zeros((3, len(ARM_JOINTS)))
+        n = len(ARM_JOINTS) if chain == self.side else 3
+        shared[:, :n] = jacobian[:, :n]
+        normal = self.icub.chains[chain].T_root_link(link, q)[:3, :3] @ obstacle.normal
+        strength = self.settings.gain * obstacle.magnitude
+        return retreat_velocities(shared, normal, strength, self.settings.retreat_rad_s)
+
+    def _cable_bounds(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cables' inequalities `rows @ velocities <= most`; outside them, at least no farther."""
+        chain = self.icub.chains[self.side]
+        length = chain.cables @ q
+        room = np.concatenate([chain.cables_upper_rad - length, length - chain.cables_lower_rad])
+        rows, finite = np.concatenate([chain.cables, -chain.cables]), np.isfinite(room)
+        return rows[finite], np.maximum(room[finite], 0) / self.settings.period_s
+
+    def _within_cables(
+        self, q: np.ndarray, lowest: np.ndarray, highest: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds relaxed towards standing still until the cables allow what they force joints to do.
+
+        Without it a retreat that pulls a cable would leave no velocities at all, and stop the arm.
+        """
+        forced = np.clip(0, lowest, highest)
+        rows, most = self._cable_bounds(q)
+        pull = rows @ forced
+        scale = np.min(most[pull > most] / pull[pull > most], initial=1.0)
+        return np.minimum(lowest, scale * forced), np.maximum(highest, scale * forced)
+
+    def _problem(self, q: np.ndarray, last: np.ndarray, lowest: np.ndarray, highest: np.ndarray) -> Problem:
+        """Least squares in the velocities, as `1/2 x'Px + c'x` with the cables' inequalities."""
+        settings, chain = self.settings, self.icub.chains[self.side]
+        jacobian = chain.jacobian("hand", q)
+        away = self.post_m - chain.T_root_link("hand", q)[:3, 3]
+        towards = away / max(settings.approach_s, np.linalg.norm(away) / settings.approach_m_s)
+        to_rest = (self.rest_rad - q) / settings.approach_s
+        P = settings.post_weight * jacobian.T @ jacobian
+        P[np.diag_indices_from(P)] += settings.rest_weight + settings.smooth_weight
+        c = -settings.post_weight * jacobian.T @ towards
+        c -= settings.rest_weight * to_rest + settings.smooth_weight * last
+        rows, most = self._cable_bounds(q)
+        return Problem(P, c, G=rows, h=most, lb=lowest, ub=highest)

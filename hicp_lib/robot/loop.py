@@ -1,0 +1,127 @@
+"""The avoidance loop: keypoints in, joint velocities out, one cycle every 20 ms.
+
+`Perception` and `Command` are all that a robot has to give and to take: a lab puts its own middleware
+(YARP, ROS) around `AvoidanceLoop.cycle`. Nothing here is a safety function.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hicp_lib.keypoints import N_KEYPOINTS
+from hicp_lib.robot.controller import Controller, NoSolution
+from hicp_lib.robot.peripersonal_space import Obstacle, ReceptiveField, gains, obstacles
+from hicp_lib.robot.posture import Posture
+from hicp_lib.robot.skin import Skin, read_skin
+from hicp_lib.robot.tracking import KeypointTracker
+
+FREE, AVOIDING, STOPPED = "free", "avoiding", "stopped"
+"""What a command says of itself: nothing is near, something is, or the arm stands still (see `reason`)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Perception:
+    """What a camera saw.
+
+    Attributes
+    ----------
+    time_s : when the image was taken, in the clock of the loop
+    keypoints_m : (p, 136, 3) of p people (none: p = 0) in the robot's root frame, NaN where unknown
+    scores : (p, 136), 0 to 1
+    """
+
+    time_s: float
+    keypoints_m: np.ndarray
+    scores: np.ndarray
+
+    def __post_init__(self) -> None:
+        n = len(self.keypoints_m)
+        if np.shape(self.keypoints_m) != (n, N_KEYPOINTS, 3) or np.shape(self.scores) != (n, N_KEYPOINTS):
+            raise ValueError(
+                f"keypoints {np.shape(self.keypoints_m)} and scores {np.shape(self.scores)}: expected "
+                f"(p, {N_KEYPOINTS}, 3) and (p, {N_KEYPOINTS})"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Command:
+    """What the robot is to do until the next command.
+
+    Attributes
+    ----------
+    time_s : when it was decided, in the clock of the loop
+    velocities_rad_s : (10,) of `hicp_lib.robot.kinematics.ARM_JOINTS`; zero when stopped
+    status : `FREE`, `AVOIDING` or `STOPPED`
+    reason : why the arm stands still; empty otherwise
+    """
+
+    time_s: float
+    velocities_rad_s: np.ndarray
+    status: str
+    reason: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Threat:
+    """What the skin made of the keypoints: activation of every taxel (n,), and obstacles of the parts."""
+
+    activations: np.ndarray
+    obstacles: list[Obstacle]
+
+
+@dataclass(eq=False)
+class AvoidanceLoop:
+    """Tracker, skin and controller, in the order they work; one object per robot and stream.
+
+    Attributes
+    ----------
+    controller : knows the robot, the arm and its post
+    skin : the robot's taxels
+    sensing : what a taxel senses
+    tracker : which keypoints are believed
+    valence : (136,) factors on how threatening each keypoint is, -1 to 1; 0: all alike, as in the paper
+    avoids : whether to give way at all; without it the arm keeps its post, and threats are still reported
+    blind_after_s : the arm stops when the newest perception is older than this. Empty ones count: they say
+        that nobody is seen
+    """
+
+    controller: Controller
+    skin: Skin = field(default_factory=read_skin)
+    sensing: ReceptiveField = field(default_factory=ReceptiveField)
+    tracker: KeypointTracker = field(default_factory=KeypointTracker)
+    valence: np.ndarray = field(default_factory=lambda: np.zeros(N_KEYPOINTS))
+    avoids: bool = True
+    blind_after_s: float = 1.0
+
+    def cycle(
+        self, now_s: float, posture: Posture, perception: Perception | None = None
+    ) -> tuple[Command, Threat]:
+        """One cycle: take in what was perceived since the last one, if anything, and decide.
+
+        Whatever the perception holds, the command is finite and within all bounds.
+        """
+        if perception is not None:
+            self.tracker.see(perception.time_s, perception.keypoints_m, perception.scores, now_s)
+        threat = self.threat(now_s, posture)
+        if not now_s - self.tracker.latest_s <= self.blind_after_s:
+            return self._stop(now_s, f"no perception in the last {self.blind_after_s:g} s"), threat
+        try:
+            velocities = self.controller.velocities(posture, threat.obstacles if self.avoids else [])
+        except NoSolution as error:
+            return self._stop(now_s, str(error)), threat
+        status = AVOIDING if self.avoids and threat.obstacles else FREE
+        return Command(now_s, velocities, status), threat
+
+    def threat(self, now_s: float, posture: Posture) -> Threat:
+        """Activations by what is believed now, and the obstacles they add up to."""
+        points, weights = self.tracker.points(now_s)
+        positions, normals = self.skin.in_root(self.controller.icub, posture)
+        activations = self.sensing.activations(
+            positions, normals, points.reshape(-1, 3), gains(weights, self.valence).ravel()
+        )
+        return Threat(activations, obstacles(self.skin, activations))
+
+    def _stop(self, now_s: float, reason: str) -> Command:
+        return Command(now_s, np.zeros(len(self.controller.rest_rad)), STOPPED, reason)

@@ -1,0 +1,184 @@
+"""Peripersonal space: how much every taxel of the skin is concerned by the points around it.
+
+Each taxel looks at a truncated cone about its normal. A point inside it activates the taxel by its
+distance alone: the variant of Roncone et al. (2015) that the paper uses, without time to contact. How
+strongly, was learned by the robot as a histogram of "did an object at this distance touch me later?";
+here it is the hand-made histogram of reach 45 cm published beside it (data/README.md names the source),
+smoothed by Parzen windows. Taxels above a threshold are summed up, part by part, to one obstacle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+
+import numpy as np
+
+from hicp_lib.robot.skin import Skin
+
+BIN_M = 0.025
+HISTOGRAM_START_M = -0.05
+POSITIVES = np.array([480, 555, 480, 160, 80, 60, 50, 40, 35, 25, 15, 10, 6, 3, 1, 0, 0, 0, 0, 0])
+NEGATIVES = np.full(20, 100)
+"""Events per bin of distance, 20 bins from -5 to 45 cm: followed by a touch, and not."""
+
+ACTIVATION_THRESHOLD = 0.2
+"""Taxels above it belong to an obstacle; about 19 cm from the point with the histogram above."""
+
+_TABLE_STEP_M = 1e-4
+_TABLE_M = np.arange(-0.2, 0.6, _TABLE_STEP_M)
+_BLOCK = 136  # points at once: intermediate arrays of one person's fit the processor's cache
+
+
+@dataclass(frozen=True)
+class ReceptiveField:
+    """What a taxel senses.
+
+    Attributes
+    ----------
+    half_angle_rad, skin_radius_m : of the cone: its opening, and its radius where it meets the skin
+        (50 degrees and 7 cm since September 2016; 40 degrees and 5 cm before). It is round here and
+        opens behind the skin as in front of it; the robot's software cuts it square, along axes of the
+        taxel's that are not published.
+    point_radius_m : every point is a ball of this radius (3.5 cm: Nguyen et al. 2018, around keypoints)
+    """
+
+    half_angle_rad: float = np.deg2rad(50.0)
+    skin_radius_m: float = 0.07
+    point_radius_m: float = 0.035
+
+    @cached_property
+    def table(self) -> np.ndarray:
+        """Responses at `_TABLE_M` as single-precision numbers, for the look-up."""
+        return response(_TABLE_M).astype(np.float32)
+
+    @cached_property
+    def reach_m(self) -> float:
+        """Distance of a point beyond which nothing is activated by more than 0.001."""
+        return float(_TABLE_M[np.flatnonzero(self.table > 1e-3)[-1]]) + self.point_radius_m
+
+    def activations(
+        self, positions_m: np.ndarray, normals: np.ndarray, points_m: np.ndarray, gains: np.ndarray
+    ) -> np.ndarray:
+        """Activation of every taxel: the most that any of the points causes.
+
+        Parameters
+        ----------
+        positions_m, normals : (n, 3), taxels, in the same frame as the points
+        points_m : (m, 3); what is not finite is left out
+        gains : (m,), factor on the response to each point, at least 0; see `gains`
+
+        Returns
+        -------
+        (n,) float32, 0 where nothing is near
+        """
+        points, gains = self._near(positions_m, np.asarray(points_m, dtype=float), np.asarray(gains))
+        if not len(points):
+            return np.zeros(len(positions_m), dtype=np.float32)
+        # About the middle of the points, so that single precision is enough
+        middle = points.mean(axis=0)
+        taxels, normals = (positions_m - middle).astype(np.float32), normals.astype(np.float32)
+        points, gains = (points - middle).astype(np.float32), gains.astype(np.float32)
+        highest = np.zeros(len(taxels), dtype=np.float32)
+        for start in range(0, len(points), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            activation = self._pairwise(taxels, normals, points[block]) * gains[block]
+            np.maximum(highest, activation.max(axis=1), out=highest)
+        return highest
+
+    def _pairwise(self, taxels: np.ndarray, normals: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Response of every taxel to every point, (n, m); the arrays are single-precision."""
+        height = normals @ points.T
+        height -= np.einsum("ij,ij->i", normals, taxels)[:, None]
+        square = (-2 * taxels) @ points.T
+        square += np.einsum("ij,ij->i", taxels, taxels)[:, None] + np.einsum("ij,ij->i", points, points)
+        np.maximum(square, 0, out=square)
+        # The square of the distance at which the cone ends on the way to the point
+        cone = np.float32(np.tan(self.half_angle_rad)) * np.abs(height)
+        cone += np.float32(self.skin_radius_m)
+        cone *= cone
+        cone += height * height
+        inside = square <= cone
+        place = np.copysign(np.sqrt(square, out=square), height, out=square)
+        place -= np.float32(self.point_radius_m + _TABLE_M[0] - _TABLE_STEP_M / 2)
+        place *= np.float32(1 / _TABLE_STEP_M)
+        return self.table.take(place.astype(np.int32), mode="clip") * inside
+
+    def _near(
+        self, positions_m: np.ndarray, points_m: np.ndarray, gains: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Points that may activate a taxel: by a box around all taxels."""
+        low, high = positions_m.min(axis=0) - self.reach_m, positions_m.max(axis=0) + self.reach_m
+        near = (gains > 0) & ((points_m >= low) & (points_m <= high)).all(axis=1)
+        return points_m[near], gains[near]
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacle:
+    """The most threatened place of one part of the skin.
+
+    Attributes
+    ----------
+    part : name of the part
+    point_m : (3,) mean of the concerned taxels' positions, weighted by activation; frame of the part's link
+    normal : (3,) mean of their normals, weighted likewise; at most 1 long, less where they differ
+    magnitude : the highest activation
+    """
+
+    part: str
+    point_m: np.ndarray
+    normal: np.ndarray
+    magnitude: float
+
+
+def response(distance_m: np.ndarray) -> np.ndarray:
+    """Activation by a point at a distance from the skin, 0 to 1 (its highest).
+
+    Parzen windows over the histogram: every bin's share of touches as a normal curve at the bin's left
+    edge, as wide (standard deviation) as a bin.
+
+    Parameters
+    ----------
+    distance_m : (...), negative behind the skin
+    """
+    return _parzen(np.asarray(distance_m, dtype=float)) / _highest()
+
+
+def gains(weights: np.ndarray, valence: np.ndarray | float = 0.0) -> np.ndarray:
+    """Factors on the responses to points: how far they are believed, times `1 + min(1, valence)`.
+
+    Parameters
+    ----------
+    weights : (...), 0 to 1, how far each point is believed
+    valence : (...), -1 to 1; 0 neutral, 1 doubles the response, -0.5 halves it
+    """
+    return np.asarray(weights) * (1 + np.clip(valence, -1.0, 1.0))
+
+
+def obstacles(skin: Skin, activations: np.ndarray) -> list[Obstacle]:
+    """One obstacle for each part that has taxels above `ACTIVATION_THRESHOLD`.
+
+    Parameters
+    ----------
+    activations : (n,) of the skin's taxels
+    """
+    found = []
+    for part, rows in skin.slices.items():
+        activation = activations[rows]
+        if activation.max() > ACTIVATION_THRESHOLD:
+            weights = np.where(activation > ACTIVATION_THRESHOLD, activation, 0).astype(float)
+            weights /= weights.sum()
+            point, normal = weights @ skin.positions_m[rows], weights @ skin.normals[rows]
+            found.append(Obstacle(part, point, normal, float(activation.max())))
+    return found
+
+
+def _parzen(distance_m: np.ndarray) -> np.ndarray:
+    share = POSITIVES / (POSITIVES + NEGATIVES)
+    edges = HISTOGRAM_START_M + BIN_M * np.arange(len(share))
+    return np.exp(-0.5 * ((distance_m[..., None] - edges) / BIN_M) ** 2) @ share
+
+
+@cache
+def _highest() -> float:
+    return float(_parzen(np.arange(HISTOGRAM_START_M, 0.05, 1e-5)).max())

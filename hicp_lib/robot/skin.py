@@ -1,0 +1,120 @@
+"""The robot's sensitive skin: where its taxels are, and which way they face.
+
+Palms and forearms are at the positions the robot's own software has for them. For the upper arms and the
+front of the torso only their number is documented: they are placed on simple cylinders, an assumption
+(data/icub_skin.json says which, data/README.md names the sources).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hicp_lib.errors import InputError
+from hicp_lib.files import read_json
+from hicp_lib.robot.kinematics import ICub
+from hicp_lib.robot.posture import Posture
+
+SKIN_FILE = Path(__file__).parents[2] / "data" / "icub_skin.json"
+COLUMNS = ["x_mm", "y_mm", "z_mm", "normal_x", "normal_y", "normal_z"]
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """Taxels of all parts, one after another.
+
+    Attributes
+    ----------
+    parts : names of the parts, such as "left_forearm"
+    slices : part -> its rows in the arrays
+    positions_m, normals : (n, 3) in the frame of the part's link; normals are unit vectors, outward
+    """
+
+    parts: tuple[str, ...]
+    slices: dict[str, slice]
+    positions_m: np.ndarray
+    normals: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.positions_m)
+
+    def in_root(self, icub: ICub, posture: Posture) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (n, 3) in metres and normals (n, 3) of all taxels in the root frame."""
+        chains = {icub.parts[part][0] for part in self.parts}
+        links = {chain: icub.chains[chain].T_root_links(posture.angles(chain)) for chain in chains}
+        positions, normals = np.empty_like(self.positions_m), np.empty_like(self.normals)
+        for part, rows in self.slices.items():
+            chain, link = icub.parts[part]
+            T = links[chain][link]
+            positions[rows] = self.positions_m[rows] @ T[:3, :3].T + T[:3, 3]
+            normals[rows] = self.normals[rows] @ T[:3, :3].T
+        return positions, normals
+
+
+@lru_cache(maxsize=4)
+def read_skin(path: Path = SKIN_FILE) -> Skin:
+    """The taxels of the project's robot.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, or a part of it is incomplete or not numbers.
+    """
+    data = read_json(path)
+    try:
+        if data["columns"] != COLUMNS:
+            raise ValueError(f"columns are not {', '.join(COLUMNS)}")
+        taxels = {part: _taxels(part, data["parts"]) for part in data["parts"]}
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        raise InputError(
+            f"{path}: not the robot's skin ({error!r}); restore the file from the repository"
+        ) from None
+    ends = np.cumsum([len(rows) for rows in taxels.values()]).tolist()
+    rows = np.concatenate(list(taxels.values()))
+    return Skin(
+        parts=tuple(taxels),
+        slices={part: slice(a, b) for part, a, b in zip(taxels, [0, *ends], ends, strict=False)},
+        positions_m=1e-3 * rows[:, :3],
+        normals=rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True),
+    )
+
+
+def _taxels(part: str, parts: dict[str, Any]) -> np.ndarray:
+    """Rows (k, 6) of one part: position in mm, normal."""
+    ((kind, given),) = parts[part].items()
+    if kind == "patch":
+        return _patch(**given)
+    if kind == "mirrors":
+        return _mirrored(parts, **given)
+    rows = np.array(given, dtype=float)
+    if rows.ndim != 2 or rows.shape[1] != len(COLUMNS) or not np.isfinite(rows).all():
+        raise ValueError(f"taxels of {part} are not rows of {len(COLUMNS)} numbers")
+    return rows
+
+
+def _mirrored(
+    parts: dict[str, Any], part: str, position_factors: list, normal_factors: list, shift_mm: list
+) -> np.ndarray:
+    """The taxels of another part in a frame that is turned, and moved a little, against that part's."""
+    return _taxels(part, parts) * [*position_factors, *normal_factors] + [*shift_mm, 0, 0, 0]
+
+
+def _patch(
+    start_mm: list, end_mm: list, front_mm: list, side_mm: list, arc_deg: list, rows: int, columns: int
+) -> np.ndarray:
+    """A grid on an elliptic cylinder: `rows` from start to end of its axis, `columns` over the arc.
+
+    `front_mm` and `side_mm` are the half-axes; angle 0 is at the front, 90 degrees at the side.
+    """
+    axis, angle = np.meshgrid(
+        np.linspace(0, 1, rows), np.deg2rad(np.linspace(*arc_deg, columns)), indexing="ij"
+    )
+    front, side = np.array(front_mm, dtype=float), np.array(side_mm, dtype=float)
+    cos, sin = np.cos(angle)[..., None], np.sin(angle)[..., None]
+    centres = np.array(start_mm) + axis[..., None] * (np.array(end_mm) - np.array(start_mm))
+    normals = cos * front / (front @ front) + sin * side / (side @ side)
+    return np.concatenate([centres + cos * front + sin * side, normals], axis=-1).reshape(-1, 6)

@@ -1,0 +1,143 @@
+"""How far each keypoint is believed: scores, time since it was seen, and whether it was seen twice.
+
+Detectors invent people for one frame, lose real ones for a few, and let single keypoints jump. So a
+keypoint counts from its second sighting near the first on, keeps its last believed position while newer
+ones contradict it, and fades out when it is not seen any more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from hicp_lib.keypoints import N_KEYPOINTS
+
+FARTHEST_M = 20.0  # what is farther from the robot along any axis is no sighting: depth ends at 10 m
+
+
+@dataclass(frozen=True)
+class Trust:
+    """When a keypoint is believed.
+
+    Attributes
+    ----------
+    lowest_score, full_score : not believed at or below the first, fully from the second on, linear between
+        (the paper's two thresholds, 0.1 and 0.3)
+    jump_m, speed_m_s : two sightings `dt` apart are of the same thing within `jump_m + speed_m_s * dt`
+    memory_s : a sighting is forgotten after this time: what appears then is new again
+    hold_s : fully believed for this long after the last sighting, which covers a detector's delay
+    fade_s : then falls to 1/e in this time (0.9 per cycle of 20 ms, as in HARMONIOUS, is 0.19 s)
+    max_people : only so many people are followed, the nearest to the robot
+    """
+
+    lowest_score: float = 0.1
+    full_score: float = 0.3
+    jump_m: float = 0.15
+    speed_m_s: float = 3.0
+    memory_s: float = 0.6
+    hold_s: float = 0.2
+    fade_s: float = 0.19
+    max_people: int = 8
+
+
+_MEMORY = np.dtype(
+    [("seen_m", "3f8"), ("seen_s", "f8"), ("believed_m", "3f8"), ("believed_s", "f8"), ("score", "f8")]
+)
+"""Of every person and keypoint: the last sighting, and the last one that was believed with its score."""
+
+
+class KeypointTracker:
+    """Remembers what was seen of every person; one object per stream, in the order of time.
+
+    A person is recognised from one frame to the next by the keypoints seen in both.
+    """
+
+    def __init__(self, trust: Trust | None = None):
+        self.trust = trust or Trust()
+        self.latest_s = -np.inf
+        self._memory = _nothing(0)
+
+    def see(self, time_s: float, keypoints_m: np.ndarray, scores: np.ndarray, now_s: float) -> bool:
+        """Take in one frame.
+
+        Parameters
+        ----------
+        time_s : when the image was taken; frames from the future, and ones not newer than the last, are
+            left out
+        keypoints_m : (p, 136, 3) in the root frame; NaN where unknown
+        scores : (p, 136)
+
+        Returns
+        -------
+        whether the frame was taken in
+        """
+        if not self.latest_s < time_s <= now_s:
+            return False
+        self.latest_s = time_s
+        scores = np.nan_to_num(scores, nan=0.0, posinf=0.0, neginf=0.0)
+        known = (np.abs(keypoints_m) < FARTHEST_M).all(axis=2) & (scores > self.trust.lowest_score)
+        points = np.where(known[..., None], keypoints_m, np.nan)
+        people = self._nearest(points)
+        self._forget(time_s)
+        self._update(time_s, points[people], scores[people])
+        return True
+
+    def points(self, now_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (p, 136, 3) in the root frame, NaN where nothing is believed, and weights (p, 136)."""
+        late_s = np.maximum(now_s - self._memory["believed_s"] - self.trust.hold_s, 0)
+        span = self.trust.full_score - self.trust.lowest_score
+        weights = np.clip((self._memory["score"] - self.trust.lowest_score) / span, 0, 1)
+        return self._memory["believed_m"], weights * np.exp(-late_s / self.trust.fade_s)
+
+    def _nearest(self, points: np.ndarray) -> np.ndarray:
+        """Rows of people of whom anything was seen: the nearest to the robot's root."""
+        distance = np.nanmin(np.linalg.norm(points, axis=2), axis=1, initial=np.inf)
+        order = np.argsort(distance, kind="stable")[: self.trust.max_people]
+        return order[np.isfinite(distance[order])]
+
+    def _forget(self, time_s: float) -> None:
+        """Leave out people not seen for long, and all but the latest if there are too many."""
+        last_s = np.maximum(self._memory["seen_s"], self._memory["believed_s"]).max(axis=1, initial=-np.inf)
+        latest = np.argsort(-last_s, kind="stable")[: 2 * self.trust.max_people]
+        self._memory = self._memory[latest[time_s - last_s[latest] <= self.trust.memory_s]]
+
+    def _update(self, time_s: float, points: np.ndarray, scores: np.ndarray) -> None:
+        """Remember the sightings, and believe those near an earlier one of the same person."""
+        rows, people = self._recognise(points, time_s)
+        new = np.setdiff1d(np.arange(len(points)), people)
+        memory = np.concatenate([self._memory[rows], _nothing(len(new))])
+        people = np.append(people, new)
+        points, scores = points[people], scores[people]
+        believed = self._near(points, time_s, memory["seen_m"], memory["seen_s"])
+        believed |= self._near(points, time_s, memory["believed_m"], memory["believed_s"])
+        memory["believed_m"][believed], memory["believed_s"][believed] = points[believed], time_s
+        memory["score"][believed] = scores[believed]
+        seen = np.isfinite(points[..., 0])
+        memory["seen_m"][seen], memory["seen_s"][seen] = points[seen], time_s
+        self._memory = np.concatenate([memory, np.delete(self._memory, rows, axis=0)])
+
+    def _recognise(self, points: np.ndarray, time_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of the memory and of people seen, paired so that most keypoints fit."""
+        memory = self._memory[:, None]
+        shared = self._near(points[None], time_s, memory["seen_m"], memory["seen_s"]).sum(axis=2)
+        rows, people = linear_sum_assignment(-shared)
+        paired = shared[rows, people] > 0
+        return rows[paired], people[paired]
+
+    def _near(
+        self, points: np.ndarray, time_s: float, before_m: np.ndarray, before_s: np.ndarray
+    ) -> np.ndarray:
+        """Whether sightings are of the same thing as earlier ones; not where either is unknown."""
+        passed_s = time_s - before_s
+        allowed_m = self.trust.jump_m + self.trust.speed_m_s * passed_s
+        return (np.linalg.norm(points - before_m, axis=-1) <= allowed_m) & (passed_s <= self.trust.memory_s)
+
+
+def _nothing(n: int) -> np.ndarray:
+    """Memory (n, 136) of people never seen."""
+    memory = np.zeros((n, N_KEYPOINTS), dtype=_MEMORY)
+    memory["seen_m"] = memory["believed_m"] = np.nan
+    memory["seen_s"] = memory["believed_s"] = -np.inf
+    return memory

@@ -1,0 +1,152 @@
+"""The loop: what comes in, however odd, and what goes out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from keypoint_streams import first_violation
+
+from hicp_lib.keypoints import INDEX
+from hicp_lib.robot.controller import Controller, Settings
+from hicp_lib.robot.home import HOME_M, home_posture
+from hicp_lib.robot.loop import AVOIDING, FREE, STOPPED, AvoidanceLoop, Perception
+
+PERIOD_S = 0.02
+POST = np.array(HOME_M["left"])
+
+
+@pytest.fixture
+def make_loop(icub, home):
+    def make(**options):
+        return AvoidanceLoop(
+            Controller(icub, POST, home.angles("left"), settings=Settings(gain=1.5)), **options
+        )
+
+    return make
+
+
+def wrist_at(place, time_s, score=0.9):
+    points, scores = np.full((1, 136, 3), np.nan), np.zeros((1, 136))
+    points[0, INDEX["left_wrist"]], scores[0, INDEX["left_wrist"]] = place, score
+    return Perception(time_s, points, scores)
+
+
+def nobody(time_s):
+    return Perception(time_s, np.zeros((0, 136, 3)), np.zeros((0, 136)))
+
+
+def reach(icub, home, loop, seconds=3.0, speed=0.4):
+    """A wrist comes to the palm along its normal and stays; distances of the skin to it, and the posture."""
+    T = icub.chains["left"].T_root_link("hand", home.angles("left"))
+    posture, distances, statuses = home, [], set()
+    for k in range(int(seconds / PERIOD_S)):
+        wrist = POST - T[:3, 2] * max(0.6 - speed * k * PERIOD_S, 0.02)
+        command, _ = loop.cycle(k * PERIOD_S, posture, wrist_at(wrist, k * PERIOD_S))
+        posture = posture.moved("left", posture.angles("left") + PERIOD_S * command.velocities_rad_s)
+        positions, _ = loop.skin.in_root(icub, posture)
+        distances.append(np.linalg.norm(positions - wrist, axis=1).min())
+        statuses.add(command.status)
+    return np.array(distances), posture, statuses
+
+
+def test_hand_gives_way_and_does_not_without_avoidance(icub, home, make_loop):
+    with_avoidance, _, statuses = reach(icub, home, make_loop())
+    without, posture, _ = reach(icub, home, make_loop(avoids=False))
+    assert statuses == {FREE, AVOIDING}
+    assert with_avoidance.min() > 2 * without.min() and with_avoidance.min() > 0.03
+    hand = icub.chains["left"].T_root_link("hand", posture.angles("left"))[:3, 3]
+    np.testing.assert_allclose(hand, POST, atol=2e-3)
+
+
+def test_hand_comes_back_when_the_person_leaves(icub, home, make_loop):
+    loop = make_loop()
+    _, posture, _ = reach(icub, home, loop)
+    hand = icub.chains["left"].T_root_link("hand", posture.angles("left"))[:3, 3]
+    assert np.linalg.norm(hand - POST) > 0.05
+    for k in range(100):
+        now_s = 3.0 + k * PERIOD_S
+        command, _ = loop.cycle(now_s, posture, nobody(now_s))
+        posture = posture.moved("left", posture.angles("left") + PERIOD_S * command.velocities_rad_s)
+    hand = icub.chains["left"].T_root_link("hand", posture.angles("left"))[:3, 3]
+    assert np.linalg.norm(hand - POST) < 0.02
+
+
+def test_a_person_of_one_frame_moves_nothing(home, make_loop):
+    loop, quiet = make_loop(), make_loop()
+    for k in range(50):
+        now_s = k * PERIOD_S
+        seen = wrist_at(POST, now_s) if k == 10 else nobody(now_s)
+        command, threat = loop.cycle(now_s, home, seen)
+        expected, _ = quiet.cycle(now_s, home, nobody(now_s))
+        assert command.status == FREE and not threat.obstacles
+        np.testing.assert_array_equal(command.velocities_rad_s, expected.velocities_rad_s)
+
+
+def test_threatened_taxels_are_those_near_the_keypoint(icub, home, make_loop):
+    loop = make_loop()
+    positions, normals = loop.skin.in_root(icub, home)
+    row = loop.skin.slices["left_forearm"].start + 3
+    place = positions[row] + 0.1 * normals[row]
+    for now_s in (0.0, 0.03):
+        _, threat = loop.cycle(now_s, home, wrist_at(place, now_s))
+    assert "left_forearm" in [obstacle.part for obstacle in threat.obstacles]
+    assert threat.activations[row] == pytest.approx(0.531, abs=0.01)  # of 6.5 cm, by the response table
+    assert threat.activations[loop.skin.slices["right_hand"]].max() < 0.2
+
+
+def test_threats_reported_without_avoidance_do_not_move_the_arm(home, make_loop):
+    loop = make_loop(avoids=False)
+    for now_s in (0.0, 0.03):
+        command, threat = loop.cycle(now_s, home, wrist_at(POST + (-0.05, 0.1, 0), now_s))
+    assert threat.obstacles and command.status == FREE
+
+
+def test_valence_changes_the_response(home, make_loop):
+    def highest(valence):
+        loop = make_loop(valence=np.full(136, valence))
+        for now_s in (0.0, 0.03):
+            _, threat = loop.cycle(now_s, home, wrist_at(POST + (-0.1, 0.1, 0), now_s))
+        return threat.activations.max()
+
+    assert highest(1.0) == pytest.approx(2 * highest(0.0), rel=1e-5)
+    assert highest(-0.5) == pytest.approx(0.5 * highest(0.0), rel=1e-5)
+    assert highest(-1.0) == 0
+
+
+def test_without_perception_the_arm_stops_and_says_why(home, make_loop):
+    loop = make_loop()
+    command, _ = loop.cycle(0.0, home)
+    assert command.status == STOPPED and "no perception" in command.reason
+    assert loop.cycle(0.02, home, nobody(0.02))[0].status == FREE
+    assert loop.cycle(1.0, home)[0].status == FREE
+    command, _ = loop.cycle(1.1, home)
+    assert command.status == STOPPED and (command.velocities_rad_s == 0).all()
+
+
+def test_unknown_joint_angles_stop_the_arm(home, make_loop):
+    lost = home.moved("left", np.full(10, np.nan))
+    command, _ = make_loop().cycle(0.0, lost, nobody(0.0))
+    assert command.status == STOPPED and command.reason == "joint angles are not finite"
+    assert (command.velocities_rad_s == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("points", "scores"), [((2, 136, 3), (1, 136)), ((1, 17, 3), (1, 17)), ((1, 136, 2), (1, 136))]
+)
+def test_perceptions_of_another_shape_are_refused(points, scores):
+    with pytest.raises(ValueError, match="expected"):
+        Perception(0.0, np.zeros(points), np.zeros(scores))
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_no_stream_of_keypoints_breaks_a_bound(icub, home, seed):
+    """`benchmarks/random_streams.py` runs 10,000 of them."""
+    assert first_violation(np.random.default_rng(seed), icub, home, n_cycles=25) is None
+
+
+def test_unreachable_posts_are_refused(icub):
+    with pytest.raises(ValueError, match="choose a nearer place"):
+        home_posture(icub, post_m=np.array([-3.0, 0, 0]))

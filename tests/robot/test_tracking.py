@@ -1,0 +1,124 @@
+"""What the tracker believes, step by step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hicp_lib.keypoints import INDEX
+from hicp_lib.robot.tracking import KeypointTracker, Trust
+
+WRIST, ELBOW = INDEX["left_wrist"], INDEX["left_elbow"]
+
+
+def person(wrist=(-0.5, 0, 0), elbow=None, score=0.9):
+    points, scores = np.full((1, 136, 3), np.nan), np.zeros((1, 136))
+    for keypoint, place in ((WRIST, wrist), (ELBOW, elbow)):
+        if place is not None:
+            points[0, keypoint], scores[0, keypoint] = place, score
+    return points, scores
+
+
+NOBODY = np.zeros((0, 136, 3)), np.zeros((0, 136))
+
+
+def see(tracker, frames, step_s=0.03):
+    """Show frames one after another; returns the time of the last."""
+    start = max(tracker.latest_s + step_s, 0)
+    times = start + step_s * np.arange(len(frames))
+    for time_s, frame in zip(times, frames, strict=True):
+        assert tracker.see(time_s, *frame, now_s=time_s)
+    return times[-1]
+
+
+def weight(tracker, now_s, keypoint=WRIST):
+    return tracker.points(now_s)[1][:, keypoint].max(initial=0)
+
+
+def test_seen_once_is_not_believed_seen_twice_is():
+    tracker = KeypointTracker()
+    assert weight(tracker, see(tracker, [person()])) == 0
+    assert weight(tracker, see(tracker, [person()])) == 1
+
+
+def test_a_person_of_one_frame_is_never_believed():
+    tracker = KeypointTracker()
+    see(tracker, [NOBODY, person(), NOBODY, NOBODY])
+    assert all(weight(tracker, now_s) == 0 for now_s in np.arange(0.1, 1, 0.02))
+
+
+def test_a_jump_of_one_frame_is_not_followed():
+    tracker = KeypointTracker()
+    now_s = see(tracker, [person(), person(), person((0.5, 0, 0)), person()])
+    points, weights = tracker.points(now_s)
+    np.testing.assert_allclose(points[0, WRIST], (-0.5, 0, 0))
+    assert weights[0, WRIST] == 1
+
+
+def test_a_jump_that_stays_is_followed_from_the_second_frame_on():
+    tracker = KeypointTracker()
+    now_s = see(tracker, [person(), person(), *2 * [person((0.5, 0, 0), elbow=(0.5, 0.2, 0))]])
+    points, weights = tracker.points(now_s)
+    believed = points[(weights > 0.99)[:, WRIST], WRIST]
+    assert (0.5, 0, 0) in [tuple(point) for point in believed]
+
+
+def test_lost_keypoints_are_held_then_fade():
+    trust = Trust(hold_s=0.2, fade_s=0.19)
+    tracker = KeypointTracker(trust)
+    now_s = see(tracker, [person(), person()])
+    assert weight(tracker, now_s + 0.19) == 1
+    # 0.9 per period of 20 ms
+    fades = [weight(tracker, now_s + 0.2 + k * 0.02) for k in range(20)]
+    np.testing.assert_allclose(np.array(fades[1:]) / fades[:-1], 0.9, atol=1e-3)
+
+
+def test_people_not_seen_are_forgotten_after_a_while():
+    tracker = KeypointTracker()
+    see(tracker, [person(), person()])
+    see(tracker, 30 * [NOBODY])
+    assert len(tracker.points(2.0)[0]) == 0
+    assert weight(tracker, see(tracker, [person()])) == 0  # new again
+
+
+@pytest.mark.parametrize(("score", "expected"), [(0.05, 0), (0.1, 0), (0.2, 0.5), (0.3, 1), (0.9, 1)])
+def test_low_scores_weigh_less(score, expected):
+    tracker = KeypointTracker()
+    now_s = see(tracker, 2 * [person(score=score)])
+    assert weight(tracker, now_s) == pytest.approx(expected, abs=1e-12)
+
+
+def test_people_keep_their_rows_apart_whatever_their_order():
+    tracker = KeypointTracker()
+    one, other = person((-0.5, 0.3, 0)), person((-0.5, -0.3, 0))
+
+    def both(a, b):
+        return tuple(np.concatenate(pair) for pair in zip(a, b, strict=True))
+
+    now_s = see(tracker, [both(one, other), both(other, one), both(one, other)])
+    points, weights = tracker.points(now_s)
+    assert len(points) == 2 and (weights[:, WRIST] == 1).all()
+    assert sorted(points[:, WRIST, 1]) == [-0.3, 0.3]
+
+
+def test_of_a_crowd_the_nearest_are_followed():
+    tracker = KeypointTracker(Trust(max_people=2))
+    crowd = [person((-distance, 0, 0)) for distance in (3, 1, 2, 4)]
+    frame = tuple(np.concatenate(arrays) for arrays in zip(*crowd, strict=True))
+    points, _ = tracker.points(see(tracker, [frame, frame]))
+    assert sorted(points[:, WRIST, 0]) == [-2, -1]
+
+
+@pytest.mark.parametrize("time_s", [np.nan, np.inf, -np.inf, 0.03, 0.01, 5.0])
+def test_old_and_future_frames_are_left_out(time_s):
+    tracker = KeypointTracker()
+    now_s = see(tracker, [person(), person()])
+    assert not tracker.see(time_s, *person((0.5, 0, 0)), now_s=now_s)
+    assert tracker.latest_s == now_s and weight(tracker, now_s) == 1
+
+
+@pytest.mark.parametrize("place", [(np.nan, 0, 0), (np.inf, 0, 0), (1e200, 0, 0), (0, -30, 0)])
+def test_impossible_places_are_no_sightings(place):
+    tracker = KeypointTracker()
+    now_s = see(tracker, 3 * [person(place)])
+    assert len(tracker.points(now_s)[0]) == 0
