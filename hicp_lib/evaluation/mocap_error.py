@@ -191,32 +191,6 @@ def paper_medians() -> pd.DataFrame:
     return frame.assign(median_m=frame.pop("median_cm") / 100)
 
 
-def beside_paper(medians: pd.DataFrame, min_score: float) -> pd.DataFrame:
-    """One of the paper's two tables, what was measured here above the paper's own rows, for showing.
-
-    Returns
-    -------
-    DataFrame, columns `detector` and one per joint, as text: count / median [cm], and here the 95 % interval
-    """
-    here = medians[medians["keypoint"].isin(TABLE_JOINTS)]
-    paper = paper_medians()
-    rows = pd.concat([here, paper.assign(detector=paper["detector"] + " (paper)")])
-    rows = rows[rows["min_score"] == min_score]
-    cells = rows.assign(cell=[_cell(row) for row in rows.to_dict("records")])
-    table = cells.pivot(index="detector", columns="keypoint", values="cell").loc[
-        list(dict.fromkeys(rows["detector"])), list(TABLE_JOINTS)
-    ]
-    return table.rename(columns=lambda name: name.replace("_", " ")).reset_index().rename_axis(columns=None)
-
-
-def _cell(row: dict) -> str:
-    if row["count"] == 0:
-        return "0"
-    given = np.isfinite(row["low_m"])
-    interval = f" ({100 * row['low_m']:.1f}–{100 * row['high_m']:.1f})" if given else ""
-    return f"{row['count']:.0f} / {100 * row['median_m']:.1f}{interval}"
-
-
 def _block_length(errors: pd.DataFrame) -> int:
     """One length for the whole table, so that its rows are comparable."""
     series = errors.pivot_table(index="frame", columns=_CASE, values="error_m", dropna=False)

@@ -1,0 +1,97 @@
+"""Tables of the motion capture test for reading: centimetres with their intervals, one line per detector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.evaluation.mocap_error import JOINTS, TABLE_JOINTS
+
+_MARKS = {"n_points": "markers", "rms_m": "residual [mm]", "leave_one_out_m": "leave-one-out [mm]"}
+_AGAINST_TRUTH = {"turned_rad": "turned [°]", "added_m": "added [mm]", "worst_m": "at most [mm]"}
+
+
+def beside_paper(
+    medians: pd.DataFrame,
+    paper: pd.DataFrame,
+    method: str,
+    min_score: float,
+    joints: Sequence[str] = TABLE_JOINTS,
+) -> pd.DataFrame:
+    """One of the paper's two tables, what was measured here above the paper's own rows.
+
+    Parameters
+    ----------
+    medians, paper : as from `median_errors` and `paper_medians`
+    method : of lifting
+
+    Returns
+    -------
+    DataFrame, columns `detector` and one per joint: "count / median [cm]", here with the 95 % interval
+    """
+    here = medians[(medians["method"] == method) & medians["keypoint"].isin(joints)]
+    rows = pd.concat([here, paper.assign(detector=paper["detector"] + " (paper)")])
+    rows = rows[(rows["min_score"] == min_score) & rows["keypoint"].isin(joints)]
+    return _wide(rows.assign(text=[_cell(row) for row in rows.to_dict("records")]), ["detector"], "keypoint")
+
+
+def shoulders_and_centres(medians: pd.DataFrame, method: str, min_score: float) -> pd.DataFrame:
+    """Median distance [cm] from the markers' mean and, where known, from the joint's centre: "4.0 / 2.1"."""
+    rows = medians[(medians["method"] == method) & (medians["min_score"] == min_score)]
+    pairs = zip(rows["median_m"], rows["centre_median_m"], strict=True)
+    rows = rows.assign(text=[f"{_cm(markers)} / {_cm(centre)}" for markers, centre in pairs])
+    return _wide(rows, ["detector"], "keypoint", JOINTS)
+
+
+def fractions_text(fractions: pd.DataFrame, method: str) -> pd.DataFrame:
+    """Fractions within each distance as "0.71 [0.65, 0.77]", a column per joint."""
+    rows = fractions[fractions["method"] == method]
+    bounds = rows[["value", "low", "high"]].itertuples(index=False)
+    within = [f"{100 * limit:g} cm" for limit in rows["threshold_m"]]
+    text = [f"{value:.2f} [{low:.2f}, {high:.2f}]" for value, low, high in bounds]
+    return _wide(rows.assign(within=within, text=text), ["detector", "within"], "keypoint", JOINTS)
+
+
+def registrations_text(table: pd.DataFrame) -> pd.DataFrame:
+    """`compare_registrations`' table in millimetres and degrees; against the truth only where it is known."""
+    known = bool(table["added_m"].notna().any())
+    names = {"method": "solution"} | _MARKS | (_AGAINST_TRUTH if known else {})
+    shown = table[list(names)].copy()
+    for column in shown.columns:
+        if column.endswith("_m"):
+            shown[column] = 1000 * shown[column]
+        elif column.endswith("_rad"):
+            shown[column] = np.degrees(shown[column])
+    return shown.rename(columns=names)
+
+
+def costs_text(table: pd.DataFrame, method: str) -> pd.DataFrame:
+    """`medians_under`'s table: median error [cm] of elbows and wrists, a column per registration."""
+    rows = table[table["method"] == method]
+    rows = rows.assign(text=[_cm(value) for value in rows["median_m"]])
+    return _wide(rows, ["detector", "part"], "registration")
+
+
+def _cell(row: dict) -> str:
+    if row["count"] == 0:
+        return "0"
+    given = np.isfinite(row["low_m"])
+    interval = f" [{_cm(row['low_m'])}, {_cm(row['high_m'])}]" if given else ""
+    return f"{row['count']:.0f} / {_cm(row['median_m'])}{interval}"
+
+
+def _cm(value_m: float) -> str:
+    return f"{100 * value_m:.1f}" if np.isfinite(value_m) else "–"
+
+
+def _wide(
+    rows: pd.DataFrame, index: list[str], columns: str, order: Sequence[str] | None = None
+) -> pd.DataFrame:
+    """`text` of every row and value of `columns`, rows in the order they come in."""
+    wide = rows.pivot(index=index, columns=columns, values="text")
+    first = list(dict.fromkeys(rows[index].itertuples(index=False, name=None)))
+    wide = wide.reindex([key[0] if len(index) == 1 else key for key in first])
+    wide = wide[[name for name in order or dict.fromkeys(rows[columns]) if name in wide]]
+    return wide.rename(columns=lambda name: name.replace("_", " ")).rename_axis(columns=None).reset_index()
