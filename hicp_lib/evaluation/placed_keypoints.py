@@ -1,0 +1,120 @@
+"""What a detector does with keypoints that are hidden or outside the picture.
+
+A crop cuts people off, but the image it was cut from knows where the rest of them is. So of a keypoint that
+is not in the picture it can be said, too, whether a detector gives it, how surely, where it puts it, and
+whether that is right. Bodies only: the 17 keypoints all detectors share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.annotations import Annotations
+from hicp_lib.detectors.base import Detections
+from hicp_lib.evaluation.compare import source_images
+from hicp_lib.evaluation.keypoint_hits import HIT_TERM, people_pairs
+from hicp_lib.evaluation.oks import oks_terms
+from hicp_lib.keypoints import COCO_17, SIGMAS
+
+# Where a keypoint truly is: in the picture and visible, in the picture but hidden, outside the picture, or
+# nowhere known (not labelled in the source image).
+STATES = ("visible", "hidden", "outside", "unknown")
+BORDER = 0.05  # of the picture's side: what counts as at its border
+_SIGMAS = SIGMAS["halpe"][COCO_17]
+
+
+def placed_keypoints(
+    truth: Mapping[str, Annotations],
+    found: Mapping[tuple[str, str], Mapping[int, Detections]],
+    source: Annotations,
+) -> pd.DataFrame:
+    """The 17 keypoints of every detection that fits a person who counts best.
+
+    Parameters
+    ----------
+    truth : subset -> annotations of crops, whose people name their `source_id` and `crop_px`
+    found : (subset, detector) -> detections by image id
+    source : the annotations that the crops were made from
+
+    Returns
+    -------
+    DataFrame, columns `subset, detector, image_id, source_image, cut_side` (empty outside Headless),
+    `keypoint, state` (one of `STATES`), `given, score` (NaN where not given), `x, y` (where it was put, from
+    0 at the left or top border to 1 at the other), `hit` (OKS term of at least .5; NaN where not given or
+    unknown)
+    """
+    source_row = {int(i): row for row, i in enumerate(source.ids)}
+    parts = [pd.DataFrame()]
+    for (subset, detector), run in found.items():
+        people, sources = truth[subset], source_images(truth[subset])
+        rows_of = pd.Series(range(len(people))).groupby(people.image_ids).indices
+        for image_id, detections in run.items():
+            here = people.take(rows_of[image_id])
+            for row, person in _matched(here, detections):
+                true_px, state = _truth(here, person, source, source_row)
+                part = _row_per_keypoint(here, person, detections, row, true_px, state)
+                labels = {"subset": subset, "detector": detector, "image_id": image_id}
+                cut_side = here.extras[person].get("cut_side", "")
+                parts.append(part.assign(**labels, source_image=sources[image_id], cut_side=cut_side))
+    order = ["subset", "detector", "image_id", "source_image", "cut_side"]
+    table = pd.concat(parts, ignore_index=True)
+    return table[[*order, *table.columns.drop(order)]]
+
+
+def _matched(people: Annotations, detections: Detections) -> Iterator[tuple[int, int]]:
+    for row, person in people_pairs(people, detections, COCO_17, _SIGMAS):
+        if person is not None and not people.is_crowd[person]:
+            yield row, person
+
+
+def _truth(
+    people: Annotations, person: int, source: Annotations, source_row: Mapping[int, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """True places (17, 2) in the crop's frame, also outside it, and states (17,)."""
+    flags = people.visibility[person, COCO_17]
+    about = people.extras[person]
+    row = source_row[about["source_id"]]
+    labelled = source.visibility[row, COCO_17] > 0
+    true_px = source.keypoints_px[row, COCO_17] - np.array(about["crop_px"][:2], dtype=float)
+    state = np.select([flags >= 2, flags > 0, labelled], STATES[:3], STATES[3])
+    return true_px, state
+
+
+def _row_per_keypoint(
+    people: Annotations, person: int, detections: Detections, row: int, true_px: np.ndarray, state: np.ndarray
+) -> pd.DataFrame:
+    image = people.images[int(people.image_ids[person])]
+    points = detections.keypoints_px[row, COCO_17]
+    given = np.isfinite(points).all(axis=-1)
+    terms = oks_terms(true_px, points, people.areas_px2[person], _SIGMAS)
+    x, y = ((points + 0.5) / [image.width_px, image.height_px]).T
+    return pd.DataFrame(
+        {
+            "keypoint": COCO_17, "state": state, "given": given,
+            "score": np.where(given, detections.scores[row, COCO_17], np.nan), "x": x, "y": y,
+            "hit": np.where(given & (state != "unknown"), terms >= HIT_TERM, np.nan),
+        }
+    )  # fmt: skip
+
+
+def landed(placed: pd.DataFrame) -> pd.Series:
+    """Where given keypoints were put: "outside" the picture, "at the border" or "inside"."""
+    x, y = placed["x"], placed["y"]
+    depth = np.minimum(np.minimum(x, 1 - x), np.minimum(y, 1 - y))
+    place = np.select([depth < 0, depth < BORDER], ["outside", "at the border"], "inside")
+    return pd.Series(place, index=placed.index).where(placed["given"])
+
+
+def from_the_cut(placed: pd.DataFrame) -> pd.DataFrame:
+    """Places in Headless turned so that the head was cut off above: columns `along`, `below`.
+
+    `along` runs from 0 to 1 along the cut and `below` from 0 at the cut to 1 at the far side; it is negative
+    where the picture has been cut away.
+    """
+    x, y, side = placed["x"], placed["y"], placed["cut_side"]
+    along = np.where(side.isin(["top", "bottom"]), x, y)
+    below = np.select([side == "top", side == "bottom", side == "left"], [y, 1 - y, x], 1 - x)
+    return pd.DataFrame({"along": along, "below": below}, index=placed.index)
