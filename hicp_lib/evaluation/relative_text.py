@@ -25,7 +25,7 @@ def shares_text(table: pd.DataFrame | None, threshold_m: float) -> pd.DataFrame:
 
 def distances_text(table: pd.DataFrame) -> pd.DataFrame:
     """Spread, bias and error in centimetres as "1.2 [1.1, 1.4]"; `table` of `spread_and_bias`."""
-    shown = table[[*_ROW, "method", "n"]].copy()
+    shown = table[[*_ROW, "method"]].assign(images=table["n_images"].map("{:.0f}".format))
     for name, title in _DISTANCES.items():
         if name in table:
             numbers_cm = 100 * table[[name, f"{name}_low", f"{name}_high"]]
@@ -34,10 +34,10 @@ def distances_text(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def causes_text(table: pd.DataFrame) -> pd.DataFrame:
-    """Spread per cause in centimetres as "1.2 (3.4)", the 90th percentile in brackets, a column per cause."""
+    """Spread and bias per cause in centimetres as "0.4 / 1.3", a column per cause; of `spread_causes`."""
     if table.empty:
         return _not_available("what a simulated recording has: truth, depth without errors, joints")
-    text = [f"{100 * s:.1f} ({100 * p:.1f})" for s, p in zip(table["spread_m"], table["p90_m"], strict=True)]
+    text = [f"{100 * s:.1f} / {100 * b:.1f}" for s, b in zip(table["spread_m"], table["bias_m"], strict=True)]
     return _wide(table.assign(text=text), "cause")
 
 

@@ -106,17 +106,17 @@ def spread_and_bias(
 
     Returns
     -------
-    DataFrame, columns `view, detector, method, part`, `n` (keypoints found, all images together), then in
-    metres, each with `_low` and `_high` beside it: `spread_m`, the median distance to the median position;
-    with `truth` also `bias_m`, how far the median position is from the true one, and `error_m`, the median
-    distance to the truth. For a hand, the mean of each over its keypoints; NaN where nothing was found
+    DataFrame, columns `view, detector, method, part, n_images` (in which it was found), then in metres, each
+    with `_low` and `_high` beside it: `spread_m`, the median distance to the median position; with `truth`
+    also `bias_m`, how far the median position is from the true one, and `error_m`, the median distance to
+    the truth. For a hand, the mean of each over its keypoints; NaN where nothing was found
     """
     rows = []
     for case, part, found_m, true_m in _cases(points, n_frames, truth, min_score):
         weights = draw_counts(len(found_m), n_resamples, seed)
         row = dict(zip(CASE, case, strict=True)) | {
             "part": part,
-            "n": int(np.isfinite(found_m[..., 0]).sum()),
+            "n_images": float(np.isfinite(found_m[..., 0]).sum(axis=0).mean()),
         }
         for name, draws in _distances_drawn(found_m, true_m, weights).items():
             value, low, high = with_interval(draws)

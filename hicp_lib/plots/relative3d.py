@@ -10,11 +10,12 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from hicp_lib.detectors.base import Detections
 from hicp_lib.keypoints import HANDS, INDEX, LIMBS, N_KEYPOINTS
-from hicp_lib.plots.people import detections_grid
+from hicp_lib.plots.people import draw_people, picture_grid
 from hicp_lib.plots.style import Figure, detector_colour, in_style, in_words, legend_entries, new_figure
 from hicp_lib.rgbd.recording import Recording, read_rgb
 
 TRUTH_COLOUR = "#111111"
+_AXES = ("x_m", "y_m", "z_m")
 # Seen by the robot, which looks along -x; the axis that is not drawn is the one looked along.
 _LOOKS = {"as the robot looks": ("y_m", "z_m"), "from its left": ("x_m", "z_m"), "from above": ("y_m", "x_m")}
 # Fewer images than this say little about a spread.
@@ -39,18 +40,29 @@ def camera_views(
     ----------
     recordings : view -> recording
     found : (view, detector) -> detections of each frame
+    frames : numbers of frames that every view has
     """
-    detectors = list(dict.fromkeys(detector for _, detector in found))
-    pictures = {
-        f"{view} {frame}": (
-            read_rgb(recording, frame),
-            {name: found[view, name][frame] for name in detectors},
-        )
-        for view, recording in recordings.items()
-        for frame in frames
-        if frame < len(recording)
-    }
-    return detections_grid(pictures, min_score, f"Rows: view and number of the image. Data: {note}.")
+    rows = []
+    for frame in frames:
+        row = []
+        for (view, detector), detections in found.items():
+            people = detections[frame]
+            colour = detector_colour(detector)
+            image = read_rgb(recordings[view], frame)
+            row.append(draw_people(image, people.keypoints_px, people.scores, colour, min_score))
+        rows.append(row)
+    seen = [
+        f"{detector} {sum(len(detections[frame]) > 0 for frame in frames)} ({view})"
+        for (view, detector), detections in found.items()
+    ]
+    return picture_grid(
+        rows,
+        row_titles=[f"image {frame}" for frame in frames],
+        column_titles=[f"{view}\n{detector}" for view, detector in found],
+        caption=f"Some images of every view, with keypoints of a score of at least {min_score}: {note}.",
+        alt=f"{len(frames)} images per view and detector; with somebody found: {in_words(seen)}.",
+        cell_in=min(3.2, 11 / len(found)),
+    )
 
 
 @in_style
@@ -62,8 +74,10 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
     medians : table of `hicp_lib.evaluation.stability.median_positions`, one method
     truth : view -> table with `keypoint, x_m, y_m, z_m`; None where it is not known
     """
+    medians = medians[medians["n"] >= MIN_IMAGES]
     views = list(dict.fromkeys(medians["view"]))
-    figure, axes = new_figure(len(views), 3, 10.5, 3.7 * len(views), squeeze=False)
+    figure, axes = new_figure(len(views), 3, 10.5, 3.1 * len(views) + 0.4, squeeze=False)
+    limits = {name: (medians[name].min() - 0.05, medians[name].max() + 0.05) for name in _AXES}
     for row, view in zip(axes, views, strict=True):
         skeletons = dict(list(medians[medians["view"] == view].groupby("detector", sort=False)))
         lines = [(name, rows, detector_colour(name), "-") for name, rows in skeletons.items()]
@@ -74,11 +88,12 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
                 _draw_skeleton(axis, rows, columns, colour, style, name)
             axis.set(aspect="equal", title=f"{view} · {look}")
             axis.set(xlabel=f"{columns[0][0]} [m]", ylabel=f"{columns[1][0]} [m]")
+            axis.set(xlim=limits[columns[0]], ylim=limits[columns[1]])
             axis.yaxis.set_inverted(columns[1] == "x_m")  # forward is up
     figure.legend(*legend_entries(axes), loc="outside lower center", ncols=4, fontsize=9)
     caption = (
-        "Median skeletons: coordinate-wise median of every keypoint over the images, in the robot's base "
-        "frame (x backward, y to its right, z up)"
+        "Median skeletons: coordinate-wise median over the images of every keypoint that was found in at "
+        f"least {MIN_IMAGES}, in the robot's base frame (x backward, y to its right, z up)"
         f"{'; dashed: the true skeleton' if truth is not None else ''}: {note}."
     )
     counts = medians.groupby(["detector", "view"], sort=False).size()
@@ -104,7 +119,7 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
 
     `table` from `hicp_lib.evaluation.stability.spread_and_bias` with truth, of which `method` is drawn.
     """
-    table = table[(table["method"] == method) & (table["n"] >= MIN_IMAGES) & table["bias_m"].notna()]
+    table = table[(table["method"] == method) & (table["n_images"] >= MIN_IMAGES) & table["bias_m"].notna()]
     views = list(dict.fromkeys(table["view"]))
     figure, axes = new_figure(
         1, len(views), max(4.6 * len(views), 6), 4.9, sharex=True, sharey=True, squeeze=False
@@ -164,29 +179,46 @@ def _part_legend(figure, axis, detectors: Sequence[str]) -> None:
 
 @in_style
 def spread_causes(table: pd.DataFrame, note: str) -> Figure:
-    """Spread of every part with one cause at a time.
+    """Spread (upper row) and bias (lower row) of every part with one cause at a time.
 
-    `table` from `hicp_lib.evaluation.spread_sources.spread_sources` with the columns `view` and `detector`.
+    `table` from `hicp_lib.evaluation.spread_causes.spread_causes`.
     """
     cases = list(dict.fromkeys(zip(table["view"], table["detector"], strict=True)))
-    parts, causes = (list(dict.fromkeys(table[column])) for column in ("part", "cause"))
-    size = {"width_in": max(3.1 * len(cases), 7), "height_in": 1.6 + 0.42 * len(parts)}
-    figure, axes = new_figure(1, len(cases), sharey=True, sharex=True, squeeze=False, **size)
-    for (view, detector), axis in zip(cases, axes[0], strict=True):
+    parts = list(dict.fromkeys(table["part"]))
+    size = {"width_in": max(2.9 * len(cases), 7), "height_in": 1.6 + 0.8 * len(parts)}
+    figure, axes = new_figure(2, len(cases), sharey=True, sharex="row", squeeze=False, **size)
+    for (view, detector), (upper, lower) in zip(cases, axes.T, strict=True):
         rows = table[(table["view"] == view) & (table["detector"] == detector)]
-        for k, (cause, part) in enumerate(rows.groupby("cause", sort=False)):
-            colour, marker = _CAUSE_STYLES[causes.index(cause) % len(_CAUSE_STYLES)]
-            y = np.array([parts.index(item) for item in part["part"]]) + 0.13 * (k - (len(causes) - 1) / 2)
-            axis.hlines(y, 100 * part["spread_m"], 100 * part["p90_m"], color=colour, lw=1.2)
-            axis.plot(100 * part["spread_m"], y, marker, color=colour, markersize=6, label=cause)
-        axis.set(title=f"{view}\n{detector}", xlabel="distance to the median [cm]", xscale="log")
-        _plain_ticks(axis.xaxis)
+        _draw_causes(upper, rows, parts, "spread_m")
+        _draw_causes(lower, rows, parts, "bias_m")
+        upper.set(title=f"{view}\n{detector}", xlabel="spread: distance to the median [cm]")
+        lower.set(xlabel="bias: median to truth [cm]")
     axes[0, 0].set(yticks=range(len(parts)), yticklabels=parts, ylim=(len(parts) - 0.5, -0.5))
     figure.legend(*legend_entries(axes), loc="outside lower center", ncols=3, fontsize=9)
     caption = (
-        "Where the spread over the images comes from: median (marker) and 90th percentile (end of the line) "
-        f"of the distance to the median position, with one cause at a time and with all: {note}."
+        "Where spread and bias come from, one cause at a time and all together. Upper row: median (marker) and "
+        "90th percentile (end of the line) of the distance to the median position; lower row: how far that "
+        f"position is from the true one: {note}."
     )
-    medians = table.groupby("cause", sort=False)["spread_m"].median()
-    said = in_words([f"{cause} {100 * value:.1f} cm" for cause, value in medians.items()])
-    return Figure(figure, caption, f"Dots per part and cause. Median over the parts: {said}.", table)
+    medians = table.groupby("cause", sort=False)[["spread_m", "bias_m"]].median()
+    said = in_words(
+        [
+            f"{row.Index} {100 * row.spread_m:.1f} and {100 * row.bias_m:.1f} cm"
+            for row in medians.itertuples()
+        ]
+    )
+    return Figure(
+        figure, caption, f"Dots per part and cause. Median spread and bias over parts: {said}.", table
+    )
+
+
+def _draw_causes(axis, rows: pd.DataFrame, parts: list[str], measure: str) -> None:
+    causes = list(dict.fromkeys(rows["cause"]))
+    for k, (cause, part) in enumerate(rows.groupby("cause", sort=False)):
+        colour, marker = _CAUSE_STYLES[k]
+        y = np.array([parts.index(item) for item in part["part"]]) + 0.13 * (k - (len(causes) - 1) / 2)
+        if measure == "spread_m":
+            axis.hlines(y, 100 * part["spread_m"], 100 * part["p90_m"], color=colour, lw=1.2)
+        axis.plot(100 * part[measure], y, marker, color=colour, markersize=5, label=cause)
+    axis.set(xscale="log")
+    _plain_ticks(axis.xaxis)

@@ -48,9 +48,9 @@ def scene(
         traces.append(_robot(robot))
     for (view, recording), colour in zip(recordings.items(), VIEW_COLOURS, strict=False):
         lines = _frusta(recording.intrinsics, recording.T_base_cam)
-        traces.append(_line(lines, f"cameras, {view}", colour, 1))
+        traces.append(_line(lines, f"cameras ({view})", colour, 1))
     for (view, detector), rows in medians.groupby(["view", "detector"], sort=False):
-        traces.append(_line(_limbs(rows), f"{detector}, {view}", detector_colour(detector), 5))
+        traces.append(_line(_limbs(rows), f"{detector} ({view})", detector_colour(detector), 5))
     if truth is not None:
         traces.append(_line(_limbs(truth[first]), "true skeleton", TRUTH_COLOUR, 3))
     figure = go.Figure(traces)

@@ -19,15 +19,15 @@ def test_shares_have_a_column_per_method_and_the_order_they_came_in():
 
 
 def test_distances_are_in_centimetres_and_unknown_ones_left_out():
-    columns = ["view", "detector", "part", "method", "n", "spread_m", "spread_m_low", "spread_m_high"]
-    table = pd.DataFrame([("upper", "a", "left wrist", "paper", 9, 0.012, 0.011, 0.0144)], columns=columns)
+    columns = ["view", "detector", "part", "method", "n_images", "spread_m", "spread_m_low", "spread_m_high"]
+    table = pd.DataFrame([("upper", "a", "left wrist", "paper", 9.2, 0.012, 0.011, 0.0144)], columns=columns)
     assert distances_text(table).to_dict("records") == [
         {
             "view": "upper",
             "detector": "a",
             "part": "left wrist",
             "method": "paper",
-            "n": 9,
+            "images": "9",
             "spread [cm]": "1.2 [1.1, 1.4]",
         }
     ]
@@ -36,10 +36,10 @@ def test_distances_are_in_centimetres_and_unknown_ones_left_out():
 def test_causes_have_a_column_each():
     rows = [("upper", "a", "left wrist", cause, s, 2 * s) for cause, s in (("depth", 0.01), ("pixel", 0.02))]
     table = causes_text(
-        pd.DataFrame(rows, columns=["view", "detector", "part", "cause", "spread_m", "p90_m"])
+        pd.DataFrame(rows, columns=["view", "detector", "part", "cause", "spread_m", "bias_m"])
     )
     assert table.iloc[0].to_dict() == {
-        "view": "upper", "detector": "a", "part": "left wrist", "depth": "1.0 (2.0)", "pixel": "2.0 (4.0)",
+        "view": "upper", "detector": "a", "part": "left wrist", "depth": "1.0 / 2.0", "pixel": "2.0 / 4.0",
     }  # fmt: skip
 
 

@@ -108,7 +108,9 @@ def test_nothing_found_is_a_share_of_zero_and_no_distance():
     points = make_points([NONE] * 3, ["left_wrist"])
     assert (within_distance(points, {"upper": 3}, n_resamples=5)["value"] == 0).all()
     distances = spread_and_bias(points, {"upper": 3}, {"upper": make_truth(3)}, n_resamples=5)
-    assert (distances["n"] == 0).all() and distances[["spread_m", "bias_m", "error_m"]].isna().all(axis=None)
+    assert (distances["n_images"] == 0).all() and distances[["spread_m", "bias_m", "error_m"]].isna().all(
+        axis=None
+    )
 
 
 def test_parts_name_every_keypoint_once():

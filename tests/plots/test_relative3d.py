@@ -99,7 +99,9 @@ def test_spread_and_bias_are_in_centimetres_and_rare_parts_left_out():
             for part, n in (("left wrist", 50), ("right wrist", 2))]  # fmt: skip
     names = [f"{name}{end}" for name in ("spread_m", "bias_m", "error_m") for end in ("", "_low", "_high")]
     figure = relative3d.spread_against_bias(
-        pd.DataFrame(rows, columns=["view", "detector", "method", "part", "n", *names]), "robust", "made up"
+        pd.DataFrame(rows, columns=["view", "detector", "method", "part", "n_images", *names]),
+        "robust",
+        "made up",
     )
     assert figure.table["part"].tolist() == ["left wrist"]
     marker = figure.figure.axes[0].get_lines()[0]
@@ -110,26 +112,28 @@ def test_spread_and_bias_are_in_centimetres_and_rare_parts_left_out():
 
 def test_causes_are_dots_with_the_tail_as_a_line():
     rows = [
-        ("upper", "mediapipe", "left wrist", source, cause, 30, spread, 2 * spread)
-        for source, cause, spread in (("depth", "depth sensor", 0.004), ("pixel", "2D detection", 0.016))
+        ("upper", "mediapipe", "left wrist", cause, 30, spread, 2 * spread, 0.05)
+        for cause, spread in (("depth sensor", 0.004), ("2D detection", 0.016))
     ]
-    columns = ["view", "detector", "part", "source", "cause", "n", "spread_m", "p90_m"]
+    columns = ["view", "detector", "part", "cause", "n", "spread_m", "p90_m", "bias_m"]
     figure = relative3d.spread_causes(pd.DataFrame(rows, columns=columns), "made up")
     dots = [line.get_xdata()[0] for line in figure.figure.axes[0].get_lines()]
     assert dots == pytest.approx([0.4, 1.6])
-    assert "depth sensor 0.4 cm and 2D detection 1.6 cm" in figure.alt
+    off = [line.get_xdata()[0] for line in figure.figure.axes[1].get_lines()]
+    assert off == pytest.approx([5, 5])
+    assert "depth sensor 0.4 and 5.0 cm and 2D detection 1.6 and 5.0 cm" in figure.alt
 
 
-def test_camera_views_have_a_row_per_frame_that_is_there(monkeypatch):
-    monkeypatch.setattr(relative3d, "read_rgb", lambda recording, frame: np.zeros((30, 40, 3), np.uint8))
+def test_camera_views_have_a_row_per_frame_and_a_column_per_view_and_detector(monkeypatch):
+    monkeypatch.setattr(
+        relative3d, "read_rgb", lambda recording, frame: np.full((30, 40, 3), frame, np.uint8)
+    )
     pixels, scores = np.full((1, 136, 2), np.nan), np.zeros((1, 136))
     pixels[0, INDEX["left_wrist"]], scores[0, INDEX["left_wrist"]] = (20, 10), 0.9
-    one = Detections(pixels, scores, np.ones(1))
-    figure = relative3d.camera_views(
-        {"upper": range(3), "lower": range(1)},
-        {("upper", "mediapipe"): [one] * 3, ("lower", "mediapipe"): [one]},
-        [0, 2], 0.1, "made up",
-    )  # fmt: skip
-    titles = [axis.get_ylabel() for axis in figure.figure.axes]
-    assert titles == ["upper 0", "upper 2", "lower 0"]
-    assert "made up" in figure.caption
+    found, nobody = Detections(pixels, scores, np.ones(1)), Detections.none()
+    people = {("upper", "mediapipe"): [found] * 3, ("lower", "mediapipe"): [nobody, nobody, found]}
+    figure = relative3d.camera_views({"upper": None, "lower": None}, people, [0, 2], 0.1, "made up")
+    images = [axis.images[0].get_array() for axis in figure.figure.axes]
+    assert [int(image[0, 0, 0]) for image in images] == [0, 0, 2, 2]
+    assert [bool((image != image[0, 0]).any()) for image in images] == [True, False, True, True]
+    assert "mediapipe 2 (upper) and mediapipe 1 (lower)" in figure.alt and "made up" in figure.caption

@@ -52,17 +52,17 @@ def test_the_scene_holds_robot_cameras_skeletons_and_truth(recording):
     medians = SKELETON.assign(view="upper", detector="mediapipe")
     figure = scene3d.scene({"upper": recording}, medians, body_segments(load_icub()), {"upper": SKELETON})
     traces = {trace.name: trace for trace in figure.data}
-    assert list(traces) == ["point cloud", "robot", "cameras, upper", "mediapipe, upper", "true skeleton"]
-    arm = traces["mediapipe, upper"]
+    assert list(traces) == ["point cloud", "robot", "cameras (upper)", "mediapipe (upper)", "true skeleton"]
+    arm = traces["mediapipe (upper)"]
     np.testing.assert_allclose(
         arm.x[:2], [-0.8, -0.6], atol=1e-6
     )  # the nose has no neighbour to be joined to
     assert len(arm.x) == 3 and np.isnan(arm.x[2])
-    cameras = np.stack([traces["cameras, upper"][axis] for axis in "xyz"], axis=1)
+    cameras = np.stack([traces["cameras (upper)"][axis] for axis in "xyz"], axis=1)
     assert (np.abs(cameras - T_BASE_CAM[:3, 3]) < 1e-6).all(axis=1).sum() == 2 * 2  # apexes of two cameras
     assert len(figure.to_json()) < 500_000
 
 
 def test_without_joints_and_truth_there_is_no_robot_and_no_true_skeleton(recording):
     figure = scene3d.scene({"own": recording}, NOBODY)
-    assert [trace.name for trace in figure.data] == ["point cloud", "cameras, own"]
+    assert [trace.name for trace in figure.data] == ["point cloud", "cameras (own)"]
