@@ -10,16 +10,14 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
 import click
 
+from hicp_lib.cli_options import PATH, WORKERS, detector_options, given, say
+from hicp_lib.cli_recordings import lift, record
 from hicp_lib.errors import InputError
-
-_PATH = click.Path(path_type=Path)
-_WORKERS = click.IntRange(min=1)
 
 
 def main() -> NoReturn:
@@ -53,44 +51,13 @@ def _fail(message: object, code: int) -> int:
     return code
 
 
-def _say(line: str) -> None:
-    click.echo(line)
-    sys.stdout.flush()
-
-
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 def hicp() -> None:
     """Human keypoint detection at close range: data, detectors, evaluation, report."""
 
 
-def _detector_options(command: Callable) -> Callable:
-    """The options that say which detector runs, on which weights; they arrive as `**chosen`."""
-    for option in (
-        click.option("-o", "--option", "pairs", nargs=2, multiple=True, metavar="NAME VALUE",
-                     help="A further option of the detector; may be repeated."),
-        click.option("--boxes", help="Where people's boxes come from: gt, image or detected."),
-        click.option("--person-model", type=_PATH, help="ONNX file that finds the boxes (YOLOX, RTMDet)."),
-        click.option("--model", type=_PATH, help="The detector's weights, for those that run on yours."),
-        click.option("--detector", required=True, help="Its name; a wrong one lists those there are."),
-    ):  # fmt: skip
-        command = option(command)
-    return command
-
-
-def _given(model: Path | None, person_model: Path | None, boxes: str | None, pairs) -> dict[str, Any]:
-    """The detector's options out of the command line's."""
-    named = {"model": model, "person_model": person_model, "boxes": boxes}
-    return {name: value for name, value in named.items() if value is not None} | {
-        name: _value(text) for name, text in pairs
-    }
-
-
-def _value(text: str) -> Any:
-    """true, 1 or 0.5 as such, anything else as text."""
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError):
-        return text
+hicp.add_command(record)
+hicp.add_command(lift)
 
 
 @hicp.group()
@@ -106,12 +73,12 @@ def models_list() -> None:
 
     for row in list_weights():
         size = f"{row['size_bytes'] / 1e6:5.1f} MB"
-        _say(f"{row['name']:<32} {row['status']:<8} {size}  {row['licence']:<12} {', '.join(row['used_by'])}")
-    _say("\npublished, fetched by name:")
+        say(f"{row['name']:<32} {row['status']:<8} {size}  {row['licence']:<12} {', '.join(row['used_by'])}")
+    say("\npublished, fetched by name:")
     for model in published().values():
         size = "     ? MB" if model.size_bytes is None else f"{model.size_bytes / 1e6:6.1f} MB"
         row = f"{model.name:<32} {status(model):<10} {size}  {model.licence or 'licence ?':<12}"
-        _say(f"{row} {model.use or 'not run here'}: {model.note}")
+        say(f"{row} {model.use or 'not run here'}: {model.note}")
 
 
 @models.command("fetch")
@@ -129,21 +96,21 @@ def models_fetch(names: tuple[str, ...]) -> None:
     others = [name for name in names if name not in by_name]
     if others or not names:
         for name in fetch(others or None):
-            _say(f"fetched {name}")
+            say(f"fetched {name}")
     for name in by_name:
         model = fetch_published(name)
         how = f"hicp detect --detector {model.use} {model.path} ..." if model.use else model.note
-        _say(f"fetched {name}: {model.path} ({how})")
+        say(f"fetched {name}: {model.path} ({how})")
 
 
 @models.command("show")
-@_detector_options
+@detector_options
 def models_show(detector: str, **chosen) -> None:
     """Tell everything that is taken for granted about a detector and its model file."""
     from hicp_lib.detectors.registry import describe, make_detector
 
-    for what, value, why in describe(make_detector(detector, **_given(**chosen))):
-        _say(f"{what:<16} {value}" + (f"  ({why})" if why else ""))
+    for what, value, why in describe(make_detector(detector, **given(**chosen))):
+        say(f"{what:<16} {value}" + (f"  ({why})" if why else ""))
 
 
 @hicp.group()
@@ -152,16 +119,16 @@ def scenes() -> None:
 
 
 @scenes.command("render")
-@click.argument("out", type=_PATH)
+@click.argument("out", type=PATH)
 @click.option("--n", default=100, show_default=True, type=click.IntRange(min=1), help="Number of images.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0))
-@click.option("--workers", type=_WORKERS, help="Processes; all cores if not given.")
+@click.option("--workers", type=WORKERS, help="Processes; all cores if not given.")
 def scenes_render(out: Path, n: int, seed: int, workers: int | None) -> None:
     """Render people at 1-5 m into the folder OUT, with annotations in Halpe's layout."""
     from hicp_lib.simulation.scenes import render_dataset
 
     render_dataset(out, n=n, seed=seed, workers=workers)
-    _say(f"{out}: {n} images")
+    say(f"{out}: {n} images")
 
 
 @hicp.group()
@@ -170,24 +137,24 @@ def dataset() -> None:
 
 
 @dataset.command("create")
-@click.option("--annotations", type=_PATH, required=True, help="Annotations in Halpe's layout.")
-@click.option("--images", type=_PATH, required=True, help="Folder of the images.")
-@click.option("--out", type=_PATH, required=True, help="Where basic/ and headless/ are written.")
+@click.option("--annotations", type=PATH, required=True, help="Annotations in Halpe's layout.")
+@click.option("--images", type=PATH, required=True, help="Folder of the images.")
+@click.option("--out", type=PATH, required=True, help="Where basic/ and headless/ are written.")
 @click.option("--min-pixels", default=20_000, show_default=True, type=click.IntRange(min=1))
 def dataset_create(annotations: Path, images: Path, out: Path, min_pixels: int) -> None:
     """Cut people out of annotated images: Basic, and Headless without their heads."""
     from hicp_lib.hicp_dataset import create_hicp
 
     counts = create_hicp(annotations, images, out, min_pixels=min_pixels, progress=sys.stderr.isatty())
-    _say(json.dumps(counts, indent=2))
+    say(json.dumps(counts, indent=2))
 
 
 @hicp.command()
-@_detector_options
-@click.option("--dataset", "dataset_dir", type=_PATH, help="Folder with images/ and annotations.json.")
-@click.option("--images", "images_dir", type=_PATH, help="Folder of images without annotations.")
-@click.option("--out", type=_PATH, required=True, help="COCO keypoint results to write.")
-@click.option("--workers", type=_WORKERS, help="Threads; all cores if not given.")
+@detector_options
+@click.option("--dataset", "dataset_dir", type=PATH, help="Folder with images/ and annotations.json.")
+@click.option("--images", "images_dir", type=PATH, help="Folder of images without annotations.")
+@click.option("--out", type=PATH, required=True, help="COCO keypoint results to write.")
+@click.option("--workers", type=WORKERS, help="Threads; all cores if not given.")
 @click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster, which then does the work.")
 def detect(
     detector: str, dataset_dir: Path | None, images_dir: Path | None, out: Path, workers, dask, **chosen
@@ -204,14 +171,14 @@ def detect(
     if workers and dask:
         raise click.UsageError("Give either --workers N or --dask ADDRESS.", click.get_current_context())
     if dataset_dir is not None:
-        found = detect_dataset(detector, dataset_dir, workers, dask=dask, **_given(**chosen))
+        found = detect_dataset(detector, dataset_dir, workers, dask=dask, **given(**chosen))
     else:
         paths = _numbered_images(images_dir)
-        results = detect_images(detector, paths, workers, dask=dask, **_given(**chosen))
+        results = detect_images(detector, paths, workers, dask=dask, **given(**chosen))
         found = {key: result.detections for key, result in results.items()}
         _write_names(out, paths)
     write_detections(out, found)
-    _say(f"{out}: {sum(len(people) for people in found.values())} people in {len(found)} images")
+    say(f"{out}: {sum(len(people) for people in found.values())} people in {len(found)} images")
 
 
 def _numbered_images(folder: Path) -> dict[int, Path]:
@@ -237,9 +204,9 @@ def _write_names(out: Path, paths: dict[int, Path]) -> None:
 
 @hicp.command("import")
 @click.option("--format", "kind", required=True, help="openpose, alphapose, mmpose, detectron2 or coco.")
-@click.option("--predictions", type=_PATH, required=True, help="The folder or file the tool wrote.")
-@click.option("--annotations", type=_PATH, required=True, help="Annotations of the images the tool saw.")
-@click.option("--out", type=_PATH, required=True, help="COCO keypoint results to write.")
+@click.option("--predictions", type=PATH, required=True, help="The folder or file the tool wrote.")
+@click.option("--annotations", type=PATH, required=True, help="Annotations of the images the tool saw.")
+@click.option("--out", type=PATH, required=True, help="COCO keypoint results to write.")
 @click.option("--score-scale", type=float, help="Divides keypoint scores; the format's own if not given.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def import_(kind: str, predictions: Path, annotations: Path, out: Path, score_scale, as_json: bool) -> None:
@@ -251,15 +218,15 @@ def import_(kind: str, predictions: Path, annotations: Path, out: Path, score_sc
     write_imported(out, imported)
     summary = imported.summary
     for line in [json.dumps(summary.as_dict(), indent=2)] if as_json else summary.lines():
-        _say(line)
+        say(line)
 
 
 @hicp.command("export")
-@click.option("--detections", type=_PATH, required=True, help="COCO keypoint results.")
+@click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
 @click.option("--format", "kind", required=True, help="coco (results) or fiftyone (a COCO data set).")
 @click.option("--layout", default="halpe136", show_default=True, help="Or halpe26, coco17, wholebody133.")
-@click.option("--annotations", type=_PATH, help="Annotations of the images; fiftyone needs them.")
-@click.option("--out", type=_PATH, required=True)
+@click.option("--annotations", type=PATH, help="Annotations of the images; fiftyone needs them.")
+@click.option("--out", type=PATH, required=True)
 def export(detections: Path, kind: str, layout: str, annotations: Path | None, out: Path) -> None:
     """Write detections for other tools."""
     from hicp_lib.annotations import read_annotations, read_detections
@@ -267,12 +234,12 @@ def export(detections: Path, kind: str, layout: str, annotations: Path | None, o
 
     people = None if annotations is None else read_annotations(annotations)
     n = export_detections(kind, read_detections(detections, people), out, people, layout)
-    _say(f"{out}: {n} people")
+    say(f"{out}: {n} people")
 
 
 @hicp.command()
-@click.option("--annotations", type=_PATH, required=True, help="Annotations in Halpe's layout.")
-@click.option("--detections", type=_PATH, required=True, help="COCO keypoint results.")
+@click.option("--annotations", type=PATH, required=True, help="Annotations in Halpe's layout.")
+@click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
 @click.option("--group", default="body", show_default=True, help="body (17 points) or hand (42).")
 @click.option("--sigmas", default="halpe", show_default=True, help="halpe or wholebody.")
 @click.option("--area", default="segment", show_default=True, help="segment, box, box53 or source.")
@@ -294,15 +261,15 @@ def evaluate(
     rows = bootstrap_intervals(evaluation, seed=seed, clusters=clusters).to_dict("records")
     if as_json:
         figures = {row["metric"]: _finite({k: row[k] for k in ("value", "low", "high")}) for row in rows}
-        _say(json.dumps(_finite(evaluation.row()) | {"metrics": figures, "seed": seed}, indent=2))
+        say(json.dumps(_finite(evaluation.row()) | {"metrics": figures, "seed": seed}, indent=2))
         return
-    _say(
+    say(
         f"{group}: {evaluation.n_people} people in {evaluation.n_images} images; {sigmas} sigmas, {area} area"
     )
     if not any(map(len, found.values())):
-        _say(f"{detections}: an empty list: nobody was found in any image")
+        say(f"{detections}: an empty list: nobody was found in any image")
     for row in rows:
-        _say(f"{row['metric']:<5} {row['value']:.3f}  [{row['low']:.3f}, {row['high']:.3f}]")
+        say(f"{row['metric']:<5} {row['value']:.3f}  [{row['low']:.3f}, {row['high']:.3f}]")
 
 
 def _finite(row: dict[str, Any]) -> dict[str, Any]:
@@ -320,7 +287,7 @@ def report(profile: str, pairs: tuple[tuple[str, str], ...]) -> int:
     from hicp_lib.report.runs import RunError
 
     try:
-        make_report(profile, list(pairs), _say)
+        make_report(profile, list(pairs), say)
     except RunError as error:
         return _fail(error, 1)
     return 0
@@ -334,5 +301,5 @@ def doctor() -> int:
     checks = run_checks()
     for check in checks:
         remedy = "" if check.is_ok else f"; remedy: {check.remedy}"
-        _say(f"{'ok  ' if check.is_ok else 'FAIL'} {check.name}: {check.finding}{remedy}")
+        say(f"{'ok  ' if check.is_ok else 'FAIL'} {check.name}: {check.finding}{remedy}")
     return 0 if all(check.is_ok for check in checks) else 2

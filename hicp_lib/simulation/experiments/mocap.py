@@ -63,7 +63,7 @@ def capture(
     obstacles : what hides markers besides the person
     duration_s : from the first frame to the last
     """
-    rng = np.random.default_rng(np.random.SeedSequence([seed, 3]))
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 4]))
     T_mocap_world = mocap_frame(rng)
     n = int(round((duration_s + 2 * LEAD_S) * QUALISYS.rate_hz)) + 1
     clock_s = np.arange(n) / QUALISYS.rate_hz

@@ -25,13 +25,13 @@ from hicp_lib.simulation.surfaces import Surface
 
 Rng = np.random.Generator
 
-HEAD_RAD = np.radians([0.0, 0.0, 0.0, 6.0, 0.0, 0.0])
+HEAD_RAD = np.radians([0.0, 0.0, 0.0, 9.0, 0.0, 0.0])
 """Where the robot holds its head: a little up, so that the person is seen from the thighs to the hair."""
 DISTANCE_M = 1.65  # of the person from the robot's root, along the floor
 TABLE_HEIGHT_M = 0.72
 _TABLE_M = ((-0.6, 0.75), (0.6, 1.3))  # two corners of its top, (x, y)
 _LEGS = ("hip_flexion", "hip_abduction", "hip_rotation", "knee_flexion", "ankle_flexion")
-_TOUCH_DEG = {"spine_flexion": 26.0, "neck_flexion": 10.0}
+_TOUCH_DEG = {"spine_flexion": 28.0, "neck_flexion": 10.0}
 _WAVING_DEG = {
     "shoulder_abduction": 65.0, "shoulder_flexion": 15.0, "shoulder_rotation": -80.0,
     "elbow_flexion": 100.0, "forearm_supination": -50.0, "wrist_flexion": 0.0,
@@ -93,7 +93,7 @@ class _Mover:
         pelvis_m = self._posed(self._standing(joints)).heads_m[0]
         for side in self.rng.permutation(["left", "right"])[: self.rng.integers(1, 3)]:
             sign = 1 if side == "left" else -1
-            ahead_m = pelvis_m[1] - _TABLE_M[1][1] + self.rng.uniform(0.06, 0.12)
+            ahead_m = pelvis_m[1] - _TABLE_M[1][1] + self.rng.uniform(0.1, 0.18)
             up_m = TABLE_HEIGHT_M + 0.07 - pelvis_m[2]
             wrist_m = np.array([ahead_m, sign * self.rng.uniform(0.12, 0.3), up_m])
             joints = reach(self.body, self.shape, joints, side, wrist_m, (-0.2, 0.7, -0.7)) or joints
@@ -173,7 +173,7 @@ class Moving:
 
 def moving(seed: int) -> Moving:
     """The scene of a seed: who moves how, in what room. The same in every process."""
-    rng = np.random.default_rng(np.random.SeedSequence([seed, 2]))
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 3]))
     appearance = adult(rng)
     top = table(rng, *_TABLE_M, TABLE_HEIGHT_M)
     room = furnished(rng, [top], [(0.0, DISTANCE_M, 0.8), (0.0, 0.9, 0.8)])

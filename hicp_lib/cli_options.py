@@ -1,0 +1,50 @@
+"""What the `hicp` command's parts share: kinds of options, and how results are said."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+PATH = click.Path(path_type=Path)
+WORKERS = click.IntRange(min=1)
+
+
+def say(line: str) -> None:
+    """A line on standard output, at once."""
+    click.echo(line)
+    sys.stdout.flush()
+
+
+def detector_options(command: Callable) -> Callable:
+    """The options that say which detector runs, on which weights; they arrive as `**chosen`."""
+    for option in (
+        click.option("-o", "--option", "pairs", nargs=2, multiple=True, metavar="NAME VALUE",
+                     help="A further option of the detector; may be repeated."),
+        click.option("--boxes", help="Where people's boxes come from: gt, image or detected."),
+        click.option("--person-model", type=PATH, help="ONNX file that finds the boxes (YOLOX, RTMDet)."),
+        click.option("--model", type=PATH, help="The detector's weights, for those that run on yours."),
+        click.option("--detector", required=True, help="Its name; a wrong one lists those there are."),
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
+def given(model: Path | None, person_model: Path | None, boxes: str | None, pairs) -> dict[str, Any]:
+    """The detector's options out of the command line's."""
+    named = {"model": model, "person_model": person_model, "boxes": boxes}
+    return {name: value for name, value in named.items() if value is not None} | {
+        name: _value(text) for name, text in pairs
+    }
+
+
+def _value(text: str) -> Any:
+    """true, 1 or 0.5 as such, anything else as text."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return text
