@@ -95,8 +95,9 @@ class Chain:
         if points_link_m is None:
             return full[:3].copy()
         # v = v_origin + w x r, with r from the link's origin to the point, in root axes
-        arms = np.asarray(points_link_m) @ self._data.oMf[frame].rotation.T
-        return full[:3] + np.cross(full[3:].T, arms[..., None, :]).swapaxes(-1, -2)
+        x, y, z = np.moveaxis(np.asarray(points_link_m) @ self._data.oMf[frame].rotation.T, -1, 0)[..., None]
+        wx, wy, wz = full[3:]
+        return full[:3] + np.stack([wy * z - wz * y, wz * x - wx * z, wx * y - wy * x], axis=-2)
 
     def _frame(self, link: str) -> int:
         if link not in self._frames:

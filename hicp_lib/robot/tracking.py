@@ -106,7 +106,7 @@ class KeypointTracker:
     def _update(self, time_s: float, points: np.ndarray, scores: np.ndarray) -> None:
         """Remember the sightings, and believe those near an earlier one of the same person."""
         rows, people = self._recognise(points, time_s)
-        new = np.setdiff1d(np.arange(len(points)), people)
+        new = np.delete(np.arange(len(points)), people)
         memory = np.concatenate([self._memory[rows], _nothing(len(new))])
         people = np.append(people, new)
         points, scores = points[people], scores[people]
