@@ -121,8 +121,6 @@ def _values(
 def _mean(
     rows: pd.DataFrame, flags: pd.Series, n_resamples: int, seed: int
 ) -> tuple[float, float, float, int]:
-    if not len(rows):
-        return np.nan, np.nan, np.nan, 0
     return *mean_with_interval(flags, rows["source_image"], n_resamples, seed), len(rows)
 
 

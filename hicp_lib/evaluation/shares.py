@@ -37,7 +37,9 @@ def shares(
 def mean_with_interval(
     values: np.ndarray, clusters: np.ndarray, n_resamples: int = 1000, seed: int = 0
 ) -> tuple[float, float, float]:
-    """Mean of values (n,) and its 95 % percentile interval when whole clusters (n,) are drawn."""
+    """Mean of values (n,) and its 95 % percentile interval when whole clusters (n,) are drawn; NaN of none."""
+    if not len(values):
+        return np.nan, np.nan, np.nan
     cluster, names = pd.factorize(np.asarray(clusters))
     sums = np.bincount(cluster, weights=np.asarray(values, float), minlength=len(names))
     times = draw_counts(len(names), n_resamples, seed)

@@ -40,8 +40,10 @@ def worst_cases(errors: pd.DataFrame, n: int = 4) -> pd.DataFrame:
     table = table[table["badness"] > 0].sort_values("badness", ascending=False, kind="stable")
     table = table.drop_duplicates(["detector", "case", "source_image"])
     table = table.assign(rank=table.groupby(["detector", "case"]).cumcount() + 1)
-    order = [list(dict.fromkeys(errors["detector"])).index(name) for name in table["detector"]]
-    place = np.lexsort((table["rank"], table["case"].map(KINDS_OF_CASE.index), order))
+    detectors = list(dict.fromkeys(errors["detector"]))
+    place = np.lexsort(
+        (table["rank"], table["case"].map(KINDS_OF_CASE.index), table["detector"].map(detectors.index))
+    )
     table = table.iloc[place]
     columns = ["detector", "case", "rank", "subset", "image_id", "badness"]
     return table.loc[table["rank"] <= n, columns].reset_index(drop=True)

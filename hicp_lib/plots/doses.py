@@ -1,0 +1,128 @@
+"""Figures of doses: what was varied, and how detection falls with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.annotations import Annotations
+from hicp_lib.images import read_image
+from hicp_lib.plots.people import picture_grid
+from hicp_lib.plots.style import Figure, detector_colour, in_style, in_words, new_figure
+
+_LABELS = {
+    "distance": "distance [m]",
+    "light": "share of the light",
+    "hidden": "share of the height hidden, from below",
+    "resolution": "height of the picture [px]",
+    "upper part": "share of the height seen, from above",
+    "lower part": "share of the height seen, from below",
+    "share of keypoints in the picture": "share of keypoints in the picture",
+    "picture": "size of the picture [px, square root of its area]",
+    "share of keypoints hidden": "share of keypoints hidden",
+    "distance to the border": "distance to the border [of the shorter side]",
+    "brightness": "mean brightness [of 255]",
+}
+_LOGARITHMIC = ("light", "resolution", "distance")
+_SUBSET_STYLES = {"basic": "-", "headless": "--", "close": ":"}
+
+
+def dose_pictures(annotations: Annotations, folder: Path, person: int = 0) -> Figure:
+    """Every picture of one person, a row for each dose."""
+    rows: dict[str, list] = {}
+    for image_id, extra in zip(annotations.image_ids.tolist(), annotations.extras, strict=True):
+        if extra["source_image_id"] == person:
+            image = read_image(Path(folder) / "images" / annotations.images[image_id].file_name)
+            rows.setdefault(extra["dose"], []).append((extra["level"], image))
+    figure = picture_grid(
+        [[image for _, image in pictures] for pictures in rows.values()],
+        row_titles=list(rows), cell_in=1.5,
+        caption="The pictures of one person, rendered: one thing varied in each row, the rest the same.",
+        alt=f"Rows of pictures of one person: {in_words(list(rows))}.",
+    )  # fmt: skip
+    columns = max(len(pictures) for pictures in rows.values())
+    for i, (dose, pictures) in enumerate(rows.items()):
+        for j, (level, _) in enumerate(pictures):
+            title = (
+                f"{level:g} m"
+                if dose == "distance"
+                else f"{level:g} px"
+                if dose == "resolution"
+                else f"{level:g}"
+            )
+            figure.figure.axes[i * columns + j].set_title(title, loc="center", fontsize=7, pad=2)
+    return figure
+
+
+@in_style
+def dose_curves(table: pd.DataFrame, group: str) -> Figure:
+    """AP and hits of visible keypoints against each dose; `table` from `dose_curves.dose_curves`."""
+    rows = table[(table["group"] == group) & (table["measure"] != "hidden keypoints hit")]
+    doses = list(dict.fromkeys(rows["dose"]))
+    figure, axes = _panels(len(doses))
+    for axis, dose in zip(axes.flat, doses, strict=False):
+        for (detector, measure), part in rows[rows["dose"] == dose].groupby(
+            ["detector", "measure"], sort=False
+        ):
+            solid = measure == "AP"
+            label = detector if solid else f"{detector}, {measure}"
+            _line(axis, part.sort_values("level"), detector, "-" if solid else ":", label)
+        if dose in _LOGARITHMIC:
+            ticks = sorted(rows.loc[rows["dose"] == dose, "level"].unique())
+            axis.set_xscale("log")
+            axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+            axis.minorticks_off()
+        axis.set(xlabel=_LABELS.get(dose, dose), ylim=(-0.02, 1.02))
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=9)
+    caption = (
+        "Detection against dose, one thing varied and the rest fixed: average precision (solid) and the "
+        "share of "
+        "visible keypoints hit (dotted), with 95 % bootstrap intervals over people. Rendered people."
+    )
+    lows = rows[rows["measure"] == "AP"].groupby(["detector", "dose"], sort=False)["value"].min()
+    said = [f"{detector} {value:.2f} for {dose}" for (detector, dose), value in lows.items()]
+    return Figure(figure, caption, f"Curves per dose. Lowest average precision: {in_words(said)}.", rows)
+
+
+@in_style
+def observed_curves(table: pd.DataFrame, note: str) -> Figure:
+    """Hit rate against doses as the data set has them; `table` from `dose_curves.observed_curves`."""
+    doses = list(dict.fromkeys(table["dose"]))
+    figure, axes = _panels(len(doses))
+    for axis, dose in zip(axes.flat, doses, strict=False):
+        for (subset, detector), part in table[table["dose"] == dose].groupby(
+            ["subset", "detector"], sort=False
+        ):
+            style = _SUBSET_STYLES.get(subset, "-.")
+            _line(axis, part.sort_values("level"), detector, style, f"{detector}, {subset}")
+        axis.set(xlabel=_LABELS.get(dose, dose), ylim=(-0.02, 1.02))
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
+    caption = (
+        "Share of labelled body keypoints hit, by fifths of what the data set happens to hold of each "
+        "dose, with "
+        f"95 % bootstrap intervals over source images: {note}."
+    )
+    spread = table.groupby(["detector", "dose"], sort=False)["value"].agg(np.ptp)
+    said = [f"{detector} {value:.2f} for {dose}" for (detector, dose), value in spread.items()]
+    return Figure(figure, caption, f"Curves per dose. Range of the hit rate: {in_words(said)}.", table)
+
+
+def _panels(n: int):
+    columns = min(n, 3)
+    rows = -(-n // columns)
+    figure, axes = new_figure(rows, columns, 3.7 * columns, 2.9 * rows + 0.5, sharey=True, squeeze=False)
+    for axis in axes.flat[n:]:
+        axis.set_axis_off()
+    for row in axes:
+        row[0].set(ylabel="AP, share of hits")
+    return figure, axes
+
+
+def _line(axis, rows: pd.DataFrame, detector: str, style: str, label: str) -> None:
+    colour = detector_colour(detector)
+    axis.plot(rows["level"], rows["value"], style, marker="o", ms=3.5, color=colour, label=label)
+    axis.fill_between(rows["level"], rows["low"], rows["high"], color=colour, alpha=0.13, lw=0)
