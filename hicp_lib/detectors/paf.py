@@ -5,9 +5,10 @@ affinity fields", TPAMI 2021) and the defaults of its released program. Plain Nu
 `PartModel`; positions are in pixels of the network's input, pixel centres at integers, where
 cell i of a map with stride s covers pixels s i ... s i + s - 1.
 
-One deliberate difference: OpenPose enlarges the maps to input size and takes a centroid around
-each maximum. Here the maximum is found in the map itself and refined with the parabola through
-the logarithms of its neighbours, exact for the Gaussians the maps are trained on and cheaper.
+Two deliberate differences, which `paf_released` does not have: OpenPose enlarges the maps to input size
+and takes a centroid around each maximum. Here the maximum is found in the map itself and refined with
+the parabola through the logarithms of its neighbours, exact for the Gaussians the maps are trained on and
+cheaper. And two people are merged when a limb joins them and they have no part in common.
 """
 
 from __future__ import annotations
@@ -69,11 +70,14 @@ class _Person:
     n_limbs: int = 0
 
 
+# Peaks at its start and end, by their row, and how well the field supports it.
+Limb = tuple[int, int, float]
 # Values of maps (c, h, w) at input positions (..., 2), given the stride: (c, ...).
 Sampler = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
 
 MAX_PEAKS = 64
 _LEAST = 1e-4
+_LEAST_LENGTH_PX = _LEAST_SCORE = 1e-6
 
 
 def find_peaks(heat_maps: np.ndarray, stride: int, min_peak: float) -> list[np.ndarray]:
@@ -163,7 +167,7 @@ def limb_scores(
     count = agree.sum(axis=-1)
     mean = np.where(agree, projected, 0).sum(axis=-1) / np.maximum(count, 1)
     # Points nearly on top of each other leave the field no room; OpenPose lets them just pass.
-    is_short = length < np.sqrt(limb_field[0].size) * stride / 150
+    is_short = (length > _LEAST_LENGTH_PX) & (length < np.sqrt(limb_field[0].size) * stride / 150)
     weak = np.where(is_short, options.min_peak + 1e-6, 0.0)
     return np.where(count > options.min_agreement * n_samples, mean, weak)
 
@@ -180,12 +184,12 @@ def _sample(maps: np.ndarray, positions_px: np.ndarray, stride: int) -> np.ndarr
     return top * (1 - fy) + bottom * fy
 
 
-def connect(scores: np.ndarray) -> list[tuple[int, int, float]]:
-    """Limbs (start, end, score) taken greedily by falling score, each end used once."""
+def connect(scores: np.ndarray) -> list[Limb]:
+    """Limbs taken greedily by falling score, of equal ones the last first; each end used once."""
     limbs, free_start, free_end = [], set(range(scores.shape[0])), set(range(scores.shape[1]))
-    for flat in np.argsort(-scores, axis=None, kind="stable"):
+    for flat in np.argsort(scores, axis=None, kind="stable")[::-1]:
         start, end = divmod(int(flat), scores.shape[1])
-        if scores[start, end] <= 0:
+        if scores[start, end] <= _LEAST_SCORE:
             break
         if start in free_start and end in free_end:
             limbs.append((start, end, float(scores[start, end])))
@@ -211,26 +215,27 @@ def assemble(
     scores : array, shape (n_people,): (sum of part and limb scores) / (parts + limbs)
     """
     peaks = find_peaks(heat_maps, stride, options.min_peak)
-    return assemble_peaks(peaks, fields, model, stride, options)
+    people: list[_Person] = []
+    for index, limbs in enumerate(find_limbs(peaks, fields, model, stride, options)):
+        a, b = model.pairs[index].tolist()
+        for start, end, score in limbs:
+            _join(people, (a, start), (b, end), score, index in model.completing)
+    return _keep(people, peaks, model, options)
 
 
-def assemble_peaks(
+def find_limbs(
     peaks: list[np.ndarray],
     fields: np.ndarray,
     model: PartModel,
     stride: int,
     options: PafOptions,
     sample: Sampler | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """As `assemble`, from the peaks (n, 3: x, y in input pixels, value) of each part."""
-    people: list[_Person] = []
-    for index, (a, b) in enumerate(model.pairs):
-        if len(peaks[a]) and len(peaks[b]):
-            limb_field = fields[model.fields[index]]
-            limbs = connect(limb_scores(limb_field, peaks[a], peaks[b], stride, options, sample))
-            for start, end, score in limbs:
-                _join(people, (int(a), start), (int(b), end), score, index in model.completing)
-    return _keep(people, peaks, model, options)
+) -> list[list[Limb]]:
+    """Limbs of each pair, from the peaks (n, 3: x, y in input pixels, value) of each part."""
+    return [
+        connect(limb_scores(fields[channels], peaks[a], peaks[b], stride, options, sample))
+        for (a, b), channels in zip(model.pairs, model.fields, strict=True)
+    ]
 
 
 def _join(

@@ -4,26 +4,43 @@ The maps are enlarged to the size of the network's input; a peak is the centroid
 values within 3 pixels of a local maximum, and fields are read at the nearest pixel. `paf` finds
 peaks in the small maps, which is far cheaper and as good; this is for the original networks,
 whose results should be the program's (constants and rules: its `net` folder, version 1.7).
+
+The program counts image pixels from their corners: it adds half an image pixel to a peak before it
+reads the fields, and leaves it in its results. The fields are read there, too (`offset_px`); positions
+given have pixel centres at integers, as everywhere here.
 """
 
 from __future__ import annotations
 
+from functools import partial
+
 import cv2
 import numpy as np
 
-from hicp_lib.detectors.paf import PafOptions, PartModel, assemble_peaks
+from hicp_lib.detectors.paf import PafOptions, PartModel, find_limbs
+from hicp_lib.detectors.paf_joining import join_as_released
 
 _MAX_PEAKS = 127
 _REACH_PX = 3
 
 
 def assemble_released(
-    heat_maps: np.ndarray, fields: np.ndarray, model: PartModel, stride: int, options: PafOptions
+    heat_maps: np.ndarray,
+    fields: np.ndarray,
+    model: PartModel,
+    stride: int,
+    options: PafOptions,
+    offset_px: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """People in the maps of one image; parameters and results as of `paf.assemble`."""
+    """People in the maps of one image; parameters and results as of `paf.assemble`.
+
+    Person scores are the program's, see `join_as_released`. `offset_px` is half an image pixel in pixels
+    of the network's input.
+    """
     heat_maps, fields = enlarge(heat_maps, stride), enlarge(fields, stride)
     peaks = [centroid_peaks(heat_map, options.min_peak) for heat_map in heat_maps]
-    return assemble_peaks(peaks, fields, model, 1, options, _nearest)
+    sample = partial(_nearest, offset_px=offset_px)
+    return join_as_released(peaks, find_limbs(peaks, fields, model, 1, options, sample), model, options)
 
 
 def enlarge(maps: np.ndarray, factor: int) -> np.ndarray:
@@ -67,7 +84,9 @@ def _windows(
     return padded[rows[:, None, None] + step[:, None], columns[:, None, None] + step]
 
 
-def _nearest(maps: np.ndarray, positions_px: np.ndarray, stride: int) -> np.ndarray:
+def _nearest(maps: np.ndarray, positions_px: np.ndarray, stride: int, offset_px: float = 0.0) -> np.ndarray:
     limit = np.array([maps.shape[2], maps.shape[1]]) - 1
-    x, y = np.moveaxis(np.clip(np.floor(positions_px / stride + 0.5).astype(int), 0, limit), -1, 0)
+    x, y = np.moveaxis(
+        np.clip(np.floor((positions_px + offset_px) / stride + 0.5).astype(int), 0, limit), -1, 0
+    )
     return maps[:, y, x]

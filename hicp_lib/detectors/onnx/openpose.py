@@ -76,7 +76,7 @@ class OpenPose:
         height, width = _image_size(self._model)
         self._size_px = height or net_height_px, width if height else None
         self._hands = OpenPoseHands(hand_model, provider, threads) if hand_model is not None else None
-        self._assemble = assemble_released if as_released else assemble
+        self._as_released = as_released
         self._options = PafOptions()
         self.settings = {
             "model": self._model.settings,
@@ -92,7 +92,11 @@ class OpenPose:
         net_input = fit(image, *self._size_px)
         maps = self._model.run(_feed(net_input.pixels))
         heat_maps, fields, parts_model = _split(self._model, maps, net_input.pixels.shape)
-        parts, scores = self._assemble(heat_maps, fields, parts_model, STRIDE, self._options)
+        given = heat_maps, fields, parts_model, STRIDE, self._options
+        if self._as_released:
+            parts, scores = assemble_released(*given, offset_px=0.5 * net_input.scale.min())
+        else:
+            parts, scores = assemble(*given)
         people = as_detections(parts, scores, net_input, parts_model.convention)
         return self._hands.complete(image, people) if self._hands else people
 
@@ -108,12 +112,14 @@ class OpenPose:
             Fact("pixels", "BGR / 256 - 0.5, aspect kept, padded right and below", "as OpenPose"),
             Fact("keypoints", " or ".join(part_model.convention for part_model in _PART_MODELS.values()),
                  "told by the number of maps when it runs"),
-            Fact("decoding", "as OpenPose's program" if self.settings["as_released"] else "in the small maps",
+            Fact("decoding", "as OpenPose's program" if self._as_released else "in the small maps",
                  "option as_released"),
             Fact("hands", hands, "square around wrist + 0.33 (wrist - elbow), side 1.5 x the greater of "
                  "forearm and 0.9 x upper arm"),
             Fact("keypoint score", "value of the map's peak, cut off at 1", "as OpenPose"),
-            Fact("person score", "mean of part and limb scores", "as OpenPose"),
+            Fact("person score", "sum of part and limb scores / " + (
+                 "number of all parts and limbs" if self._as_released else "number of those found"),
+                 "as OpenPose" if self._as_released else "option as_released"),
         ]  # fmt: skip
 
 
