@@ -37,7 +37,7 @@ def shares(
 def mean_with_interval(
     values: np.ndarray, clusters: np.ndarray, n_resamples: int = 1000, seed: int = 0
 ) -> tuple[float, float, float]:
-    """Mean of values (n,) and its 95 % percentile interval when whole clusters (n,) are drawn; NaN of none."""
+    """Mean of values (n,), and its 95 % percentile interval from drawing clusters (n,); NaN for none."""
     if not len(values):
         return np.nan, np.nan, np.nan
     cluster, names = pd.factorize(np.asarray(clusters))

@@ -126,3 +126,33 @@ def _line(axis, rows: pd.DataFrame, detector: str, style: str, label: str) -> No
     colour = detector_colour(detector)
     axis.plot(rows["level"], rows["value"], style, marker="o", ms=3.5, color=colour, label=label)
     axis.fill_between(rows["level"], rows["low"], rows["high"], color=colour, alpha=0.13, lw=0)
+
+
+@in_style
+def flicker_rates(table: pd.DataFrame, note: str) -> Figure:
+    """Flicker rate and jitter as detected and filtered; `table` from `flicker.flicker`."""
+    measures = ("flicker rate", "jitter [px]")
+    detectors = list(dict.fromkeys(table["detector"]))[::-1]
+    figure, axes = new_figure(1, len(measures), 9.0, 1.3 + 0.55 * len(detectors), sharey=True)
+    for axis, measure in zip(axes, measures, strict=True):
+        for shift, kind, filled in ((0.13, "as detected", True), (-0.13, "filtered", False)):
+            for y, detector in enumerate(detectors):
+                case = (table["detector"] == detector) & (table["tracks"] == kind)
+                row = table[case & (table["measure"] == measure)].iloc[0]
+                colour = detector_colour(detector)
+                axis.errorbar(
+                    row["value"], y + shift, xerr=[[row["value"] - row["low"]], [row["high"] - row["value"]]],
+                    fmt="o", color=colour, mfc=colour if filled else "white", capsize=2,
+                )  # fmt: skip
+        axis.set(xlabel=measure, xlim=(0, None), ylim=(-0.5, len(detectors) - 0.5))
+    axes[0].set(yticks=range(len(detectors)), yticklabels=detectors)
+    lag = table[(table["measure"] == "latency [s]") & (table["tracks"] == "filtered")]
+    said = [f"{row.detector} {1000 * row.value:.0f} ms" for row in lag.itertuples()]
+    caption = (
+        "Keypoints that come and go between consecutive frames, and how far they jump, as detected (filled) "
+        f"and through a causal filter (open), with 95 % bootstrap intervals over seconds: {note}. "
+        f"Delay of the filter: {in_words(said)}."
+    )
+    rates = table[(table["measure"] == "flicker rate") & (table["tracks"] == "as detected")]
+    said = [f"{row.detector} {row.value:.3f}" for row in rates.itertuples()]
+    return Figure(figure, caption, f"Dots with whiskers. Flicker rate as detected: {in_words(said)}.", table)
