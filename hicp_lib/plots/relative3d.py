@@ -196,7 +196,7 @@ def spread_causes(table: pd.DataFrame, note: str) -> Figure:
     axes[0, 0].set(yticks=range(len(parts)), yticklabels=parts, ylim=(len(parts) - 0.5, -0.5))
     figure.legend(*legend_entries(axes), loc="outside lower center", ncols=3, fontsize=9)
     caption = (
-        "Where spread and bias come from, one cause at a time and all together. Upper row: median (marker) and "
+        "Where spread and bias come from, one cause at a time, and all. Upper row: median (marker) and "
         "90th percentile (end of the line) of the distance to the median position; lower row: how far that "
         f"position is from the true one: {note}."
     )

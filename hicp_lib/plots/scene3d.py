@@ -6,6 +6,7 @@ one line or one cloud for Plotly, in single precision, so the page stays small.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -20,9 +21,9 @@ from hicp_lib.robot.segments import Segment
 
 ROBOT_COLOUR = "#5F6B7A"
 TRUTH_COLOUR = "#111111"
-VIEW_COLOURS = ("#56B4E9", "#E69F00", "#009E73")
+VIEW_STYLES = (("#E377C2", "solid"), ("#17BECF", "dash"))  # of its cameras, and of its skeletons' lines
 _FRUSTUM_DEPTH_M = 0.05
-_EYE = {"x": -1.1, "y": 1.3, "z": 0.7}  # from in front of the robot, to its right
+_EYE = {"x": 0.6, "y": 1.4, "z": 0.6}  # from in front of the robot, to its right
 _PEN_UP = np.full((1, 3), np.nan)
 
 
@@ -46,32 +47,35 @@ def scene(
     traces = [point_cloud(recordings[first], 0)]
     if robot:
         traces.append(_robot(robot))
-    for (view, recording), colour in zip(recordings.items(), VIEW_COLOURS, strict=False):
+    styles = dict(zip(recordings, itertools.cycle(VIEW_STYLES), strict=False))
+    for view, recording in recordings.items():
         lines = _frusta(recording.intrinsics, recording.T_base_cam)
-        traces.append(_line(lines, f"cameras ({view})", colour, 1))
+        traces.append(_line(lines, f"cameras ({view})", styles[view][0], 1))
     for (view, detector), rows in medians.groupby(["view", "detector"], sort=False):
-        traces.append(_line(_limbs(rows), f"{detector} ({view})", detector_colour(detector), 5))
+        colour, (_, dash) = detector_colour(detector), styles[view]
+        traces.append(_line(_limbs(rows), f"{detector} ({view})", colour, 6, dash))
     if truth is not None:
         traces.append(_line(_limbs(truth[first]), "true skeleton", TRUTH_COLOUR, 3))
     figure = go.Figure(traces)
     axes = {f"{axis}axis": {"title": f"{axis} [m]", "backgroundcolor": "#FAFAFA"} for axis in "xyz"}
     figure.update_layout(
         scene={**axes, "aspectmode": "data", "camera": {"eye": _EYE}},
-        margin={"l": 0, "r": 0, "t": 0, "b": 0}, height=560, legend={"itemsizing": "constant"},
+        margin={"l": 0, "r": 0, "t": 0, "b": 0}, height=560, legend={"itemsizing": "constant", "y": 0.9},
         template="plotly_white",
     )  # fmt: skip
     return figure
 
 
 def point_cloud(
-    recording: Recording, frame: int, n_points: int = 12_000, max_depth_m: float = 3.0
+    recording: Recording, frame: int, n_points: int = 15_000, max_depth_m: float = 1.7
 ) -> go.Scatter3d:
-    """What the camera saw in one frame, as at most `n_points` coloured points on a regular grid of pixels."""
+    """What the camera saw in one frame nearer than `max_depth_m`, as about `n_points` coloured points."""
     depth_m, rgb = read_depth_m(recording, frame), read_rgb(recording, frame)
-    step = max(1, int(np.ceil(np.sqrt(depth_m.size / n_points))))
+    n_near = int((depth_m < max_depth_m).sum())  # no depth is NaN: not near
+    step = max(1, int(np.ceil(np.sqrt(n_near / n_points))))
     v, u = np.mgrid[0 : depth_m.shape[0] : step, 0 : depth_m.shape[1] : step]
     depth_m, colours = depth_m[v, u], rgb[v, u]
-    near = depth_m < max_depth_m  # False where there is no depth
+    near = depth_m < max_depth_m
     pixels_px = np.stack([u[near], v[near]], axis=-1)
     in_camera = deproject(recording.intrinsics, pixels_px, depth_m[near])
     x, y, z = transform(recording.T_base_cam[frame], in_camera).astype(np.float32).T
@@ -79,10 +83,10 @@ def point_cloud(
     return go.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name="point cloud", hoverinfo="skip")
 
 
-def _line(points_m: np.ndarray, name: str, colour: str, width: float) -> go.Scatter3d:
+def _line(points_m: np.ndarray, name: str, colour: str, width: float, dash: str = "solid") -> go.Scatter3d:
     """A line through points (n, 3), interrupted where they are NaN."""
     x, y, z = points_m.astype(np.float32).T
-    line = {"color": colour, "width": width}
+    line = {"color": colour, "width": width, "dash": dash}
     return go.Scatter3d(
         x=x, y=y, z=z, mode="lines", line=line, name=name, hoverinfo="name", connectgaps=False
     )
