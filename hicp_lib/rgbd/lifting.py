@@ -29,9 +29,9 @@ from hicp_lib.rgbd.camera import Intrinsics
 RADIUS_M = np.full(N_KEYPOINTS, 0.003)
 RADIUS_M[BODY] = 0.020
 
-REASONS = ("lifted", "not_detected", "outside_image", "no_depth", "implausible")
-"""What `Lifted.reason` counts: lifted, or why not. The paper's method finds nothing implausible."""
-LIFTED, NOT_DETECTED, OUTSIDE_IMAGE, NO_DEPTH, IMPLAUSIBLE = range(5)
+REASONS = ("lifted", "not_detected", "outside_image", "no_depth")
+"""What `Lifted.reason` counts: lifted, or why not."""
+LIFTED, NOT_DETECTED, OUTSIDE_IMAGE, NO_DEPTH = range(4)
 
 MIN_DEPTH_M = 0.1  # nearer than depth cameras measure; bounds the neighbourhood
 
