@@ -19,6 +19,7 @@ from mediapipe.tasks.metadata import metadata_schema_py_generated as metadata
 from mediapipe.tasks.metadata import schema_py_generated as tflite
 from mediapipe.tasks.python.metadata.metadata_writers.model_asset_bundle_utils import AlignZipFile
 
+from hicp_lib.detectors.published import check_use
 from hicp_lib.detectors.zoo import load
 from hicp_lib.errors import InputError
 
@@ -58,7 +59,8 @@ def read_bundle(task: str, path: str | Path) -> bytes:
     Raises
     ------
     InputError
-        If the file is unreadable or lacks a model the task needs.
+        If the file is unreadable, lacks a model the task needs or, if it was fetched by name, is not the
+        one that was recorded then.
     """
     try:
         content = Path(path).read_bytes()
@@ -68,6 +70,7 @@ def read_bundle(task: str, path: str | Path) -> bytes:
     absent = [member for member in BUNDLES[task] if member not in members]
     if absent:
         raise InputError(f"{path}: has no {absent[0]}; give the .task file of the {task} landmarker")
+    check_use(Path(path), content)
     return content
 
 

@@ -131,6 +131,26 @@ def fetch_published(name: str) -> Published:
     return model
 
 
+def check_use(path: Path, content: bytes) -> None:
+    """Hold a weight file that is about to be used against the hash recorded when it was fetched.
+
+    Files that were not fetched by name are the user's own, and pass.
+
+    Raises
+    ------
+    InputError
+        If it is not the file that was recorded.
+    """
+    path = path.resolve()
+    if path.parent != published_dir().resolve():
+        return
+    record = next((row for name, row in _records().items() if name in (path.stem, path.name)), None)
+    if record is not None and sha256_bytes(content) != record["file_sha256"]:
+        raise InputError(
+            f"{path}: is not the file that {lock_path()} records; run: hicp models fetch {path.stem}"
+        )
+
+
 def _obtain(model: Published, folder: Path) -> Path:
     """The download put in its place by hand, or else the one from its address."""
     if model.by_hand.is_file():

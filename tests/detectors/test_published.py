@@ -18,6 +18,7 @@ import pytest
 
 from hicp_lib import cli
 from hicp_lib.detectors import native, published
+from hicp_lib.detectors.onnx.session import open_model
 from hicp_lib.detectors.zoo import weights_dir
 from hicp_lib.errors import InputError
 from hicp_lib.files import sha256_bytes
@@ -131,6 +132,17 @@ def test_the_first_fetch_records_the_hash_and_the_second_stays_at_home(server, n
     assert record["file_sha256"] == sha256_bytes(CONTENT)
     assert published.fetch_published(name).path == path
     assert server.requests == 1
+
+
+def test_a_fetched_file_is_held_against_its_record_when_it_is_used(server, tmp_path):
+    path = published.fetch_published("net").path
+    published.check_use(path, CONTENT)
+    other = CONTENT[:-1] + b"?"
+    path.write_bytes(other)
+    for use in (lambda: published.check_use(path, other), lambda: open_model(path)):
+        with pytest.raises(InputError, match=r"net\.onnx: is not the file that .* records; run: hicp models"):
+            use()
+    published.check_use(tmp_path / "net.onnx", other)  # the user's own
 
 
 def test_a_download_that_changed_is_refused(server):

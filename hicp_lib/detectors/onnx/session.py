@@ -16,6 +16,7 @@ import numpy as np
 import onnx
 import onnxruntime
 
+from hicp_lib.detectors.published import check_use
 from hicp_lib.errors import InputError
 from hicp_lib.files import sha256_bytes
 
@@ -107,7 +108,8 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
     Raises
     ------
     InputError
-        If the file is absent or not a network ONNX Runtime can run, or the provider is not to be had.
+        If the file is absent, not a network ONNX Runtime can run or, if it was fetched by name, not the one
+        that was recorded then, or the provider is not to be had.
     """
     path = Path(path)
     if provider not in available_providers():
@@ -123,6 +125,7 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
         raise InputError(
             f"{path}: cannot be read ({error.strerror}); give the path of an ONNX file"
         ) from None
+    check_use(path, content)
     key = (sha256_bytes(content), str(path), provider, threads)
     with _lock:
         model = _open.get(key)
