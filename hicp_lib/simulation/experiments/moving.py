@@ -136,7 +136,7 @@ class _Mover:
 
     def _is_free(self, posture: Posture) -> bool:
         """Whether the person can go to a posture without running through themselves."""
-        ways = [between(self.now, posture, share).joints for share in (0.25, 0.5, 0.75, 1.0)]
+        ways = [between(self.now, posture, share).joints for share in np.linspace(0.125, 1, 8)]
         return within_limits(posture.joints) and all(
             clearance_m(self.body, self.person, pose_from_joints(way)) > -_PENETRATION_M for way in ways
         )

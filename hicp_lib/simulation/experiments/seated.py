@@ -32,7 +32,7 @@ _POSTURE_DEG = {
     "left_hip_abduction": 6.0, "right_hip_abduction": 8.0,
     "left_ankle_flexion": -2.0, "right_ankle_flexion": -5.0,
 }  # fmt: skip
-_HAND_DEG = {"forearm_supination": -76.0, "wrist_flexion": -8.0, "wrist_deviation": -4.0}
+_HAND_DEG = {"forearm_supination": -76.0, "wrist_flexion": 15.0, "wrist_deviation": -4.0}
 _CONTACT_M = 0.003  # between the lowest point of hand or forearm and the table
 _N_ROUNDS = 6
 
@@ -63,7 +63,7 @@ def _sit_down(body: Body, shape: np.ndarray, rng: np.random.Generator) -> PosedB
     joints = {name: float(np.radians(angle)) for name, angle in _POSTURE_DEG.items()}
     for side in _WRISTS_M:
         hand = {name: float(np.radians(angle)) for name, angle in _HAND_DEG.items()}
-        joints |= {f"{side}_{name}": angle for name, angle in (sample_hand(rng, "relaxed") | hand).items()}
+        joints |= {f"{side}_{name}": angle for name, angle in (sample_hand(rng, "open") | hand).items()}
     T_world_body = facing_robot(DISTANCE_M)
     wrist_heights_m = dict.fromkeys(_WRISTS_M, TABLE_HEIGHT_M + 0.05)
     for _ in range(_N_ROUNDS):
