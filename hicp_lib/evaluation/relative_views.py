@@ -1,0 +1,105 @@
+"""The relative 3D test's material: recordings of a still person, detected and lifted, view by view.
+
+A *view* is one recording: "upper" and "lower" when simulated, as the paper's two holders of the camera; a
+lab's own are called after their folders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from hicp_lib.detectors.base import Detections
+from hicp_lib.detectors.run import detect_images
+from hicp_lib.rgbd.experiments import open_experiment
+from hicp_lib.rgbd.keypoints3d import lift_recording
+from hicp_lib.rgbd.recording import Recording, read_joints, read_simulation, read_truth
+from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
+from hicp_lib.robot.segments import Segment, body_segments
+
+SIMULATED_NOTE = "simulated recordings (rendered person, simulated D435)"
+METHODS = ("robust", "paper")
+
+Found = Mapping[tuple[str, str], Sequence[Detections]]
+
+
+def open_views(
+    recording: str = "", recording_lower: str = "", n_frames: int = 100, seed: int = 0
+) -> dict[str, Recording]:
+    """View -> recording: the folders given, or two simulated ones where none is.
+
+    Parameters
+    ----------
+    recording, recording_lower : a lab's own recordings of a person who sits still; the second is optional
+    n_frames, seed : of the simulated ones
+
+    Raises
+    ------
+    InputError
+        If a folder is not a recording.
+    """
+    given = [folder for folder in (recording, recording_lower) if folder]
+    if given:
+        return {
+            name: open_experiment("relative-upper", folder)
+            for name, folder in zip(_names(given), given, strict=True)
+        }
+    return {view: open_experiment(f"relative-{view}", "", n_frames, seed) for view in ("upper", "lower")}
+
+
+def _names(folders: Sequence[str]) -> list[str]:
+    names = [Path(folder).name for folder in folders]
+    return names if len(set(names)) == len(names) else list(folders)
+
+
+def data_note(views: Mapping[str, Recording]) -> str:
+    """What the recordings are, in the words of captions."""
+    if all(read_simulation(recording) for recording in views.values()):
+        return SIMULATED_NOTE
+    return f"recording{'s' if len(views) > 1 else ''} {' and '.join(views)}"
+
+
+def detect_views(
+    views: Mapping[str, Recording], detectors: Sequence[str]
+) -> dict[tuple[str, str], list[Detections]]:
+    """(view, detector) -> detections of every frame; kept on disk."""
+    return {
+        (view, detector): [
+            result.detections
+            for result in detect_images(detector, dict(enumerate(recording.rgb_paths))).values()
+        ]
+        for view, recording in views.items()
+        for detector in detectors
+    }
+
+
+def lift_views(
+    views: Mapping[str, Recording], found: Found, methods: Sequence[str] = METHODS
+) -> pd.DataFrame:
+    """Everything lifted by every method: columns `view, detector, method` and those of `lift_recording`."""
+    tables = []
+    for (view, detector), detections in found.items():
+        for method in methods:
+            table = lift_recording(views[view], detections, method=method)
+            labels = {"view": view, "detector": detector, "method": method}
+            tables.append(table.assign(**labels)[[*labels, *table.columns]])
+    return pd.concat(tables, ignore_index=True)
+
+
+def true_positions(views: Mapping[str, Recording]) -> dict[str, pd.DataFrame] | None:
+    """View -> table of `read_truth`; None when a view has none."""
+    truth = {view: read_truth(recording) for view, recording in views.items()}
+    return None if any(table is None for table in truth.values()) else truth
+
+
+def robot_body(views: Mapping[str, Recording]) -> list[Segment]:
+    """The robot's body in the first view's first frame (base frame); empty where joints are not known."""
+    recording = next(iter(views.values()))
+    joints = read_joints(recording)
+    columns = [f"{name}_rad" for name in HEAD_JOINTS]
+    if joints is None or not set(columns) <= set(joints):
+        return []
+    head_rad = joints.set_index("frame").loc[0, columns].to_numpy(float)
+    return body_segments(load_icub(), head_rad)
