@@ -16,7 +16,7 @@ from qpsolvers import Problem, solve_problem
 from hicp_lib.robot.kinematics import ARM_JOINTS, ICub
 from hicp_lib.robot.peripersonal_space import Obstacle
 from hicp_lib.robot.posture import Posture
-from hicp_lib.robot.velocity_bounds import guarded_bounds, retreat_velocities, shape_bounds
+from hicp_lib.robot.velocity_bounds import guarded_bounds, pushes, shape_bounds
 
 
 class NoSolution(Exception):
@@ -25,14 +25,16 @@ class NoSolution(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Settings:
-    """How the controller behaves; defaults from the published code unless said otherwise.
+    """How the controller behaves; `PUBLISHED` has the published numbers.
 
     Attributes
     ----------
     period_s : time between two commands
     fastest_rad_s : of every joint (30 degrees per second in 2022, 20 in 2018)
     retreat_rad_s : velocity `v_a` of the retreat per metre of lever arm (50 degrees per second)
-    gain : factor on the magnitudes of what is seen (0.5; 1.5 was for touch)
+    gain : factor on it (published: 0.5 for what is seen, 1.5 for touch; ours acts on less, see `neutral`)
+    onset, neutral : magnitudes at which an obstacle begins to slow joints that turn towards it, and from
+        which on it pushes them back (ours; published: the push begins at 0.2, at full strength)
     guard : part of a joint's range in which it slows down towards its limit
     post_weight, rest_weight, smooth_weight : costs of the hand's velocity error (m/s)^2, of the joints'
         from the way to rest (rad/s)^2, and of changes of velocity (rad/s)^2
@@ -43,13 +45,19 @@ class Settings:
     period_s: float = 0.02
     fastest_rad_s: float = np.deg2rad(30.0)
     retreat_rad_s: float = np.deg2rad(50.0)
-    gain: float = 0.5
+    gain: float = 10.0
+    onset: float = 0.1
+    neutral: float = 0.2
     guard: float = 0.025
     post_weight: float = 10.0
     rest_weight: float = 0.01
     smooth_weight: float = 1.0
     approach_s: float = 0.3
     approach_m_s: float = 0.3
+
+
+PUBLISHED = Settings(gain=0.5, onset=0.2, neutral=0.0)
+"""The form of Nguyen et al. (2018), at the joint speed of 2022."""
 
 
 @dataclass(eq=False)
@@ -96,10 +104,11 @@ class Controller:
     ) -> tuple[np.ndarray, np.ndarray]:
         limits, settings = self.icub.chains[self.side].limits_rad, self.settings
         lowest, highest = guarded_bounds(q, limits, settings.fastest_rad_s, settings.guard, settings.period_s)
-        retreats = [self._retreat(posture, obstacle) for obstacle in obstacles]
-        return self._within_cables(q, *shape_bounds(lowest, highest, retreats))
+        pushed = [(self._pushes(posture, obstacle), obstacle.magnitude) for obstacle in obstacles]
+        shaped = shape_bounds(lowest, highest, pushed, settings.onset, settings.neutral)
+        return self._within_cables(q, *shaped)
 
-    def _retreat(self, posture: Posture, obstacle: Obstacle) -> np.ndarray:
+    def _pushes(self, posture: Posture, obstacle: Obstacle) -> np.ndarray:
         """What an obstacle wants of the controlled joints: those of another limb do not move."""
         chain, link = self.icub.parts[obstacle.part]
         q = posture.angles(chain)
@@ -108,8 +117,7 @@ class Controller:
         n = len(ARM_JOINTS) if chain == self.side else 3
         shared[:, :n] = jacobian[:, :n]
         normal = self.icub.chains[chain].T_root_link(link, q)[:3, :3] @ obstacle.normal
-        strength = self.settings.gain * obstacle.magnitude
-        return retreat_velocities(shared, normal, strength, self.settings.retreat_rad_s)
+        return pushes(shared, normal, self.settings.gain * self.settings.retreat_rad_s)
 
     def _cable_bounds(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The cables' inequalities `rows @ velocities <= most`; outside them, at least no farther."""

@@ -12,7 +12,13 @@ import numpy as np
 
 from hicp_lib.keypoints import N_KEYPOINTS
 from hicp_lib.robot.controller import Controller, NoSolution
-from hicp_lib.robot.peripersonal_space import Obstacle, ReceptiveField, gains, obstacles
+from hicp_lib.robot.peripersonal_space import (
+    ACTIVATION_THRESHOLD,
+    Obstacle,
+    ReceptiveField,
+    gains,
+    obstacles,
+)
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.skin import Skin, read_skin
 from hicp_lib.robot.tracking import KeypointTracker
@@ -65,10 +71,18 @@ class Command:
 
 @dataclass(frozen=True, eq=False)
 class Threat:
-    """What the skin made of the keypoints: activation of every taxel (n,), and obstacles of the parts."""
+    """What the skin made of the keypoints: activation of every taxel (n,), and obstacles of the parts.
+
+    There are obstacles from the magnitude on at which joints begin to slow down.
+    """
 
     activations: np.ndarray
     obstacles: list[Obstacle]
+
+    @property
+    def is_close(self) -> bool:
+        """Whether any taxel's activation is above the threshold at which robots of this kind react."""
+        return any(obstacle.magnitude > ACTIVATION_THRESHOLD for obstacle in self.obstacles)
 
 
 @dataclass(eq=False)
@@ -111,7 +125,7 @@ class AvoidanceLoop:
             velocities = self.controller.velocities(posture, threat.obstacles if self.avoids else [])
         except NoSolution as error:
             return self._stop(now_s, str(error)), threat
-        status = AVOIDING if self.avoids and threat.obstacles else FREE
+        status = AVOIDING if self.avoids and threat.is_close else FREE
         return Command(now_s, velocities, status), threat
 
     def threat(self, now_s: float, posture: Posture) -> Threat:
@@ -121,7 +135,7 @@ class AvoidanceLoop:
         activations = self.sensing.activations(
             positions, normals, points.reshape(-1, 3), gains(weights, self.valence).ravel()
         )
-        return Threat(activations, obstacles(self.skin, activations))
+        return Threat(activations, obstacles(self.skin, activations, self.controller.settings.onset))
 
     def _stop(self, now_s: float, reason: str) -> Command:
         return Command(now_s, np.zeros(len(self.controller.rest_rad)), STOPPED, reason)

@@ -23,7 +23,7 @@ NEGATIVES = np.full(20, 100)
 """Events per bin of distance, 20 bins from -5 to 45 cm: followed by a touch, and not."""
 
 ACTIVATION_THRESHOLD = 0.2
-"""Taxels above it belong to an obstacle; about 19 cm from the point with the histogram above."""
+"""Taxels above it belong to an obstacle, if nothing else is said; reached at about 19 cm."""
 
 _TABLE_STEP_M = 1e-4
 _TABLE_M = np.arange(-0.2, 0.6, _TABLE_STEP_M)
@@ -155,8 +155,8 @@ def gains(weights: np.ndarray, valence: np.ndarray | float = 0.0) -> np.ndarray:
     return np.asarray(weights) * (1 + np.clip(valence, -1.0, 1.0))
 
 
-def obstacles(skin: Skin, activations: np.ndarray) -> list[Obstacle]:
-    """One obstacle for each part that has taxels above `ACTIVATION_THRESHOLD`.
+def obstacles(skin: Skin, activations: np.ndarray, threshold: float = ACTIVATION_THRESHOLD) -> list[Obstacle]:
+    """One obstacle for each part that has taxels above the threshold.
 
     Parameters
     ----------
@@ -165,8 +165,8 @@ def obstacles(skin: Skin, activations: np.ndarray) -> list[Obstacle]:
     found = []
     for part, rows in skin.slices.items():
         activation = activations[rows]
-        if activation.max() > ACTIVATION_THRESHOLD:
-            weights = np.where(activation > ACTIVATION_THRESHOLD, activation, 0).astype(float)
+        if activation.max() > threshold:
+            weights = np.where(activation > threshold, activation, 0).astype(float)
             weights /= weights.sum()
             point, normal = weights @ skin.positions_m[rows], weights @ skin.normals[rows]
             found.append(Obstacle(part, point, normal, float(activation.max())))

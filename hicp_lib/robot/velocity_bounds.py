@@ -1,7 +1,8 @@
 """How fast each joint may turn: joint limits, and obstacles that push joints away.
 
 After the reactive controller of Nguyen et al. (2018) and its published code (robotology/react-control):
-an obstacle does not add a motion, it narrows what the joints may do until they give way.
+an obstacle does not add a motion, it narrows what the joints may do until they give way. That bounds tighten
+before they push is ours, in the spirit of the authors' later controller (HARMONIOUS, 2023).
 """
 
 from __future__ import annotations
@@ -36,40 +37,46 @@ def guarded_bounds(
     return -towards[0], towards[1]
 
 
-def retreat_velocities(
-    jacobian: np.ndarray, normal: np.ndarray, magnitude: float, gain_rad_s: float
-) -> np.ndarray:
-    """Joint velocities (n,) that move a point of the skin back from an obstacle: `-J^T n` times gains.
+def pushes(jacobian: np.ndarray, normal: np.ndarray, gain_rad_s: float) -> np.ndarray:
+    """Joint velocities (n,) that move a point of the skin back from an obstacle: `-J^T n` times the gain.
 
     Parameters
     ----------
     jacobian : (3, n) of the point, root frame
     normal : (3,) towards the obstacle, root frame
-    magnitude : of the obstacle, dimensionless
-    gain_rad_s : for a lever arm of one metre and magnitude 1
+    gain_rad_s : for a lever arm of one metre
     """
-    return -gain_rad_s * magnitude * (jacobian.T @ normal)
+    return -gain_rad_s * (jacobian.T @ normal)
 
 
 def shape_bounds(
-    lowest: np.ndarray, highest: np.ndarray, retreats: Iterable[np.ndarray]
+    lowest: np.ndarray,
+    highest: np.ndarray,
+    obstacles: Iterable[tuple[np.ndarray, float]],
+    onset: float,
+    neutral: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds that make every joint at least as fast as each retreat wants, as far as they allow it.
+    """Bounds that make every joint give way to obstacles, as far as the bounds given allow it.
 
-    Obstacles come one after another. One that wants a joint to turn forward raises its lower bound (and
-    the upper one where that is lower), one that wants it back lowers the upper bound likewise; never
-    beyond the bounds given.
+    Obstacles come one after another. One that pushes a joint forward raises its lower bound (and the upper
+    one where that is lower), one that pushes it back lowers the upper bound likewise: to the push times
+    the magnitude above `neutral`. From magnitude `onset` on, joints may turn towards the obstacle the
+    slower the nearer it is, and at `neutral` not at all. In the published form (`neutral` 0, from 0.2 on)
+    the push begins with a step: at that distance the arm trembles between giving way and coming back.
 
     Parameters
     ----------
-    lowest, highest : (n,) rad/s
-    retreats : velocities (n,), see `retreat_velocities`
+    lowest, highest : (n,) rad/s, before
+    obstacles : of each, the velocities (n,) it pushes with (see `pushes`), and its magnitude
     """
     low, high = lowest.copy(), highest.copy()
-    for retreat in retreats:
-        wanted = np.clip(retreat, lowest, highest)
-        forward = retreat >= 0
-        low = np.where(forward, np.maximum(low, wanted), low)
-        high = np.where(forward, np.maximum(high, low), np.minimum(high, wanted))
-        low = np.where(forward, low, np.minimum(low, high))
+    for push, magnitude in obstacles:
+        forward, back = push > 0, push < 0
+        if magnitude >= neutral:
+            bound = np.clip(push * (magnitude - neutral), lowest, highest)
+        else:
+            bound = np.where(forward, lowest, highest) * min((neutral - magnitude) / (neutral - onset), 1.0)
+        low = np.where(forward, np.maximum(low, bound), low)
+        high = np.where(back, np.minimum(high, bound), np.maximum(high, low))
+        low = np.where(back, np.minimum(low, high), low)
     return low, high

@@ -62,7 +62,7 @@ def random_posture(rng: np.random.Generator, icub: ICub, home: Posture) -> Postu
 
 def first_violation(rng: np.random.Generator, icub: ICub, home: Posture, n_cycles: int) -> str | None:
     """Drive the robot by one random stream; says what was violated first, or nothing."""
-    settings = Settings(gain=float(rng.uniform(0.2, 5)), fastest_rad_s=float(rng.uniform(0.1, 3)))
+    settings = Settings(gain=float(rng.uniform(0.2, 20)), fastest_rad_s=float(rng.uniform(0.1, 3)))
     controller = Controller(icub, np.array(HOME_M["left"]), home.angles("left"), settings=settings)
     loop = AvoidanceLoop(controller, valence=rng.uniform(-1, 1, 136))
     posture = random_posture(rng, icub, home)

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from qpsolvers import Solution
 
-from hicp_lib.robot.controller import Controller, NoSolution, Settings
+from hicp_lib.robot.controller import PUBLISHED, Controller, NoSolution, Settings
 from hicp_lib.robot.home import HOME_M
 from hicp_lib.robot.kinematics import ARM_JOINTS
 from hicp_lib.robot.peripersonal_space import Obstacle
-from hicp_lib.robot.velocity_bounds import guarded_bounds, retreat_velocities, shape_bounds
+from hicp_lib.robot.velocity_bounds import guarded_bounds, pushes, shape_bounds
 
 LIMITS = np.array([[-1.0, 1.0], [0.0, 2.0]])
 PERIOD_S = 0.02
@@ -46,6 +46,7 @@ def test_guard_slows_joints_near_their_limits():
     assert high[1] == pytest.approx(0.25) and low[1] == pytest.approx(-0.5)
 
 
+@settings(deadline=None)
 @given(st.floats(-1.5, 1.5), st.floats(0.1, 3))
 def test_limits_are_never_crossed_and_joints_outside_come_back(q, fastest):
     limits = LIMITS[:1]
@@ -58,34 +59,51 @@ def test_limits_are_never_crossed_and_joints_outside_come_back(q, fastest):
         assert high[0] == pytest.approx(-min(fastest, (q - 1) / PERIOD_S))
 
 
-def test_retreat_goes_away_from_the_obstacle():
+def test_an_obstacle_pushes_away():
     # A lever of 0.3 m, magnitude 1: 15 degrees per second, as the published constants give.
     jacobian = np.array([[0.3], [0.0], [0.0]])
-    velocity = retreat_velocities(jacobian, np.array([1.0, 0, 0]), 1.0, np.deg2rad(50))
+    velocity = pushes(jacobian, np.array([1.0, 0, 0]), np.deg2rad(50))
     np.testing.assert_allclose(np.rad2deg(velocity), [-15])
 
 
+def shaped(*obstacles, onset=PUBLISHED.onset, neutral=PUBLISHED.neutral):
+    """Bounds of one joint that may turn at -0.5 to 0.5 rad/s; obstacles are (push, magnitude)."""
+    obstacles = [(np.array([push]), magnitude) for push, magnitude in obstacles]
+    bounds = shape_bounds(np.array([-0.5]), np.array([0.5]), obstacles, onset, neutral)
+    return pytest.approx([float(bound[0]) for bound in bounds])
+
+
 def test_bounds_as_published_for_one_joint():
-    low, high = np.array([-0.5]), np.array([0.5])
-
-    def shaped(*retreats):
-        return [float(bound[0]) for bound in shape_bounds(low, high, np.reshape(retreats, (-1, 1)))]
-
     assert shaped() == [-0.5, 0.5]
-    assert shaped(0.2) == [0.2, 0.5]
-    assert shaped(-0.2) == [-0.5, -0.2]
-    assert shaped(0.0) == [0.0, 0.5]
-    assert shaped(9.0) == [0.5, 0.5]
-    assert shaped(0.1, 0.3) == [0.3, 0.5]
+    assert shaped((0.4, 0.5)) == [0.2, 0.5]
+    assert shaped((-0.4, 0.5)) == [-0.5, -0.2]
+    assert shaped((9.0, 1.0)) == [0.5, 0.5]
+    assert shaped((0.1, 1.0), (0.3, 1.0)) == [0.3, 0.5]
+    assert shaped((0.3, 1.0), (0.1, 1.0)) == [0.3, 0.5]
     # Contradicting ones: the later moves both bounds.
-    assert shaped(0.2, -0.1) == [-0.1, -0.1]
-    assert shaped(-0.1, 0.2) == [0.2, 0.2]
+    assert shaped((0.2, 1.0), (-0.1, 1.0)) == [-0.1, -0.1]
+    assert shaped((-0.1, 1.0), (0.2, 1.0)) == [0.2, 0.2]
+    # A joint the obstacle does not push (beyond the threatened part) stays free.
+    assert shaped((0.0, 1.0)) == [-0.5, 0.5]
 
 
-@given(st.lists(st.lists(st.floats(-5, 5), min_size=3, max_size=3), max_size=5))
-def test_shaped_bounds_stay_within_those_given(retreats):
+def test_bounds_tighten_before_they_push():
+    def at(magnitude):
+        return shaped((2.0, magnitude), onset=0.1, neutral=0.2)
+
+    assert at(0.05) == [-0.5, 0.5]
+    assert at(0.1) == [-0.5, 0.5]
+    assert at(0.15) == [-0.25, 0.5]
+    assert at(0.2) == [0.0, 0.5]
+    assert at(0.3) == [0.2, 0.5]
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(st.lists(st.floats(-5, 5), min_size=3, max_size=3), st.floats(0, 2)), max_size=5))
+def test_shaped_bounds_stay_within_those_given(obstacles):
     low, high = np.array([-0.5, 0.0, -0.1]), np.array([0.5, 0.3, -0.05])
-    shaped_low, shaped_high = shape_bounds(low, high, [np.array(r) for r in retreats])
+    obstacles = [(np.array(push), magnitude) for push, magnitude in obstacles]
+    shaped_low, shaped_high = shape_bounds(low, high, obstacles, onset=0.1, neutral=0.2)
     assert (low <= shaped_low).all() and (shaped_low <= shaped_high).all() and (shaped_high <= high).all()
 
 
@@ -116,10 +134,10 @@ def test_threatened_parts_move_away(icub, home, controller, part):
 
 
 def test_joints_beyond_the_threatened_part_are_not_pushed(controller, home):
-    retreat = controller._retreat(home, in_front_of("left_forearm"))
-    assert (retreat[-2:] == 0).all() and (np.abs(retreat[:-2]) > 1e-6).any()
-    assert (controller._retreat(home, in_front_of("left_upper_arm"))[-4:] == 0).all()
-    assert (controller._retreat(home, in_front_of("right_forearm"))[3:] == 0).all()
+    pushed = controller._pushes(home, in_front_of("left_forearm"))
+    assert (pushed[-2:] == 0).all() and (np.abs(pushed[:-2]) > 1e-6).any()
+    assert (controller._pushes(home, in_front_of("left_upper_arm"))[-4:] == 0).all()
+    assert (controller._pushes(home, in_front_of("right_forearm"))[3:] == 0).all()
 
 
 angles = st.lists(st.floats(0, 1), min_size=10, max_size=10)
@@ -127,7 +145,7 @@ normals = st.lists(st.floats(-1, 1), min_size=3, max_size=3)
 
 
 @settings(max_examples=40, deadline=None)
-@given(angles, normals, normals, st.floats(0.2, 2), st.floats(0.5, 5))
+@given(angles, normals, normals, st.floats(0.1, 2), st.floats(0.5, 20))
 def test_limits_and_cables_hold_wherever_the_arm_is(icub, home, where, n_hand, n_arm, magnitude, gain):
     """A cycle from any angles within the limits; the cables hold if they held before."""
     chain = icub.chains["left"]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from keypoint_streams import first_violation
 
 from hicp_lib.keypoints import INDEX
-from hicp_lib.robot.controller import Controller, Settings
+from hicp_lib.robot.controller import PUBLISHED, Controller, Settings
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.loop import AVOIDING, FREE, STOPPED, AvoidanceLoop, Perception
 
@@ -20,9 +20,7 @@ POST = np.array(HOME_M["left"])
 @pytest.fixture
 def make_loop(icub, home):
     def make(**options):
-        return AvoidanceLoop(
-            Controller(icub, POST, home.angles("left"), settings=Settings(gain=1.5)), **options
-        )
+        return AvoidanceLoop(Controller(icub, POST, home.angles("left")), **options)
 
     return make
 
@@ -71,6 +69,23 @@ def test_hand_comes_back_when_the_person_leaves(icub, home, make_loop):
         posture = posture.moved("left", posture.angles("left") + PERIOD_S * command.velocities_rad_s)
     hand = icub.chains["left"].T_root_link("hand", posture.angles("left"))[:3, 3]
     assert np.linalg.norm(hand - POST) < 0.02
+
+
+def test_arm_does_not_tremble_where_it_begins_to_give_way(icub, home):
+    """Somebody's wrist rests near the palm's post: where a push begins with a step, velocities jump."""
+    T = icub.chains["left"].T_root_link("hand", home.angles("left"))
+
+    def roughness(settings):
+        controller = Controller(icub, POST, home.angles("left"), settings=settings)
+        loop, posture, velocities = AvoidanceLoop(controller), home, []
+        for k in range(150):
+            command, _ = loop.cycle(k * PERIOD_S, posture, wrist_at(POST - 0.12 * T[:3, 2], k * PERIOD_S))
+            posture = posture.moved("left", posture.angles("left") + PERIOD_S * command.velocities_rad_s)
+            velocities.append(command.velocities_rad_s)
+        return np.std(np.diff(velocities[75:], axis=0))
+
+    step = Settings(gain=3, onset=PUBLISHED.onset, neutral=PUBLISHED.neutral)  # keeps a like distance
+    assert roughness(Settings()) < 0.2 * roughness(step)
 
 
 def test_a_person_of_one_frame_moves_nothing(home, make_loop):
