@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 
 import click
 
+from hicp_lib.cli_calibration import calibration
 from hicp_lib.cli_options import PATH, WORKERS, detector_options, given, say
 from hicp_lib.cli_recordings import lift, record
 from hicp_lib.errors import InputError
@@ -58,6 +59,7 @@ def hicp() -> None:
 
 hicp.add_command(record)
 hicp.add_command(lift)
+hicp.add_command(calibration)
 
 
 @hicp.group()
