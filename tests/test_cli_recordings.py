@@ -52,3 +52,7 @@ def test_notes_do_not_fail(capsys, small):
     assert cli.run(["record", "check", str(small)]) == 0
     note, ok = capsys.readouterr().out.splitlines()
     assert note.startswith("note ") and ok.startswith("ok ") and "3 frames" in ok
+def test_lift_needs_a_recording(capsys, tmp_path):
+    arguments = ["lift", "--recording", str(tmp_path), "--detector", "mediapipe", "--out", "k.parquet"]
+    assert cli.run(arguments) == 2
+    assert "camera.json: cannot be read" in capsys.readouterr().err

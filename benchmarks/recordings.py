@@ -1,0 +1,99 @@
+"""How long simulating the study's recordings takes, and what a frame of them costs.
+
+    python benchmarks/recordings.py [--share 0.2] [--workers 2] [--json OUT]
+
+Whole recordings, as `hicp record simulate` writes them: images and depth drawn, measured and
+written, truth, joints and motion capture; `--share 1` times them whole, less the first part of them
+(reading the library and the scene in every process counts in full). The floors of the project are 40
+s for the 100 views and 180 s for the 480 frames with motion capture, on two free processors. The
+baseline, in the same run, is drawing the frames alone: what `render` takes for the same scenes.
+Processor time tells more than wall time on a machine that is busy otherwise.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.simulation.experiments.frames import camera_poses, record_frame
+from hicp_lib.simulation.experiments.laboratory import COLOUR, robot_camera
+from hicp_lib.simulation.experiments.scenarios import SCENARIOS, Scenario
+from hicp_lib.simulation.experiments.simulate import simulate_recording
+from hicp_lib.simulation.render import render
+from hicp_lib.simulation.scenes import worker_pool
+
+FLOORS_S = {"relative-upper": 40.0, "relative-lower": 40.0, "mocap": 180.0}
+N_TIMED = 8  # frames whose processor time is measured
+
+
+def frame_cost(name: str) -> dict[str, float]:
+    """Mean processor seconds of a frame, and of drawing it alone."""
+    plan = SCENARIOS[name]
+    frames = np.linspace(1, plan.n_frames - 1, N_TIMED).astype(int).tolist()
+    record_frame(name, 0, 0)  # the scene is made, textures too
+    drawn_s = sum(_draw(plan, k) for k in frames)
+    start_s = time.process_time()
+    for k in frames:
+        record_frame(name, 0, k)
+    return {"frame_s": (time.process_time() - start_s) / N_TIMED, "drawn_s": drawn_s / N_TIMED}
+
+
+def _draw(plan: Scenario, k: int) -> float:
+    world, _ = plan.stage(0)(float(plan.times_s(k + 1)[k]))
+    camera = robot_camera(COLOUR, camera_poses(plan, k + 1)[k])
+    start_s = time.process_time()
+    render(world, camera, np.random.default_rng(k))
+    return time.process_time() - start_s
+
+
+def whole_s(name: str, n: int, workers: int) -> float:
+    """Wall seconds of simulating the first `n` frames into a folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        start_s = time.perf_counter()
+        simulate_recording(Path(folder) / name, name, n, workers=workers, progress=False)
+        return time.perf_counter() - start_s
+
+
+def measure(name: str, share: float, workers: int, cost: dict[str, float]) -> dict[str, float]:
+    """One scenario's figures."""
+    n = max(2, round(share * SCENARIOS[name].n_frames))
+    wall_s = whole_s(name, n, workers)
+    return {
+        "frames": n,
+        "wall_s": wall_s,
+        "frames_per_second": n / wall_s,
+        "floor_s": FLOORS_S[name],
+        "cpu_s_per_frame": cost["frame_s"],
+        "cpu_s_whole_per_worker": cost["frame_s"] * SCENARIOS[name].n_frames / workers,
+        "ratio_to_drawing_alone": cost["frame_s"] / cost["drawn_s"],
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--share", type=float, default=0.2)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--json")
+    options = parser.parse_args()
+    with worker_pool(1) as pool:  # one thread, as when recordings are made
+        costs = dict(zip(FLOORS_S, pool.map(frame_cost, FLOORS_S), strict=True))
+    result = {name: measure(name, options.share, options.workers, costs[name]) for name in FLOORS_S}
+    for name, row in result.items():
+        print(
+            f"{name:15} {row['frames']:4d} frames in {row['wall_s']:6.1f} s ({row['frames_per_second']:.2f}/s); "
+            f"{row['cpu_s_per_frame'] * 1e3:.0f} ms of processor time per frame, "
+            f"{row['ratio_to_drawing_alone']:.2f} times drawing alone; whole recording "
+            f"{row['cpu_s_whole_per_worker']:.0f} s of each of {options.workers} processors "
+            f"(floor {row['floor_s']:.0f} s)"
+        )
+    if options.json:
+        Path(options.json).write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
