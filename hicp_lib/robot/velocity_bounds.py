@@ -73,9 +73,10 @@ def shape_bounds(
     for push, magnitude in obstacles:
         forward, back = push > 0, push < 0
         if magnitude >= neutral:
-            bound = np.clip(push * (magnitude - neutral), lowest, highest)
+            bound = push * (magnitude - neutral)
         else:
             bound = np.where(forward, lowest, highest) * min((neutral - magnitude) / (neutral - onset), 1.0)
+        bound = np.clip(bound, lowest, highest)
         low = np.where(forward, np.maximum(low, bound), low)
         high = np.where(back, np.minimum(high, bound), np.maximum(high, low))
         low = np.where(back, np.minimum(low, high), low)
