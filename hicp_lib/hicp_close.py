@@ -121,7 +121,8 @@ def _joined(source: Annotations, parts: list[tuple[int, Box, Annotations]]) -> A
         for image_id, extra in zip(source.image_ids, source.extras, strict=True)
         if not extra.get("other")
     }
-    images, pieces, extras = {}, [], []
+    images, extras = {}, []
+    pieces = [source.take(np.zeros(0, dtype=int))]  # so that no crop at all is a data set, too
     for number, (image_id, box, people) in enumerate(parts, start=1):
         images[number] = ImageInfo(number, _file_name(number), box[2] - box[0], box[3] - box[1])
         left, top = origins[image_id]["crop_px"][:2]

@@ -67,3 +67,8 @@ def test_small_crops_are_left_out(basic):
     people = read_annotations(open_close(basic, n_per_class=9, min_pixels=9_500) / "annotations.json")
     assert min(image.width_px * image.height_px for image in people.images.values()) >= 9_500
     assert "only head" not in visibility_class(people.visibility)
+
+
+def test_no_crop_at_all_is_an_empty_data_set(basic):
+    people = read_annotations(open_close(basic, min_pixels=500_000) / "annotations.json")
+    assert len(people) == len(people.images) == 0

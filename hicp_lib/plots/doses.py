@@ -79,8 +79,8 @@ def dose_curves(table: pd.DataFrame, group: str) -> Figure:
     figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=9)
     caption = (
         "Detection against dose, one thing varied and the rest fixed: average precision (solid) and the "
-        "share of "
-        "visible keypoints hit (dotted), with 95 % bootstrap intervals over people. Rendered people."
+        "share of visible keypoints hit (dotted), with 95 % bootstrap intervals over people. Rendered "
+        "people."
     )
     lows = rows[rows["measure"] == "AP"].groupby(["detector", "dose"], sort=False)["value"].min()
     said = [f"{detector} {value:.2f} for {dose}" for (detector, dose), value in lows.items()]
@@ -103,8 +103,7 @@ def observed_curves(table: pd.DataFrame, note: str) -> Figure:
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
     caption = (
         "Share of labelled body keypoints hit, by fifths of what the data set happens to hold of each "
-        "dose, with "
-        f"95 % bootstrap intervals over source images: {note}."
+        f"dose, with 95 % bootstrap intervals over source images: {note}."
     )
     spread = table.groupby(["detector", "dose"], sort=False)["value"].agg(np.ptp)
     said = [f"{detector} {value:.2f} for {dose}" for (detector, dose), value in spread.items()]
@@ -149,8 +148,8 @@ def flicker_rates(table: pd.DataFrame, note: str) -> Figure:
     lag = table[(table["measure"] == "latency [s]") & (table["tracks"] == "filtered")]
     said = [f"{row.detector} {1000 * row.value:.0f} ms" for row in lag.itertuples()]
     caption = (
-        "Keypoints that come and go between consecutive frames, and how far they jump, as detected (filled) "
-        f"and through a causal filter (open), with 95 % bootstrap intervals over seconds: {note}. "
+        "Keypoints that come and go between consecutive frames, and how far they jump, as detected "
+        f"(filled) and through a causal filter (open), with 95 % bootstrap intervals over seconds: {note}. "
         f"Delay of the filter: {in_words(said)}."
     )
     rates = table[(table["measure"] == "flicker rate") & (table["tracks"] == "as detected")]

@@ -122,8 +122,7 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
     said = [f"{row['detector']} {row['share']:.2f} on {row[by]}" for _, row in worst.iterrows()]
     caption = (
         "What becomes of labelled keypoints, by the kinds of error of Ronchi and Perona, and those that "
-        "are not "
-        f"given or belong to people who are not found: {note}."
+        f"are not given or belong to people who are not found: {note}."
     )
     return Figure(figure, caption, f"Stacked bars per {by}. Shares of misses: {in_words(said)}.", table)
 
@@ -145,18 +144,16 @@ def head_change(table: pd.DataFrame, note: str) -> Figure:
     mean = table.groupby("detector", sort=False)["change"].mean()
     said = [f"{name} {value:+.2f}" for name, value in mean.items()]
     caption = (
-        "Without the head: change of the share of keypoints hit, on the same keypoints of the same "
-        "people, with "
-        f"95 % bootstrap intervals over source images: {note}."
+        "Without the head: change of the share of keypoints hit, on the same keypoints of the same people, "
+        f"with 95 % bootstrap intervals over source images: {note}."
     )
     return Figure(figure, caption, f"Dots per keypoint and detector. Mean change: {in_words(said)}.", table)
 
 
 @in_style
 def invented_heads(table: pd.DataFrame, note: str) -> Figure:
-    """Where head keypoints are put in pictures without the head; `table` from "
-    "`without_head.invented_heads`."""
-    detectors = list(dict.fromkeys(table["detector"]))
+    """Where head keypoints are put when the head was cut off; `table` from `without_head.invented_heads`."""
+    detectors = list(dict.fromkeys(table["detector"])) or ["none given"]
     figure, axes = new_figure(
         1, len(detectors), 4.0 * len(detectors) + 0.8, 4.4, sharex=True, sharey=True, squeeze=False
     )
@@ -174,8 +171,7 @@ def invented_heads(table: pd.DataFrame, note: str) -> Figure:
     said = [f"{d} {share:.2f}" for d, share in beyond.groupby(table["detector"], sort=False).mean().items()]
     caption = (
         "Noses, eyes and ears given in pictures whose head was cut off (square: the picture, turned so "
-        "that the "
-        f"cut is above), coloured by score: {note}."
+        f"that the cut is above), coloured by score: {note}."
     )
     return Figure(figure, caption, f"Scatter of places. Share put beyond the cut: {in_words(said)}.", table)
 
@@ -202,11 +198,9 @@ def scores_by_state(table: pd.DataFrame, note: str) -> Figure:
     top = table[table["state"] == "outside"].groupby("detector", sort=False).tail(1)
     said = [f"{row.detector} {row.value:.2f} at {row.score:.2f}" for row in top.itertuples()]
     caption = (
-        "What a score is worth by where the keypoint truly is: share of hits per fifth of the score, "
-        "for keypoints "
-        "that are visible, hidden, and outside the picture, with 95 % bootstrap intervals over source "
-        "images: "
-        f"{note}."
+        "What a score is worth by where the keypoint truly is: share of hits per fifth of the score, for "
+        "keypoints that are visible, hidden, and outside the picture, with 95 % bootstrap intervals over "
+        f"source images: {note}."
     )
     alt = f"Curves of hits against score. Highest scores outside the picture: {in_words(said)}."
     return Figure(figure, caption, alt, table)
