@@ -12,18 +12,20 @@ from hicp_lib.rgbd.camera import project, transform
 from hicp_lib.rgbd.recording import Recording, read_depth_m
 
 SIGHTS = ("clear", "hidden", "outside", "no depth", "unknown")
-# Half an upper arm and the sleeve around it lie in front of a joint that is in plain view.
-IN_FRONT_M = 0.10
+# How far in front of the middle between two markers something must be to hide the joint: more than half
+# the limb and its sleeve.
+IN_FRONT_M = {"wrist": 0.06, "elbow": 0.09, "shoulder": 0.13}
 _HALF_WINDOW_PX = 2
 _POSITION = ["x_m", "y_m", "z_m"]
 
 
 def lines_of_sight(recording: Recording, positions: pd.DataFrame) -> pd.DataFrame:
-    """Distance from the camera, and what the depth image has at each position's pixel.
+    """Distance from the camera, and what the depth image has at each joint's pixel.
 
     Parameters
     ----------
-    positions : columns `frame, keypoint, x_m, y_m, z_m` (base frame); NaN where not known
+    positions : columns `frame, keypoint` ("left_wrist", ...), `x_m, y_m, z_m` (base frame); NaN where
+        not known
 
     Returns
     -------
@@ -36,23 +38,24 @@ def lines_of_sight(recording: Recording, positions: pd.DataFrame) -> pd.DataFram
         points_m = transform(np.linalg.inv(recording.T_base_cam[frame]), rows[_POSITION].to_numpy(float))
         known = np.isfinite(points_m).all(axis=1)
         sights = np.full(len(rows), "unknown", dtype=object)
-        sights[known] = _sights(points_m[known], recording, int(frame))
+        margins_m = rows["keypoint"].str.split("_").str[1].map(IN_FRONT_M).to_numpy(float)
+        sights[known] = _sights(points_m[known], margins_m[known], recording, int(frame))
         distances_m = np.linalg.norm(points_m, axis=1)
         tables.append(rows[["frame", "keypoint"]].assign(distance_m=distances_m, sight=sights))
     return pd.concat(tables).loc[positions.index]
 
 
-def _sights(points_m: np.ndarray, recording: Recording, frame: int) -> list[str]:
+def _sights(points_m: np.ndarray, margins_m: np.ndarray, recording: Recording, frame: int) -> list[str]:
     depth_m = read_depth_m(recording, frame)
     height, width = depth_m.shape
     pixels_px = project(recording.intrinsics, points_m)
     sights = []
-    for (u, v), z in zip(pixels_px, points_m[:, 2], strict=True):
+    for (u, v), furthest_m in zip(pixels_px, points_m[:, 2] - margins_m, strict=True):
         if not (-0.5 <= u <= width - 0.5 and -0.5 <= v <= height - 0.5):  # also NaN: behind the camera
             sights.append("outside")
             continue
         row, column, half = round(v), round(u), _HALF_WINDOW_PX
         window = depth_m[max(row - half, 0) : row + half + 1, max(column - half, 0) : column + half + 1]
         near_m = np.median(window[np.isfinite(window)]) if np.isfinite(window).any() else np.nan
-        sights.append("no depth" if np.isnan(near_m) else "hidden" if near_m < z - IN_FRONT_M else "clear")
+        sights.append("no depth" if np.isnan(near_m) else "hidden" if near_m < furthest_m else "clear")
     return sights

@@ -1,6 +1,6 @@
 """Where the motion capture's frame lies in the robot's base frame, from markers clicked in images.
 
-Three ways, from the same kind of clicks:
+Three ways, from the same kind of clicks (`reprojection` has a fourth, without depth):
 
 - `as_in_paper`: eight markers in two images give the rotation by Arun's method; the translation is the
   one that puts the marker on the camera at the camera's optical centre (paper section IV-C). It is as wrong
@@ -34,6 +34,7 @@ N_PAPER_MARKERS, N_PAPER_IMAGES = 8, 2
 _SEEN, _MEASURED = ["x_m", "y_m", "z_m"], ["mocap_x_m", "mocap_y_m", "mocap_z_m"]
 _MIN_OUTLIER_M = 0.02
 _MAX_ROUNDS = 20
+_MAX_STRETCH_M = 0.1
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,14 @@ def lift_clicks(
 
 def papers_choice(matched: pd.DataFrame) -> pd.DataFrame:
     """Eight markers in two images, as in the paper: of the two images that show most markers, the eight
-    that lie furthest from each other."""
+    that lie furthest from each other.
+
+    Clicks whose depth is that of something else, a wall behind for one, are not chosen: the distances
+    between markers must be the same in both frames, to a decimetre for most of the others.
+    """
+    a, b = (matched[names].to_numpy() for names in (_SEEN, _MEASURED))
+    stretched_m = np.abs(_distances_between(a) - _distances_between(b))
+    matched = matched[np.median(stretched_m, axis=1) < _MAX_STRETCH_M]
     frames = matched["frame"].value_counts(sort=True).sort_index(kind="stable").nlargest(N_PAPER_IMAGES).index
     table = matched[matched["frame"].isin(frames)].reset_index(drop=True)
     points = table[_MEASURED].to_numpy()
@@ -97,6 +105,10 @@ def papers_choice(matched: pd.DataFrame) -> pd.DataFrame:
         nearest = np.linalg.norm(points[:, None] - points[chosen], axis=2).min(axis=1)
         chosen.append(int(nearest.argmax()))
     return table.loc[sorted(chosen)].reset_index(drop=True)
+
+
+def _distances_between(points_m: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(points_m[:, None] - points_m[None], axis=2)
 
 
 def as_in_paper(

@@ -36,12 +36,22 @@ def recording(tmp_path):
 def test_positions_are_clear_hidden_outside_or_without_depth(recording):
     points = np.array([point for point, _ in SIGHT_OF.values()])
     table = pd.DataFrame(transform(T_BASE_CAM, points), columns=["x_m", "y_m", "z_m"])
-    both = pd.concat([table.assign(frame=k, keypoint=list(SIGHT_OF)) for k in (0, 1)], ignore_index=True)
+    both = pd.concat(
+        [table.assign(frame=k, keypoint=[f"left_elbow_{name}" for name in SIGHT_OF]) for k in (0, 1)],
+        ignore_index=True,
+    )
     both = both.sample(frac=1, random_state=0)
     result = lines_of_sight(recording, both)
     assert result.index.equals(both.index) and result["frame"].equals(both["frame"])
     assert set(result["sight"]) == set(SIGHTS)
     for row in result.itertuples():
-        point, sight = SIGHT_OF[row.keypoint]
+        point, sight = SIGHT_OF[row.keypoint.removeprefix("left_elbow_")]
         assert row.sight == sight
         assert row.distance_m == pytest.approx(np.linalg.norm(point), nan_ok=True)
+
+
+def test_how_much_may_be_in_front_depends_on_the_joint(recording):
+    point = transform(T_BASE_CAM, np.array([[0.0, 0.0, 1.08]]))
+    joints = pd.DataFrame(np.repeat(point, 3, axis=0), columns=["x_m", "y_m", "z_m"])
+    joints = joints.assign(frame=0, keypoint=["left_wrist", "left_elbow", "left_shoulder"])
+    assert lines_of_sight(recording, joints)["sight"].tolist() == ["hidden", "clear", "clear"]

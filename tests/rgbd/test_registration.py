@@ -127,6 +127,13 @@ def test_wrong_clicks_do_not_spoil_the_fit_to_many(laboratory, clicks):
     assert robust.n_points == len(clicks) - len(wrong[::7])
 
 
+def test_clicks_on_the_wall_behind_are_not_among_the_eight(laboratory, clicks):
+    matched = lift_clicks(laboratory[0], clicks, laboratory[1])
+    matched.loc[::4, ["x_m", "y_m", "z_m"]] += [-0.4, 0.9, 1.2]
+    eight = papers_choice(matched)
+    assert len(eight) == 8 and same_clicks(eight).rms_m < 0.005
+
+
 def test_what_cannot_be_matched_is_left_out(laboratory, clicks):
     recording, mocap = laboratory
     points = mocap.points_m.copy()

@@ -1,0 +1,194 @@
+"""The motion capture test's material: one recording, its clock offset, and its registration.
+
+A simulated recording knows its exact transform and clock; clicks are simulated there. A laboratory's own
+holds `clicks.csv` (markers clicked in images, see `hicp_lib.rgbd.clicking`), or `registration.json` when
+the transform is known from elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.detectors.run import detect_images
+from hicp_lib.errors import InputError
+from hicp_lib.evaluation.mocap_error import MIN_SCORES, POSITION, TABLE_JOINTS, marker_means, mocap_errors
+from hicp_lib.evaluation.stability import position_array
+from hicp_lib.rgbd.clicking import CLICKS_FILE, read_clicks
+from hicp_lib.rgbd.keypoints3d import lift_recording
+from hicp_lib.rgbd.qualisys import MotionCapture, read_mocap
+from hicp_lib.rgbd.recording import MOCAP_FILE, Recording, read_simulation
+from hicp_lib.rgbd.registration import (
+    CAMERA_MARKER,
+    N_PAPER_MARKERS,
+    REGISTRATION_FILE,
+    Registration,
+    all_clicks,
+    as_in_paper,
+    lift_clicks,
+    papers_choice,
+    read_registration,
+    same_clicks,
+)
+from hicp_lib.rgbd.reprojection import by_reprojection
+from hicp_lib.rgbd.synchronisation import ClockOffset, clock_offset
+
+SIMULATED_NOTE = "simulated recording (rendered person, simulated D435 and motion capture)"
+METHODS = ("robust", "paper")
+
+
+@dataclass(frozen=True)
+class Registered:
+    """The registrations of a recording.
+
+    Attributes
+    ----------
+    fits : in the order of the module `hicp_lib.rgbd.registration`, then by reprojection: the one to use
+    exact : the true transform T_base_mocap, (4, 4); None where it is not known
+    clicks : the clicks of the images the paper's registration rests on; empty where the transform was given
+    """
+
+    fits: list[Registration]
+    exact: np.ndarray | None
+    clicks: pd.DataFrame
+
+
+def data_note(recording: Recording) -> str:
+    """What the recording is, in the words of captions."""
+    return SIMULATED_NOTE if read_simulation(recording) else f"recording {recording.folder.name}"
+
+
+def open_mocap(recording: Recording) -> MotionCapture:
+    """The recording's motion capture.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is not an export of 3D data.
+    """
+    if recording.mocap_path is None:
+        raise InputError(
+            f"{recording.folder}: has no {MOCAP_FILE}; export 3D data from Qualisys with header into it"
+        )
+    return read_mocap(recording.mocap_path)
+
+
+def detect_and_lift(
+    recording: Recording, detectors: Sequence[str], methods: Sequence[str] = METHODS
+) -> pd.DataFrame:
+    """Everyone's keypoints in space: columns `detector, method` and those of `lift_recording`."""
+    tables = []
+    for detector in detectors:
+        results = detect_images(detector, dict(enumerate(recording.rgb_paths))).values()
+        for method in methods:
+            table = lift_recording(recording, [result.detections for result in results], method=method)
+            labels = {"detector": detector, "method": method}
+            tables.append(table.assign(**labels)[[*labels, *table.columns]])
+    return pd.concat(tables, ignore_index=True)
+
+
+def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame) -> ClockOffset:
+    """What to add to the motion capture's stamps, from how fast elbows and wrists move.
+
+    Parameters
+    ----------
+    points : as from `detect_and_lift`; those of all detectors and methods are compared at once
+
+    Raises
+    ------
+    InputError
+        If nothing moves together (`hicp_lib.rgbd.synchronisation.clock_offset`).
+    """
+    best = points[points["person"] == 0]
+    cases = [rows for _, rows in best.groupby(["detector", "method"], sort=False)]
+    seen_m = [position_array(rows, TABLE_JOINTS, len(recording)) for rows in cases]
+    # Speeds are the same in any frame: no registration is needed yet.
+    means = marker_means(mocap, mocap.times_s, np.eye(4), TABLE_JOINTS)
+    means_m = means[POSITION].to_numpy(float).reshape(len(mocap.times_s), len(TABLE_JOINTS), 3)
+    return clock_offset(
+        recording.times_s, np.concatenate(seen_m, axis=1), mocap.times_s, np.tile(means_m, (1, len(cases), 1))
+    )
+
+
+def register(
+    recording: Recording,
+    mocap: MotionCapture,
+    offset_s: float,
+    n_images: int = 12,
+    noise_px: float = 1.0,
+    seed: int = 0,
+) -> Registered:
+    """Every registration a recording allows.
+
+    Parameters
+    ----------
+    offset_s : of the motion capture's clock, as from `find_clock`
+    n_images, noise_px, seed : of the simulated clicks; not used on a laboratory's own recording
+
+    Raises
+    ------
+    InputError
+        If the recording has neither clicks nor a registration, or they are malformed.
+    """
+    simulation = read_simulation(recording)
+    clicks_path, given = recording.folder / CLICKS_FILE, recording.folder / REGISTRATION_FILE
+    if simulation:
+        from hicp_lib.simulation.sensors.clicks import simulate_clicks
+
+        exact = np.array(simulation["T_base_mocap"])
+        clicks = simulate_clicks(
+            recording, mocap, exact, n_images, noise_px, simulation["mocap_offset_s"], seed
+        )
+        return _from_clicks(recording, mocap, clicks, offset_s, exact)
+    if clicks_path.is_file():
+        clicks = read_clicks(clicks_path, recording, mocap.names)
+        return _from_clicks(recording, mocap, clicks, offset_s, None)
+    if given.is_file():
+        return Registered([read_registration(given)], None, pd.DataFrame())
+    raise InputError(
+        f"{recording.folder}: has neither {CLICKS_FILE} (frame,marker,u_px,v_px) nor {REGISTRATION_FILE}; "
+        f"click {N_PAPER_MARKERS} or more markers with hicp_lib.rgbd.clicking, or give T_base_mocap"
+    )
+
+
+def medians_under(
+    registered: Registered, points: pd.DataFrame, recording: Recording, mocap: MotionCapture, offset_s: float
+) -> pd.DataFrame:
+    """What the choice of the registration does to the median errors of elbows and wrists.
+
+    Returns
+    -------
+    DataFrame, columns `registration, detector, method, part`, `median_m` (both sides together; score above
+    0.1); the exact transform, where it is known, comes last
+    """
+    fits = {fit.method: fit.T_base_mocap for fit in registered.fits}
+    if registered.exact is not None:
+        fits["exact"] = registered.exact
+    tables = []
+    for name, T_base_mocap in fits.items():
+        reference = marker_means(mocap, recording.times_s - offset_s, T_base_mocap, TABLE_JOINTS)
+        errors = mocap_errors(points, reference)
+        errors = errors[errors["score"] > MIN_SCORES[-1]]
+        part = errors["keypoint"].str.split("_").str[1].rename("part")
+        medians = errors.groupby(["detector", "method", part], sort=False)["error_m"].median()
+        tables.append(medians.rename("median_m").reset_index().assign(registration=name))
+    return pd.concat(tables, ignore_index=True)[["registration", "detector", "method", "part", "median_m"]]
+
+
+def _from_clicks(
+    recording: Recording,
+    mocap: MotionCapture,
+    clicks: pd.DataFrame,
+    offset_s: float,
+    exact: np.ndarray | None,
+) -> Registered:
+    matched = lift_clicks(recording, clicks, mocap, offset_s)
+    eight = papers_choice(matched)
+    fits = [same_clicks(eight), all_clicks(matched)]
+    fits.append(by_reprojection(recording, clicks, mocap, fits[-1], offset_s))
+    if CAMERA_MARKER in mocap.names:
+        fits.insert(0, as_in_paper(eight, recording, mocap, offset_s))
+    return Registered(fits, exact, clicks.merge(eight[["frame", "marker"]]))
