@@ -87,8 +87,8 @@ class Controller:
         NoSolution
             If the angles are not finite, or no velocities satisfy all bounds. The next call starts from rest.
         """
-        q = posture.angles(self.side)
-        last, self._last = self._last, np.zeros_like(self._last)
+        q, last = posture.angles(self.side), self._last
+        self.stop()
         if not np.isfinite(q).all():
             raise NoSolution("joint angles are not finite")
         lowest, highest = self._bounds(posture, q, obstacles)
@@ -98,6 +98,10 @@ class Controller:
         # The solver keeps bounds to its tolerance only.
         self._last = np.clip(chosen, lowest, highest)
         return self._last.copy()
+
+    def stop(self) -> None:
+        """Say that the arm stands still: the next velocities start from rest."""
+        self._last = np.zeros(len(ARM_JOINTS))
 
     def _bounds(
         self, posture: Posture, q: np.ndarray, obstacles: list[Obstacle]

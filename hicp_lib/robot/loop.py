@@ -138,4 +138,5 @@ class AvoidanceLoop:
         return Threat(activations, obstacles(self.skin, activations, self.controller.settings.onset))
 
     def _stop(self, now_s: float, reason: str) -> Command:
+        self.controller.stop()
         return Command(now_s, np.zeros(len(self.controller.rest_rad)), STOPPED, reason)

@@ -140,6 +140,17 @@ def test_without_perception_the_arm_stops_and_says_why(home, make_loop):
     assert command.status == STOPPED and (command.velocities_rad_s == 0).all()
 
 
+def test_after_a_stop_the_arm_starts_from_rest(home, make_loop):
+    away = home.moved("left", home.angles("left") + 0.2)
+    loop = make_loop()
+    first, _ = loop.cycle(0.0, away, nobody(0.0))
+    second, _ = loop.cycle(0.02, away, nobody(0.02))
+    assert np.linalg.norm(second.velocities_rad_s) > 1.05 * np.linalg.norm(first.velocities_rad_s)
+    assert loop.cycle(1.1, away)[0].status == STOPPED
+    again, _ = loop.cycle(1.12, away, nobody(1.12))
+    np.testing.assert_array_equal(again.velocities_rad_s, first.velocities_rad_s)
+
+
 def test_unknown_joint_angles_stop_the_arm(home, make_loop):
     lost = home.moved("left", np.full(10, np.nan))
     command, _ = make_loop().cycle(0.0, lost, nobody(0.0))
