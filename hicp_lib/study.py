@@ -59,6 +59,8 @@ class Study:
     Attributes
     ----------
     folder : where this run's results are written
+    results : where the notebooks before this one left theirs, a folder each; in Jupyter, those of the
+        last full report
     """
 
     def __init__(self, name: str, /, **parameters: Any):
@@ -67,6 +69,7 @@ class Study:
         self.name = name
         self.parameters = _plain(parameters)
         self.folder = results / name
+        self.results = ROOT / "results" / ("full" if profile == "interactive" else profile)
         self._link = f"../results/{profile}/{name}"
         self._values: dict[str, Any] = {}
         self._captions: dict[str, dict[str, str]] = {}

@@ -97,6 +97,11 @@ def verdict_table(verdicts: list[Verdict]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def verdict_counts(table: pd.DataFrame) -> dict[str, int]:
+    """How many claims got each verdict, by `VERDICTS`; `table` from `verdict_table`."""
+    return {verdict: int((table["verdict"] == verdict).sum()) for verdict in VERDICTS}
+
+
 def _judge(claim: Claim, results: Path) -> Verdict:
     if not claim.tests:
         return Verdict(claim, NOT_TESTABLE, reason=claim.reason, command=claim.command)
