@@ -7,6 +7,7 @@ ones contradict it, and fades out when it is not seen any more.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +27,8 @@ class Trust:
     lowest_score, full_score : not believed at or below the first, fully from the second on, linear between
         (the paper's two thresholds, 0.1 and 0.3)
     jump_m, speed_m_s : two sightings `dt` apart are of the same thing within `jump_m + speed_m_s * dt`
-    memory_s : a sighting is forgotten after this time: what appears then is new again
+    confirm_frames : what appears is believed when it is seen again within so many frames
+    memory_s : what was believed is forgotten after this time: what appears then is new again
     hold_s : fully believed for this long after the last sighting, which covers a detector's delay
     fade_s : then falls to 1/e in this time (0.9 per cycle of 20 ms, as in HARMONIOUS, is 0.19 s)
     max_people : only so many people are followed, the nearest to the robot
@@ -36,6 +38,7 @@ class Trust:
     full_score: float = 0.3
     jump_m: float = 0.15
     speed_m_s: float = 3.0
+    confirm_frames: int = 2
     memory_s: float = 0.6
     hold_s: float = 0.2
     fade_s: float = 0.19
@@ -57,6 +60,7 @@ class KeypointTracker:
     def __init__(self, trust: Trust | None = None):
         self.trust = trust or Trust()
         self.latest_s = -np.inf
+        self._frames_s: deque[float] = deque(maxlen=self.trust.confirm_frames)
         self._memory = _nothing(0)
 
     def see(self, time_s: float, keypoints_m: np.ndarray, scores: np.ndarray, now_s: float) -> bool:
@@ -82,6 +86,7 @@ class KeypointTracker:
         people = self._nearest(points)
         self._forget(time_s)
         self._update(time_s, points[people], scores[people])
+        self._frames_s.append(time_s)
         return True
 
     def points(self, now_s: float) -> tuple[np.ndarray, np.ndarray]:
@@ -110,7 +115,8 @@ class KeypointTracker:
         memory = np.concatenate([self._memory[rows], _nothing(len(new))])
         people = np.append(people, new)
         points, scores = points[people], scores[people]
-        believed = self._near(points, time_s, memory["seen_m"], memory["seen_s"])
+        lately = memory["seen_s"] >= min(self._frames_s, default=np.inf)
+        believed = lately & self._near(points, time_s, memory["seen_m"], memory["seen_s"])
         believed |= self._near(points, time_s, memory["believed_m"], memory["believed_s"])
         memory["believed_m"][believed], memory["believed_s"][believed] = points[believed], time_s
         memory["score"][believed] = scores[believed]

@@ -47,6 +47,13 @@ def test_a_person_of_one_frame_is_never_believed():
     assert all(weight(tracker, now_s) == 0 for now_s in np.arange(0.1, 1, 0.02))
 
 
+@pytest.mark.parametrize(("frames_between", "believed"), [(0, True), (1, True), (2, False), (5, False)])
+def test_a_second_sighting_must_come_within_two_frames(frames_between, believed):
+    tracker = KeypointTracker()
+    now_s = see(tracker, [person(), *frames_between * [NOBODY], person()])
+    assert weight(tracker, now_s) == believed
+
+
 def test_a_jump_of_one_frame_is_not_followed():
     tracker = KeypointTracker()
     now_s = see(tracker, [person(), person(), person((0.5, 0, 0)), person()])
