@@ -34,10 +34,16 @@ from hicp_lib.simulation.experiments.laboratory import T_WORLD_ROOT
 from hicp_lib.simulation.experiments.scenarios import Scenario, scenario
 from hicp_lib.simulation.scenes import worker_pool
 
-# Besides the renderer: what decides what a simulated recording holds.
+# What decides what a simulated recording holds: the renderer, these experiments, sensors, robot, files.
+_EXPERIMENTS = (
+    "finishing", "frames", "gestures", "laboratory", "mocap", "motion", "moving", "scenarios", "seated",
+    "simulate",
+)  # fmt: skip
 _LIBRARY_PATTERNS = (
-    "simulation/**/*.py", "robot/kinematics.py", "robot/tables.py", "keypoints.py",
-    "rgbd/camera.py", "rgbd/tum.py", "rgbd/recording*.py", "rgbd/qualisys.py", "rgbd/c3d.py",
+    "simulation/*.py", *(f"simulation/experiments/{name}.py" for name in _EXPERIMENTS),
+    "simulation/sensors/depth_*.py", "simulation/sensors/markers.py", "simulation/sensors/motion_capture.py",
+    "robot/kinematics.py", "robot/tables.py", "keypoints.py", "images.py",
+    "rgbd/camera.py", "rgbd/tum.py", "rgbd/recording_writer.py", "rgbd/qualisys.py", "rgbd/c3d.py",
 )  # fmt: skip
 _DATA_PATTERNS = ("body*", "icub.json", "relative_poses.csv")
 
@@ -83,9 +89,13 @@ def simulate_recording(
 @cache
 def simulation_version() -> str:
     """SHA-256 over everything that decides what a simulated recording holds."""
+    return files_sha256(deciding_files(), LIBRARY_DIR.parent)
+
+
+def deciding_files() -> list[Path]:
+    """The code and data `simulation_version` is about."""
     library = [path for pattern in _LIBRARY_PATTERNS for path in LIBRARY_DIR.glob(pattern)]
-    data = [path for pattern in _DATA_PATTERNS for path in DATA_DIR.glob(pattern)]
-    return files_sha256([*library, *data], LIBRARY_DIR.parent)
+    return library + [path for pattern in _DATA_PATTERNS for path in DATA_DIR.glob(pattern)]
 
 
 def _check(out: Path, plan: Scenario, n: int, seed: int, workers: int | None) -> None:

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from hicp_lib.simulation.body import load_body
 from hicp_lib.simulation.clearance import clearance_m, outline
+from hicp_lib.simulation.experiments.gestures import TABLE_HEIGHT_M
 from hicp_lib.simulation.experiments.motion import Motion, Move, Posture, between, minimum_jerk
-from hicp_lib.simulation.experiments.moving import TABLE_HEIGHT_M, moving
+from hicp_lib.simulation.experiments.moving import moving
 from hicp_lib.simulation.joints import pose_from_joints, within_limits
 
 A = Posture({"left_elbow_flexion": 0.2}, (0.0, 1.0))
