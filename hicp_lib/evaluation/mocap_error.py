@@ -33,6 +33,11 @@ MIN_SCORES = (0.3, 0.1)
 THRESHOLDS_M = (0.025, 0.05, 0.1)
 POSITION = ["x_m", "y_m", "z_m"]
 _CASE = ["detector", "method", "keypoint"]
+_BINS: dict[str, list[float] | None] = {
+    "distance_m": [0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.5, 3.0, 4.0],
+    "score": [0.1, 0.3, 0.5, 0.7, 0.9, 1.001],
+    "sight": None,
+}
 
 
 def marker_means(
@@ -182,6 +187,14 @@ def errors_by(
     table["bin"] = [str(b) if edges is None else f"{b.left:g} to {b.right:g}" for b in table["bin"]]
     columns = ["detector", "method", "part", "by", "bin", "middle", "n", "median_m", "lower_m", "upper_m"]
     return table[columns].sort_values(["detector", "method", "part"], kind="stable", ignore_index=True)
+
+
+def error_dependence(errors: pd.DataFrame, min_score: float = 0.1) -> pd.DataFrame:
+    """`errors_by` distance, score and line of sight, one after the other.
+
+    `errors` with the columns `distance_m, sight` of `hicp_lib.evaluation.sight.lines_of_sight`.
+    """
+    return pd.concat([errors_by(errors, column, edges, min_score) for column, edges in _BINS.items()])
 
 
 def paper_medians() -> pd.DataFrame:

@@ -7,20 +7,22 @@ the transform is known from elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
+from hicp_lib.detectors.base import Detections
 from hicp_lib.detectors.run import detect_images
 from hicp_lib.errors import InputError
 from hicp_lib.evaluation.mocap_error import MIN_SCORES, POSITION, TABLE_JOINTS, marker_means, mocap_errors
+from hicp_lib.evaluation.sight import lines_of_sight
 from hicp_lib.evaluation.stability import position_array
 from hicp_lib.rgbd.clicking import CLICKS_FILE, read_clicks
 from hicp_lib.rgbd.keypoints3d import lift_recording
 from hicp_lib.rgbd.qualisys import MotionCapture, read_mocap
-from hicp_lib.rgbd.recording import MOCAP_FILE, Recording, read_simulation
+from hicp_lib.rgbd.recording import MOCAP_FILE, Recording, read_simulation, read_truth
 from hicp_lib.rgbd.registration import (
     CAMERA_MARKER,
     N_PAPER_MARKERS,
@@ -76,15 +78,23 @@ def open_mocap(recording: Recording) -> MotionCapture:
     return read_mocap(recording.mocap_path)
 
 
-def detect_and_lift(
-    recording: Recording, detectors: Sequence[str], methods: Sequence[str] = METHODS
+def detect_frames(recording: Recording, detectors: Sequence[str]) -> dict[str, list[Detections]]:
+    """Detector -> detections of every frame; kept on disk."""
+    paths = dict(enumerate(recording.rgb_paths))
+    return {
+        detector: [result.detections for result in detect_images(detector, paths).values()]
+        for detector in detectors
+    }
+
+
+def lift_frames(
+    recording: Recording, found: Mapping[str, Sequence[Detections]], methods: Sequence[str] = METHODS
 ) -> pd.DataFrame:
     """Everyone's keypoints in space: columns `detector, method` and those of `lift_recording`."""
     tables = []
-    for detector in detectors:
-        results = detect_images(detector, dict(enumerate(recording.rgb_paths))).values()
+    for detector, detections in found.items():
         for method in methods:
-            table = lift_recording(recording, [result.detections for result in results], method=method)
+            table = lift_recording(recording, detections, method=method)
             labels = {"detector": detector, "method": method}
             tables.append(table.assign(**labels)[[*labels, *table.columns]])
     return pd.concat(tables, ignore_index=True)
@@ -95,7 +105,7 @@ def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame)
 
     Parameters
     ----------
-    points : as from `detect_and_lift`; those of all detectors and methods are compared at once
+    points : as from `lift_frames`; those of all detectors and methods are compared at once
 
     Raises
     ------
@@ -176,6 +186,16 @@ def medians_under(
         medians = errors.groupby(["detector", "method", part], sort=False)["error_m"].median()
         tables.append(medians.rename("median_m").reset_index().assign(registration=name))
     return pd.concat(tables, ignore_index=True)[["registration", "detector", "method", "part", "median_m"]]
+
+
+def errors_at_joints(
+    points: pd.DataFrame, registered: Registered, recording: Recording, mocap: MotionCapture, offset_s: float
+) -> pd.DataFrame:
+    """`mocap_errors` under the best registration, with the lines of sight: columns `distance_m, sight`."""
+    stamps_s, T_base_mocap = recording.times_s - offset_s, registered.fits[-1].T_base_mocap
+    reference = marker_means(mocap, stamps_s, T_base_mocap)
+    errors = mocap_errors(points, reference, read_truth(recording))
+    return errors.merge(lines_of_sight(recording, reference), on=["frame", "keypoint"])
 
 
 def _from_clicks(

@@ -8,50 +8,54 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.evaluation.mocap_error import JOINTS, TABLE_JOINTS
+from hicp_lib.rgbd.synchronisation import ClockOffset
 
+_CASE = ["detector", "method"]
 _MARKS = {"n_points": "markers", "rms_m": "residual [mm]", "leave_one_out_m": "leave-one-out [mm]"}
 _AGAINST_TRUTH = {"turned_rad": "turned [°]", "added_m": "added [mm]", "worst_m": "at most [mm]"}
 
 
-def beside_paper(
-    medians: pd.DataFrame,
-    paper: pd.DataFrame,
-    method: str,
-    min_score: float,
-    joints: Sequence[str] = TABLE_JOINTS,
-) -> pd.DataFrame:
+def clock_text(clock: ClockOffset) -> pd.DataFrame:
+    """The offset of the whole recording and of its halves, in seconds."""
+    offsets = {
+        "whole recording": clock.offset_s,
+        "first half": clock.halves_s[0],
+        "second half": clock.halves_s[1],
+    }
+    return pd.DataFrame(offsets.items(), columns=["from", "offset [s]"])
+
+
+def beside_paper(medians: pd.DataFrame, paper: pd.DataFrame, min_score: float) -> pd.DataFrame:
     """One of the paper's two tables, what was measured here above the paper's own rows.
 
     Parameters
     ----------
     medians, paper : as from `median_errors` and `paper_medians`
-    method : of lifting
 
     Returns
     -------
-    DataFrame, columns `detector` and one per joint: "count / median [cm]", here with the 95 % interval
+    DataFrame, columns `detector, lifting` and one per joint: "count / median [cm]", here with the 95 %
+    interval
     """
-    here = medians[(medians["method"] == method) & medians["keypoint"].isin(joints)]
-    rows = pd.concat([here, paper.assign(detector=paper["detector"] + " (paper)")])
-    rows = rows[(rows["min_score"] == min_score) & rows["keypoint"].isin(joints)]
-    return _wide(rows.assign(text=[_cell(row) for row in rows.to_dict("records")]), ["detector"], "keypoint")
+    rows = pd.concat([medians, paper.assign(detector=paper["detector"] + " (paper)", method="paper")])
+    rows = rows[(rows["min_score"] == min_score) & rows["keypoint"].isin(TABLE_JOINTS)]
+    return _wide(rows.assign(text=[_cell(row) for row in rows.to_dict("records")]), _CASE, "keypoint")
 
 
-def shoulders_and_centres(medians: pd.DataFrame, method: str, min_score: float) -> pd.DataFrame:
+def shoulders_and_centres(medians: pd.DataFrame, min_score: float) -> pd.DataFrame:
     """Median distance [cm] from the markers' mean and, where known, from the joint's centre: "4.0 / 2.1"."""
-    rows = medians[(medians["method"] == method) & (medians["min_score"] == min_score)]
+    rows = medians[medians["min_score"] == min_score]
     pairs = zip(rows["median_m"], rows["centre_median_m"], strict=True)
     rows = rows.assign(text=[f"{_cm(markers)} / {_cm(centre)}" for markers, centre in pairs])
-    return _wide(rows, ["detector"], "keypoint", JOINTS)
+    return _wide(rows, _CASE, "keypoint", JOINTS)
 
 
-def fractions_text(fractions: pd.DataFrame, method: str) -> pd.DataFrame:
+def fractions_text(fractions: pd.DataFrame) -> pd.DataFrame:
     """Fractions within each distance as "0.71 [0.65, 0.77]", a column per joint."""
-    rows = fractions[fractions["method"] == method]
-    bounds = rows[["value", "low", "high"]].itertuples(index=False)
-    within = [f"{100 * limit:g} cm" for limit in rows["threshold_m"]]
+    bounds = fractions[["value", "low", "high"]].itertuples(index=False)
+    within = [f"{100 * limit:g} cm" for limit in fractions["threshold_m"]]
     text = [f"{value:.2f} [{low:.2f}, {high:.2f}]" for value, low, high in bounds]
-    return _wide(rows.assign(within=within, text=text), ["detector", "within"], "keypoint", JOINTS)
+    return _wide(fractions.assign(within=within, text=text), [*_CASE, "within"], "keypoint", JOINTS)
 
 
 def registrations_text(table: pd.DataFrame) -> pd.DataFrame:
@@ -67,11 +71,19 @@ def registrations_text(table: pd.DataFrame) -> pd.DataFrame:
     return shown.rename(columns=names)
 
 
-def costs_text(table: pd.DataFrame, method: str) -> pd.DataFrame:
+def costs_text(table: pd.DataFrame) -> pd.DataFrame:
     """`medians_under`'s table: median error [cm] of elbows and wrists, a column per registration."""
-    rows = table[table["method"] == method]
-    rows = rows.assign(text=[_cm(value) for value in rows["median_m"]])
-    return _wide(rows, ["detector", "part"], "registration")
+    rows = table.assign(text=[_cm(value) for value in table["median_m"]])
+    return _wide(rows, [*_CASE, "part"], "registration")
+
+
+def ablation_text(table: pd.DataFrame | None) -> pd.DataFrame:
+    """`lifting_ablation`'s table in centimetres and per cent; what it needs, where there is none."""
+    if table is None:
+        return pd.DataFrame({"needs": ["true positions (truth.parquet)"], "here": "not in this recording"})
+    changes = [f"{100 * change:+.0f} %" for change in table["p95_change"]]
+    errors = {"median [cm]": 100 * table["median_m"], "95th percentile [cm]": 100 * table["p95_m"]}
+    return table[["group", "method", "n_lifted", "n_compared"]].assign(**errors, change=changes)
 
 
 def _cell(row: dict) -> str:
@@ -91,7 +103,7 @@ def _wide(
 ) -> pd.DataFrame:
     """`text` of every row and value of `columns`, rows in the order they come in."""
     wide = rows.pivot(index=index, columns=columns, values="text")
-    first = list(dict.fromkeys(rows[index].itertuples(index=False, name=None)))
-    wide = wide.reindex([key[0] if len(index) == 1 else key for key in first])
+    wide = wide.reindex(list(dict.fromkeys(rows[index].itertuples(index=False, name=None))))
     wide = wide[[name for name in order or dict.fromkeys(rows[columns]) if name in wide]]
-    return wide.rename(columns=lambda name: name.replace("_", " ")).rename_axis(columns=None).reset_index()
+    wide = wide.rename(columns=lambda name: name.replace("_", " ")).rename_axis(columns=None)
+    return wide.reset_index().rename(columns={"method": "lifting"})

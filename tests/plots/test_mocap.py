@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.evaluation.mocap_error import JOINTS, TABLE_JOINTS, errors_by, paper_medians
+from hicp_lib.evaluation.mocap_error import JOINTS, TABLE_JOINTS, error_dependence, paper_medians
 from hicp_lib.plots import mocap as draw
 from hicp_lib.plots.style import detector_colour
 
@@ -100,12 +100,7 @@ def test_a_joint_motion_capture_never_saw_can_still_be_drawn(errors):
 
 
 def test_dependence_is_drawn_for_numbers_and_labels(errors):
-    parts = [
-        errors_by(errors, "distance_m", [1.0, 1.3, 1.6, 2.0]),
-        errors_by(errors, "score", [0, 0.5, 1.01]),
-        errors_by(errors, "sight"),
-    ]
-    figure = draw.error_dependence(pd.concat(parts), "made up")
+    figure = draw.error_dependence(error_dependence(errors), "made up")
     axes = np.array(figure.figure.axes).reshape(2, 3)
     assert [axis.get_xlabel() for axis in axes[1]] == [
         "distance from the camera [m]",
