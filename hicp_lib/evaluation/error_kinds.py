@@ -26,7 +26,6 @@ from hicp_lib.annotations import Annotations
 from hicp_lib.detectors.base import Detections
 from hicp_lib.evaluation.coco import check_detections
 from hicp_lib.evaluation.compare import groups_of, source_images
-from hicp_lib.evaluation.keypoint_hits import people_pairs
 from hicp_lib.evaluation.oks import oks, oks_terms
 from hicp_lib.keypoints import GROUPS, SIGMAS, mirror
 
@@ -74,9 +73,14 @@ def keypoint_errors(
     rows_of = pd.Series(range(len(annotations))).groupby(annotations.image_ids).indices
     for image_id, rows in rows_of.items():
         people = annotations.take(rows)
-        matched = _matched(people, detections.get(image_id, Detections.none()), keypoints, constants)
+        found = detections.get(image_id, Detections.none())
+        matched = matched_people(people, found, keypoints, constants)
         for person in np.flatnonzero(_counts(people)):
-            parts.append(_judge(people, person, matched.get(int(person)), keypoints, constants))
+            row = matched.get(int(person))
+            match = (
+                None if row is None else (found.keypoints_px[row, keypoints], found.scores[row, keypoints])
+            )
+            parts.append(_judge(people, person, match, keypoints, constants))
     columns = ["image_id", "annotation_id", "keypoint", "visibility", "score", "term", "kind"]
     table = pd.concat([pd.DataFrame(columns=columns).astype(_DTYPES), *parts], ignore_index=True)
     kind = pd.Categorical.from_codes(table["kind"], KINDS)
@@ -91,22 +95,35 @@ def _counts(people: Annotations) -> np.ndarray:
     return ~people.is_crowd & ~np.array([bool(extra.get("other")) for extra in people.extras], dtype=bool)
 
 
-def _matched(
+def matched_people(
     people: Annotations, found: Detections, keypoints: np.ndarray, sigmas: np.ndarray
-) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Person's row -> keypoints (k, 2) and scores (k,) of the detection matched to them."""
-    matched = {}
-    for row, person in people_pairs(people, found, keypoints, sigmas):
-        points = found.keypoints_px[row, keypoints]
-        if person is None:
-            continue
-        labelled = people.visibility[person, keypoints] > 0
-        fit = oks(
-            people.keypoints_px[person, keypoints], labelled, people.boxes_px[person],
-            people.areas_px2[person], points, sigmas,
-        )  # fmt: skip
-        if labelled.any() and fit >= MATCH_OKS:
-            matched[person] = points, found.scores[row, keypoints]
+) -> dict[int, int]:
+    """The detection of each person who has one: row of the person -> row of the detection.
+
+    Detections, best first, take the free person they fit best, with an OKS of at least .1. People without a
+    labelled keypoint take no part: anything near them would fit.
+
+    Parameters
+    ----------
+    people, found : of one image
+    keypoints, sigmas : arrays, shape (k,): Halpe indices of the group, and their constants
+    """
+    labelled = people.visibility[:, keypoints] > 0
+    fit = oks(
+        people.keypoints_px[:, None, keypoints],
+        labelled[:, None],
+        people.boxes_px[:, None],
+        people.areas_px2[:, None],
+        found.keypoints_px[None, :, keypoints],
+        sigmas,
+    )
+    fit[~labelled.any(axis=1)] = 0.0
+    matched: dict[int, int] = {}
+    for row in np.argsort(-found.person_scores, kind="stable"):
+        person = int(fit[:, row].argmax()) if len(people) else 0
+        if len(people) and fit[person, row] >= MATCH_OKS:
+            matched[person] = int(row)
+            fit[person] = 0.0
     return matched
 
 

@@ -70,7 +70,7 @@ def keypoint_hits(
     columns: dict[str, list] = {"image_id": [], "keypoint": [], "score": [], "hit": []}
     for image_id, found in detections.items():
         people = annotations.take(annotations.image_ids == image_id)
-        for row, person in people_pairs(people, found, keypoints, constants):
+        for row, person in _pairs(people, found, keypoints, constants):
             known, hits = _hits(people, person, found.keypoints_px[row, keypoints], keypoints, constants)
             columns["image_id"] += [image_id] * int(known.sum())
             columns["keypoint"] += keypoints[known].tolist()
@@ -79,18 +79,10 @@ def keypoint_hits(
     return pd.DataFrame(columns).astype({"image_id": int, "keypoint": int, "score": float, "hit": bool})
 
 
-def people_pairs(
+def _pairs(
     people: Annotations, found: Detections, keypoints: np.ndarray, sigmas: np.ndarray
 ) -> Iterator[tuple[int, int | None]]:
-    """Rows of detections, best first, with the row of the person they fit best; None where they fit nobody.
-
-    Parameters
-    ----------
-    people : the annotated people of one image
-    found : the detections in it; those without a keypoint of the group are left out
-    keypoints : array, shape (k,), Halpe indices of the group
-    sigmas : array, shape (k,)
-    """
+    """Rows of detections with the row of their person; None for those that fit nobody."""
     points = found.keypoints_px[:, keypoints]
     labelled = people.visibility[:, keypoints] > 0
     fit = oks(

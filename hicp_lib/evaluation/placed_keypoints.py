@@ -7,7 +7,7 @@ whether that is right. Bodies only: the 17 keypoints all detectors share.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -15,7 +15,8 @@ import pandas as pd
 from hicp_lib.annotations import Annotations
 from hicp_lib.detectors.base import Detections
 from hicp_lib.evaluation.compare import source_images
-from hicp_lib.evaluation.keypoint_hits import HIT_TERM, people_pairs
+from hicp_lib.evaluation.error_kinds import matched_people
+from hicp_lib.evaluation.keypoint_hits import HIT_TERM
 from hicp_lib.evaluation.oks import oks_terms
 from hicp_lib.keypoints import COCO_17, SIGMAS
 
@@ -31,7 +32,7 @@ def placed_keypoints(
     found: Mapping[tuple[str, str], Mapping[int, Detections]],
     source: Annotations,
 ) -> pd.DataFrame:
-    """The 17 keypoints of every detection that fits a person who counts best.
+    """The 17 keypoints of every detection matched to a person who counts (`error_kinds.matched_people`).
 
     Parameters
     ----------
@@ -53,7 +54,9 @@ def placed_keypoints(
         rows_of = pd.Series(range(len(people))).groupby(people.image_ids).indices
         for image_id, detections in run.items():
             here = people.take(rows_of[image_id])
-            for row, person in _matched(here, detections):
+            for person, row in matched_people(here, detections, COCO_17, _SIGMAS).items():
+                if here.is_crowd[person]:
+                    continue
                 true_px, state = _truth(here, person, source, source_row)
                 part = _row_per_keypoint(here, person, detections, row, true_px, state)
                 labels = {"subset": subset, "detector": detector, "image_id": image_id}
@@ -62,12 +65,6 @@ def placed_keypoints(
     order = ["subset", "detector", "image_id", "source_image", "cut_side"]
     table = pd.concat(parts, ignore_index=True)
     return table[[*order, *table.columns.drop(order)]]
-
-
-def _matched(people: Annotations, detections: Detections) -> Iterator[tuple[int, int]]:
-    for row, person in people_pairs(people, detections, COCO_17, _SIGMAS):
-        if person is not None and not people.is_crowd[person]:
-            yield row, person
 
 
 def _truth(

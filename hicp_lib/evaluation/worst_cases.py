@@ -2,7 +2,8 @@
 
 - *Surest mistakes*: people for whom the scores of wrong keypoints (inversion, swap or miss), added up, are
   highest.
-- *Overlooked*: people with the most visible keypoints of whom nothing was found.
+- *Overlooked*: people with the most visible keypoints whom no detection fits (an OKS of .1 is asked for; a
+  body found with left and right exchanged throughout may not reach it).
 
 Equal cases follow in the order of their ids; of each source image only the worst case counts.
 """

@@ -62,7 +62,8 @@ def class_precision(table: pd.DataFrame, note: str) -> Figure:
     for axis, group in zip(axes[0], groups, strict=True):
         for k, detector in enumerate(detectors):
             part = rows[(rows["group"] == group) & (rows["detector"] == detector)]
-            y = part["class"].map(names.index) + 0.24 * (k - (len(detectors) - 1) / 2)
+            y = np.array([names.index(name) for name in part["class"]])
+            y = y + 0.24 * (k - (len(detectors) - 1) / 2)
             _dots(axis, part, y, detector)
         people = rows[rows["group"] == group].drop_duplicates("class").set_index("class")
         few = people.index[people["value"].isna()]
@@ -230,7 +231,7 @@ def gallery(
         titles.append(f"{detector}\n{case}")
     return picture_grid(
         rows, row_titles=titles, cell_in=2.3,
-        caption="The worst cases, by rule: the surest mistakes, and people overlooked although much of them "
-        f"is visible. Green: the truth (bodies); in the detector's colour: what it found. {note}.",
+        caption="The worst cases, by rule: the surest mistakes, and people whom no detection fits although "
+        f"much of them is visible. Green: the truth (bodies); in the detector's colour: what it found. {note}.",
         alt=f"Pictures of {len(cases)} cases with skeletons of truth and detection.",
     )  # fmt: skip

@@ -107,3 +107,14 @@ def test_shares_of_kinds_add_up_to_one():
     assert table.index.tolist() == list(KINDS)
     assert table["miss"] == pytest.approx(1 / 68) and table["not found"] == pytest.approx(1 / 4)
     assert table.sum() == pytest.approx(1)
+
+
+def test_a_detection_goes_to_whom_it_fits_and_not_to_those_nothing_is_known_of():
+    visibility = np.full((2, 136), 2.0)
+    visibility[0] = 0  # somebody around the person, without a labelled keypoint
+    people = make_annotations(
+        np.stack([GRID, GRID]), [0, 0], visibility=visibility, crowd=[0], extras=[{"other": True}, {}],
+        boxes_px=[[0, 0, 12_000, 12_000]] * 2,
+    )  # fmt: skip
+    surer = make_detections(np.stack([GRID + 5_000, GRID]), [0.9, 0.5])
+    assert (keypoint_errors(people, {0: surer})["kind"] == "good").all()
