@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from hicp_lib.keypoints import LEFT_HAND
 from hicp_lib.rgbd.body_measures import LEVELS, BodyMeasures, hang_together
 
-_SIGMA = 0.05  # a limb longer or shorter than people's by this share and 1 cm costs 1
-_SIGMA_FLOOR_M = 0.01
-_TOO_LONG, _TOO_SHORT = 40.0, 4.0  # the most it costs; limbs seen too short are often the detector's fault
+# A limb longer or shorter than people's by a share of its length and some more costs 1, and so on with the
+# square up to a most. Limbs of the body seen too short are often the detector's fault; hands are rigid.
+_BODY = {"share": 0.05, "more_m": 0.010, "most_long": 40.0, "most_short": 4.0}
+_HAND = {"share": 0.03, "more_m": 0.003, "most_long": 40.0, "most_short": 20.0}
 
 
 def choose_along_limbs(
@@ -53,7 +55,8 @@ def _length_costs(grid_m, rays, pair, measures: BodyMeasures) -> np.ndarray:
     squared = aa * grid_m[:, None] ** 2 + bb * grid_m**2 - 2 * ab * grid_m[:, None] * grid_m
     length_m = np.sqrt(np.maximum(squared, 0))
     least_m, most_m = measures.closest_m[tuple(pair)], measures.farthest_m[tuple(pair)]
-    sigma_m = _SIGMA * most_m + _SIGMA_FLOOR_M
+    limits = _HAND if pair[1] >= LEFT_HAND[0] else _BODY
+    sigma_m = limits["share"] * most_m + limits["more_m"]
     too_long = np.maximum(length_m - most_m, 0) / sigma_m
     too_short = np.maximum(least_m - length_m, 0) / sigma_m
-    return np.minimum(too_long**2, _TOO_LONG) + np.minimum(too_short**2, _TOO_SHORT)
+    return np.minimum(too_long**2, limits["most_long"]) + np.minimum(too_short**2, limits["most_short"])

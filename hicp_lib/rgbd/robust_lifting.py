@@ -12,6 +12,10 @@ What exact truth shows to go wrong with it, and the steps here that mend it:
   of all keypoints are chosen together, so that they cost least while limbs have lengths that people have.
   Then a joint may also lie behind what is seen, at a cost.
 
+Tried as well and left out, as they brought nothing: the mode of depth around the keypoint instead of the
+cheapest candidate, scores of the detector as weights of limbs, and the person's true size for the limbs'
+lengths instead of everybody's.
+
 Measures of people come from the body model (`body_measures`). The costs (`near_surfaces`, `limb_lengths`)
 were chosen by hand on rendered people who are in no recording of the study.
 """
@@ -83,7 +87,8 @@ def _lift_person(
     """Found keypoints of one person, (m, 3); `first_m` (m,) are the paper's depths, `below_m` of all 136."""
     middle_m = _middle_m(found, first_m)
     nearest_m, farthest_m = max(middle_m - _REACH_M, MIN_DEPTH_M), middle_m + _REACH_M
-    near_m = np.clip(np.where(np.isnan(first_m), middle_m, first_m), nearest_m, farthest_m)
+    # What is seen may be the wall: the neighbourhood is never smaller than at the person's middle.
+    near_m = np.clip(np.fmin(first_m, middle_m), nearest_m, None)
     candidates = look_around(found, pixels_px, near_m, depth_m, intrinsics, below_m)
     seen = np.flatnonzero(np.isfinite(candidates.depth_m).any(axis=1))
     candidates = candidates.take(seen)
