@@ -96,10 +96,10 @@ def _flat(triples: np.ndarray) -> list[float]:
 
 
 def write_openpose(folder: Path, found: Found, body: str = "body25", with_hands: bool = True) -> None:
-    """`--write_json`: a file per image; a part with score 0 is 0, 0, 0."""
+    """`--write_json`: a file per image; a part with score 0 is 0, 0, 0; bodies half a pixel on."""
 
-    def part(person: Person, layout: Sequence[str], extra: int = 0) -> list[float]:
-        triples = np.concatenate([person.triples(layout), np.zeros((extra, 3))])
+    def part(person: Person, layout: Sequence[str], extra: int = 0, on_px: float = 0.0) -> list[float]:
+        triples = np.concatenate([person.triples(layout) + [on_px, on_px, 0], np.zeros((extra, 3))])
         triples[triples[:, 2] == 0] = 0
         return [float(f"{value:.6g}") for value in triples.ravel()]
 
@@ -107,7 +107,7 @@ def write_openpose(folder: Path, found: Found, body: str = "body25", with_hands:
         rows = [
             {
                 "person_id": [-1],
-                "pose_keypoints_2d": part(person, LAYOUTS[body]),
+                "pose_keypoints_2d": part(person, LAYOUTS[body], on_px=0.5),
                 "face_keypoints_2d": part(person, _FACE, extra=2) if with_hands else [],
                 "hand_left_keypoints_2d": part(person, LAYOUTS["left_hand"]) if with_hands else [],
                 "hand_right_keypoints_2d": part(person, LAYOUTS["right_hand"]) if with_hands else [],
@@ -122,11 +122,11 @@ def write_openpose(folder: Path, found: Found, body: str = "body25", with_hands:
 
 
 def write_openpose_coco(path: Path, found: Found) -> None:
-    """`--write_coco_json`: flags in place of scores, -1, -1, 0 for what was not found."""
+    """`--write_coco_json`: flags in place of scores, -1, -1, 0 for what was not found; half a pixel on."""
     rows = []
     for name, people in found.items():
         for person in people:
-            triples = person.triples(COCO_17)
+            triples = person.triples(COCO_17) + [0.5, 0.5, 0]
             triples[triples[:, 2] == 0] = (-1, -1, 0)
             triples[:, 2] = triples[:, 2] > 0
             rows.append(_result(_number(name), triples, person.score))

@@ -3,6 +3,8 @@
 - The body has 25 parts (BODY_25) or 18 (COCO), told by the length of its list; face 70 and hands 21 each.
   An empty list is a part of the model that was not run; a part with confidence 0 was not found.
 - Coordinates are read as source pixels (`--keypoint_scale 0`, OpenPose's default) and refused otherwise.
+- OpenPose adds half a pixel to the body's peaks, not to those of face and hands; it is taken off, which
+  puts pixel centres at integers.
 - No score of the person is written (OpenPose's own averages parts and limbs, and limbs are not in the
   file). Here it is the sum of the body parts' confidences over the number of parts, absent ones 0;
   where no body was run, the mean confidence of what was found.
@@ -77,9 +79,11 @@ def _triples(rows: FileRows) -> tuple[np.ndarray, Counter[str], np.ndarray]:
             chosen = {i: values for i, values in lists.items() if len(values) == length}
             if chosen:
                 conventions[convention] = len(chosen)
-                triples[list(chosen)] += rows.points(key, convention, chosen)
+                points = rows.points(key, convention, chosen)
                 if key == "pose_keypoints_2d":
                     n_parts[list(chosen)] = length // 3
+                    points[..., :2] -= OPENPOSE.offset_px * (points[..., 2:] > 0)
+                triples[list(chosen)] += points
     return triples, conventions, n_parts
 
 

@@ -11,6 +11,7 @@ All have `image_id, category_id, keypoints, score`; what each tool does its own 
   Keypoint scores of its regression models run far below those of its heat maps (0.05 against 0.4 is
   where its own drawings begin).
 - OpenPose's `--write_coco_json`: the body's 17, found (1) or not (0), and the number in the file name.
+  They are half a pixel above pixel centres at integers, which is taken off.
 
 Sources: the COCO results format, and the writers of Detectron2 (`coco_evaluation.py`), AlphaPose
 (`pPose_nms.py`) and OpenPose (`cocoJsonSaver.cpp`).
@@ -44,6 +45,7 @@ class Dialect:
     named_by : what a number as `image_id` is, see `People`
     absent : a keypoint is not given when all three numbers are 0, or when its score is not positive
     categories : ids that mean a person
+    offset_px : what its coordinates exceed those with pixel centres at integers by
     """
 
     tool: str
@@ -51,13 +53,14 @@ class Dialect:
     named_by: Literal["id", "number"] = "id"
     absent: Literal["zeros", "score"] = "score"
     categories: tuple[int, ...] = (1,)
+    offset_px: float = 0.0
 
 
 COCO = Dialect("COCO", "results.json", absent="zeros")
 # Without a registered COCO data set, Detectron2 counts its only class, the person, as 0.
 DETECTRON2 = Dialect("Detectron2", "coco_instances_results.json", categories=(1, 0))
 ALPHAPOSE = Dialect("AlphaPose", "alphapose-results.json", named_by="number")
-OPENPOSE = Dialect("OpenPose", "coco.json", named_by="number")
+OPENPOSE = Dialect("OpenPose", "coco.json", named_by="number", offset_px=0.5)
 
 
 def read_results(path: Path, dialect: Dialect) -> People:
@@ -79,8 +82,8 @@ def read_results(path: Path, dialect: Dialect) -> People:
     given = triples[..., 2] > 0 if dialect.absent == "score" else (triples != 0).any(axis=-1)
     keypoints, scores = split(triples, given)
     return People(
-        path, dialect.named_by, sources, source_of, keypoints, scores, rows.numbers("score"),
-        Counter(rows.conventions()), rows.extras(_KNOWN_KEYS),
+        path, dialect.named_by, sources, source_of, keypoints - dialect.offset_px, scores,
+        rows.numbers("score"), Counter(rows.conventions()), rows.extras(_KNOWN_KEYS),
     )  # fmt: skip
 
 

@@ -85,7 +85,19 @@ def test_feet_grouped_per_foot_become_interleaved(tmp_path, images):
         # Halpe: big toes 20, 21, small toes 22, 23, heels 24, 25, left first.
         assert np.allclose(xy[20:26], person.points_px[20:26], rtol=6e-6)
     first = json.loads(next((tmp_path / "openpose").iterdir()).read_text())["people"][0]["pose_keypoints_2d"]
-    assert np.allclose(first[3 * 20 : 3 * 20 + 2], xy[22], rtol=6e-6)  # BODY_25's 20: left small toe
+    small_toe = np.subtract(first[3 * 20 : 3 * 20 + 2], 0.5)  # BODY_25's 20: the left one
+    assert np.allclose(small_toe, xy[22], rtol=6e-6)
+
+
+def test_openpose_bodies_lie_half_a_pixel_on(tmp_path, images):
+    # Found at the centre of pixel (100, 50): OpenPose writes (100.5, 50.5) for bodies, (100, 50) for hands.
+    person = make_person(points_px=np.tile([100.0, 50.0], (136, 1)))
+    write_openpose(tmp_path / "o", {NAMES[785]: [person]})
+    written = json.loads(next((tmp_path / "o").iterdir()).read_text())["people"][0]
+    assert written["pose_keypoints_2d"][:2] == [100.5, 50.5]
+    assert written["hand_left_keypoints_2d"][:2] == [100.0, 50.0]
+    xy = import_predictions("openpose", tmp_path / "o", images).detections[785].keypoints_px[0]
+    assert (xy[np.isfinite(xy).all(axis=-1)] == [100.0, 50.0]).all()
 
 
 def test_detectron2_has_its_pixel_centres_at_integers(tmp_path, images):
