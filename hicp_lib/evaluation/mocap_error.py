@@ -138,8 +138,8 @@ def median_errors(
 
 def fractions_within(
     errors: pd.DataFrame,
-    thresholds_m: Sequence[float] = THRESHOLDS_M,
     min_score: float = 0.1,
+    thresholds_m: Sequence[float] = THRESHOLDS_M,
     n_resamples: int = 1000,
     seed: int = 0,
 ) -> pd.DataFrame:

@@ -16,6 +16,7 @@ import pandas as pd
 from hicp_lib.detectors.base import Detections
 from hicp_lib.detectors.run import detect_images
 from hicp_lib.errors import InputError
+from hicp_lib.evaluation.lifting_ablation import lifting_ablation
 from hicp_lib.evaluation.mocap_error import MIN_SCORES, POSITION, TABLE_JOINTS, marker_means, mocap_errors
 from hicp_lib.evaluation.sight import lines_of_sight
 from hicp_lib.evaluation.stability import position_array
@@ -196,6 +197,12 @@ def errors_at_joints(
     reference = marker_means(mocap, stamps_s, T_base_mocap)
     errors = mocap_errors(points, reference, read_truth(recording))
     return errors.merge(lines_of_sight(recording, reference), on=["frame", "keypoint"])
+
+
+def ablation(recording: Recording, found: Mapping[str, Sequence[Detections]]) -> pd.DataFrame | None:
+    """`lifting_ablation` of the first detector's keypoints; None where no true positions are known."""
+    truth = read_truth(recording)
+    return None if truth is None else lifting_ablation(recording, next(iter(found.values())), truth)
 
 
 def _from_clicks(

@@ -11,18 +11,16 @@ from hicp_lib.evaluation.mocap_error import JOINTS, TABLE_JOINTS
 from hicp_lib.rgbd.synchronisation import ClockOffset
 
 _CASE = ["detector", "method"]
+_HALVES = ("first half", "second half")
 _MARKS = {"n_points": "markers", "rms_m": "residual [mm]", "leave_one_out_m": "leave-one-out [mm]"}
 _AGAINST_TRUTH = {"turned_rad": "turned [°]", "added_m": "added [mm]", "worst_m": "at most [mm]"}
 
 
 def clock_text(clock: ClockOffset) -> pd.DataFrame:
-    """The offset of the whole recording and of its halves, in seconds."""
-    offsets = {
-        "whole recording": clock.offset_s,
-        "first half": clock.halves_s[0],
-        "second half": clock.halves_s[1],
-    }
-    return pd.DataFrame(offsets.items(), columns=["from", "offset [s]"])
+    """The offset of the whole recording, with the correlation there, and of its halves."""
+    rows = [("whole recording", clock.offset_s, clock.correlation)]
+    rows += [(part, value, np.nan) for part, value in zip(_HALVES, clock.halves_s, strict=True)]
+    return pd.DataFrame(rows, columns=["from", "offset [s]", "correlation"])
 
 
 def beside_paper(medians: pd.DataFrame, paper: pd.DataFrame, min_score: float) -> pd.DataFrame:

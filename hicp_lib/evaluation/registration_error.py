@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -53,20 +53,25 @@ def compare_registrations(
 
 
 def marker_pixels(
-    recording: Recording, mocap: MotionCapture, registrations: Sequence[Registration], frames: Sequence[int],
+    recording: Recording,
+    mocap: MotionCapture,
+    registrations: Sequence[Registration],
+    frames: Iterable[int],
     offset_s: float = 0.0,
-) -> pd.DataFrame:  # fmt: skip
+) -> pd.DataFrame:
     """Where each registration puts the measured markers in images.
 
     Parameters
     ----------
+    frames : of the images; a number may come more than once
     offset_s : to add to the motion capture's stamps to have them on the camera's clock
 
     Returns
     -------
     DataFrame, columns `method, frame, marker, u_px, v_px`; NaN where a marker was not measured
     """
-    measured_m = interpolate_mocap(mocap.times_s, mocap.points_m, recording.times_s[list(frames)] - offset_s)
+    frames = sorted(set(frames))
+    measured_m = interpolate_mocap(mocap.times_s, mocap.points_m, recording.times_s[frames] - offset_s)
     tables = []
     for one in registrations:
         for frame, points_m in zip(frames, measured_m, strict=True):
