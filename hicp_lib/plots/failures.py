@@ -232,6 +232,6 @@ def gallery(
     return picture_grid(
         rows, row_titles=titles, cell_in=2.3,
         caption="The worst cases, by rule: the surest mistakes, and people whom no detection fits although "
-        f"much of them is visible. Green: the truth (bodies); in the detector's colour: what it found. {note}.",
+        f"much of them is visible. Green: the truth (bodies); the detector's colour: what it found. {note}.",
         alt=f"Pictures of {len(cases)} cases with skeletons of truth and detection.",
     )  # fmt: skip

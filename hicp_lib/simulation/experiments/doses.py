@@ -6,7 +6,7 @@ picture is of one dose at one level:
 - "distance": of the camera, in metres. The lens is fixed, so a near camera sees less of the person.
 - "light": a share of the laboratory's. The camera makes up for it by amplification: shot noise grows with
   the root of the missing light, read noise in proportion.
-- "hidden": a board stands half a metre before the person and hides this share of their height, from below.
+- "hidden": a board, out of reach before the person, hides this share of their height from below.
 - "resolution": height of the picture in pixels, of the same view, by down-sampling.
 - "upper part", "lower part": the share of the person's height that the picture shows, from the head down
   and from the feet up; cut from the same picture.
@@ -53,7 +53,7 @@ LEVELS: dict[str, tuple[float, ...]] = {
 }
 DISTANCE_M, EYE_M = 2.5, 1.3
 _WIDTH_PX, _HEIGHT_PX, _FOCAL_PX = 480, 640, 560.0
-_PERSON_Y_M, _BOARD_M, _BOARD_HALF_M = 1.2, 0.5, 0.6
+_PERSON_Y_M, _BOARD_M, _BOARD_HALF_M = 1.2, 0.85, 0.6
 _SIDE_MARGIN = 0.1  # of the person's height, left and right of a cut-out part
 _POSES = ("standing", "reaching", "reaching_both", "pointing", "raised", "hips")
 
