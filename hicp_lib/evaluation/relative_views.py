@@ -13,6 +13,7 @@ import pandas as pd
 
 from hicp_lib.detectors.base import Detections
 from hicp_lib.detectors.run import detect_images
+from hicp_lib.errors import InputError
 from hicp_lib.rgbd.experiments import open_experiment
 from hicp_lib.rgbd.keypoints3d import lift_recording
 from hicp_lib.rgbd.recording import Recording, read_joints, read_simulation, read_truth
@@ -78,14 +79,24 @@ def detect_views(
 def lift_views(
     views: Mapping[str, Recording], found: Found, methods: Sequence[str] = METHODS
 ) -> pd.DataFrame:
-    """Everything lifted by every method: columns `view, detector, method` and those of `lift_recording`."""
+    """Everything lifted by every method: columns `view, detector, method` and those of `lift_recording`.
+
+    Raises
+    ------
+    InputError
+        If no detector found anybody in any view, or a depth image cannot be read.
+    """
     tables = []
     for (view, detector), detections in found.items():
         for method in methods:
             table = lift_recording(views[view], detections, method=method)
             labels = {"view": view, "detector": detector, "method": method}
             tables.append(table.assign(**labels)[[*labels, *table.columns]])
-    return pd.concat(tables, ignore_index=True)
+    points = pd.concat(tables, ignore_index=True)
+    if points.empty:
+        folders = ", ".join(str(recording.folder) for recording in views.values())
+        raise InputError(f"{folders}: no detector found anybody in any image; record a person in view")
+    return points
 
 
 def true_positions(views: Mapping[str, Recording]) -> dict[str, pd.DataFrame] | None:

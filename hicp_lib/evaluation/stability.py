@@ -6,13 +6,14 @@ truth, and a detector that is always wrong in the same way is stable. *Accuracy*
 position, which simulated recordings have.
 
 Throughout, `points` is the table of `hicp_lib.rgbd.keypoints3d.lift_recording` with the columns `view`,
-`detector` and `method` before its own, and `n_frames` maps a view to its number of images. The person with
-the best score of each image counts; a keypoint counts as found when its score is above `min_score` and it
-could be lifted.
+`detector` and `method` before its own, and `n_frames` maps every view to its number of images. The person
+with the best score of each image counts; a keypoint counts as found when its score is above `min_score`
+and it could be lifted.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -147,13 +148,15 @@ def _cases(
         detector: {name.split()[1] for name in PARTS if set(PARTS[name]) & set(rows["keypoint"])}
         for detector, rows in points.groupby("detector", sort=False)
     }
-    for case, rows in points.groupby(CASE, sort=False):
-        view, detector, _ = case
-        rows = counted(rows, min_score)
+    found = dict(list(counted(points, min_score).groupby(CASE, sort=False)))
+    runs = points[["detector", "method"]].drop_duplicates().itertuples(index=False, name=None)
+    for (view, n), (detector, method) in itertools.product(n_frames.items(), runs):
+        # A detector that finds nobody in a view has no rows there, and is counted all the same.
+        rows = found.get((view, detector, method), points[:0])
         for part, keypoints in PARTS.items():
             if part.split()[1] in given[detector]:
-                true = None if truth is None else position_array(truth[view], keypoints, n_frames[view])
-                yield case, part, position_array(rows, keypoints, n_frames[view]), true
+                true = None if truth is None else position_array(truth[view], keypoints, n)
+                yield (view, detector, method), part, position_array(rows, keypoints, n), true
 
 
 def _median_position(found_m: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -9,8 +9,8 @@ import pandas as pd
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from hicp_lib.detectors.base import Detections
-from hicp_lib.keypoints import HANDS, INDEX, LIMBS, N_KEYPOINTS
 from hicp_lib.plots.people import draw_people, picture_grid
+from hicp_lib.plots.skeleton import BODY_LIMBS, HAND_LIMBS, limb_lines
 from hicp_lib.plots.style import Figure, detector_colour, in_style, in_words, legend_entries, new_figure
 from hicp_lib.rgbd.recording import Recording, read_rgb
 
@@ -74,7 +74,8 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
     medians : table of `hicp_lib.evaluation.stability.median_positions`, one method
     truth : view -> table with `keypoint, x_m, y_m, z_m`; None where it is not known
     """
-    medians = medians[medians["n"] >= MIN_IMAGES]
+    fewest = min(MIN_IMAGES, medians["n"].max())
+    medians = medians[medians["n"] >= fewest]
     views = list(dict.fromkeys(medians["view"]))
     figure, axes = new_figure(len(views), 3, 10.5, 3.1 * len(views) + 0.4, squeeze=False)
     limits = {name: (medians[name].min() - 0.05, medians[name].max() + 0.05) for name in _AXES}
@@ -93,7 +94,7 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
     figure.legend(*legend_entries(axes), loc="outside lower center", ncols=4, fontsize=9)
     caption = (
         "Median skeletons: coordinate-wise median over the images of every keypoint that was found in at "
-        f"least {MIN_IMAGES}, in the robot's base frame (x backward, y to its right, z up)"
+        f"least {fewest}, in the robot's base frame (x backward, y to its right, z up)"
         f"{'; dashed: the true skeleton' if truth is not None else ''}: {note}."
     )
     counts = medians.groupby(["detector", "view"], sort=False).size()
@@ -104,13 +105,9 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
 
 
 def _draw_skeleton(axis, rows: pd.DataFrame, columns: tuple[str, str], colour, style, label) -> None:
-    points = np.full((N_KEYPOINTS, 2), np.nan)
-    rows = rows.drop_duplicates("keypoint")  # of a table with many frames, the first
-    points[rows["keypoint"].map(INDEX)] = rows[list(columns)]
-    for a, b in LIMBS:
-        width = 0.7 if a in HANDS else 1.6
-        axis.plot(*points[[a, b]].T, style, color=colour, lw=width, alpha=0.9, label=label)
-        label = None
+    pen = {"color": colour, "linestyle": style, "alpha": 0.9}
+    axis.plot(*limb_lines(rows, columns, BODY_LIMBS).T, lw=1.6, label=label, **pen)
+    axis.plot(*limb_lines(rows, columns, HAND_LIMBS).T, lw=0.7, **pen)
 
 
 @in_style
@@ -119,7 +116,8 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
 
     `table` from `hicp_lib.evaluation.stability.spread_and_bias` with truth, of which `method` is drawn.
     """
-    table = table[(table["method"] == method) & (table["n_images"] >= MIN_IMAGES) & table["bias_m"].notna()]
+    table = table[table["method"] == method]
+    table = table[table["n_images"] >= min(MIN_IMAGES, table["n_images"].max())]
     views = list(dict.fromkeys(table["view"]))
     figure, axes = new_figure(
         1, len(views), max(4.6 * len(views), 6), 4.9, sharex=True, sharey=True, squeeze=False
@@ -158,8 +156,8 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
 
 
 def _plain_ticks(axis) -> None:
-    """Ticks of a logarithmic axis at 1, 2 and 5, written as plain numbers."""
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    """Ticks of a logarithmic axis at 1, 2, 3 and 5, written as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
     axis.set_major_formatter("{x:g}")
     axis.set_minor_formatter(NullFormatter())
 

@@ -13,7 +13,8 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from hicp_lib.keypoints import INDEX, LIMBS, N_KEYPOINTS
+from hicp_lib.evaluation.stability import POSITION
+from hicp_lib.plots.skeleton import limb_lines
 from hicp_lib.plots.style import detector_colour, in_words
 from hicp_lib.rgbd.camera import Intrinsics, deproject, transform
 from hicp_lib.rgbd.recording import Recording, read_depth_m, read_rgb
@@ -53,9 +54,9 @@ def scene(
         traces.append(_line(lines, f"cameras ({view})", styles[view][0], 1))
     for (view, detector), rows in medians.groupby(["view", "detector"], sort=False):
         colour, (_, dash) = detector_colour(detector), styles[view]
-        traces.append(_line(_limbs(rows), f"{detector} ({view})", colour, 6, dash))
+        traces.append(_line(limb_lines(rows, POSITION), f"{detector} ({view})", colour, 6, dash))
     if truth is not None:
-        traces.append(_line(_limbs(truth[first]), "true skeleton", TRUTH_COLOUR, 3))
+        traces.append(_line(limb_lines(truth[first], POSITION), "true skeleton", TRUTH_COLOUR, 3))
     figure = go.Figure(traces)
     axes = {f"{axis}axis": {"title": f"{axis} [m]", "backgroundcolor": "#FAFAFA"} for axis in "xyz"}
     figure.update_layout(
@@ -106,16 +107,6 @@ def _frusta(intrinsics: Intrinsics, T_base_cam: np.ndarray) -> np.ndarray:
     outline = [*corners, corners[0], apex, corners[1], corners[2], apex, corners[3]]
     lines = np.concatenate([outline, _PEN_UP])
     return transform(T_base_cam, lines).reshape(-1, 3)
-
-
-def _limbs(rows: pd.DataFrame) -> np.ndarray:
-    """Lines of a skeleton's limbs whose both ends are known, shape (n, 3)."""
-    points = np.full((N_KEYPOINTS, 3), np.nan)
-    rows = rows.drop_duplicates("keypoint")  # of a table with many frames, the first
-    points[rows["keypoint"].map(INDEX)] = rows[["x_m", "y_m", "z_m"]]
-    limbs = points[np.array(LIMBS)]
-    limbs = limbs[np.isfinite(limbs).all(axis=(1, 2))]
-    return np.concatenate([limbs, np.full((len(limbs), 1, 3), np.nan)], axis=1).reshape(-1, 3)
 
 
 def describe(figure: go.Figure) -> str:

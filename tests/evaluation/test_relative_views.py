@@ -71,6 +71,12 @@ def test_everything_found_is_lifted_by_every_method(lab, monkeypatch):
     np.testing.assert_allclose(at, [[0, 0, 1], [0.2, -0.2, 1]], atol=0.011)  # half a pixel is 1 cm there
 
 
+def test_recordings_of_nobody_are_refused(lab):
+    views = relative_views.open_views(str(lab / "a/still"))
+    with pytest.raises(InputError, match="still: no detector found anybody in any image"):
+        relative_views.lift_views(views, {("still", "mediapipe"): [Detections.none()] * 2})
+
+
 def test_truth_joints_and_simulation_are_known_only_where_they_are(lab):
     views = relative_views.open_views(str(lab / "a/still"), str(lab / "b/still"))
     first = next(iter(views.values())).folder
