@@ -38,6 +38,14 @@ def test_a_good_recording_is_told_so(capsys, small):
     assert capsys.readouterr().out == f"ok   {small}: 4 frames in 0.3 s\n"
 
 
+def test_a_simulated_recording_is_one(capsys, tmp_path):
+    out = tmp_path / "out"
+    simulate = ["record", "simulate", "relative-lower", str(out), "--n-frames", "1", "--workers", "1"]
+    assert cli.run(simulate) == 0
+    assert capsys.readouterr().out == f"{out}: 1 frames\n"
+    assert cli.run(["record", "check", str(out)]) == 0
+
+
 def test_findings_are_told_one_a_line(capsys, small):
     (small / "depth/000001.png").unlink()
     (small / "camera.json").unlink()
@@ -52,6 +60,8 @@ def test_notes_do_not_fail(capsys, small):
     assert cli.run(["record", "check", str(small)]) == 0
     note, ok = capsys.readouterr().out.splitlines()
     assert note.startswith("note ") and ok.startswith("ok ") and "3 frames" in ok
+
+
 def test_lift_needs_a_recording(capsys, tmp_path):
     arguments = ["lift", "--recording", str(tmp_path), "--detector", "mediapipe", "--out", "k.parquet"]
     assert cli.run(arguments) == 2

@@ -107,7 +107,7 @@ def import_open3d(
 def import_bag(bag: str | Path, out: str | Path, poses: PoseSource) -> int:
     """Import a `.bag` recorded by the RealSense viewer or SDK; depth is aligned to colour on the way.
 
-    Times are those of the file, in seconds.
+    Times are those of the file, in seconds; colour is stored as JPEG of high quality.
 
     Returns
     -------

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hicp_lib.errors import InputError
+from hicp_lib.rgbd.qualisys import MotionCapture, write_tsv
 from hicp_lib.rgbd.recording import open_recording
 from hicp_lib.rgbd.recording_check import check_recording
 
@@ -88,6 +89,38 @@ def test_several_damages_are_all_told(small):
     assert len(check_recording(small)) == 3
     with pytest.raises(InputError):
         open_recording(small)
+
+
+def write_mocap(small, start_s=99.5, duration_s=1.3):
+    """Motion capture that covers the recording's images, 100.0 to 100.3 s; marker "wrist" is never seen."""
+    times_s = start_s + np.arange(0, duration_s, 0.01)
+    points_m = np.ones((len(times_s), 2, 3))
+    points_m[:, 1] = np.nan
+    write_tsv(small / "mocap.tsv", MotionCapture(times_s, ("elbow", "wrist"), points_m, 100.0))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ({}, []),
+        ({"start_s": 0.0}, ["does not overlap with the images in time"]),
+        ({"start_s": 100.0, "duration_s": 0.1}, ["lasts 0.09 s, the images 0.30 s"]),
+    ],
+)
+def test_motion_capture_is_looked_at(small, arguments, expected):
+    write_mocap(small, **arguments)
+    *others, never = check_recording(small)
+    assert "wrist never seen (1 of 2 markers)" in str(never) and not never.is_fatal
+    assert len(others) == len(expected)
+    assert all(
+        text in str(finding) and not finding.is_fatal for text, finding in zip(expected, others, strict=True)
+    )
+
+
+def test_motion_capture_that_is_none_is_told(small):
+    (small / "mocap.tsv").write_text("not motion capture")
+    (finding,) = check_recording(small)
+    assert "mocap.tsv" in str(finding) and finding.is_fatal
 
 
 def test_a_folder_that_is_none(tmp_path):
