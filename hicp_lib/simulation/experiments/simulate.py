@@ -121,6 +121,8 @@ def _prepare(out: Path, stamp: dict) -> None:
         return
     for folder in ("rgb", "depth", EXACT_DEPTH_DIR, PARTS_DIR):
         shutil.rmtree(out / folder, ignore_errors=True)
+    for kind in (".tsv", ".c3d"):
+        (out / MOCAP_FILE).with_suffix(kind).unlink(missing_ok=True)
     write_json(stamp_file, stamp)
 
 

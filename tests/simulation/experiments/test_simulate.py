@@ -126,10 +126,11 @@ def test_what_another_seed_made_is_dropped(lower, tmp_path, monkeypatch):
     blank = np.zeros((480, 640, 3), np.uint8)
     truth = json.loads((out / ".frames" / "000000.json").read_text())
     fake = blank, np.ones((480, 640)), np.ones((480, 640)), truth
+    (out / "mocap.tsv").write_text("of another scenario")
     monkeypatch.setattr(simulate, "record_frame", lambda *job: fake)
     simulate_recording(out, "relative-lower", n_frames=1, seed=5, workers=1, progress=False)
     assert read_image(out / "rgb" / "000000.jpg").max() == 0
-    assert not (out / "rgb" / "000001.jpg").exists()
+    assert not (out / "rgb" / "000001.jpg").exists() and not (out / "mocap.tsv").exists()
 
 
 @pytest.mark.parametrize(
