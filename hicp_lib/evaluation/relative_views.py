@@ -84,7 +84,7 @@ def lift_views(
     Raises
     ------
     InputError
-        If no detector found anybody in any view, or a depth image cannot be read.
+        If no keypoint was found and lifted in any view, or a depth image cannot be read.
     """
     tables = []
     for (view, detector), detections in found.items():
@@ -93,9 +93,11 @@ def lift_views(
             labels = {"view": view, "detector": detector, "method": method}
             tables.append(table.assign(**labels)[[*labels, *table.columns]])
     points = pd.concat(tables, ignore_index=True)
-    if points.empty:
+    if points["x_m"].isna().all():
         folders = ", ".join(str(recording.folder) for recording in views.values())
-        raise InputError(f"{folders}: no detector found anybody in any image; record a person in view")
+        raise InputError(
+            f"{folders}: nobody was found and lifted in any image; record people in view, with depth"
+        )
     return points
 
 

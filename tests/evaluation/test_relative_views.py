@@ -73,7 +73,7 @@ def test_everything_found_is_lifted_by_every_method(lab, monkeypatch):
 
 def test_recordings_of_nobody_are_refused(lab):
     views = relative_views.open_views(str(lab / "a/still"))
-    with pytest.raises(InputError, match="still: no detector found anybody in any image"):
+    with pytest.raises(InputError, match="still: nobody was found and lifted in any image"):
         relative_views.lift_views(views, {("still", "mediapipe"): [Detections.none()] * 2})
 
 
