@@ -1,0 +1,59 @@
+"""The runs of avoidance for reading: short tables, captions and the numbers the book's prose takes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.simulation.experiments.avoidance_runs import IDEAL, NO_AVOIDANCE, PUBLISHED_GAINS, Run
+from hicp_lib.simulation.experiments.avoidance_runs import TRUE_KEYPOINTS as TRUE
+
+
+def of_animation(run: Run, note: str) -> tuple[str, str]:
+    """Caption and alt text of a run's animation."""
+    job, nearest_cm = run.job, 100 * run.cycles["distance_m"].min()
+    caption = (
+        f"{job.trial.script}, {job.condition}, in real time: the image the robot last took, and robot and "
+        f"person in space, threatened taxels red. Data: {note}."
+    )
+    alt = (
+        f"Animation: a person comes near the robot's left hand, the arm gives way and comes back. They come "
+        f"no nearer than {nearest_cm:.1f} cm."
+    )
+    return caption, alt
+
+
+def losses(metrics: pd.DataFrame) -> pd.DataFrame:
+    """Per script and detector: share of images in which the person was found while near, longest loss."""
+    rows = metrics[~metrics["detector"].isin(IDEAL)]
+    columns = ["script", "detector", "seen_share", "blind_s", "reaction_s", "min_distance_m"]
+    return rows[columns].rename(columns={"seen_share": "value"}).reset_index(drop=True)
+
+
+def error_table(errors: pd.DataFrame) -> pd.DataFrame:
+    """Number of sure keypoints in space, median and 95th percentile of their errors (metres)."""
+    by = errors.groupby(["detector", "script"])["error_m"]
+    table = pd.DataFrame({"keypoints": by.size(), "value": by.median(), "percentile_95_m": by.quantile(0.95)})
+    return table.reset_index()
+
+
+def values(metrics: pd.DataFrame, verdicts: pd.DataFrame) -> dict[str, object]:
+    """Numbers for the prose; None for what did not happen."""
+    by = {name: rows for name, rows in metrics.groupby("detector")}
+    enough = verdicts[~verdicts["detector"].isin(IDEAL)]
+    return {
+        "min_distance_m_no_avoidance": _number(by[NO_AVOIDANCE]["min_distance_m"].max()),
+        "min_distance_m_ground_truth": _number(by[TRUE]["min_distance_m"].min()),
+        "min_distance_m_published_gains": _number(by[PUBLISHED_GAINS]["min_distance_m"].min()),
+        "back_s_ground_truth": _number(by[TRUE]["back_s"].max()),
+        "idle_error_m": _number(metrics["idle_error_m"].max()),
+        "false_retreats": int(metrics.loc[~metrics["detector"].isin(IDEAL), "false_retreats"].sum()),
+        "enough": [f"{row.script}: {row.detector}" for row in enough[enough["enough"]].itertuples()],
+        "not_enough": [
+            f"{row.script}: {row.detector} ({row.why})" for row in enough[~enough["enough"]].itertuples()
+        ],
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

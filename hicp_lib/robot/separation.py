@@ -1,0 +1,64 @@
+"""Separation by ISO/TS 15066: how far a person and a moving robot must be for the robot to stop in time.
+
+`S = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z_d + Z_r` {cite}`iso15066`: what the person covers until
+the robot stands, what the robot covers while it reacts and while it brakes evenly, how far the person's
+body gets before it is noticed, and how uncertain the places of both are. A yardstick for drawing only:
+nothing in this project is a safety function.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pandas as pd
+
+HUMAN_SPEED_M_S = 1.6
+"""How fast a person is taken to be when nobody measures it."""
+
+
+@dataclass(frozen=True)
+class Separation:
+    """The terms of the protective separation distance; metres, seconds.
+
+    Attributes
+    ----------
+    human_m_s, robot_m_s : speeds towards each other
+    reaction_s : T_r, from what happens to the robot's reaction
+    stopping_s : T_s, from there to standstill
+    intrusion_m : C
+    human_uncertainty_m, robot_uncertainty_m : Z_d and Z_r
+    """
+
+    robot_m_s: float
+    reaction_s: float
+    stopping_s: float
+    human_uncertainty_m: float
+    robot_uncertainty_m: float = 0.0
+    intrusion_m: float = 0.0
+    human_m_s: float = HUMAN_SPEED_M_S
+
+    def terms_m(self) -> dict[str, float]:
+        """The summands in metres, by what they stand for."""
+        return {
+            "person, until the robot stands": self.human_m_s * (self.reaction_s + self.stopping_s),
+            "robot, while it reacts": self.robot_m_s * self.reaction_s,
+            "robot, while it brakes": self.robot_m_s * self.stopping_s / 2,
+            "intrusion": self.intrusion_m,
+            "uncertainty of the person's place": self.human_uncertainty_m,
+            "uncertainty of the robot's place": self.robot_uncertainty_m,
+        }
+
+    @property
+    def distance_m(self) -> float:
+        """The sum: nearer than this the robot would have to be stopping already."""
+        return sum(self.terms_m().values())
+
+
+def separation_table(separations: dict[str, Separation]) -> pd.DataFrame:
+    """A row per term and what it is computed for: columns `detector`, `term`, `value` (metres)."""
+    rows = [
+        {"detector": name, "term": term, "value": value}
+        for name, separation in separations.items()
+        for term, value in (separation.terms_m() | {"sum": separation.distance_m}).items()
+    ]
+    return pd.DataFrame(rows)

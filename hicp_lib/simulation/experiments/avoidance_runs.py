@@ -1,0 +1,204 @@
+"""Runs of the closed loop, one per script and condition: simulated in parallel, kept in the cache.
+
+A run is kept under a key of all it depends on: trial, condition, delay, the detector's settings and
+weights, and the code and data of simulation, lifting, robot and detectors.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pandas as pd
+
+from hicp_lib.detectors.base import Detections
+from hicp_lib.detectors.cache import identity
+from hicp_lib.detectors.registry import make_detector
+from hicp_lib.errors import InputError
+from hicp_lib.files import atomic_path, cache_dir, read_json, write_json
+from hicp_lib.keypoints import N_KEYPOINTS
+from hicp_lib.provenance import DATA_DIR, LIBRARY_DIR, digest, files_sha256, machine
+from hicp_lib.robot.controller import PUBLISHED
+from hicp_lib.robot.home import home_posture
+from hicp_lib.robot.kinematics import load_icub
+from hicp_lib.simulation.experiments.closed_loop import NECK_RAD, Trial, TrueKeypoints, simulate
+from hicp_lib.simulation.experiments.head_camera import DetectorEyes, Sight, perceived, photograph
+from hicp_lib.simulation.experiments.reaching import in_root, script
+from hicp_lib.simulation.scenes import worker_pool
+
+NO_AVOIDANCE, TRUE_KEYPOINTS = "no avoidance", "ground truth"
+PUBLISHED_GAINS = "ground truth, published gains"
+IDEAL = (NO_AVOIDANCE, TRUE_KEYPOINTS, PUBLISHED_GAINS)
+"""Conditions without a detector; every other condition is a detector's name."""
+
+_LIBRARY_PATTERNS = ("simulation/**/*.py", "robot/*.py", "rgbd/*lifting.py", "rgbd/camera.py", "keypoints.py")
+_DATA_PATTERNS = ("body*", "icub*.json")
+_SHOWN_PX = (320, 240)  # kept images are for looking at
+_TIMED_AT_S = (0.3, 1.7, 3.0)
+_ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run: `condition` is one of `IDEAL` or a detector's name."""
+
+    trial: Trial
+    condition: str
+    delay_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What happened in a run.
+
+    Attributes
+    ----------
+    job : what was run
+    cycles : a row per control period, see `closed_loop.simulate`
+    frames : a row per image: `t_s`, `jpeg` (bytes), and as flat lists `keypoints_px`, `scores` and
+        `keypoints_m` (root frame) of all people, and `truth_m` of the one there is
+    """
+
+    job: Job
+    cycles: pd.DataFrame
+    frames: pd.DataFrame
+
+
+def run_all(jobs: Iterable[Job]) -> list[Run]:
+    """The runs of all jobs, in their order; what is not in the cache is simulated on all cores."""
+    jobs = list(jobs)
+    missing = [job for job in jobs if not (_folder(job) / "cycles.parquet").is_file()]
+    # The longest first, so that no core is left with one at the end.
+    missing.sort(key=lambda job: job.condition in IDEAL)
+    if len(missing) > 1:
+        with worker_pool(min(len(missing), os.cpu_count() or 1)) as pool:
+            pool.map(_simulate_and_keep, missing, chunksize=1)
+    else:
+        list(map(_simulate_and_keep, missing))
+    return [_read(job) for job in jobs]
+
+
+def of_condition(runs: Iterable[Run], condition: str) -> list[Run]:
+    """The runs of one condition, a script each."""
+    return [run for run in runs if run.job.condition == condition]
+
+
+def choose(runs: Iterable[Run], name: str, condition: str) -> Run:
+    """The run of a script under a condition; the first of the condition if the script was not run.
+
+    Raises
+    ------
+    InputError
+        If there is no run of the condition.
+    """
+    found = sorted(of_condition(runs, condition), key=lambda run: run.job.trial.script != name)
+    if not found:
+        raise InputError(f"no run of {condition!r}; add it to the detectors")
+    return found[0]
+
+
+def measured_delay_s(name: str, seed: int = 0) -> float:
+    """From image to keypoints in space on this machine: detector and lifting, in seconds.
+
+    The least of a few rounds' medians over some of the scripts' images, measured once and kept. Of wall time
+    and processor time the lesser counts: on a machine that is busy otherwise the second one is nearer to
+    what the detector would take alone.
+    """
+    detector = make_detector(name)
+    key = digest([identity(detector), machine(), _code()])
+    path = cache_dir() / "avoidance" / "delays" / f"{key[:24]}.json"
+    if not path.is_file():
+        posture = replace(home_posture(load_icub()), neck_rad=NECK_RAD)
+        scene = script("sitting, hand", seed)
+        images = [(t, *photograph(scene, t, posture, seed)) for t in _TIMED_AT_S]
+        rounds = [[_timed_s(detector, posture, *image) for image in images] for _ in range(1 + _ROUNDS)]
+        write_json(path, {"delay_s": float(np.median(rounds[1:], axis=1).min())})
+    return float(read_json(path)["delay_s"])
+
+
+def image(frame: pd.Series) -> tuple[np.ndarray, Detections]:
+    """The picture of a row of `Run.frames`, RGB uint8, and what was detected, in the picture's pixels."""
+    bgr = cv2.imdecode(np.frombuffer(frame["jpeg"], np.uint8), cv2.IMREAD_COLOR)
+    keypoints_px = (_array(frame["keypoints_px"], 2) + 0.5) * (_SHOWN_PX[0] / 640) - 0.5
+    scores = _array(frame["scores"], 1)[..., 0]
+    return np.ascontiguousarray(bgr[..., ::-1]), Detections(keypoints_px, scores, np.ones(len(scores)))
+
+
+def keypoints_m(frame: pd.Series) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What was perceived (p, 136, 3) and its scores (p, 136), and the truth (136, 3), in the root frame."""
+    return (
+        _array(frame["keypoints_m"], 3),
+        _array(frame["scores"], 1)[..., 0],
+        _array(frame["truth_m"], 3)[0],
+    )
+
+
+def _timed_s(detector, posture, time_s: float, rgb: np.ndarray, depth_m: np.ndarray) -> float:
+    start_s = time.perf_counter(), time.process_time()
+    perceived(detector.detect(rgb), depth_m, time_s, posture)
+    return min(time.perf_counter() - start_s[0], time.process_time() - start_s[1])
+
+
+def _simulate_and_keep(job: Job) -> None:
+    settings = {"settings": PUBLISHED} if job.condition == PUBLISHED_GAINS else {}
+    sights: list[Sight] = []
+    if job.condition in IDEAL:
+        cycles = simulate(job.trial, TrueKeypoints(), avoids=job.condition != NO_AVOIDANCE, **settings)
+    else:
+        eyes = DetectorEyes(make_detector(job.condition), job.delay_s, job.trial.seed)
+        cycles, sights = simulate(job.trial, eyes), eyes.sights
+    scene = script(job.trial.script, job.trial.seed)
+    rows = [_frame(sight, in_root(scene.person_at(sight.perception.time_s).keypoints_m)) for sight in sights]
+    folder = _folder(job)
+    _write(folder / "frames.parquet", pd.DataFrame(rows))
+    _write(folder / "cycles.parquet", cycles)
+
+
+def _frame(sight: Sight, truth_m: np.ndarray) -> dict:
+    small = cv2.resize(sight.rgb, _SHOWN_PX, interpolation=cv2.INTER_AREA)
+    _, jpeg = cv2.imencode(".jpg", np.ascontiguousarray(small[..., ::-1]), [cv2.IMWRITE_JPEG_QUALITY, 88])
+    seen = sight.perception
+    arrays = {
+        "keypoints_px": sight.detections.keypoints_px,
+        "scores": seen.scores,
+        "keypoints_m": seen.keypoints_m,
+        "truth_m": truth_m,
+    }
+    flat = {name: np.asarray(array, np.float32).ravel().tolist() for name, array in arrays.items()}
+    return {"t_s": seen.time_s, "jpeg": jpeg.tobytes()} | flat
+
+
+def _array(flat: np.ndarray, width: int) -> np.ndarray:
+    return np.asarray(flat, float).reshape(-1, N_KEYPOINTS, width)
+
+
+def _folder(job: Job) -> Path:
+    known = {} if job.condition in IDEAL else _identity(job.condition)
+    return cache_dir() / "avoidance" / digest([asdict(job), known, _code()])[:24]
+
+
+@cache
+def _identity(name: str) -> dict:
+    return identity(make_detector(name))
+
+
+@cache
+def _code() -> str:
+    library = [path for pattern in _LIBRARY_PATTERNS for path in LIBRARY_DIR.glob(pattern)]
+    data = [path for pattern in _DATA_PATTERNS for path in DATA_DIR.glob(pattern)]
+    return files_sha256([*library, *data], LIBRARY_DIR.parent)
+
+
+def _read(job: Job) -> Run:
+    return Run(job, *(pd.read_parquet(_folder(job) / f"{name}.parquet") for name in ("cycles", "frames")))
+
+
+def _write(path: Path, table: pd.DataFrame) -> None:
+    with atomic_path(path) as temporary:
+        table.to_parquet(temporary, index=False)

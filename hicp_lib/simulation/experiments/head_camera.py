@@ -1,0 +1,81 @@
+"""Eyes that look: an image and a depth image from the robot's head, a detector, the lifting.
+
+The camera sits on the moving robot and sees the robot's own arms; keypoints on them are left out, since
+where the robot is, is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hicp_lib.detectors.base import Detections, Detector
+from hicp_lib.rgbd.camera import transform
+from hicp_lib.rgbd.lifting import lift
+from hicp_lib.robot.kinematics import load_icub
+from hicp_lib.robot.loop import Perception
+from hicp_lib.robot.own_body import without_own_body
+from hicp_lib.robot.posture import Posture
+from hicp_lib.simulation.experiments.closed_loop import MOUNT
+from hicp_lib.simulation.experiments.laboratory import COLOUR, PHOTOGRAPHIC, robot_camera
+from hicp_lib.simulation.experiments.reaching import Script
+from hicp_lib.simulation.experiments.robot_surfaces import robot_surfaces
+from hicp_lib.simulation.render import render
+from hicp_lib.simulation.sensor import expose
+from hicp_lib.simulation.sensors.depth_camera import D435, simulate_depth
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """One image and what was made of it; `perception` has the robot's own body left out."""
+
+    rgb: np.ndarray
+    detections: Detections
+    perception: Perception
+
+
+@dataclass(eq=False)
+class DetectorEyes:
+    """A detector behind the camera on the head; keeps what it saw.
+
+    Attributes
+    ----------
+    detector : looks at the images
+    delay_s : from image to keypoints in the loop
+    seed : of the noise of both cameras
+    sights : all images so far
+    """
+
+    detector: Detector
+    delay_s: float
+    seed: int = 0
+    sights: list[Sight] = field(default_factory=list)
+
+    def see(self, script: Script, time_s: float, posture: Posture) -> Perception:
+        """Render what is to be seen, find people and lift them; remember all of it."""
+        rgb, depth_m = photograph(script, time_s, posture, self.seed)
+        found = self.detector.detect(rgb)
+        perception = perceived(found, depth_m, time_s, posture)
+        self.sights.append(Sight(rgb, found, perception))
+        return perception
+
+
+def photograph(script: Script, time_s: float, posture: Posture, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Image (480, 640, 3) and depth in metres (480, 640) from the robot's head."""
+    rng = np.random.default_rng(np.random.SeedSequence([seed, round(1000 * time_s)]))
+    icub = load_icub()
+    camera = robot_camera(COLOUR, icub.T_root_camera(posture.angles("head"), MOUNT))
+    world, _ = script.at(time_s, robot_surfaces(icub, posture))
+    frame = render(world, camera, rng)
+    rgb = expose(frame.radiance, PHOTOGRAPHIC, rng, frame.person >= 0)
+    return rgb, simulate_depth(frame.rays, camera, D435, rng)
+
+
+def perceived(found: Detections, depth_m: np.ndarray, time_s: float, posture: Posture) -> Perception:
+    """Keypoints in the root frame, without those on the robot's own body."""
+    icub = load_icub()
+    in_camera_m = lift(found.keypoints_px, depth_m, COLOUR).points_m
+    T_root_camera = icub.T_root_camera(posture.angles("head"), MOUNT)
+    points_m = without_own_body(icub, posture, transform(T_root_camera, in_camera_m))
+    return Perception(time_s, points_m, found.scores)

@@ -1,0 +1,55 @@
+"""How far a person is from the robot, exactly as the simulation has it: what avoidance is judged by.
+
+The robot is its taxels, and its arms as thick lines; the person is the skin of the body model, without
+clothes and hair. Fingers of the robot are not modelled.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from hicp_lib.robot.kinematics import ICub
+from hicp_lib.robot.posture import Posture
+from hicp_lib.robot.segments import body_segments
+from hicp_lib.robot.skin import Skin
+
+FAR_M = 0.6
+"""Distances are not told apart beyond this."""
+_STEP_M = 0.01
+
+
+def robot_balls(icub: ICub, skin: Skin, posture: Posture) -> tuple[np.ndarray, np.ndarray]:
+    """Places (n, 3) on the robot in the root frame, and how thick it is there, (n,) metres.
+
+    Taxels are points; upper arms, forearms and hands are rows of balls a centimetre apart.
+    """
+    taxels, _ = skin.in_root(icub, posture)
+    places, radii = [taxels], [np.zeros(len(taxels))]
+    chains = (posture.angles(name) for name in ("head", "left", "right"))
+    for segment in body_segments(icub, *chains):
+        if not segment.part.startswith(("left", "right")):
+            continue
+        n = 2 + int(np.linalg.norm(segment.end_m - segment.start_m) / _STEP_M)
+        places.append(np.linspace(segment.start_m, segment.end_m, n))
+        radii.append(np.full(n, segment.radius_m))
+    return np.concatenate(places), np.concatenate(radii)
+
+
+def skin_distance_m(balls: tuple[np.ndarray, np.ndarray], vertices_m: np.ndarray) -> float:
+    """Least distance between robot and person in metres, at most `FAR_M`; 0 where they touch.
+
+    To the nearest vertex of the person's mesh, which on hands is at most a few millimetres too far.
+
+    Parameters
+    ----------
+    balls : see `robot_balls`
+    vertices_m : (v, 3) of the person, root frame
+    """
+    places, radii = balls
+    low, high = places.min(axis=0) - FAR_M, places.max(axis=0) + FAR_M
+    near = vertices_m[((vertices_m > low) & (vertices_m < high)).all(axis=1)]
+    if not len(near):
+        return FAR_M
+    gap_m, _ = cKDTree(near).query(places, distance_upper_bound=FAR_M)
+    return float(np.clip(np.min(gap_m - radii), 0, FAR_M))

@@ -1,0 +1,16 @@
+"""ISO/TS 15066's separation against a worked example."""
+
+import pytest
+
+from hicp_lib.robot.separation import Separation, separation_table
+
+
+def test_a_worked_example_of_a_course():
+    example = Separation(
+        human_m_s=1.6, robot_m_s=1.0, reaction_s=0.10, stopping_s=0.30, intrusion_m=0.20,
+        human_uncertainty_m=0.10, robot_uncertainty_m=0.05,
+    )  # fmt: skip
+    assert list(example.terms_m().values()) == pytest.approx([0.64, 0.10, 0.15, 0.20, 0.10, 0.05])
+    assert example.distance_m == pytest.approx(1.24)
+    table = separation_table({"a": example})
+    assert table.loc[table["term"] == "sum", "value"].item() == pytest.approx(1.24)
