@@ -94,6 +94,13 @@ class Study:
         image = f'<img src="{source}" alt="{html.escape(figure.alt)}">'
         self._show_figure(name, image, figure.caption, downloads)
 
+    def animation(self, name: str, webp: bytes, caption: str, alt: str) -> None:
+        """Save an animated WebP and show it; it plays offline, on its own."""
+        write_bytes(self.folder / f"{name}.webp", webp)
+        self._captions[name] = {"file": f"{name}.webp", "caption": caption, "alt": alt}
+        source = f"data:image/webp;base64,{base64.b64encode(webp).decode()}"
+        self._show_figure(name, f'<img src="{source}" alt="{html.escape(alt)}">', caption, ["webp"])
+
     def scene(self, name: str, scene: go.Figure, caption: str, alt: str) -> None:
         """Save an interactive 3D scene (its data as JSON) and show it; the page loads plotly.js once."""
         write_bytes(self.folder / f"{name}.json", scene.to_json().encode())

@@ -92,6 +92,13 @@ def test_the_stamp_says_what_was_run(study, shown, tmp_path):
     assert stamp["lock_sha256"][:12] in shown[0]
 
 
+def test_an_animation_is_saved_whole_and_shown_with_its_words(study, shown):
+    study.animation("moves", b"RIFF....WEBP", "It <moves>.", 'An "arm"')
+    assert (study.folder / "moves.webp").read_bytes() == b"RIFF....WEBP"
+    assert 'src="data:image/webp;base64,' in shown[0] and 'alt="An &quot;arm&quot;"' in shown[0]
+    assert "It &lt;moves&gt;." in shown[0] and 'href="../results/quick/07_x/moves.webp"' in shown[0]
+
+
 def test_a_scene_is_described_and_carries_no_library_of_its_own(study, shown):
     import plotly.graph_objects as go
 
