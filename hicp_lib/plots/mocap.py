@@ -12,6 +12,7 @@ from hicp_lib.evaluation.mocap_error import TABLE_JOINTS, THRESHOLDS_M
 from hicp_lib.plots.style import Figure, detector_colour, in_style, in_words, legend_entries, new_figure
 
 REFERENCE_COLOUR = "#111111"
+_MIN_N = 5  # fewer say little of a median
 _AXES = {"x_m": "x (backward) [m]", "y_m": "y (right) [m]", "z_m": "z (up) [m]"}
 _BY = {"distance_m": "distance from the camera [m]", "score": "score", "sight": "line of sight"}
 
@@ -40,7 +41,8 @@ def fraction_curves(errors: pd.DataFrame, min_score: float, note: str) -> Figure
     _legend(figure, list(axes.values()))
     caption = (
         f"Share of frames with motion capture in which a joint was found (score above {min_score:g}) within "
-        f"a distance of the mean of its two markers; grey: 2.5, 5 and 10 cm, as in the paper: {note}."
+        f"a distance of the mean of its two markers; grey: 2.5, 5 and 10 cm, as in the paper: "
+        f"{_lifting(errors)}, {note}."
     )
     within = table[np.isclose(table["distance_m"], 0.05)].groupby("detector", sort=False)["share"].mean()
     said = in_words([f"{detector} {share:.2f}" for detector, share in within.items()])
@@ -84,8 +86,8 @@ def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: fl
     said = in_words([f"{d} {k.replace('_', ' ')} {100 * v:.1f} cm" for (d, k), v in medians.items()])
     caption = (
         f"Distance of lifted joints (score above {min_score:g}) from the mean of their two markers: box "
-        f"25–75 %, whiskers 5–95 %, line the median: {note}. Diamonds: the paper's medians, of its own "
-        "detectors on its own recording."
+        f"25–75 %, whiskers 5–95 %, line the median: {_lifting(errors)}, {note}. Diamonds: the "
+        "paper's medians, of its own detectors and lifting on its own recording."
     )
     table = found[["detector", "keypoint", "frame", "score", "error_m"]]
     return Figure(figure, caption, f"Box plots per joint. Medians: {said}.", table)
@@ -104,6 +106,10 @@ def _joint_axes(joints: list[str], width_in: float, height_in: float):
     for joint, axis in by_joint.items():
         axis.set(title=joint.replace("_", " "))
     return figure, by_joint
+
+
+def _lifting(table: pd.DataFrame) -> str:
+    return f"{in_words(dict.fromkeys(table['method']))} lifting"
 
 
 def _legend(figure, axes) -> None:
@@ -156,7 +162,7 @@ def trajectories(
     caption = (
         f"The {name} over time in the robot's base frame: motion capture (line, interrupted where a marker "
         f"was missing) and lifted keypoints with a score above {min_score:g}; points more than 15 cm beyond "
-        f"the line's range are not shown: {note}."
+        f"the line's range are not shown: {_lifting(errors)}, {note}."
     )
     found = (
         errors[(errors["score"] > min_score) & errors["error_m"].notna()]
@@ -176,7 +182,7 @@ def error_dependence(table: pd.DataFrame, note: str) -> Figure:
 
     `table` from `hicp_lib.evaluation.mocap_error.errors_by`, one after the other for every column.
     """
-    table = table[table["part"].isin(["elbow", "wrist"])]
+    table = table[table["part"].isin(["elbow", "wrist"]) & (table["n"] >= _MIN_N)]
     columns, parts = (list(dict.fromkeys(table[name])) for name in ("by", "part"))
     figure, axes = new_figure(
         len(parts), len(columns), 3.7 * len(columns), 2.9 * len(parts), squeeze=False, sharey=True
@@ -193,7 +199,8 @@ def error_dependence(table: pd.DataFrame, note: str) -> Figure:
     _legend(figure, axes.flat)
     caption = (
         "Distance from the markers by distance from the camera, by score, and by whether something is in "
-        f"front of the joint (lines and dots the median, bands and whiskers the quartiles): {note}."
+        f"front of the joint (lines and dots the median, bands and whiskers the quartiles; bins of {_MIN_N} or more): "
+        f"{_lifting(table)}, {note}."
     )
     said = _said_by_sight(table)
     return Figure(figure, caption, f"Curves per detector.{said}", table)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from matplotlib.patheffects import withStroke
 
 from hicp_lib.plots.style import Figure, in_style, in_words, new_figure
 from hicp_lib.rgbd.recording import Recording, read_rgb
@@ -11,6 +12,8 @@ from hicp_lib.rgbd.recording import Recording, read_rgb
 # Solutions in the order they are given; not detectors' colours.
 _STYLES = (("#D5272D", "x"), ("#F0A202", "+"), ("#19B5FE", "1"), ("#2ECC40", "2"))
 _MARGIN_PX = 45
+# White on a picture, and to be seen on the page as well.
+_OUTLINED = [withStroke(linewidth=3, foreground="#333333")]
 
 
 @in_style
@@ -53,15 +56,9 @@ def registration(
 def _draw_markers(axis, recording: Recording, frame: int, clicks, pixels: pd.DataFrame, methods) -> None:
     axis.imshow(read_rgb(recording, frame))
     axis.plot(
-        clicks["u_px"],
-        clicks["v_px"],
-        "o",
-        color="white",
-        mfc="none",
-        mew=1.5,
-        markersize=11,
-        label="clicked",
-    )
+        clicks["u_px"], clicks["v_px"], "o", color="white", mfc="none", mew=1.5, markersize=11,
+        path_effects=_OUTLINED, label="clicked",
+    )  # fmt: skip
     for method, (colour, shape) in zip(methods, _STYLES, strict=False):
         part = pixels[(pixels["method"] == method) & (pixels["frame"] == frame)]
         axis.plot(part["u_px"], part["v_px"], shape, color=colour, mew=1.8, markersize=9, label=method)
