@@ -23,7 +23,7 @@ from hicp_lib.evaluation.stability import position_array
 from hicp_lib.rgbd.clicking import CLICKS_FILE, read_clicks
 from hicp_lib.rgbd.keypoints3d import lift_recording
 from hicp_lib.rgbd.qualisys import MotionCapture, read_mocap
-from hicp_lib.rgbd.recording import MOCAP_FILE, Recording, read_simulation, read_truth
+from hicp_lib.rgbd.recording import MOCAP_FILE, Recording, open_recording, read_simulation, read_truth
 from hicp_lib.rgbd.registration import (
     CAMERA_MARKER,
     N_PAPER_MARKERS,
@@ -132,7 +132,7 @@ def register(
     noise_px: float = 1.0,
     seed: int = 0,
 ) -> Registered:
-    """Every registration a recording allows.
+    """Every registration a recording allows; of one cut short, clicks beyond its end are not used.
 
     Parameters
     ----------
@@ -155,7 +155,8 @@ def register(
         )
         return _from_clicks(recording, mocap, clicks, offset_s, exact)
     if clicks_path.is_file():
-        clicks = read_clicks(clicks_path, recording, mocap.names)
+        clicks = read_clicks(clicks_path, open_recording(recording.folder), mocap.names)
+        clicks = clicks[clicks["frame"] < len(recording)]
         return _from_clicks(recording, mocap, clicks, offset_s, None)
     if given.is_file():
         return Registered([read_registration(given)], None, pd.DataFrame())

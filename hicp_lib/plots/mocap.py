@@ -199,8 +199,8 @@ def error_dependence(table: pd.DataFrame, note: str) -> Figure:
     _legend(figure, axes.flat)
     caption = (
         "Distance from the markers by distance from the camera, by score, and by whether something is in "
-        f"front of the joint (lines and dots the median, bands and whiskers the quartiles; bins of {_MIN_N} or more): "
-        f"{_lifting(table)}, {note}."
+        "front of the joint (lines and dots the median, bands and whiskers the quartiles; bins of at least "
+        f"{_MIN_N}): {_lifting(table)}, {note}."
     )
     said = _said_by_sight(table)
     return Figure(figure, caption, f"Curves per detector.{said}", table)

@@ -11,7 +11,7 @@ from hicp_lib.evaluation.mocap_error import JOINTS, MARKERS, TABLE_JOINTS
 from hicp_lib.evaluation.mocap_recording import find_clock, medians_under, open_mocap, register
 from hicp_lib.rgbd.camera import Intrinsics, project, transform
 from hicp_lib.rgbd.qualisys import MotionCapture
-from hicp_lib.rgbd.recording import Recording, open_recording
+from hicp_lib.rgbd.recording import Recording, first_frames, open_recording
 from hicp_lib.rgbd.recording_writer import RecordingWriter
 
 CAMERA = Intrinsics(320, 240, 300.0, 300.0, 159.5, 119.5)
@@ -81,6 +81,13 @@ def test_a_laboratorys_clicks_are_used_and_nothing_is_said_of_the_truth(laborato
     assert [fit.method for fit in register(recording, without, OFFSET_S).fits] == [
         "Arun: the same eight clicks", "all clicks", "reprojection of all clicks",
     ]  # fmt: skip
+
+
+def test_clicks_beyond_the_end_of_a_recording_cut_short_are_not_used(laboratory):
+    recording, mocap = laboratory
+    (recording.folder / "clicks.csv").write_text(clicks_csv())
+    found = register(first_frames(recording, 1), mocap, OFFSET_S)
+    assert found.fits[-1].n_points == 12 and set(found.clicks["frame"]) == {0}
 
 
 def test_a_given_transform_is_taken(laboratory):
