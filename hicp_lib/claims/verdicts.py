@@ -97,6 +97,20 @@ def verdict_table(verdicts: list[Verdict]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def for_reading(table: pd.DataFrame, verdict: str) -> pd.DataFrame:
+    """The claims with one verdict, for a page: claim and test in one column, and only columns that say something.
+
+    `table` from `verdict_table`; columns `section, claim, paper, ours` and, for what could not be tested,
+    `why not, and what would test it`.
+    """
+    rows = table[table["verdict"] == verdict]
+    shown = rows[["section", "paper", "ours"]].copy()
+    shown.insert(1, "claim", rows["claim"] + " Tested: " + rows["tested"])
+    if verdict == NOT_TESTABLE:
+        shown["why not, and what would test it"] = rows["why_not"] + ": " + rows["command"]
+    return shown
+
+
 def verdict_counts(table: pd.DataFrame) -> dict[str, int]:
     """How many claims got each verdict, by `VERDICTS`; `table` from `verdict_table`."""
     return {verdict: int((table["verdict"] == verdict).sum()) for verdict in VERDICTS}

@@ -199,3 +199,14 @@ def test_a_malformed_claim_is_named(tmp_path, row, message):
     path.write_text(json.dumps([full]))
     with pytest.raises(InputError, match=f"this-one.*{message}"):
         read_claims(path)
+
+
+def test_for_reading_every_claim_appears_once(write):
+    results = write(rows(a=(-0.4, -0.5, -0.3)))
+    table = v.verdict_table(v.judge([claim(LOSES), claim(reason="no robot", command="buy one")], results))
+    parts = {verdict: v.for_reading(table, verdict) for verdict in v.VERDICTS}
+    assert {verdict: len(part) for verdict, part in parts.items() if len(part)} == {
+        v.REPRODUCED: 1, v.NOT_TESTABLE: 1,
+    }  # fmt: skip
+    assert "no robot: buy one" in set(parts[v.NOT_TESTABLE]["why not, and what would test it"])
+    assert v.verdict_counts(table)[v.REPRODUCED] == 1
