@@ -98,7 +98,7 @@ def verdict_table(verdicts: list[Verdict]) -> pd.DataFrame:
 
 
 def for_reading(table: pd.DataFrame, verdict: str) -> pd.DataFrame:
-    """The claims with one verdict, for a page: claim and test in one column, and only columns that say something.
+    """The claims with one verdict, for a page: claim and test in one column, and nothing that is empty.
 
     `table` from `verdict_table`; columns `section, claim, paper, ours` and, for what could not be tested,
     `why not, and what would test it`.
