@@ -40,6 +40,8 @@ class Settings:
         from the way to rest (rad/s)^2, and of changes of velocity (rad/s)^2
     approach_s : the hand wants to be at its post in this time, ... (ours)
     approach_m_s : ... but no faster than this (ours)
+    rest_s : the joints want to be at rest in this time; with `rest_weight` (published: 0.01) it is such that
+        they do not swing about it (ours)
     """
 
     period_s: float = 0.02
@@ -50,13 +52,14 @@ class Settings:
     neutral: float = 0.2
     guard: float = 0.025
     post_weight: float = 10.0
-    rest_weight: float = 0.01
+    rest_weight: float = 0.1
     smooth_weight: float = 1.0
     approach_s: float = 0.3
     approach_m_s: float = 0.3
+    rest_s: float = 1.0
 
 
-PUBLISHED = Settings(gain=0.5, onset=0.2, neutral=0.0)
+PUBLISHED = Settings(gain=0.5, onset=0.2, neutral=0.0, rest_weight=0.01, rest_s=0.3)
 """The form of Nguyen et al. (2018), at the joint speed of 2022."""
 
 
@@ -150,7 +153,7 @@ class Controller:
         jacobian = chain.jacobian("hand", q)
         away = self.post_m - chain.T_root_link("hand", q)[:3, 3]
         towards = away / max(settings.approach_s, np.linalg.norm(away) / settings.approach_m_s)
-        to_rest = (self.rest_rad - q) / settings.approach_s
+        to_rest = (self.rest_rad - q) / settings.rest_s
         P = settings.post_weight * jacobian.T @ jacobian
         P[np.diag_indices_from(P)] += settings.rest_weight + settings.smooth_weight
         c = -settings.post_weight * jacobian.T @ towards
