@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.keypoints import mirror
+from hicp_lib.robot.home import HOME_M
 from hicp_lib.robot.loop import AVOIDING
 from hicp_lib.robot.separation import Separation
 from hicp_lib.simulation.experiments.avoidance_runs import IDEAL, NO_AVOIDANCE, Run, keypoints_m
@@ -16,7 +17,10 @@ from hicp_lib.simulation.experiments.reaching import script
 WITHIN_M = (0.05, 0.10, 0.20)
 FIELD_M = 0.25
 """The person is near the robot's skin when nearer than this: about where its receptive fields begin."""
+REACH_M = 0.4  # keypoints this near the post can threaten the hand
+CROSSED_M = 0.2  # reactions count from here
 MOVED_M = 0.005  # the hand has begun to give way
+LOST_S = 0.5  # without a sighting for longer, the robot has forgotten
 BACK_M = 0.02  # the hand is back at its post
 SURE = 0.3  # the paper's threshold for scores
 
@@ -25,11 +29,12 @@ def metrics(runs: Iterable[Run]) -> pd.DataFrame:
     """One row per run; seconds and metres, NaN for what did not happen.
 
     Columns: `script`, `detector` (the condition), `delay_s`, `min_distance_m`, `under_5cm_s`, `under_10cm_s`,
-    `under_20cm_s`, `reaction_s` (from the person within `FIELD_M` to the first motion), `retreat_m` (the
-    hand's largest distance from its post), `false_retreats` (begun while the person was farther),
-    `idle_error_m` (the hand's mean error before the person moves), `back_s` (from the person's having left
-    to the hand's being back), `seen_share` (of the images taken while the person is near, those with any
-    sure keypoint in space), `blind_s` (longest time the person was near with nothing new seen of them).
+    `under_20cm_s`, `reaction_s` (from the person's coming within `CROSSED_M` to the first motion),
+    `retreat_m` (the hand's largest distance from its post), `false_retreats` (begun while the person was
+    farther than `FIELD_M`), `idle_error_m` (the hand's mean error before the person moves), `back_s` (from
+    the person's having left to the hand's being back), `seen_share` (of the images taken while the person
+    is near, those with any sure keypoint in space), `blind_s` (longest time the person was near with
+    nothing new seen of them).
     """
     return pd.DataFrame([_metrics(run) for run in runs])
 
@@ -49,24 +54,27 @@ def against_no_avoidance(table: pd.DataFrame, times: float = 2.0) -> pd.DataFram
 
 
 def keypoint_errors(runs: Iterable[Run]) -> pd.DataFrame:
-    """Error of every sure keypoint that reached the loop: `script`, `detector`, `t_s`, `error_m`.
+    """Error of every sure keypoint that reached the loop: `script`, `detector`, `t_s`, `near`, `error_m`.
 
     To the person's true keypoint of that name on either side, the nearer one: which of the two hands it is
-    matters to names, not to distances.
+    matters to names, not to distances. `near`: perceived within `REACH_M` of the hand's post.
     """
     parts = []
     for run in runs:
         for _, frame in run.frames.iterrows():
             points, scores, truth = keypoints_m(frame)
+            kept = (scores > SURE) & np.isfinite(points[..., 0])
             either_m = [np.linalg.norm(points - side, axis=2) for side in (truth, truth[mirror("halpe136")])]
-            error_m = np.min(either_m, axis=0)[(scores > SURE) & np.isfinite(points[..., 0])]
+            near = np.linalg.norm(points - HOME_M["left"], axis=2) < REACH_M
             about = {"script": run.job.trial.script, "detector": run.job.condition, "t_s": frame["t_s"]}
-            parts.append(pd.DataFrame({"error_m": error_m}).assign(**about))
-    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=["error_m", "detector"])
+            errors = {"error_m": np.min(either_m, axis=0)[kept], "near": near[kept]}
+            parts.append(pd.DataFrame(errors).assign(**about))
+    empty = {"error_m": np.zeros(0), "near": np.zeros(0, bool), "script": [], "detector": [], "t_s": []}
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(empty)
 
 
 def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> dict[str, Separation]:
-    """The separation each detector would need: its delay, its error (95th percentile), the hand's speed.
+    """The separation each detector would need: its delay, its error near the hand (95th percentile), speeds.
 
     The robot's speed is the fastest the hand was in any of the runs. It brakes within one control period,
     which is when its velocities can be zero: an assumption, real joints take longer. Detectors that gave
@@ -75,7 +83,7 @@ def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> d
     runs = list(runs)
     robot_m_s = max(float(run.cycles["hand_error_m"].diff().abs().max()) for run in runs) / period_s
     delays_s = {run.job.condition: run.job.delay_s for run in runs if run.job.condition not in IDEAL}
-    by_detector = errors.groupby("detector")["error_m"].quantile(0.95)
+    by_detector = errors[errors["near"]].groupby("detector")["error_m"].quantile(0.95)
     return {
         name: Separation(robot_m_s, delay_s + period_s, period_s, float(by_detector[name]))
         for name, delay_s in delays_s.items()
@@ -90,7 +98,7 @@ def _metrics(run: Run) -> dict:
     row = {"script": job.trial.script, "detector": job.condition, "delay_s": job.delay_s}
     row["min_distance_m"] = distance.min()
     row |= {f"under_{round(100 * m)}cm_s": period_s * (distance < m).sum() for m in WITHIN_M}
-    row["reaction_s"] = _first(t, away > MOVED_M) - _first(t, distance < FIELD_M)
+    row["reaction_s"] = _first(t, away > MOVED_M) - _crossing_s(t, distance)
     row["retreat_m"] = away.max()
     begins = (cycles["status"] == AVOIDING) & (cycles["status"].shift() != AVOIDING)
     row["false_retreats"] = int((begins & (distance >= FIELD_M)).sum())
@@ -117,6 +125,13 @@ def _is_seen(frame: pd.Series) -> bool:
     return bool(((scores > SURE) & np.isfinite(points[..., 0])).any())
 
 
+def _crossing_s(t: np.ndarray, distance_m: np.ndarray) -> float:
+    """When the distance falls below `CROSSED_M` for the last time before it is least; NaN: it never does."""
+    before = distance_m[: distance_m.argmin() + 1]
+    outside = np.flatnonzero(before >= CROSSED_M)
+    return float(t[outside[-1]]) if len(outside) and before[-1] < CROSSED_M else np.nan
+
+
 def _first(t: np.ndarray, which: np.ndarray) -> float:
     return float(t[which.argmax()]) if which.any() else np.nan
 
@@ -126,6 +141,6 @@ def _why(row) -> str:
         return "the controller is too slow"
     if row.seen_share == 0:
         return "the detector never finds the person while they are near"
-    if row.seen_share < 0.5:
+    if row.blind_s > LOST_S:
         return f"the person is lost in {1 - row.seen_share:.0%} of the images, for up to {row.blind_s:.1f} s"
     return f"found in {row.seen_share:.0%} of the images, but the hand moves {row.reaction_s:.1f} s late"

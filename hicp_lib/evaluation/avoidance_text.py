@@ -31,8 +31,8 @@ def losses(metrics: pd.DataFrame) -> pd.DataFrame:
 
 
 def error_table(errors: pd.DataFrame) -> pd.DataFrame:
-    """Number of sure keypoints in space, median and 95th percentile of their errors (metres)."""
-    by = errors.groupby(["detector", "script"])["error_m"]
+    """Number of sure keypoints near the hand, median and 95th percentile of their errors (metres)."""
+    by = errors[errors["near"]].groupby(["detector", "script"])["error_m"]
     table = pd.DataFrame({"keypoints": by.size(), "value": by.median(), "percentile_95_m": by.quantile(0.95)})
     return table.reset_index()
 

@@ -24,8 +24,8 @@ from hicp_lib.simulation.experiments.reaching import Script, in_root, script
 from hicp_lib.simulation.experiments.skin_distance import robot_balls, skin_distance_m
 
 MOUNT = "tilted"
-NECK_RAD = np.radians([9.0, 0.0, 2.0])
-"""How the robot holds its head: down before it, where people come from."""
+NECK_RAD = np.radians([3.0, 0.0, 4.0])
+"""How the robot holds its head: it looks at its left hand and at whoever comes for it."""
 CAMERA_HZ = 10.0
 _POSED_S = 0.08  # the person's skin is posed this often, and moves on straight lines in between
 

@@ -51,5 +51,6 @@ def skin_distance_m(balls: tuple[np.ndarray, np.ndarray], vertices_m: np.ndarray
     near = vertices_m[((vertices_m > low) & (vertices_m < high)).all(axis=1)]
     if not len(near):
         return FAR_M
-    gap_m, _ = cKDTree(near).query(places, distance_upper_bound=FAR_M)
+    tree = cKDTree(near, balanced_tree=False, compact_nodes=False)  # asked once, so built in haste
+    gap_m, _ = tree.query(places, distance_upper_bound=FAR_M)
     return float(np.clip(np.min(gap_m - radii), 0, FAR_M))
