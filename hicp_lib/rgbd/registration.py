@@ -91,12 +91,9 @@ def papers_choice(matched: pd.DataFrame) -> pd.DataFrame:
     """Eight markers in two images, as in the paper: of the two images that show most markers, the eight
     that lie furthest from each other.
 
-    Clicks whose depth is that of something else, a wall behind for one, are not chosen: the distances
-    between markers must be the same in both frames, to a decimetre for most of the others.
+    Clicks whose depth is that of something else, a wall behind for one, are not chosen.
     """
-    a, b = (matched[names].to_numpy() for names in (_SEEN, _MEASURED))
-    stretched_m = np.abs(_distances_between(a) - _distances_between(b))
-    matched = matched[np.median(stretched_m, axis=1) < _MAX_STRETCH_M]
+    matched = matched[_keeps_distances(matched)]
     frames = matched["frame"].value_counts(sort=True).sort_index(kind="stable").nlargest(N_PAPER_IMAGES).index
     table = matched[matched["frame"].isin(frames)].reset_index(drop=True)
     points = table[_MEASURED].to_numpy()
@@ -105,6 +102,13 @@ def papers_choice(matched: pd.DataFrame) -> pd.DataFrame:
         nearest = np.linalg.norm(points[:, None] - points[chosen], axis=2).min(axis=1)
         chosen.append(int(nearest.argmax()))
     return table.loc[sorted(chosen)].reset_index(drop=True)
+
+
+def _keeps_distances(matched: pd.DataFrame) -> np.ndarray:
+    """Which points (n,) are as far from most others in the one frame as in the other, to a decimetre."""
+    seen, measured = (matched[names].to_numpy() for names in (_SEEN, _MEASURED))
+    stretched_m = np.abs(_distances_between(seen) - _distances_between(measured))
+    return np.median(stretched_m, axis=1) < _MAX_STRETCH_M
 
 
 def _distances_between(points_m: np.ndarray) -> np.ndarray:
@@ -145,11 +149,12 @@ def same_clicks(matched: pd.DataFrame) -> Registration:
 def all_clicks(matched: pd.DataFrame) -> Registration:
     """Arun's method from all of `matched` that agree.
 
-    Points whose residual is beyond three robust standard deviations (and 2 cm) are left out, and the fit is
-    made anew, until it stays. Raises as `arun`.
+    The start is from points that keep their distances to most others, as for `papers_choice`. Then points
+    whose residual is beyond three robust standard deviations (and 2 cm) are left out, and the fit is made
+    anew, until it stays. Raises as `arun`.
     """
     seen, measured = matched[_SEEN].to_numpy(), matched[_MEASURED].to_numpy()
-    kept = np.ones(len(matched), dtype=bool)
+    kept = _keeps_distances(matched)
     for _ in range(_MAX_ROUNDS):
         fit = arun(measured[kept], seen[kept])
         residuals_m = np.linalg.norm(transform(fit.T_b_a, measured) - seen, axis=1)

@@ -134,6 +134,15 @@ def test_clicks_on_the_wall_behind_are_not_among_the_eight(laboratory, clicks):
     assert len(eight) == 8 and same_clicks(eight).rms_m < 0.005
 
 
+def test_many_clicks_on_the_wall_behind_do_not_spoil_the_fit(laboratory, clicks):
+    matched = lift_clicks(laboratory[0], clicks, laboratory[1])
+    rng = np.random.default_rng(0)
+    behind = rng.random(len(matched)) < 0.4
+    matched.loc[behind, ["x_m", "y_m", "z_m"]] += rng.normal(0, 1.0, (behind.sum(), 3)) + [0.5, 0.5, 1.5]
+    found = all_clicks(matched)
+    assert errors_of(found)[1] < 0.005 and found.n_points == (~behind).sum()
+
+
 def test_what_cannot_be_matched_is_left_out(laboratory, clicks):
     recording, mocap = laboratory
     points = mocap.points_m.copy()
