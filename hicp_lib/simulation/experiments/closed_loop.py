@@ -26,17 +26,25 @@ from hicp_lib.simulation.experiments.skin_distance import robot_balls, skin_dist
 MOUNT = "tilted"
 NECK_RAD = np.radians([3.0, 0.0, 4.0])
 """How the robot holds its head: it looks at its left hand and at whoever comes for it."""
-CAMERA_HZ = 10.0
 _POSED_S = 0.08  # the person's skin is posed this often, and moves on straight lines in between
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What is simulated: the person's script, for how long, what draws person, room and noise."""
+    """What is simulated.
+
+    Attributes
+    ----------
+    script : what the person does
+    duration_s : for how long
+    seed : draws person, room and noise
+    camera_hz : images per second, if the eyes are as fast
+    """
 
     script: str
     duration_s: float = 7.6
     seed: int = 0
+    camera_hz: float = 10.0
 
 
 class Eyes(Protocol):
@@ -71,7 +79,8 @@ def simulate(trial: Trial, eyes: Eyes, avoids: bool = True, settings: Settings |
     """
     scene, icub = script(trial.script, trial.seed), load_icub()
     posture = replace(home_posture(icub), neck_rad=NECK_RAD)
-    loop = _loop(icub, posture, eyes, avoids, settings or Settings())
+    between_s = next_image_s(0.0, eyes.delay_s, trial.camera_hz)
+    loop = _loop(icub, posture, eyes.delay_s + between_s, avoids, settings or Settings())
     period_s, under_way, free_s, rows = loop.controller.settings.period_s, None, 0.0, []
     for k in range(round(trial.duration_s / period_s)):
         now_s, arrived = k * period_s, None
@@ -79,7 +88,7 @@ def simulate(trial: Trial, eyes: Eyes, avoids: bool = True, settings: Settings |
             arrived, under_way = under_way, None
         if under_way is None and now_s >= free_s - 1e-9:
             under_way = eyes.see(scene, now_s, posture)
-            free_s = next_image_s(now_s, eyes.delay_s)
+            free_s = next_image_s(now_s, eyes.delay_s, trial.camera_hz)
             if eyes.delay_s == 0:
                 arrived, under_way = under_way, None
         command, threat = loop.cycle(now_s, posture, arrived)
@@ -88,15 +97,16 @@ def simulate(trial: Trial, eyes: Eyes, avoids: bool = True, settings: Settings |
     return pd.DataFrame(rows)
 
 
-def next_image_s(taken_s: float, delay_s: float) -> float:
+def next_image_s(taken_s: float, delay_s: float, camera_hz: float) -> float:
     """When the next image is taken: the camera's first one after the last is done with."""
-    return taken_s + max(1, np.ceil(delay_s * CAMERA_HZ - 1e-9)) / CAMERA_HZ
+    return taken_s + max(1, np.ceil(delay_s * camera_hz - 1e-9)) / camera_hz
 
 
-def _loop(icub: ICub, posture: Posture, eyes: Eyes, avoids: bool, settings: Settings) -> AvoidanceLoop:
+def _loop(icub: ICub, posture: Posture, late_s: float, avoids: bool, settings: Settings) -> AvoidanceLoop:
+    """The loop for eyes whose next sighting may come `late_s` after the last one's image."""
     controller = Controller(icub, np.array(HOME_M["left"]), posture.angles("left"), settings=settings)
     # A sighting holds until the next one can be there, so that slow eyes do not blink.
-    hold_s = max(Trust().hold_s, eyes.delay_s + next_image_s(0.0, eyes.delay_s))
+    hold_s = max(Trust().hold_s, late_s)
     tracker = KeypointTracker(Trust(hold_s=hold_s, memory_s=Trust().memory_s + hold_s))
     return AvoidanceLoop(controller, tracker=tracker, avoids=avoids)
 

@@ -84,7 +84,8 @@ def test_slow_eyes_skip_images_and_none_of_theirs_is_lost(monkeypatch):
     heard = run.dropna().drop_duplicates("seen_s")
     np.testing.assert_allclose(heard["t_s"] - heard["seen_s"], 0.2, atol=1e-9)
     assert len(heard) == 5
-    assert next_image_s(1.0, 0.05) == pytest.approx(1.1) and next_image_s(1.0, 0.11) == pytest.approx(1.2)
+    assert next_image_s(1.0, 0.05, 10.0) == pytest.approx(1.1)
+    assert next_image_s(1.0, 0.11, 10.0) == pytest.approx(1.2)
 
 
 def test_with_true_keypoints_the_hand_gives_way_and_without_avoidance_it_stays():
