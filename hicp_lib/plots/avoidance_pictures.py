@@ -30,7 +30,7 @@ from hicp_lib.simulation.experiments.closed_loop import NECK_RAD
 from hicp_lib.simulation.experiments.reaching import in_root, script
 
 _TURN_RAD, _TILT_RAD = np.radians(35.0), np.radians(18.0)  # of the view: to the side, from above
-_LIMITS_M = ((-1.25, 0.35), (-0.65, 0.75))
+_LIMITS_M = ((-1.2, 0.3), (-0.48, 0.7))
 _PERSON_COLOUR = "#666666"
 _WEBP = {"quality": 55, "method": 4}
 
