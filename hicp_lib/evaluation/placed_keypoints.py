@@ -25,6 +25,10 @@ from hicp_lib.keypoints import COCO_17, SIGMAS
 STATES = ("visible", "hidden", "outside", "unknown")
 BORDER = 0.05  # of the picture's side: what counts as at its border
 _SIGMAS = SIGMAS["halpe"][COCO_17]
+_DTYPES = {
+    "subset": object, "detector": object, "image_id": int, "source_image": object, "cut_side": object,
+    "keypoint": int, "state": object, "given": bool, "score": float, "x": float, "y": float, "hit": float,
+}  # fmt: skip
 
 
 def placed_keypoints(
@@ -48,7 +52,7 @@ def placed_keypoints(
     unknown)
     """
     source_row = {int(i): row for row, i in enumerate(source.ids)}
-    parts = [pd.DataFrame()]
+    parts = [pd.DataFrame(columns=_DTYPES).astype(_DTYPES)]
     for (subset, detector), run in found.items():
         people, sources = truth[subset], source_images(truth[subset])
         rows_of = pd.Series(range(len(people))).groupby(people.image_ids).indices
@@ -62,9 +66,7 @@ def placed_keypoints(
                 labels = {"subset": subset, "detector": detector, "image_id": image_id}
                 cut_side = here.extras[person].get("cut_side", "")
                 parts.append(part.assign(**labels, source_image=sources[image_id], cut_side=cut_side))
-    order = ["subset", "detector", "image_id", "source_image", "cut_side"]
-    table = pd.concat(parts, ignore_index=True)
-    return table[[*order, *table.columns.drop(order)]]
+    return pd.concat([part[list(_DTYPES)] for part in parts if len(part)] or parts, ignore_index=True)
 
 
 def _truth(

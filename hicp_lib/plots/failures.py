@@ -180,7 +180,7 @@ def invented_heads(table: pd.DataFrame, note: str) -> Figure:
 @in_style
 def scores_by_state(table: pd.DataFrame, note: str) -> Figure:
     """Hit rate against score for visible, hidden and outside keypoints; from `scores_by_state`."""
-    detectors = list(dict.fromkeys(table["detector"]))
+    detectors = list(dict.fromkeys(table["detector"])) or ["none given"]
     figure, axes = new_figure(1, len(detectors), 4.2 * len(detectors), 4.2, sharey=True, squeeze=False)
     for axis, detector in zip(axes[0], detectors, strict=True):
         for state, (line, marker) in _STATE_STYLES.items():

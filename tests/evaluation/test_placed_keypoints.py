@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from conftest import make_annotations, make_detections
 
+from hicp_lib.detectors.base import Detections
 from hicp_lib.evaluation.error_kinds import all_errors
 from hicp_lib.evaluation.false_confidence import MEASURES, paper_remarks, scores_by_state
 from hicp_lib.evaluation.placed_keypoints import from_the_cut, landed, placed_keypoints
 from hicp_lib.evaluation.without_head import change_per_keypoint, invented_heads, invented_shares
 from hicp_lib.evaluation.worst_cases import worst_cases
 from hicp_lib.keypoints import HEAD, INDEX, N_KEYPOINTS
+from hicp_lib.plots import failures as draw
 
 # A person in a source image; the crop starts at (100, 200) and shows what is below the head.
 POINTS = np.random.default_rng(3).uniform([120, 220], [700, 600], (N_KEYPOINTS, 2))
@@ -53,6 +55,18 @@ def test_what_is_right_outside_the_picture_is_a_hit_and_what_is_unknown_is_neith
     table = placed_keypoints(truth, found, source)
     assert by_keypoint(table, "hit")[0] == 0 and np.isnan(by_keypoint(table, "hit")[1])
     assert by_keypoint(table, "given").tolist() == [k != 1 for k in range(17)]
+
+
+def test_where_nobody_is_found_every_table_and_figure_is_empty_but_there(world):
+    source, truth, _ = world
+    found = {("headless", "mediapipe-pose"): {5: Detections.none()}}
+    placed = placed_keypoints(truth, found, source)
+    assert placed.empty and placed.dtypes["given"] == bool
+    assert invented_shares(placed, 0.3, 10).empty
+    assert "(0)" in draw.invented_heads(invented_heads(placed), "drawn").figure.axes[0].get_title("left")
+    assert draw.scores_by_state(scores_by_state(placed, 10), "drawn").table.empty
+    remarks = paper_remarks(placed, all_errors(truth, found), truth, found, 10)
+    assert remarks["measure"].nunique() == len(MEASURES)
 
 
 def test_places_are_named_by_the_picture_border(world):
