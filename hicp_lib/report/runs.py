@@ -80,6 +80,8 @@ def run_all(runs: list[Run], folders: Folders, say: Callable[[str], None]) -> No
     InputError
         If a parameter names a file or folder that does not exist.
     """
+    for run in runs:
+        _input_paths(run)  # a mistake is told now, not when the notebook's turn comes
     folders.executed.mkdir(parents=True, exist_ok=True)
     for left_behind in folders.executed.glob(".run-*"):
         shutil.rmtree(left_behind, ignore_errors=True)
@@ -140,14 +142,19 @@ def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
 
 def _inputs(run: Run) -> dict[str, str]:
     """Identity of the files and folders that parameters point to; an empty one points to nothing."""
-    inputs = {}
-    for name, value in run.parameters.items():
-        if is_path(name, run.notebook.defaults[name]) and value:
-            path = run.notebook.path.parent / value
-            if not path.exists():
-                raise InputError(f"{path}: does not exist; parameter '{name}' must name a file or folder")
-            inputs[name] = provenance.input_sha256(path)
-    return inputs
+    return {name: provenance.input_sha256(path) for name, path in _input_paths(run).items()}
+
+
+def _input_paths(run: Run) -> dict[str, Path]:
+    paths = {
+        name: run.notebook.path.parent / value
+        for name, value in run.parameters.items()
+        if is_path(name, run.notebook.defaults[name]) and value
+    }
+    for name, path in paths.items():
+        if not path.exists():
+            raise InputError(f"{path}: does not exist; parameter '{name}' must name a file or folder")
+    return paths
 
 
 def why_stale(name: str, key: dict[str, Any], folders: Folders) -> str | None:
@@ -284,6 +291,9 @@ class _Children:
                 stdout=log,
                 stderr=log,
                 env=_environment(staging, profile, private),
+                # What ends the report's whole process group must not end this one before it has
+                # ended the kernel's workers.
+                start_new_session=True,
             )
             self._running.add(process)
             try:

@@ -139,7 +139,10 @@ def test_a_library_edited_during_the_run_is_not_stamped(tmp_path, monkeypatch, l
     assert not folders.results.exists()
 
 
-def test_an_input_that_is_not_there_is_the_users_mistake(tmp_path):
-    run, folders = tiny_run(tmp_path, START, FINISH, images="/nowhere/images")
+def test_an_input_that_is_not_there_is_told_before_anything_runs(tmp_path, monkeypatch):
+    monkeypatch.setattr(_Children, "execute", pretend_to_execute)
+    first, folders = tiny_run(tmp_path / "first", START, FINISH)
+    run, _ = tiny_run(tmp_path / "second", START, FINISH, images="/nowhere/images")
     with pytest.raises(InputError, match="/nowhere/images: does not exist; parameter 'images'"):
-        run_all([run], folders, print)
+        run_all([first, run], folders, print)
+    assert not list(folders.executed.glob("*"))
