@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
 from pathlib import Path
 from typing import Any, NoReturn
@@ -23,6 +24,7 @@ from hicp_lib.errors import InputError
 
 def main() -> NoReturn:
     """Run the command line and exit."""
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # an image cut off is told in one line, by us
     sys.exit(run(sys.argv[1:]))
 
 
@@ -44,7 +46,8 @@ def run(arguments: list[str]) -> int:
     except OSError as error:
         if error.filename is None:
             raise
-        return _fail(f"{error.filename}: {error.strerror}; check the path, the rights and the disk space", 2)
+        name = error.filename2 or error.filename  # of two, the one to be written
+        return _fail(f"{name}: {error.strerror}; check the path, the rights and the disk space", 2)
 
 
 def _fail(message: object, code: int) -> int:

@@ -41,14 +41,12 @@ def lift_recording(
     InputError
         For an unknown method, detections of another number of frames, or a depth image that cannot be read.
     """
-    if isinstance(method, str) and method not in METHODS:
-        raise InputError(f"no method {method!r} of lifting; choose one of {', '.join(METHODS)}")
+    lifting = lifting_method(method) if isinstance(method, str) else method
     if len(detections) != len(recording):
         raise InputError(
             f"{recording.folder}: {len(recording)} frames, but detections of {len(detections)} images; "
             "detect people in the frames of this recording"
         )
-    lifting = METHODS[method] if isinstance(method, str) else method
     frames = [_lift_frame(recording, k, found, lifting) for k, found in enumerate(detections)]
     table = {name: np.concatenate([frame[name] for frame in frames]) for name in frames[0]}
     table["keypoint"], table["reason"] = (
@@ -56,6 +54,19 @@ def lift_recording(
         np.array(REASONS)[table["reason"]],
     )
     return pd.DataFrame(table)
+
+
+def lifting_method(name: str) -> Lifting:
+    """A way of lifting by its name.
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+    """
+    if name not in METHODS:
+        raise InputError(f"no method {name!r} of lifting; choose one of {', '.join(METHODS)}")
+    return METHODS[name]
 
 
 def _lift_frame(recording: Recording, k: int, found: Detections, lifting: Lifting) -> dict[str, np.ndarray]:
