@@ -22,6 +22,7 @@ def small(tmp_path):
         (["import", "out", "--bag", "/no.bag"], "/no.bag: is not there"),
         (["import", "out", "--open3d", "/no"], "/no/intrinsic.json: cannot be read"),
         (["import", "out", "--open3d", "/no", "--poses", "/no.txt"], "/no.txt: cannot be read"),
+        (["import", "out", "--open3d", "/no", "--rate", "nan"], "rate is nan; expected frames per second"),
         (["import", "out", "--open3d", "/no", "--mount", "x"], "'x' is not one of"),
     ],
 )
@@ -60,6 +61,13 @@ def test_notes_do_not_fail(capsys, small):
     assert cli.run(["record", "check", str(small)]) == 0
     note, ok = capsys.readouterr().out.splitlines()
     assert note.startswith("note ") and ok.startswith("ok ") and "3 frames" in ok
+
+
+def test_a_method_of_lifting_is_asked_for_before_anybody_is_looked_for(capsys, small, monkeypatch):
+    monkeypatch.setattr("hicp_lib.detectors.run.detect_images", None)
+    arguments = ["lift", "--recording", str(small), "--detector", "mediapipe", "--out", "k.parquet"]
+    assert cli.run([*arguments, "--method", "nonsense"]) == 2
+    assert capsys.readouterr().err.startswith("hicp: no method 'nonsense' of lifting; choose one of paper")
 
 
 def test_lift_needs_a_recording(capsys, tmp_path):

@@ -26,7 +26,7 @@ from hicp_lib.errors import InputError
 from hicp_lib.files import read_json
 from hicp_lib.images import read_image
 from hicp_lib.rgbd.camera import Intrinsics, read_camera
-from hicp_lib.rgbd.tum import associate, read_file_list, read_poses
+from hicp_lib.rgbd.tum import MAX_DIFFERENCE_S, associate, read_file_list, read_poses
 
 CAMERA_FILE, RGB_LIST, DEPTH_LIST, POSES_FILE = "camera.json", "rgb.txt", "depth.txt", "groundtruth.txt"
 MOCAP_FILE = "mocap.tsv"
@@ -81,7 +81,8 @@ def open_recording(folder: str | Path) -> Recording:
     rgb, depth, pose = associate_frames(rgb_s, depth_s, pose_s)
     if len(rgb) == 0:
         raise InputError(
-            f"{folder}: no frame has colour, depth and pose within 0.02 s; bring their clocks together"
+            f"{folder}: no frame has colour, depth and pose within {MAX_DIFFERENCE_S:g} s; "
+            "bring their clocks together"
         )
     mocap = folder / MOCAP_FILE
     return Recording(

@@ -20,9 +20,11 @@ from hicp_lib.rgbd.recording import (
     associate_frames,
     open_recording,
     read_depth_m,
+    read_joints,
     read_rgb,
+    read_truth,
 )
-from hicp_lib.rgbd.tum import associate, read_file_list, read_poses
+from hicp_lib.rgbd.tum import MAX_DIFFERENCE_S, associate, read_file_list, read_poses
 
 Read = TypeVar("Read")
 
@@ -50,7 +52,7 @@ def check_recording(folder: str | Path) -> list[Finding]:
     if any(finding.is_fatal for finding in findings):
         return findings
     recording = open_recording(folder)
-    return [*findings, *_images(recording), *_poses(recording), *_mocap(recording)]
+    return [*findings, *_images(recording), *_poses(recording), *_tables(recording), *_mocap(recording)]
 
 
 def _files(folder: Path) -> Iterator[Finding]:
@@ -88,8 +90,8 @@ def _unassociated(folder: Path, rgb_s, depth_s, pose_s) -> Iterator[Finding]:
     for name, other_s in (("depth image", depth_s), ("pose", pose_s)):
         n = len(rgb_s) - len(associate(rgb_s, other_s)[0])
         if n:
-            text = f"{n} of {len(rgb_s)} colour images have no {name} within 0.02 s and are left out"
-            yield Finding(f"{folder / RGB_LIST}: {text}", is_fatal)
+            text = f"{n} of {len(rgb_s)} colour images have no {name} within {MAX_DIFFERENCE_S:g} s"
+            yield Finding(f"{folder / RGB_LIST}: {text} and are left out", is_fatal)
 
 
 def _images(recording: Recording) -> Iterator[Finding]:
@@ -125,6 +127,12 @@ def _poses(recording: Recording) -> Iterator[Finding]:
     if furthest_m > FURTHEST_POSE_M:
         text = f"the camera is up to {furthest_m:.4g} m from the base; expected metres, not millimetres"
         yield Finding(f"{recording.folder / POSES_FILE}: {text}", is_fatal=False)
+
+
+def _tables(recording: Recording) -> Iterator[Finding]:
+    """Truth and joints, where there are any, that are no such tables."""
+    for read in (read_truth, read_joints):
+        yield from _attempt(read, recording)[1]
 
 
 def _mocap(recording: Recording) -> Iterator[Finding]:

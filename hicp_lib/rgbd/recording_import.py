@@ -88,6 +88,8 @@ def import_open3d(
         If something is missing or does not match, or `out` holds files.
     """
     source, out = Path(source), Path(out)
+    if rate_hz is not None and not 0 < rate_hz < np.inf:
+        raise InputError(f"rate is {rate_hz!r}; expected frames per second")
     intrinsics, units = read_camera(source / "intrinsic.json")
     rgb, depth = (_images(source / name) for name in ("color", "depth"))
     if [path.stem for path in rgb] != [path.stem for path in depth]:

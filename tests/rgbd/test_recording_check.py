@@ -40,6 +40,7 @@ DAMAGES = {  # what is done, what the finding says, whether the recording is of 
     "order": (swap_lines, "is not after the one before", True),
     "quaternion": (stretch_quaternion, "quaternion of length 1.2", True),
     "size": (halve_an_image, "16 x 12 pixels; camera.json says 32 x 24 (1 of 4 colour", True),
+    "truth": (lambda small: (small / "truth.parquet").write_text("junk"), "is not a Parquet table", True),
     "image gone": (lambda small: (small / "depth/000001.png").unlink(), "1 of 4 listed are not", True),
     "late": (
         lambda small: edit(small / "depth.txt", lambda text: text.replace("100.1", "100.15")),
