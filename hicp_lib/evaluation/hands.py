@@ -17,10 +17,10 @@ from hicp_lib.evaluation.bootstrap import bootstrap_intervals
 from hicp_lib.evaluation.coco import check_detections, evaluate
 from hicp_lib.evaluation.compare import source_images
 from hicp_lib.evaluation.oks import oks
+from hicp_lib.evaluation.resampling import draw_counts, with_interval
 from hicp_lib.keypoints import LEFT_HAND, RIGHT_HAND, SIGMAS
 
 FOUND_OKS = 0.5
-_PERCENTILES = (2.5, 97.5)
 
 # Parts of a combination, as options of `hicp_lib.detectors.combined.Combined`; the last is its default.
 INGREDIENTS: dict[str, dict] = {
@@ -109,11 +109,7 @@ def _counts(people: Annotations, found: Mapping, baseline: Mapping, clusters: Ma
 
 def _with_interval(counts: np.ndarray, of: int, per: int, n_resamples: int, seed: int) -> tuple[float, ...]:
     """Ratio of two columns' sums over the rows, with the interval from drawing rows; NaN for 0 / 0."""
-    n = len(counts)
     if not counts[:, per].sum():
         return np.nan, np.nan, np.nan
-    times = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), size=n_resamples)
-    drawn = times @ counts
-    ratios = drawn[drawn[:, per] > 0]
-    low, high = np.percentile(ratios[:, of] / ratios[:, per], _PERCENTILES)
-    return counts[:, of].sum() / counts[:, per].sum(), low, high
+    some, whole = (draw_counts(len(counts), n_resamples, seed) @ counts)[:, [of, per]].T
+    return with_interval(np.divide(some, whole, out=np.full(len(whole), np.nan), where=whole > 0))
