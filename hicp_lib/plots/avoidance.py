@@ -103,7 +103,8 @@ def separation_terms(separations: Mapping[str, Separation], note: str) -> Figure
     axis.set_yticks(range(len(separations)), list(separations))
     axis.set_xlabel("protective separation distance (cm)")
     axis.margins(x=0.12)
-    figure.legend(loc="outside lower center", ncols=2)
+    if rows:
+        figure.legend(loc="outside lower center", ncols=2)
     sums = [f"{name} {100 * separation.distance_m:.0f} cm" for name, separation in separations.items()]
     return Figure(
         figure,
