@@ -13,9 +13,9 @@ import pandas as pd
 
 from hicp_lib.evaluation import engine
 from hicp_lib.evaluation.coco import Evaluation
+from hicp_lib.evaluation.resampling import PERCENTILES
 
 N_RESAMPLES = 1000
-_PERCENTILES = (2.5, 97.5)
 
 
 def bootstrap_intervals(
@@ -87,6 +87,6 @@ def _intervals(values: dict[str, float], samples: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for name, value in values.items():
         drawn = samples[name].dropna()
-        low, high = np.percentile(drawn, _PERCENTILES) if len(drawn) else (np.nan, np.nan)
+        low, high = np.percentile(drawn, PERCENTILES) if len(drawn) else (np.nan, np.nan)
         rows.append({"metric": name, "value": value, "low": low, "high": high})
     return pd.DataFrame(rows)

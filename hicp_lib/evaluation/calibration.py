@@ -22,10 +22,10 @@ from scipy.optimize import isotonic_regression
 
 from hicp_lib.detectors.base import Detections
 from hicp_lib.errors import InputError
+from hicp_lib.evaluation.resampling import draw_counts, with_interval
 from hicp_lib.keypoints import GROUPS
 
 N_BINS = 10
-_PERCENTILES = (2.5, 97.5)
 
 
 @dataclass(frozen=True)
@@ -143,15 +143,13 @@ def _counts(rows: pd.DataFrame) -> tuple[int, int, float]:
 
 def _errors(kinds: Mapping[str, pd.DataFrame], n_resamples: int, seed: int) -> Iterator[float]:
     """Value and interval of each kind's calibration error and, on the same draws, of their difference."""
-    values, samples = [], []
+    samples = []
     for rows in kinds.values():
         sums = _sums(rows["score"], rows["hit"], rows["source_image"])
-        values.append(_error(sums.sum(axis=0)))
         samples.append(_error(_resampled(sums, n_resamples, seed)))
-    values.append(values[1] - values[0])
     samples.append(samples[1] - samples[0])
-    for value, drawn in zip(values, samples, strict=True):
-        yield from (float(value), *map(float, np.nanpercentile(drawn, _PERCENTILES)))
+    for drawn in samples:
+        yield from map(float, with_interval(drawn))
 
 
 def calibration_error(scores: np.ndarray, hits: np.ndarray) -> float:
@@ -174,14 +172,14 @@ def reliability(
     high, count`
     """
     sums = _sums(scores, hits, groups)
-    count, score_sum, hit_sum = sums.sum(axis=0)
+    count, score_sum, _ = sums.sum(axis=0)
     drawn = _resampled(sums, n_resamples, seed)
     with np.errstate(invalid="ignore"):
-        rates = drawn[:, 2] / drawn[:, 0]
-    rows = []
-    for i in np.flatnonzero(count):
-        low, high = np.nanpercentile(rates[:, i], _PERCENTILES)
-        rows.append((int(i), score_sum[i] / count[i], hit_sum[i] / count[i], low, high, int(count[i])))
+        rate, low, high = with_interval(drawn[:, 2] / drawn[:, 0])
+    rows = [
+        (int(i), score_sum[i] / count[i], rate[i], low[i], high[i], int(count[i]))
+        for i in np.flatnonzero(count)
+    ]
     return pd.DataFrame(rows, columns=["bin", "score", "rate", "low", "high", "count"])
 
 
@@ -199,12 +197,8 @@ def _sums(scores: np.ndarray, hits: np.ndarray, groups: np.ndarray) -> np.ndarra
 
 
 def _resampled(sums: np.ndarray, n_resamples: int, seed: int) -> np.ndarray:
-    """Sums (n_resamples, 3, 10) of groups drawn with replacement."""
-    n_groups = len(sums)
-    drawn = np.random.default_rng(seed).multinomial(
-        n_groups, np.full(n_groups, 1 / n_groups), size=n_resamples
-    )
-    return np.tensordot(drawn, sums, axes=1)
+    """Sums (1 + n_resamples, 3, 10) of all groups, then of groups drawn with replacement."""
+    return np.tensordot(draw_counts(len(sums), n_resamples, seed), sums, axes=1)
 
 
 def _error(sums: np.ndarray) -> np.ndarray:

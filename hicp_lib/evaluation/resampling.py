@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-_PERCENTILES = (2.5, 97.5)
+PERCENTILES = (2.5, 97.5)  # of 95 % intervals
 
 
 def draw_counts(n: int, n_resamples: int, seed: int) -> np.ndarray:
@@ -25,7 +25,7 @@ def with_interval(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
     others = draws[1:]
     bounds = np.full((2, *draws.shape[1:]), np.nan)
     some = np.isfinite(others).any(axis=0)
-    bounds[:, some] = np.nanpercentile(others[:, some], _PERCENTILES, axis=0)
+    bounds[:, some] = np.nanpercentile(others[:, some], PERCENTILES, axis=0)
     return draws[0], *bounds
 
 

@@ -61,7 +61,7 @@ def test_where_nobody_is_found_every_table_and_figure_is_empty_but_there(world):
     source, truth, _ = world
     found = {("headless", "mediapipe-pose"): {5: Detections.none()}}
     placed = placed_keypoints(truth, found, source)
-    assert placed.empty and placed.dtypes["given"] == bool
+    assert placed.empty and placed["given"].dtype.kind == "b"
     assert invented_shares(placed, 0.3, 10).empty
     assert "(0)" in draw.invented_heads(invented_heads(placed), "drawn").figure.axes[0].get_title("left")
     assert draw.scores_by_state(scores_by_state(placed, 10), "drawn").table.empty
