@@ -22,6 +22,7 @@ from hicp_lib.provenance import DATA_DIR
 CLAIMS_FILE = DATA_DIR / "claims.json"
 RELATIONS = (">", "<", "within")
 PICKS = ("each", "least", "greatest")
+ONLY_ON = ("photographs", "rendered people")
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,8 @@ class Claim:
     paper : the paper's value as text, "" where it gives none
     unit : of the quantities that the evidence shows
     tests : all must hold
-    only_on : "" or "photographs": the claim is about these, and nothing rendered can test it
+    only_on : "", or one of `ONLY_ON`. "photographs": the claim is about these, and nothing rendered can test
+        it. "rendered people": its tables hold nothing else, whatever data the run was given
     reason, command : for what no result can test here: why not, and what would
     """
 
@@ -124,8 +126,8 @@ def _claim(row: dict[str, Any]) -> Claim:
     claim = Claim(**row | {"tests": tuple(_test(test) for test in row.get("tests", []))})
     if not claim.tests and not claim.reason:
         raise ValueError("has neither tests nor a reason why it has none")
-    if claim.only_on not in ("", "photographs"):
-        raise ValueError(f"only_on is {claim.only_on!r}; expected photographs")
+    if claim.only_on not in ("", *ONLY_ON):
+        raise ValueError(f"only_on is {claim.only_on!r}; expected one of {', '.join(ONLY_ON)}")
     return claim
 
 

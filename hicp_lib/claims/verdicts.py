@@ -121,6 +121,7 @@ def _judge(claim: Claim, results: Path) -> Verdict:
         return Verdict(claim, NOT_TESTABLE, reason=claim.reason, command=claim.command)
     try:
         rendered = any(is_rendered(results, test.left.notebook) for test in claim.tests)
+        rendered |= claim.only_on == "rendered people"
         if claim.only_on == "photographs" and rendered:
             raise _MissingError("the claim is about photographs; this run saw rendered people", _PHOTOGRAPHS)
         outcomes, evidence = zip(*(_try(test, claim.unit, results) for test in claim.tests), strict=True)

@@ -78,6 +78,11 @@ def test_rendered_data_qualify_the_verdict(write, parameters, expected):
     assert verdict(claim(LOSES), results).verdict == expected
 
 
+def test_what_is_always_rendered_stays_so_when_the_run_had_photographs(write):
+    results = write(rows(a=(-0.4, -0.5, -0.3)), {"source": "halpe"})
+    assert verdict(claim(LOSES, only_on="rendered people"), results).verdict == v.ON_RENDERED_DATA
+
+
 def test_a_claim_about_photographs_is_not_tested_on_rendered_people(write):
     results = write(rows(a=(0.4, 0.3, 0.5)), {"source": "rendered"})
     found = verdict(claim(LOSES, only_on="photographs"), results)
