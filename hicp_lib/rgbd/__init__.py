@@ -1,0 +1,1 @@
+"""Recordings of colour and depth: reading and checking them, keypoints in space, motion capture."""

@@ -65,6 +65,25 @@ def _run_and_kill(arguments: list[str], delay_s: float) -> None:
     assert not alive, "the kernel outlived the report"
 
 
+def test_what_the_kernel_started_ends_with_the_reports_process_group(tmp_path, library):
+    """As when a terminal is closed, or `timeout` ends a command."""
+    begun = tmp_path / "begun"
+    cell = f"import subprocess; subprocess.run(['sh', '-c', 'touch {begun}; exec sleep 300'])"
+    code = _REPORT.replace("START, MEASURE, FINISH)\nrun_all", "START, sys.argv[3], FINISH)\nrun_all")
+    command = [sys.executable, "-c", code, str(tmp_path / "study"), str(library), cell]
+    process = subprocess.Popen(command, cwd=Path(__file__).parent, start_new_session=True)
+    while not begun.exists():
+        assert process.poll() is None
+        time.sleep(0.05)
+    family = psutil.Process(process.pid).children(recursive=True)
+    os.killpg(process.pid, signal.SIGTERM)
+    process.wait()
+    _, alive = psutil.wait_procs(family, timeout=20)
+    for one in alive:
+        one.kill()
+    assert len(family) >= 3 and not alive
+
+
 class _Killed(BaseException):
     """Stands for the end of the process at one step."""
 
