@@ -65,7 +65,7 @@ def read_calibrations(path: str | Path, detector: str = "") -> dict[str, Calibra
     try:
         table = pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
     except (OSError, ValueError) as error:
-        problem = " ".join(str(error).split())[:150]
+        problem = getattr(error, "strerror", None) or " ".join(str(error).split())[:150]
         raise InputError(f"{path}: cannot be read as a table ({problem}); give calibrations") from None
     if list(table.columns) != _COLUMNS:
         raise InputError(f"{path}: has not the columns {', '.join(_COLUMNS)}; write it with calibration fit")
