@@ -30,7 +30,8 @@ METHODS: dict[str, str | Lifting] = {
     "paper": "paper",
     "+ below the surface": partial(lift_robust, steps=STEPS[:1]),
     "+ near surfaces": partial(lift_robust, steps=STEPS[:2]),
-    "+ limb lengths": lift_robust,
+    "+ limb lengths": partial(lift_robust, steps=STEPS[:3]),
+    "+ hand shapes": lift_robust,
 }
 """The paper's method, then one step more each."""
 

@@ -12,7 +12,7 @@ from hicp_lib.rgbd.lifting import has_depth
 
 _IS_BODY = np.isin(np.arange(N_KEYPOINTS), BODY)
 RADIUS_M = np.where(_IS_BODY, 0.030, 0.010)  # how far around a keypoint surfaces are looked at
-_SIGMA_M = np.where(_IS_BODY, 0.020, 0.010)  # depths that differ so much cost 1
+_SIGMA_M = np.where(_IS_BODY, 0.012, 0.010)  # depths that differ so much cost 1
 _SAMPLES = 7  # per side of the neighbourhood
 _STEEP_M = 0.03  # a larger difference between the pixels on both sides is a depth step
 _ON_STEP = 1.0  # cost of a surface there

@@ -11,13 +11,18 @@ What exact truth shows to go wrong with it, and the steps here that mend it:
 - It takes what hides a joint, and what is beside a limb that the detector missed. *limb_lengths*: depths
   of all keypoints are chosen together, so that they cost least while limbs have lengths that people have.
   Then a joint may also lie behind what is seen, at a cost.
+- It takes the front of a hand for the fingers behind it. *hand_shapes*: the depths of a hand's keypoints are
+  drawn to those of the hand that fits best, palm and bent fingers, behind what is seen where it must be.
 
 Tried as well and left out, as they brought nothing: the mode of depth around the keypoint instead of the
-cheapest candidate, scores of the detector as weights of limbs, and the person's true size for the limbs'
-lengths instead of everybody's.
+cheapest candidate, scores of the detector as weights of limbs, the person's true size for the limbs'
+lengths instead of everybody's, knuckles that hang on each other instead of on the hand's root, a finer grid
+of depths, and a lower cost of being hidden. Keypoints of the face need no limbs: they are taken at the
+cheapest of the surfaces near them.
 
-Measures of people come from the body model (`body_measures`). The costs (`near_surfaces`, `limb_lengths`)
-were chosen by hand on rendered people who are in no recording of the study.
+Measures of people come from the body model (`body_measures`, `hand_shapes`). The costs (there, and in
+`near_surfaces` and `limb_lengths`) were chosen by hand on rendered people who are in no recording of the
+study.
 """
 
 from __future__ import annotations
@@ -26,15 +31,16 @@ from collections.abc import Collection
 
 import numpy as np
 
-from hicp_lib.keypoints import BODY, N_KEYPOINTS
+from hicp_lib.keypoints import BODY, FACE, N_KEYPOINTS
 from hicp_lib.rgbd.body_measures import BodyMeasures, load_measures
 from hicp_lib.rgbd.camera import Intrinsics
+from hicp_lib.rgbd.hand_shapes import favour_hand_shapes
 from hicp_lib.rgbd.lifting import LIFTED, MIN_DEPTH_M, NO_DEPTH, Lifted, lift
 from hicp_lib.rgbd.limb_lengths import choose_along_limbs
 from hicp_lib.rgbd.near_surfaces import costs_of_depths, look_around, settle
 
-STEPS = ("below_surface", "near_surfaces", "limb_lengths")
-"""What goes beyond the paper; limb lengths choose among near surfaces and need them."""
+STEPS = ("below_surface", "near_surfaces", "limb_lengths", "hand_shapes")
+"""What goes beyond the paper; limb lengths choose among near surfaces, hand shapes are chosen with them."""
 
 _REACH_M, _GRID_M = 0.90, 0.02  # grid of depths around the person's middle
 
@@ -50,8 +56,9 @@ def lift_robust(
     """
     if unknown := set(steps) - set(STEPS):
         raise ValueError(f"no step {', '.join(sorted(unknown))}; there are {', '.join(STEPS)}")
-    if "limb_lengths" in steps and "near_surfaces" not in steps:
-        raise ValueError("limb_lengths needs near_surfaces, which it chooses among")
+    for step, needed in (("limb_lengths", "near_surfaces"), ("hand_shapes", "limb_lengths")):
+        if step in steps and needed not in steps:
+            raise ValueError(f"{step} needs {needed}")
     measures = load_measures()
     below_m = measures.below_skin_m if "below_surface" in steps else np.zeros(N_KEYPOINTS)
     depth_m = np.asarray(depth_m, np.result_type(depth_m, np.float32))
@@ -66,7 +73,9 @@ def lift_robust(
         first_m = paper.points_m[person, found, 2]
         if np.isfinite(first_m).any():
             image = pixels_px[found], depth_m, intrinsics
-            points_m[person, found] = _lift_person(found, first_m, *image, below_m, limbs)
+            points_m[person, found] = _lift_person(
+                found, first_m, *image, below_m, limbs, "hand_shapes" in steps
+            )
     reason[np.isfinite(points_m[..., 2])] = LIFTED
     reason[(reason == LIFTED) & np.isnan(points_m[..., 2])] = NO_DEPTH
     return Lifted(points_m, reason)
@@ -83,6 +92,7 @@ def _lift_person(
     intrinsics: Intrinsics,
     below_m: np.ndarray,
     limbs: BodyMeasures | None,
+    with_hands: bool,
 ) -> np.ndarray:
     """Found keypoints of one person, (m, 3); `first_m` (m,) are the paper's depths, `below_m` of all 136."""
     middle_m = _middle_m(found, first_m)
@@ -94,10 +104,12 @@ def _lift_person(
     candidates = candidates.take(seen)
     grid_m = np.arange(nearest_m, farthest_m, _GRID_M)
     costs = costs_of_depths(candidates, grid_m)
-    if limbs is None:
-        chosen = costs.argmin(axis=1)
-    else:
-        chosen = choose_along_limbs(costs, grid_m, candidates.rays, found[seen], limbs)
+    if with_hands:
+        costs = favour_hand_shapes(costs, grid_m, candidates.rays, found[seen])
+    chosen = costs.argmin(axis=1)
+    if limbs is not None:
+        on = np.flatnonzero(~np.isin(found[seen], FACE))
+        chosen[on] = choose_along_limbs(costs[on], grid_m, candidates.rays[on], found[seen[on]], limbs)
     points_m = np.full((len(found), 3), np.nan)
     points_m[seen] = candidates.rays * settle(candidates, grid_m[chosen], _GRID_M)[:, None]
     return points_m

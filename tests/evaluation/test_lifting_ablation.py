@@ -73,8 +73,8 @@ def test_only_what_both_lift_is_compared():
     errors = pd.DataFrame({"frame": range(4), "keypoint": "left_elbow", "group": "elbows"})
     for method in METHODS:
         errors[method] = [1.0, 1.0, np.nan, 1.0]
-    errors["+ limb lengths"] = [0.5, np.nan, 9.0, 0.5]
-    row = summary(errors).set_index("method").loc["+ limb lengths"]
+    errors["+ hand shapes"] = [0.5, np.nan, 9.0, 0.5]
+    row = summary(errors).set_index("method").loc["+ hand shapes"]
     assert (row["n_detected"], row["n_lifted"], row["n_compared"]) == (4, 3, 2)
     assert row["median_m"] == 0.5 and row["p95_change"] == -0.5
 

@@ -99,6 +99,8 @@ def test_steps_are_checked():
     assert METHODS["paper"] is lift and METHODS["robust"] is lift_robust
     with pytest.raises(ValueError, match="no step smoothing"):
         lift_robust(keypoints(), np.ones((240, 320)), CAMERA, ["smoothing"])
+    with pytest.raises(ValueError, match="hand_shapes needs limb_lengths"):
+        lift_robust(keypoints(), np.ones((240, 320)), CAMERA, ["near_surfaces", "hand_shapes"])
     with pytest.raises(ValueError, match="needs near_surfaces"):
         lift_robust(keypoints(), np.ones((240, 320)), CAMERA, ["limb_lengths"])
 
