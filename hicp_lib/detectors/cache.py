@@ -81,6 +81,14 @@ def result_path(folder: Path, image_path: Path, boxes_px: np.ndarray | None) -> 
         raise InputError(f"{image_path}: cannot be read ({error.strerror}); expected an image file") from None
 
 
+def result_path_of_pixels(folder: Path, *arrays: np.ndarray) -> Path:
+    """Where the result of an image that is no file is kept: by its pixels, and boxes if they were given."""
+    content = hashlib.sha256()
+    for array in arrays:
+        content.update(f"{array.dtype} {array.shape}".encode() + np.ascontiguousarray(array).tobytes())
+    return folder / "pixels" / f"{content.hexdigest()}.bin"
+
+
 def read_result(path: Path) -> Timed | None:
     """The result kept at `path`; None if there is none or it is damaged."""
     try:

@@ -32,6 +32,7 @@ from hicp_lib.detectors.arbitration import (
 )
 from hicp_lib.detectors.base import Detections, Detector
 from hicp_lib.detectors.hand_squares import Arms, Square, SquareRule, hand_squares, squares_along
+from hicp_lib.detectors.kept import Kept
 from hicp_lib.errors import InputError
 
 LOOKS = ("wrists", "image", "along")
@@ -48,6 +49,7 @@ class Combined:
     arbitrate : apply the rules of `arbitration`; if not, a wrist takes the surest hand of its own
         squares, and further hands go to the nearest free wrist
     min_side_px : smaller squares are enlarged to this
+    keep_looks : keep on disk what every look showed, for variants that look at the same places
     squares, rule : thresholds
     """
 
@@ -58,6 +60,7 @@ class Combined:
         looks: str = "wrists+image+along",
         arbitrate: bool = True,
         min_side_px: int = 320,
+        keep_looks: bool = False,
         squares: SquareRule | None = None,
         rule: ArbitrationRule | None = None,
     ) -> None:
@@ -65,7 +68,8 @@ class Combined:
         if not set(self._looks) <= set(LOOKS):
             raise InputError(f"looks {looks!r}: expected some of {', '.join(LOOKS)}, joined by +")
         self.name = f"combined:{body.name}+{hands.name}"
-        self._body, self._hands, self._arbitrate = body, hands, arbitrate
+        self._body, self._hands = (Kept(body), Kept(hands)) if keep_looks else (body, hands)
+        self._arbitrate = arbitrate
         self._min_side_px = min_side_px
         self._squares, self._rule = squares or SquareRule(), rule or ArbitrationRule()
         self.takes_boxes = getattr(body, "takes_boxes", False)

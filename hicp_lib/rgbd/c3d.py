@@ -15,7 +15,7 @@ from hicp_lib.files import atomic_path
 
 _UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _MAX_RATE_HZ = 1e5
-_MAX_FRAMES = 65535  # that the format's own header counts to
+MAX_FRAMES = 65535  # that the format's own header counts to
 _TIMEOUT_S = 300
 _MAX_MEMORY_BYTES = 8 * 2**30
 
@@ -97,7 +97,7 @@ def _checked(path: Path, points, residuals, names, rate, units) -> Points:
 def _refuse_cut_off(path: Path, head: bytes, n_frames: int) -> None:
     """ezc3d keeps quiet about frames that are missing at the end; the fourth and fifth word number them."""
     first, last = np.frombuffer(head, "<u2")[3:5].astype(int)
-    if n_frames == _MAX_FRAMES:
+    if n_frames == MAX_FRAMES:
         raise InputError(f"{path}: {n_frames} frames are all C3D counts to, more may be missing; export TSV")
     if n_frames < last - first + 1:
         raise InputError(f"{path}: holds {n_frames} of {last - first + 1} frames: cut off, export it again")
@@ -111,8 +111,8 @@ def write_points(path: str | Path, points_m: np.ndarray, names: tuple[str, ...],
     InputError
         For more frames than the format counts to.
     """
-    if len(points_m) >= _MAX_FRAMES:
-        raise InputError(f"{path}: C3D takes fewer than {_MAX_FRAMES} frames, not {len(points_m)}; write TSV")
+    if len(points_m) >= MAX_FRAMES:
+        raise InputError(f"{path}: C3D takes fewer than {MAX_FRAMES} frames, not {len(points_m)}; write TSV")
     file = ezc3d.c3d()
     point = file["parameters"]["POINT"]
     point["RATE"]["value"], point["UNITS"]["value"] = [rate_hz], ["mm"]

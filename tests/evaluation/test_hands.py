@@ -66,4 +66,4 @@ def test_against_a_baseline_that_finds_nothing_there_is_no_ratio():
 
 
 def test_the_last_ingredient_is_the_combination_as_it_is():
-    assert list(INGREDIENTS.values())[-1] == {}
+    assert list(INGREDIENTS.values())[-1] == {"keep_looks": True}

@@ -18,6 +18,7 @@ from tqdm import tqdm
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json, write_json
 from hicp_lib.provenance import DATA_DIR, LIBRARY_DIR, files_sha256
+from hicp_lib.rgbd.c3d import MAX_FRAMES as MAX_C3D_FRAMES
 from hicp_lib.rgbd.qualisys import write_c3d, write_tsv
 from hicp_lib.rgbd.recording import EXACT_DEPTH_DIR, MOCAP_FILE, RGB_LIST, Recording, open_recording
 from hicp_lib.rgbd.recording_writer import depth_name, rgb_name, write_depth, write_rgb
@@ -157,7 +158,8 @@ def _capture_all(out: Path, name: str, seed: int, n: int) -> None:
     T_root_camera = camera_poses(plan, 1)[0]
     found = plan.capture(seed, float(plan.times_s(n)[-1]), T_WORLD_ROOT @ T_root_camera)
     write_tsv(out / MOCAP_FILE, found.exported)
-    write_c3d((out / MOCAP_FILE).with_suffix(".c3d"), found.exported)
+    if len(found.exported.times_s) < MAX_C3D_FRAMES:  # a longer one is in the TSV file alone
+        write_c3d((out / MOCAP_FILE).with_suffix(".c3d"), found.exported)
     T_base_mocap = np.linalg.inv(found.T_mocap_world @ T_WORLD_ROOT)
     offset_s = START_S + found.start_s
     write_json(part, {"n_frames": n, "T_base_mocap": T_base_mocap.tolist(), "mocap_offset_s": offset_s})
