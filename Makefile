@@ -50,7 +50,7 @@ $(INSTALLED): environment.lock pyproject.toml
 	  { echo "make: $(PYTHON) is not Python 3.11-3.14; name one that is: make PYTHON=python3.12" >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' || \
 	  { echo "make: $(PYTHON) has no venv; on Debian and Ubuntu: apt-get install python3-venv" >&2; exit 1; }
-	@echo "Installing the locked environment into .venv (a minute or two; 1.6 GB) ..."
+	@echo "Installing the locked environment into .venv (a minute or two; 2 GB) ..."
 	@test ! -e $(INSTALLING) || rm -rf .venv
 	@$(BIN)/python -c pass 2>/dev/null || $(PYTHON) -m venv --clear .venv
 	@rm -f $(INSTALLED) && touch $(INSTALLING)
