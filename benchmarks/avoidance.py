@@ -150,7 +150,7 @@ def compare_activations(n_people: int, repeats: int = 20) -> dict[str, float]:
 
 def detector_or_none(name: str):
     try:
-        return make_detector(name)
+        return make_detector(name, **({"side_by_side": True} if name == "mediapipe" else {}))
     except InputError as error:
         print(f"without the detector: {error}")
         return None

@@ -134,6 +134,13 @@ def test_a_photograph(weights, photograph):
     assert left_shoulder[0] - right_shoulder[0] == pytest.approx(360, abs=50)
 
 
+def test_side_by_side_finds_the_same(weights, photograph):
+    one, two = MediaPipe().detect(photograph), MediaPipe(side_by_side=True).detect(photograph)
+    assert len(one) == len(two) > 0
+    assert np.array_equal(one.keypoints_px, two.keypoints_px, equal_nan=True)
+    assert MediaPipe().settings == MediaPipe(side_by_side=True).settings
+
+
 def test_an_empty_image_has_nobody(weights):
     for name in ("mediapipe-pose", "mediapipe-hands", "mediapipe"):
         found = make_detector(name).detect(np.full((90, 50, 3), 128, np.uint8))
