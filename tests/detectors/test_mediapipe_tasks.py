@@ -135,10 +135,11 @@ def test_a_photograph(weights, photograph):
 
 
 def test_side_by_side_finds_the_same(weights, photograph):
-    one, two = MediaPipe().detect(photograph), MediaPipe(side_by_side=True).detect(photograph)
+    plain, both = make_detector("mediapipe"), make_detector("mediapipe", side_by_side=True)
+    one, two = plain.detect(photograph), both.detect(photograph)
     assert len(one) == len(two) > 0
     assert np.array_equal(one.keypoints_px, two.keypoints_px, equal_nan=True)
-    assert MediaPipe().settings == MediaPipe(side_by_side=True).settings
+    assert plain.settings == both.settings
 
 
 def test_an_empty_image_has_nobody(weights):
