@@ -16,6 +16,7 @@ import pandas as pd
 
 from hicp_lib.errors import InputError
 from hicp_lib.evaluation.resampling import weighted_median, with_interval
+from hicp_lib.evaluation.stability import THRESHOLDS_M
 from hicp_lib.evaluation.time_blocks import block_length, draw_blocks
 from hicp_lib.files import read_json
 from hicp_lib.provenance import DATA_DIR
@@ -30,7 +31,6 @@ MARKERS: dict[str, tuple[str, str]] = {
     joint: (f"{part}_{side}_1", f"{part}_{side}_2") for joint in JOINTS for side, part in [joint.split("_")]
 }
 MIN_SCORES = (0.3, 0.1)
-THRESHOLDS_M = (0.025, 0.05, 0.1)
 POSITION = ["x_m", "y_m", "z_m"]
 _CASE = ["detector", "method", "keypoint"]
 _BINS: dict[str, list[float] | None] = {
