@@ -6,6 +6,7 @@ import ast
 import json
 import tomllib
 from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
@@ -103,7 +104,8 @@ def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
     Raises
     ------
     InputError
-        If the file or the profile is missing, or names a notebook or parameter that does not exist.
+        If the file or the profile is missing, names a notebook or parameter that does not exist, or has
+        notebooks wait for each other.
     """
     try:
         content = tomllib.loads(path.read_text())
@@ -118,6 +120,12 @@ def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
     for notebook in [*content[name], *after, *(item for items in after.values() for item in items)]:
         if notebook not in known:
             raise InputError(f"{path}: names notebook '{notebook}'; known are {', '.join(known)}")
+    try:
+        TopologicalSorter(after).prepare()
+    except CycleError as error:
+        raise InputError(
+            f"{path}, [after]: {' waits for '.join(reversed(error.args[1]))}; break the circle"
+        ) from None
     parameters = {
         key: check_parameters(known[key], given, f"{path}, [{name}.{key}]")
         for key, given in content[name].items()

@@ -29,6 +29,7 @@ from hicp_lib.errors import InputError
 from hicp_lib.files import sha256_file, write_json
 from hicp_lib.report import PROFILE_VARIABLE, RESULTS_VARIABLE
 from hicp_lib.report.notebooks import Notebook, is_path
+from hicp_lib.report.schedule import run_when_ready
 
 WALL_LIMIT_S = 2 * 3600
 N_PARALLEL = 2
@@ -70,7 +71,7 @@ def run_all(runs: list[Run], folders: Folders, say: Callable[[str], None]) -> No
 
     Parameters
     ----------
-    runs : in an order in which each comes after those it names in `after`
+    runs : those they name in `after` run before them; what is not among them is left out
     say : takes one line per notebook
 
     Raises
@@ -89,13 +90,15 @@ def run_all(runs: list[Run], folders: Folders, say: Callable[[str], None]) -> No
     for stamp in folders.executed.glob("*.json"):
         if stamp.stem not in kept:
             _discard(stamp.stem, folders)
-    done: dict[str, Future] = {}
+    named = {run.notebook.name: run for run in runs}
+    after = {name: [other for other in run.after if other in named] for name, run in named.items()}
     with ThreadPoolExecutor(N_PARALLEL) as pool, _Children() as children:
-        for run in runs:
-            before = [done[name] for name in run.after if name in done]
-            done[run.notebook.name] = pool.submit(_bring_up_to_date, run, before, folders, children, say)
-        errors = [future.exception() for future in done.values()]
-    for error in errors:
+
+        def job(name: str, before: list[Future]) -> str:
+            return _bring_up_to_date(named[name], before, folders, children, say)
+
+        done = run_when_ready(after, job, pool, N_PARALLEL)
+    for error in (done[name].exception() for name in named):
         if error is not None and not isinstance(error, _SkippedError):
             raise error
 

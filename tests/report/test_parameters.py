@@ -69,6 +69,10 @@ def test_profile_and_order_are_read(study):
         ("[quick.00_first]\nseed = 1.5", "'seed' is 1.5; expected an integer such as 0"),
         ("[quick.00_first]\nseed = true", "'seed' is true; expected an integer such as 0"),
         ("[quick]\n[after]\n01_second = ['x']", "names notebook 'x'"),
+        (
+            "[quick]\n[after]\n01_second = ['00_first']\n00_first = ['01_second']",
+            "01_second waits for 00_first waits for 01_second; break the circle",
+        ),
         ("[quick", "not TOML"),
     ],
 )

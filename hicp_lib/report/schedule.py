@@ -1,0 +1,58 @@
+"""Which job starts when: some at a time, each after those it needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from functools import cache
+from graphlib import TopologicalSorter
+
+
+def run_when_ready(
+    after: Mapping[str, Sequence[str]],
+    job: Callable[[str, list[Future]], object],
+    pool: Executor,
+    n_parallel: int,
+) -> dict[str, Future]:
+    """Run every job once those before it have ended, well or not; its ended future by its name.
+
+    Of those that are ready, the one at the head of the longest chain of others goes first: started late, it
+    would keep them all waiting; among equals the first in `after`.
+
+    Parameters
+    ----------
+    after : name of every job -> names of those before it
+    job : takes a name and the ended futures of those before it; called in the pool
+    n_parallel : jobs at a time; as many as the pool has workers, so that none is queued before its turn
+
+    Raises
+    ------
+    graphlib.CycleError
+        If jobs wait for each other.
+    """
+    order = TopologicalSorter(after)
+    order.prepare()
+    urgency = _urgency(after)
+    ready: list[str] = []
+    done: dict[str, Future] = {}
+    running: dict[Future, str] = {}
+    while order.is_active():
+        ready = sorted([*ready, *order.get_ready()], key=urgency.index)
+        while ready and len(running) < n_parallel:
+            name = ready.pop(0)
+            running[pool.submit(job, name, [done[other] for other in after[name]])] = name
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            name = running.pop(future)
+            done[name] = future
+            order.done(name)
+    return done
+
+
+def _urgency(after: Mapping[str, Sequence[str]]) -> list[str]:
+    """All jobs, by falling length of the longest chain that begins with each."""
+
+    @cache
+    def length(name: str) -> int:
+        return 1 + max((length(later) for later, earlier in after.items() if name in earlier), default=0)
+
+    return sorted(after, key=length, reverse=True)
