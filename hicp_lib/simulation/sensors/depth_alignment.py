@@ -19,16 +19,17 @@ def align_to_colour(depth_m: np.ndarray, left: Camera, colour: Camera) -> np.nda
     left, colour : cameras beside each other: the same orientation, a shift along x
     """
     shift_m = float(colour.T_world_camera[:3, 0] @ (left.centre_m - colour.centre_m))
-    row, column = np.nonzero(np.isfinite(depth_m))
-    z = depth_m[row, column]
-    shift = np.float32(colour.fx_px * shift_m) / z
+    z = np.where(np.isfinite(depth_m), depth_m, np.float32(np.inf))
     scale = np.float32(colour.fx_px / left.fx_px)
-    middle = scale * (column.astype(np.float32) - np.float32(left.cx_px)) + shift + np.float32(colour.cx_px)
+    middle = np.float32(colour.fx_px * shift_m) / z
+    middle += scale * (np.arange(left.width_px, dtype=np.float32) - np.float32(left.cx_px))
+    middle += np.float32(colour.cx_px)
     first, last = (np.rint(middle + side * scale / 2).astype(np.int32) for side in (-1, 1))
     wide = np.full((left.height_px, colour.width_px + 2), np.inf, np.float32)  # a column for each side's rest
+    start = np.arange(left.height_px)[:, None] * wide.shape[1] + 1
     for step in range(int(np.ceil(scale)) + 1):
-        at = np.clip(np.minimum(first + step, last), -1, colour.width_px) + 1
-        np.minimum.at(wide.ravel(), row * wide.shape[1] + at, z)
+        at = np.clip(np.minimum(first + step, last), -1, colour.width_px) + start
+        np.minimum.at(wide.reshape(-1), at.reshape(-1), z.reshape(-1))
     return _stretch_rows(wide[:, 1:-1], left, colour)
 
 

@@ -10,6 +10,7 @@ for units, range and alignment; the book's page on simulated sensors has the for
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from statistics import NormalDist
 
 import cv2
@@ -181,9 +182,9 @@ def _true_disparity(scene: RayScene, view: Camera, focal_baseline: float) -> tup
     those bend nowhere what lies between is interpolated; all the rest is cast as well.
     """
     shape = (view.height_px, view.width_px)
-    rays = pixel_rays(view).reshape(*shape, 6)
-    trace = scene.trace(np.ascontiguousarray(rays[::2, ::2]).reshape(-1, 6))
-    coarse_shape = (-(-shape[0] // 2), -(-shape[1] // 2))
+    every_second = _every_second(view)
+    coarse_shape = (every_second.height_px, every_second.width_px)
+    trace = scene.trace(pixel_rays(every_second))
     coarse = (np.float32(focal_baseline) / trace.depth_m).reshape(coarse_shape)
     # OpenCV's resizing puts the samples elsewhere: means of neighbours by hand.
     full = np.empty(shape, np.float32)
@@ -194,11 +195,18 @@ def _true_disparity(scene: RayScene, view: Camera, focal_baseline: float) -> tup
     full[1::2, 1::2] = ((right + below) / 2)[: shape[0] // 2, : shape[1] // 2]
     unknown = _doubled(_bent(coarse), shape)
     unknown[::2, ::2] = False
-    rest = np.flatnonzero(unknown)
-    full.ravel()[rest] = focal_baseline / scene.trace(rays.reshape(-1, 6).take(rest, axis=0)).depth_m
+    rows, columns = np.nonzero(unknown)
+    rays = pixel_rays(view, np.stack([columns, rows], axis=1))
+    full[rows, columns] = focal_baseline / scene.trace(rays).depth_m
     is_hair = np.array([s.parts is not None and np.isin(s.parts, _HAIR_PARTS).all() for s in scene.surfaces])
     hair = np.append(is_hair, False)[trace.surface].reshape(coarse_shape)
     return full, _doubled(hair, shape)
+
+
+def _every_second(view: Camera) -> Camera:
+    """The camera whose pixels are those of every second row and column."""
+    halves = {name: getattr(view, name) / 2 for name in ("fx_px", "fy_px", "cx_px", "cy_px")}
+    return replace(view, width_px=-(-view.width_px // 2), height_px=-(-view.height_px // 2), **halves)
 
 
 def _bent(coarse_px: np.ndarray) -> np.ndarray:
@@ -254,13 +262,24 @@ def _hidden_from_right(true_px: np.ndarray) -> np.ndarray:
 
 
 def _correlated_noise(shape: tuple[int, int], window_px: int, rng: Rng) -> np.ndarray:
-    """Normal noise of variance 1, smooth over a matching window, float32."""
+    """Normal noise of variance 1, smooth over a matching window, float32: a random piece of the kept one."""
+    tile = _noise_tile(window_px)
+    start = rng.integers(tile.shape)
+    rows, columns = (np.arange(n) + first for n, first in zip(shape, start, strict=True))
+    return tile.take(rows, axis=0, mode="wrap").take(columns, axis=1, mode="wrap")
+
+
+@lru_cache(maxsize=4)
+def _noise_tile(window_px: int) -> np.ndarray:
+    """Noise that goes on at its other side, (1536, 1536): drawing it anew would cost more than matching."""
+    white = np.random.default_rng(window_px).standard_normal((1536, 1536), np.float32)
     sigma = np.sqrt((window_px**2 - 1) / 12)  # the window's own standard deviation
-    white = rng.standard_normal(shape, np.float32)
     if sigma == 0:
         return white
-    kernel = cv2.getGaussianKernel(2 * int(3 * sigma) + 1, sigma)
-    return cv2.sepFilter2D(white, -1, kernel, kernel) / np.float32((kernel**2).sum())
+    reach = int(3 * sigma)
+    kernel = cv2.getGaussianKernel(2 * reach + 1, sigma)
+    smooth = cv2.sepFilter2D(np.pad(white, reach, mode="wrap"), -1, kernel, kernel)
+    return smooth[reach:-reach, reach:-reach] / np.float32((kernel**2).sum())
 
 
 def _patches(shape: tuple[int, int], share: float, window_px: int, rng: Rng) -> np.ndarray:
