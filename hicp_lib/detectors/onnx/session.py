@@ -38,7 +38,7 @@ class OnnxModel:
 
     Attributes
     ----------
-    path, sha256 : the file and its content's hash
+    path, sha256 : the file, and the hash of the model in it or made from it
     provider : where it runs, e.g. "cpu"
     inputs, outputs : its ports
     operators : the kinds of nodes in its graph
@@ -112,13 +112,6 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
         that was recorded then, or the provider is not to be had.
     """
     path = Path(path)
-    if provider not in available_providers():
-        raise InputError(
-            f"{path}: execution provider {provider!r} is not available here; expected one of: "
-            f"{', '.join(available_providers())} (others need another build of onnxruntime)"
-        )
-    if threads < 1:
-        raise InputError(f"{path}: threads {threads}: expected 1 or more")
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -126,6 +119,18 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
             f"{path}: cannot be read ({error.strerror}); give the path of an ONNX file"
         ) from None
     check_use(path, content)
+    return open_content(content, path, provider, threads)
+
+
+def open_content(content: bytes, path: Path, provider: str = "cpu", threads: int = 1) -> OnnxModel:
+    """As `open_model`, from the bytes of an ONNX model; `path` is the file they were made from."""
+    if provider not in available_providers():
+        raise InputError(
+            f"{path}: execution provider {provider!r} is not available here; expected one of: "
+            f"{', '.join(available_providers())} (others need another build of onnxruntime)"
+        )
+    if threads < 1:
+        raise InputError(f"{path}: threads {threads}: expected 1 or more")
     key = (sha256_bytes(content), str(path), provider, threads)
     with _lock:
         model = _open.get(key)
