@@ -120,9 +120,9 @@ def write_rgb(path: str | Path, rgb: np.ndarray) -> None:
 
 def write_depth(path: str | Path, depth_m: np.ndarray, depth_units_per_m: float) -> None:
     """Write depth in metres (height, width) as 16-bit PNG; 0 where it is not finite or does not fit."""
-    units = np.round(np.nan_to_num(depth_m, nan=0.0, posinf=0.0, neginf=0.0) * depth_units_per_m)
-    units = np.where((units < 0) | (units > _MOST_UNITS), 0, units)
-    write_png(path, units.astype(np.uint16))
+    units = np.rint(depth_m * depth_units_per_m)
+    fits = (units >= 0) & (units <= _MOST_UNITS)  # what is not a number fits nowhere
+    write_png(path, np.where(fits, units, 0).astype(np.uint16))
 
 
 def refuse_used_folder(folder: Path) -> None:
