@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import make_detections
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_people import make_detections
 
 from hicp_lib.errors import InputError
 from hicp_lib.evaluation.calibration import (

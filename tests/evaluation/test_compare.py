@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import make_annotations, make_detections
+from made_people import make_annotations, make_detections
 
 from hicp_lib.evaluation import compare as module
 from hicp_lib.evaluation.coco import evaluate

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import make_annotations, make_detections
+from made_people import make_annotations, make_detections
 
 from hicp_lib.evaluation.dose_curves import OBSERVED, dose_curves, observed_curves, observed_doses
 from hicp_lib.evaluation.error_kinds import all_errors

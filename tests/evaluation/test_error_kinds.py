@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import make_annotations, make_detections
+from made_people import make_annotations, make_detections
 
 from hicp_lib.evaluation.error_kinds import KINDS, all_errors, keypoint_errors, kind_shares
 from hicp_lib.keypoints import COCO_17, INDEX, SIGMAS

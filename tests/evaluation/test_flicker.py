@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import make_detections
+from made_people import make_detections
 
 from hicp_lib.evaluation.flicker import best_person, causal_filter, flicker, latency_s
 from hicp_lib.keypoints import N_KEYPOINTS

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import make_annotations, make_detections
+from made_people import make_annotations, make_detections
 
 from hicp_lib.annotations import write_detections
 from hicp_lib.errors import InputError

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from conftest import make_annotations, make_detections
 from hypothesis import given
 from hypothesis import strategies as st
+from made_people import make_annotations, make_detections
 
 from hicp_lib.evaluation.visibility_classes import (
     CLASSES,

@@ -1,0 +1,55 @@
+"""People and detections made up for the evaluation's tests."""
+
+import numpy as np
+
+from hicp_lib.annotations import Annotations, ImageInfo
+from hicp_lib.detectors.base import Detections
+
+
+def make_annotations(keypoints_px, image_ids, *, visibility=None, areas_px2=20_000.0, boxes_px=None, crowd=(),
+                     extras=None, n_images=None, first_id=1) -> Annotations:  # fmt: skip
+    """People with given keypoints (n, 136, 2); all labelled unless said otherwise."""
+    keypoints_px = np.array(keypoints_px, dtype=float).reshape(-1, 136, 2)
+    n = len(keypoints_px)
+    visibility = np.full((n, 136), 2.0) if visibility is None else np.array(visibility, dtype=float)
+    ids = range(n_images) if n_images else sorted({int(i) for i in image_ids})
+    if boxes_px is None:
+        corner = keypoints_px.min(axis=1, initial=np.inf)
+        boxes_px = np.concatenate([corner, keypoints_px.max(axis=1, initial=-np.inf) - corner], axis=1)
+    return Annotations(
+        {int(i): ImageInfo(int(i), f"{i}.png", 640, 480) for i in ids},
+        np.arange(first_id, first_id + n), np.array(image_ids, dtype=np.int64),
+        np.array(boxes_px, dtype=float).reshape(-1, 4), np.zeros(n) + areas_px2,
+        np.isin(np.arange(n), crowd), np.where(visibility[..., None] > 0, keypoints_px, np.nan), visibility,
+        extras or [{} for _ in range(n)],
+    )  # fmt: skip
+
+
+def make_detections(keypoints_px, person_scores=None) -> Detections:
+    """Detections with given keypoints (n, 136, 2), NaN where not given; other keypoints score 0.5."""
+    keypoints_px = np.array(keypoints_px, dtype=float).reshape(-1, 136, 2)
+    scores = np.where(np.isfinite(keypoints_px).all(axis=-1), 0.5, 0.0)
+    n = len(keypoints_px)
+    return Detections(keypoints_px, scores, np.ones(n) if person_scores is None else np.array(person_scores))
+
+
+def make_scene(seed: int, n_images: int = 40) -> tuple[Annotations, dict[int, Detections]]:
+    """Images with 0-3 people, some unlabelled or crowds, and detections from perfect to nonsense."""
+    rng = np.random.default_rng(seed)
+    image_ids = np.repeat(np.arange(n_images), rng.integers(0, 4, n_images))
+    n = len(image_ids)
+    people = rng.uniform(50, 400, (n, 1, 2)) + rng.normal(0, 60, (n, 136, 2))
+    visibility = rng.choice([0.0, 1.0, 2.0], (n, 136)) * (rng.random((n, 1)) > 0.15)
+    visibility[:, 94:] *= rng.random((n, 1)) > 0.4
+    annotations = make_annotations(
+        people, image_ids, visibility=visibility, areas_px2=rng.uniform(5_000, 60_000, n), n_images=n_images,
+        crowd=np.flatnonzero(rng.random(n) < 0.05),
+    )  # fmt: skip
+    detections = {}
+    for i in range(n_images):
+        copies = people[image_ids == i]
+        copies = copies + rng.normal(0, 1, copies.shape) * rng.choice([0.5, 4, 12, 30], (len(copies), 1, 1))
+        strangers = rng.uniform(0, 500, (rng.integers(0, 3), 136, 2))
+        found = np.concatenate([copies, strangers])
+        detections[i] = make_detections(found, np.round(rng.random(len(found)), 2))
+    return annotations, detections
