@@ -8,6 +8,7 @@ import numpy as np
 
 from hicp_lib.rgbd.camera import transform
 from hicp_lib.robot.kinematics import load_icub
+from hicp_lib.simulation.camera import Camera
 from hicp_lib.simulation.experiments.laboratory import COLOUR, PHOTOGRAPHIC, T_WORLD_ROOT, robot_camera
 from hicp_lib.simulation.experiments.scenarios import Scenario, Stage, scenario
 from hicp_lib.simulation.render import render
@@ -27,8 +28,8 @@ def record_frame(name: str, seed: int, k: int) -> tuple[np.ndarray, np.ndarray, 
     """
     plan = scenario(name)
     rng = np.random.default_rng(np.random.SeedSequence([seed, k, *name.encode()]))
-    world, person = _stage(name, seed)(float(plan.times_s(k + 1)[k]))
-    camera = robot_camera(COLOUR, camera_poses(plan, k + 1)[k])
+    world, person = stage(name, seed)(float(plan.times_s(k + 1)[k]))
+    camera = camera_at(plan, k)
     frame = render(world, camera, rng)
     rgb = expose(frame.radiance, PHOTOGRAPHIC, rng, frame.person >= 0)
     depth_m = simulate_depth(frame.rays, camera, D435, rng)
@@ -39,9 +40,15 @@ def record_frame(name: str, seed: int, k: int) -> tuple[np.ndarray, np.ndarray, 
 
 
 @lru_cache(maxsize=1)
-def _stage(name: str, seed: int) -> Stage:
-    """Made once in every process."""
+def stage(name: str, seed: int) -> Stage:
+    """What a scenario shows when; made once in every process."""
     return scenario(name).stage(seed)
+
+
+def camera_at(plan: Scenario, k: int) -> Camera:
+    """The colour camera as frame `k` is taken."""
+    (T_root_camera,) = load_icub().T_root_camera(plan.head_rad(k + 1)[k:], plan.mount)
+    return robot_camera(COLOUR, T_root_camera)
 
 
 def camera_poses(plan: Scenario, n: int) -> np.ndarray:

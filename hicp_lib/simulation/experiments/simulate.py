@@ -76,7 +76,7 @@ def simulate_recording(
     _check(out, plan, n, seed, workers)
     stamp = {"scenario": name, "seed": int(seed), "version": simulation_version()}
     _prepare(out, stamp)
-    todo = [partial(_record_one, out, name, int(seed), k) for k in range(n) if not part_path(out, k).exists()]
+    todo = [partial(record_one, out, name, int(seed), k) for k in range(n) if not part_path(out, k).exists()]
     if plan.capture is not None:
         todo.insert(0, partial(_capture_all, out, name, int(seed), int(n)))  # the longest first
     bar = tqdm(total=len(todo), desc=name, unit="frame", disable=None if progress else True)
@@ -139,7 +139,7 @@ def _call(job: Callable[[], None]) -> None:
     job()
 
 
-def _record_one(out: Path, name: str, seed: int, k: int) -> None:
+def record_one(out: Path, name: str, seed: int, k: int) -> None:
     """Write the images of a frame, then its truth: a frame counts as finished when that is there."""
     rgb, depth_m, exact_m, truth = record_frame(name, seed, k)
     write_rgb(out / rgb_name(k), rgb)

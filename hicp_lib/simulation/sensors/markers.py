@@ -37,6 +37,8 @@ housing, which is 25 mm deep; the marker's own radius is 6 mm."""
 
 _BELOW_SHOULDER = 0.3  # of the way from shoulder to elbow
 
+_CELL_M = 0.015  # edge of the cells that the skin is thinned out by
+
 STANDOFF_M = 0.012
 """From the skin to a marker's centre: cloth or tape, the marker's base, and its radius of 6 mm."""
 
@@ -92,9 +94,27 @@ def _place(body: Body, person: PosedBody, joint: str, chosen: np.ndarray) -> np.
 
 
 def body_scene(person: PosedBody, obstacles: tuple[Mesh, ...] = ()) -> RayScene:
-    """What may hide markers: the person's skin, and other meshes. Markers lie on clothes, not under them."""
-    skin = _bare(person, load_body().triangles)
+    """What may hide markers: the person's skin, and other meshes. Markers lie on clothes, not under them.
+
+    The skin is that between every few vertices: as good as all of it, and ready in a third of the time.
+    """
+    skin = _bare(person, _coarse_triangles())
     return RayScene([skin, *(Surface(mesh, _unseen) for mesh in obstacles)])
+
+
+@lru_cache(maxsize=1)
+def _coarse_triangles() -> np.ndarray:
+    """The body's triangles between one vertex of each cell of space, (n, 3): the nearest to its middle."""
+    body = load_body()
+    rest = body.vertices_m.mean(axis=0)
+    _, cell = np.unique((rest // _CELL_M).astype(int), axis=0, return_inverse=True)
+    count = np.bincount(cell)
+    middles = np.stack([np.bincount(cell, column) / count for column in rest.T], axis=1)
+    by_distance = np.argsort(np.linalg.norm(rest - middles[cell], axis=1), kind="stable")
+    _, first = np.unique(cell[by_distance], return_index=True)
+    corners = by_distance[first][cell][body.triangles]
+    flat = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
+    return corners[~flat].astype(np.int32)
 
 
 def _bare(person: PosedBody, triangles: np.ndarray) -> Surface:

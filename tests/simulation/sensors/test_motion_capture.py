@@ -6,6 +6,7 @@ import pytest
 from hicp_lib.keypoints import INDEX
 from hicp_lib.simulation import mesh as g
 from hicp_lib.simulation.body import load_body, pose_body
+from hicp_lib.simulation.raycast import RayScene
 from hicp_lib.simulation.rotations import rotation
 from hicp_lib.simulation.sensors.markers import (
     CAMERA_MARKER,
@@ -26,6 +27,7 @@ from hicp_lib.simulation.sensors.motion_capture import (
     room_cameras_m,
     watch,
 )
+from hicp_lib.simulation.surfaces import Surface
 
 BODY = load_body()
 SHAPE = "man_35_average"
@@ -93,6 +95,18 @@ def test_cameras_around_a_standing_person_see_every_marker_and_from_one_side_onl
     seen = {name for name, n in zip(JOINT_MARKERS, front, strict=True) if n == 2}
     assert {"shoulder_left_1", "shoulder_right_1"} <= seen
     assert not {"shoulder_left_2", "shoulder_right_2"} & seen
+
+
+def test_a_thinned_skin_hides_markers_as_all_of_it_does():
+    arms = {"upperarm01.L": np.array([0.9, -0.6, 0.3]), "lowerarm01.L": np.array([0, -1.8, 0])}
+    for pose in ({}, arms):
+        person, markers = _markers(SHAPE, pose)
+        cameras = room_cameras_m(QUALISYS, person.heads_m[0])
+        no_coords = np.zeros((len(person.vertices_m), 0))
+        whole = g.Mesh(person.vertices_m, BODY.triangles, person.normals, no_coords)
+        truth = count_seeing(RayScene([Surface(whole, None)]), markers, cameras)
+        found = count_seeing(body_scene(person), markers, cameras)
+        assert np.abs(found - truth).max() <= 1 and (found != truth).mean() < 0.1
 
 
 def test_measured_markers_are_the_true_ones_in_the_systems_frame_with_noise():
