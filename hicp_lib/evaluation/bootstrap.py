@@ -13,7 +13,7 @@ import pandas as pd
 
 from hicp_lib.evaluation import engine
 from hicp_lib.evaluation.coco import Evaluation
-from hicp_lib.evaluation.resampling import PERCENTILES
+from hicp_lib.evaluation.resampling import MIN_DRAWN, PERCENTILES
 
 N_RESAMPLES = 1000
 
@@ -32,10 +32,11 @@ def bootstrap_intervals(
 
     Returns
     -------
-    DataFrame, columns `metric, value, low, high`; NaN where nobody counts
+    DataFrame, columns `metric, value, low, high`; NaN where nobody counts, and no interval from fewer than
+    `MIN_DRAWN` clusters
     """
     samples = resample([evaluation], n_resamples, seed, clusters)[0]
-    return _intervals(evaluation.metrics(), samples)
+    return intervals(evaluation.metrics(), samples)
 
 
 def bootstrap_difference(
@@ -52,8 +53,13 @@ def bootstrap_difference(
     Parameters and columns as for `bootstrap_intervals`.
     """
     of_a, of_b = resample([a, b], n_resamples, seed, clusters)
-    difference = {name: value - b.metrics()[name] for name, value in a.metrics().items()}
-    return _intervals(difference, of_a - of_b)
+    return difference(a, b, of_a, of_b)
+
+
+def difference(a: Evaluation, b: Evaluation, of_a: pd.DataFrame, of_b: pd.DataFrame) -> pd.DataFrame:
+    """As `bootstrap_difference`, from the figures of both on the same draws (`resample`)."""
+    others = b.metrics()
+    return intervals({name: value - others[name] for name, value in a.metrics().items()}, of_a - of_b)
 
 
 def resample(
@@ -70,20 +76,16 @@ def resample(
     places = [np.searchsorted(image_ids, e.matches.image_ids) for e in evaluations]
     rng = np.random.default_rng(seed)
     rows: list[list[dict]] = [[] for _ in evaluations]
-    for _ in range(n_resamples):
-        drawn = (
-            np.bincount(rng.integers(n_clusters, size=n_clusters), minlength=n_clusters)
-            if n_clusters
-            else cluster
-        )
+    for _ in range(n_resamples if n_clusters >= MIN_DRAWN else 0):
+        drawn = np.bincount(rng.integers(n_clusters, size=n_clusters), minlength=n_clusters)
         weights = drawn[cluster]
         for e, place, kept in zip(evaluations, places, rows, strict=True):
             kept.append(engine.metrics(*engine.precision_recall(e.matches, weights[place])))
     return [pd.DataFrame(kept, columns=list(engine.METRICS)) for kept in rows]
 
 
-def _intervals(values: dict[str, float], samples: pd.DataFrame) -> pd.DataFrame:
-    """Percentiles over the draws in which somebody counts."""
+def intervals(values: dict[str, float], samples: pd.DataFrame) -> pd.DataFrame:
+    """Figures by metric, with percentiles over the draws (`resample`) in which somebody counts."""
     rows = []
     for name, value in values.items():
         drawn = samples[name].dropna()

@@ -16,12 +16,14 @@ from hicp_lib.annotations import Annotations
 from hicp_lib.detectors.base import Detections
 from hicp_lib.detectors.cache import Timed
 from hicp_lib.detectors.registry import DETECTORS
-from hicp_lib.evaluation.bootstrap import bootstrap_difference, bootstrap_intervals
-from hicp_lib.evaluation.coco import evaluate, person_oks
+from hicp_lib.evaluation.bootstrap import bootstrap_difference, difference, intervals, resample
+from hicp_lib.evaluation.coco import Evaluation, evaluate, person_oks
 from hicp_lib.evaluation.engine import METRICS
 from hicp_lib.keypoints import GROUPS, N_KEYPOINTS
 
 Found = Mapping[tuple[str, str], Mapping[int, Detections]]
+# (subset, detector, group) -> its evaluation, and its figures on draws that all detectors share
+Drawn = Mapping[tuple[str, str, str], tuple[Evaluation, pd.DataFrame]]
 
 
 def compare(
@@ -33,13 +35,58 @@ def compare(
     -------
     DataFrame, columns `subset, group, detector, metric, value, low, high, n_people`
     """
-    tables = []
+    return figures(draw_cases(truth, found, n_resamples, seed))
+
+
+def draw_cases(
+    truth: Mapping[str, Annotations], found: Found, n_resamples: int = 1000, seed: int = 0
+) -> dict[tuple[str, str, str], tuple[Evaluation, pd.DataFrame]]:
+    """Every case evaluated, as it is and on draws of source images: what `figures` and `pairs` read.
+
+    The detectors of one subset and group are drawn together, so that they can be told apart on the same
+    images.
+    """
+    together: dict[tuple[str, str], dict[str, Evaluation]] = {}
     for subset, detector, group in _cases(found):
         evaluation = evaluate(truth[subset], found[subset, detector], group)
-        table = bootstrap_intervals(evaluation, n_resamples, seed, source_images(truth[subset]))
-        table = table.assign(n_people=evaluation.n_people)
+        together.setdefault((subset, group), {})[detector] = evaluation
+    drawn = {}
+    for (subset, group), evaluations in together.items():
+        clusters = source_images(truth[subset])
+        samples = resample(list(evaluations.values()), n_resamples, seed, clusters)
+        for (detector, evaluation), sample in zip(evaluations.items(), samples, strict=True):
+            drawn[subset, detector, group] = evaluation, sample
+    return {case: drawn[case] for case in _cases(found)}
+
+
+def figures(drawn: Drawn) -> pd.DataFrame:
+    """AP and AR of every case: what `compare` returns."""
+    tables = []
+    for (subset, detector, group), (evaluation, samples) in drawn.items():
+        table = intervals(evaluation.metrics(), samples).assign(n_people=evaluation.n_people)
         tables.append(_labelled(table, subset=subset, group=group, detector=detector))
     return pd.concat(tables, ignore_index=True)
+
+
+def pairs(drawn: Drawn) -> pd.DataFrame:
+    """AP and AR of every detector less every other's, on the same crops and the same draws of them.
+
+    Two detectors stumble over the same pictures, so this says more of which is better than two intervals
+    side by side.
+
+    Returns
+    -------
+    DataFrame, columns `subset, group, detector, other, pair` ("a less b"), `metric, value, low, high`
+    """
+    columns = ["subset", "group", "detector", "other", "pair", "metric", "value", "low", "high"]
+    tables = []
+    for (subset, detector, group), (evaluation, samples) in drawn.items():
+        for (its_subset, other, its_group), (its, of_other) in drawn.items():
+            if (its_subset, its_group) == (subset, group) and other != detector:
+                table = difference(evaluation, its, samples, of_other)
+                labels = {"detector": detector, "other": other, "pair": f"{detector} less {other}"}
+                tables.append(_labelled(table, subset=subset, group=group, **labels))
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=columns)
 
 
 def head_loss(

@@ -8,10 +8,15 @@ from __future__ import annotations
 import numpy as np
 
 PERCENTILES = (2.5, 97.5)  # of 95 % intervals
+MIN_DRAWN = 10  # a percentile interval from fewer covers far less than 95 %, and from one nothing
 
 
 def draw_counts(n: int, n_resamples: int, seed: int) -> np.ndarray:
-    """How often each of `n` images is drawn, shape (1 + n_resamples, n); the first row is once each."""
+    """How often each of `n` images is drawn, shape (1 + n_resamples, n); the first row is once each.
+
+    Fewer than `MIN_DRAWN` images are not drawn again: the first row is all, and there is no interval.
+    """
+    n_resamples = n_resamples if n >= MIN_DRAWN else 0
     drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), size=n_resamples)
     return np.concatenate([np.ones((1, n), dtype=int), drawn])
 

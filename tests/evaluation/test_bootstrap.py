@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hicp_lib.evaluation import engine
+from hicp_lib.evaluation import bootstrap, engine
 from hicp_lib.evaluation.bootstrap import bootstrap_difference, bootstrap_intervals, resample
 from hicp_lib.evaluation.coco import evaluate
 
@@ -85,7 +85,8 @@ def test_pairing_takes_the_images_share_out_of_a_difference(annotated, detected)
     assert row["low"] > 0.01 and row["high"] < 0.06
 
 
-def test_subsets_are_paired_by_image_id(annotated, detected):
+def test_subsets_are_paired_by_image_id(annotated, detected, monkeypatch):
+    monkeypatch.setattr(bootstrap, "MIN_DRAWN", 2)
     # Images 0-9, all found, are drawn together, and so are 10-29, none found; b has only the latter.
     a = found_or_not(annotated, detected, np.arange(30) < 10)
     later = {name: getattr(a.matches, name)[10:] for name in ("image_ids", "n_people")}
@@ -94,6 +95,14 @@ def test_subsets_are_paired_by_image_id(annotated, detected):
     of_a, of_b = resample([a, b], 40, seed=0, clusters={i: i < 10 for i in range(30)})
     assert set(of_a["AR"].round(3)) == {0, 0.333, 1}
     assert np.array_equal(of_b["AR"].isna(), of_a["AR"].round(3) == 1) and (of_b["AR"].dropna() == 0).all()
+
+
+def test_a_handful_of_images_has_figures_and_no_interval(annotated, detected):
+    nine, ten = (
+        bootstrap_intervals(found_or_not(annotated, detected, np.arange(n) % 2 == 0), 20) for n in (9, 10)
+    )
+    assert nine["value"].notna().all() and nine[["low", "high"]].isna().all(axis=None)
+    assert ten[["low", "high"]].notna().all(axis=None)
 
 
 def test_the_seed_decides(scene):

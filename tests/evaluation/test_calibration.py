@@ -91,9 +91,9 @@ def test_calibration_error_by_hand():
 
 
 def test_reliability_has_a_row_per_bin_in_use():
-    scores = np.array([0.05, 0.05, 0.55, 1.0])
-    table = reliability(scores, np.array([0, 1, 1, 1]), np.arange(4), n_resamples=50)
-    assert table["bin"].tolist() == [0, 5, 9] and table["count"].tolist() == [2, 1, 1]
+    scores = np.repeat([0.05, 0.05, 0.55, 1.0], 3)
+    table = reliability(scores, np.repeat([0, 1, 1, 1], 3), np.arange(12), n_resamples=50)
+    assert table["bin"].tolist() == [0, 5, 9] and table["count"].tolist() == [6, 3, 3]
     assert table["rate"].tolist() == [0.5, 1, 1]
     assert (table["low"] <= table["rate"]).all() and (table["rate"] <= table["high"]).all()
 

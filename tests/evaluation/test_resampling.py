@@ -27,9 +27,16 @@ def test_draws_may_have_values_of_their_own():
 
 
 def test_the_first_draw_is_the_sample_and_every_draw_as_large():
-    counts = draw_counts(7, 50, seed=3)
-    assert counts.shape == (51, 7) and (counts[0] == 1).all() and (counts.sum(axis=1) == 7).all()
-    assert (draw_counts(7, 50, seed=3) == counts).all() and counts[1:].std() > 0
+    counts = draw_counts(17, 50, seed=3)
+    assert counts.shape == (51, 17) and (counts[0] == 1).all() and (counts.sum(axis=1) == 17).all()
+    assert (draw_counts(17, 50, seed=3) == counts).all() and counts[1:].std() > 0
+
+
+def test_a_handful_says_nothing_about_its_own_spread():
+    times = draw_counts(9, 50, seed=3)
+    assert times.tolist() == [[1] * 9]
+    value, low, high = with_interval(times @ np.arange(9) / times.sum(axis=1))
+    assert value == 4 and np.isnan([low, high]).all()
 
 
 def test_intervals_are_percentiles_of_the_draws_that_count():
