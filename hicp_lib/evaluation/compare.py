@@ -6,7 +6,7 @@ detections by image id. Crops of one source image are drawn together in the boot
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -39,15 +39,20 @@ def compare(
 
 
 def draw_cases(
-    truth: Mapping[str, Annotations], found: Found, n_resamples: int = 1000, seed: int = 0
+    truth: Mapping[str, Annotations],
+    found: Found,
+    n_resamples: int = 1000,
+    seed: int = 0,
+    groups: Collection[str] = tuple(GROUPS),
 ) -> dict[tuple[str, str, str], tuple[Evaluation, pd.DataFrame]]:
     """Every case evaluated, as it is and on draws of source images: what `figures` and `pairs` read.
 
     The detectors of one subset and group are drawn together, so that they can be told apart on the same
-    images.
+    images. Only `groups` of keypoints are looked at.
     """
+    cases = [case for case in _cases(found) if case[-1] in groups]
     together: dict[tuple[str, str], dict[str, Evaluation]] = {}
-    for subset, detector, group in _cases(found):
+    for subset, detector, group in cases:
         evaluation = evaluate(truth[subset], found[subset, detector], group)
         together.setdefault((subset, group), {})[detector] = evaluation
     drawn = {}
@@ -56,7 +61,7 @@ def draw_cases(
         samples = resample(list(evaluations.values()), n_resamples, seed, clusters)
         for (detector, evaluation), sample in zip(evaluations.items(), samples, strict=True):
             drawn[subset, detector, group] = evaluation, sample
-    return {case: drawn[case] for case in _cases(found)}
+    return {case: drawn[case] for case in cases}
 
 
 def figures(drawn: Drawn) -> pd.DataFrame:
