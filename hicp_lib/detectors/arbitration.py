@@ -136,13 +136,14 @@ def assign(away: np.ndarray) -> np.ndarray:
     return chosen
 
 
-def nearest_first(arms: Arms, hands: Hands, chosen: np.ndarray) -> np.ndarray:
+def nearest_first(wrists_px: np.ndarray, hands: Hands, chosen: np.ndarray) -> np.ndarray:
     """Assignment without arbitration: each hand, surest first, to the nearest wrist that is still free.
 
-    `chosen` (n_bodies, 2), -1 for arms without a hand yet; the hands are indexed as in `assign`.
+    Of wrists (n_bodies, 2, 2), NaN where not given, those are free whose arm has no hand yet, -1 in `chosen`
+    (n_bodies, 2); the hands are indexed as in `assign`.
     """
     chosen = chosen.copy()
-    away = np.linalg.norm(arms.wrists_px[:, :, None] - hands.keypoints_px[:, 0], axis=-1)
+    away = np.linalg.norm(wrists_px[:, :, None] - hands.keypoints_px[:, 0], axis=-1)
     away = np.where(np.isnan(away), np.inf, away)
     for hand in np.argsort(-hands.scores.mean(axis=1), kind="stable"):
         open_px = np.where(chosen < 0, away[:, :, hand], np.inf)
@@ -161,17 +162,32 @@ def give_hands(bodies: Detections, hands: Hands, chosen: np.ndarray) -> Detectio
     return Detections(keypoints_px, scores, bodies.person_scores)
 
 
+def in_pairs(hands: Hands) -> Detections:
+    """Instances of the k-th surest left with the k-th surest right hand, as the model calls them."""
+    return _instances(hands, *_by_side(hands))
+
+
 def without_body(hands: Hands) -> Detections:
     """Instances of hands that belong to no body found: the k-th surest left with the k-th surest right.
 
     Sides are the model's, there is nothing better; but of two hands with the same side, the less sure
     takes the other: nobody has two left hands.
     """
-    order = np.argsort(-hands.scores.mean(axis=1), kind="stable")
-    lefts, rights = ([row for row in order if hands.sides[row] == side] for side in (0, 1))
+    lefts, rights = _by_side(hands)
     more, fewer = (lefts, rights) if len(lefts) > len(rights) else (rights, lefts)
     while len(more) > len(fewer) + 1:
         fewer.append(more.pop())
+    return _instances(hands, lefts, rights)
+
+
+def _by_side(hands: Hands) -> tuple[list[int], list[int]]:
+    """Rows of the left and of the right hands, surest first."""
+    order = np.argsort(-hands.scores.mean(axis=1), kind="stable").tolist()
+    return [row for row in order if hands.sides[row] == 0], [row for row in order if hands.sides[row] == 1]
+
+
+def _instances(hands: Hands, lefts: list[int], rights: list[int]) -> Detections:
+    """People without a body: the k-th left with the k-th right hand, as far as there are both."""
     chosen = np.full((max(len(lefts), len(rights)), 2), -1)
     chosen[: len(lefts), 0], chosen[: len(rights), 1] = lefts, rights
     nobody = Detections(

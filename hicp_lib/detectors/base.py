@@ -34,6 +34,14 @@ class Detections:
         """Nobody found."""
         return cls(np.full((0, N_KEYPOINTS, 2), np.nan), np.zeros((0, N_KEYPOINTS)), np.zeros(0))
 
+    def and_also(self, more: Detections) -> Detections:
+        """These people, then others in the same image."""
+        return Detections(
+            np.concatenate([self.keypoints_px, more.keypoints_px]),
+            np.concatenate([self.scores, more.scores]),
+            np.concatenate([self.person_scores, more.person_scores]),
+        )
+
     def __len__(self) -> int:
         return len(self.person_scores)
 
@@ -44,6 +52,8 @@ class Detector(Protocol):
     `settings` (JSON-able: weights' SHA-256, thresholds, versions that matter) identifies
     its results: two detectors with equal name and settings give equal detections. A detector
     with a true attribute `takes_boxes` is given the people's boxes, `detect(image, boxes_px)`.
+    One that is made of others has them in a dictionary `parts` and asks them there, so that
+    their answers can be kept (see `hicp_lib.detectors.kept`).
     """
 
     name: str

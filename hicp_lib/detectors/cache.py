@@ -35,7 +35,7 @@ class Timed:
     Attributes
     ----------
     detections : the people found
-    time_ms : time of the detector's call when it was made (a cached result keeps its time)
+    time_ms : time of the detector's call when it was made (what was kept, its parts' too, keeps its time)
     workers : how many such calls ran side by side then; more of them make each slower
     """
 
@@ -66,27 +66,31 @@ def cache_folder(detector: Detector) -> Path:
     return cache_dir() / "detections" / detector.name / key[:32]
 
 
-def result_path(folder: Path, image_path: Path, boxes_px: np.ndarray | None) -> Path:
-    """Where the result of an image file is kept; boxes (n, 4) count if they were given.
+def image_sha256(path: str | Path) -> str:
+    """SHA-256 of an image file.
 
     Raises
     ------
     InputError
         If the file cannot be read.
     """
-    boxes_key = "" if boxes_px is None else "-" + sha256_bytes(np.asarray(boxes_px, float).tobytes())[:16]
     try:
-        return folder / f"{sha256_file(image_path)}{boxes_key}.bin"
+        return sha256_file(path)
     except OSError as error:
-        raise InputError(f"{image_path}: cannot be read ({error.strerror}); expected an image file") from None
+        raise InputError(f"{path}: cannot be read ({error.strerror}); expected an image file") from None
 
 
-def result_path_of_pixels(folder: Path, *arrays: np.ndarray) -> Path:
-    """Where the result of an image that is no file is kept: by its pixels, and boxes if they were given."""
-    content = hashlib.sha256()
-    for array in arrays:
-        content.update(f"{array.dtype} {array.shape}".encode() + np.ascontiguousarray(array).tobytes())
-    return folder / "pixels" / f"{content.hexdigest()}.bin"
+def pixels_sha256(image: np.ndarray) -> str:
+    """SHA-256 of an image that is no file."""
+    content = hashlib.sha256(f"{image.dtype} {image.shape}".encode())
+    content.update(np.ascontiguousarray(image))
+    return content.hexdigest()
+
+
+def result_path(folder: Path, image_sha256: str, boxes_px: np.ndarray | None) -> Path:
+    """Where the result of an image is kept; boxes (n, 4) count if they were given."""
+    boxes_key = "" if boxes_px is None else "-" + sha256_bytes(np.asarray(boxes_px, float).tobytes())[:16]
+    return folder / f"{image_sha256}{boxes_key}.bin"
 
 
 def read_result(path: Path) -> Timed | None:

@@ -26,7 +26,15 @@ import cv2
 import numpy as np
 
 from hicp_lib.detectors.base import Detector
-from hicp_lib.detectors.cache import Timed, cache_folder, identity, read_result, result_path, write_result
+from hicp_lib.detectors.cache import (
+    Timed,
+    cache_folder,
+    identity,
+    image_sha256,
+    read_result,
+    result_path,
+    write_result,
+)
 from hicp_lib.detectors.pool import DetectorPool
 from hicp_lib.errors import InputError
 from hicp_lib.images import decode_image
@@ -66,7 +74,7 @@ def detect_on_cluster(
         worker cannot make the same detector, or an image cannot be read or kills its workers.
     """
     folder = cache_folder(detector)
-    kept = {key: result_path(folder, *job) for key, job in jobs.items()}
+    kept = {key: result_path(folder, image_sha256(path), boxes_px) for key, (path, boxes_px) in jobs.items()}
     missing = []
     for key, path in kept.items():
         result = read_result(path)
@@ -217,7 +225,7 @@ def _detect_here(
     worker = get_worker()
     try:
         with _making:
-            pool = _pool(name, tuple(sorted(options.items())))
+            pool = _pool(name, tuple(sorted(options.items())), worker.state.nthreads)
     except (InputError, OSError) as error:
         raise InputError(f"worker {worker.address}: {_one_line(error)}") from None
     differing = _differences(expected, identity(pool.first))
@@ -226,13 +234,13 @@ def _detect_here(
             f"worker {worker.address}: would find something else, for these differ from here: "
             f"{', '.join(differing)}; install the same environment and weights, and start it anew"
         )
-    return pool.detect(decode_image(content, path), boxes_px, worker.state.nthreads)
+    return pool.detect(decode_image(content, path), boxes_px)
 
 
 @lru_cache(maxsize=2)
-def _pool(name: str, options: tuple[tuple[str, object], ...]) -> DetectorPool:
+def _pool(name: str, options: tuple[tuple[str, object], ...], workers: int) -> DetectorPool:
     cv2.setNumThreads(1)
-    return DetectorPool(name, dict(options))
+    return DetectorPool(name, dict(options), workers)
 
 
 def _differences(one: object, other: object, where: str = "") -> list[str]:

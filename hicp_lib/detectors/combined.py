@@ -32,7 +32,6 @@ from hicp_lib.detectors.arbitration import (
 )
 from hicp_lib.detectors.base import Detections, Detector
 from hicp_lib.detectors.hand_squares import Arms, Square, SquareRule, hand_squares, squares_along
-from hicp_lib.detectors.kept import Kept
 from hicp_lib.errors import InputError
 
 LOOKS = ("wrists", "image", "along")
@@ -49,7 +48,6 @@ class Combined:
     arbitrate : apply the rules of `arbitration`; if not, a wrist takes the surest hand of its own
         squares, and further hands go to the nearest free wrist
     min_side_px : smaller squares are enlarged to this
-    keep_looks : keep on disk what every look showed, for variants that look at the same places
     squares, rule : thresholds
     """
 
@@ -60,7 +58,6 @@ class Combined:
         looks: str = "wrists+image+along",
         arbitrate: bool = True,
         min_side_px: int = 320,
-        keep_looks: bool = False,
         squares: SquareRule | None = None,
         rule: ArbitrationRule | None = None,
     ) -> None:
@@ -68,7 +65,7 @@ class Combined:
         if not set(self._looks) <= set(LOOKS):
             raise InputError(f"looks {looks!r}: expected some of {', '.join(LOOKS)}, joined by +")
         self.name = f"combined:{body.name}+{hands.name}"
-        self._body, self._hands = (Kept(body), Kept(hands)) if keep_looks else (body, hands)
+        self.parts = {"body": body, "hands": hands}
         self._arbitrate = arbitrate
         self._min_side_px = min_side_px
         self._squares, self._rule = squares or SquareRule(), rule or ArbitrationRule()
@@ -85,7 +82,8 @@ class Combined:
 
     def detect(self, image: np.ndarray, boxes_px: np.ndarray | None = None) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
-        bodies = self._body.detect(image, boxes_px) if self.takes_boxes else self._body.detect(image)
+        body = self.parts["body"]
+        bodies = body.detect(image, boxes_px) if self.takes_boxes else body.detect(image)
         arms = Arms.of(bodies, self._squares)
         return (self._arbitrated if self._arbitrate else self._as_seen)(image, bodies, arms)
 
@@ -94,7 +92,7 @@ class Combined:
         hands = merge_duplicates(Hands.together(seen), self._rule.same_hand)
         chosen = assign(distances(arms, hands, self._rule))
         strangers = hands.take(~self._within_reach(arms, hands))
-        return _with(give_hands(bodies, hands, chosen), without_body(strangers))
+        return give_hands(bodies, hands, chosen).and_also(without_body(strangers))
 
     def _within_reach(self, arms: Arms, hands: Hands) -> np.ndarray:
         """Which hands (n,) some body could have, were the rest of its arms unknown."""
@@ -112,9 +110,9 @@ class Combined:
                 chosen[person, side] = len(seen)
                 seen.append(hands.take([hands.scores.mean(axis=1).argmax()]))
         hands = Hands.together(seen + self._elsewhere(image))
-        chosen = nearest_first(arms, hands, chosen)
+        chosen = nearest_first(arms.wrists_px, hands, chosen)
         rest = np.setdiff1d(np.arange(len(hands)), chosen)
-        return _with(give_hands(bodies, hands, chosen), without_body(hands.take(rest)))
+        return give_hands(bodies, hands, chosen).and_also(without_body(hands.take(rest)))
 
     def _at_wrists(self, image: np.ndarray, arms: Arms) -> list[tuple[int, int, Hands]]:
         if "wrists" not in self._looks:
@@ -123,19 +121,11 @@ class Combined:
         return [(person, side, self._look(image, square)) for person, side, square in squares]
 
     def _elsewhere(self, image: np.ndarray) -> list[Hands]:
-        whole = [Hands.of(self._hands.detect(image))] if "image" in self._looks else []
+        whole = [Hands.of(self.parts["hands"].detect(image))] if "image" in self._looks else []
         squares = squares_along(image) if "along" in self._looks else []
         return whole + [self._look(image, square) for square in squares]
 
     def _look(self, image: np.ndarray, square: Square) -> Hands:
-        hands = Hands.of(self._hands.detect(square.cut(image, self._min_side_px)))
+        hands = Hands.of(self.parts["hands"].detect(square.cut(image, self._min_side_px)))
         positions_px = square.to_image_px(hands.keypoints_px, self._min_side_px)
         return Hands(positions_px, hands.scores, hands.sides)
-
-
-def _with(bodies: Detections, more: Detections) -> Detections:
-    return Detections(
-        np.concatenate([bodies.keypoints_px, more.keypoints_px]),
-        np.concatenate([bodies.scores, more.scores]),
-        np.concatenate([bodies.person_scores, more.person_scores]),
-    )

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import weakref
 from concurrent.futures import ThreadPoolExecutor
-from itertools import zip_longest
 from pathlib import Path
 
 import mediapipe
@@ -28,16 +27,15 @@ import numpy as np
 from mediapipe.tasks.python import BaseOptions, vision
 
 from hicp_lib.detectors import mediapipe_bundle
+from hicp_lib.detectors.arbitration import Hands, give_hands, in_pairs, nearest_first
 from hicp_lib.detectors.base import Detections
 from hicp_lib.detectors.native import keep_offline, quiet_stderr
 from hicp_lib.files import sha256_bytes
-from hicp_lib.keypoints import COCO_17, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND, to_halpe
+from hicp_lib.keypoints import COCO_17, to_halpe
 
-_SIDES = {"Left": LEFT_HAND, "Right": RIGHT_HAND}
+_SIDES = {"Left": 0, "Right": 1}
 _WRISTS = [9, 10]
-
-# One hand: side, handedness score, (21, 2) positions in pixels.
-Hand = tuple[str, float, np.ndarray]
+_N_HAND = 21
 
 
 class MediaPipePose:
@@ -101,18 +99,17 @@ class MediaPipeHands:
         )
         self._task = _Task(vision.HandLandmarker, options)
 
-    def find_hands(self, image: np.ndarray) -> list[Hand]:
-        """Hands in an RGB image by falling handedness score."""
-        result = self._task.detect(image)
-        hands = [
-            (sides[0].category_name, min(sides[0].score, 1.0), _positions_px(points, image))
-            for sides, points in zip(result.handedness, result.hand_landmarks, strict=True)
-        ]
-        return sorted(hands, key=lambda hand: -hand[1])
-
     def detect(self, image: np.ndarray) -> Detections:
         """Find hands in an RGB image, shape (height, width, 3), uint8, paired into instances."""
-        return _pair(self.find_hands(image))
+        found = self._task.detect(image)
+        if not found.hand_landmarks:
+            return Detections.none()
+        labels = [sides[0] for sides in found.handedness]
+        scores = np.array([[min(label.score, 1.0)] * _N_HAND for label in labels])
+        positions_px = np.stack([_positions_px(hand, image) for hand in found.hand_landmarks])
+        return in_pairs(
+            Hands(positions_px, scores, np.array([_SIDES[label.category_name] for label in labels]))
+        )
 
 
 class MediaPipe:
@@ -135,57 +132,31 @@ class MediaPipe:
 
     def __init__(self, num_people: int = 1, min_score: float = 0.5, side_by_side: bool = False) -> None:
         self._thread = ThreadPoolExecutor(1) if side_by_side else None
-        self._pose = MediaPipePose(num_people, min_score)
-        self._hands = MediaPipeHands(2 * num_people, min_score)
-        self.settings = {"pose": self._pose.settings, "hands": self._hands.settings}
+        self.parts = {
+            "pose": MediaPipePose(num_people, min_score), "hands": MediaPipeHands(2 * num_people, min_score)
+        }  # fmt: skip
+        self.settings = {name: part.settings for name, part in self.parts.items()}
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
+        pose, hands = self.parts.values()
         if self._thread is None:
-            return attach_hands(self._pose.detect(image), self._hands.find_hands(image))
-        hands = self._thread.submit(self._hands.find_hands, image)
-        return attach_hands(self._pose.detect(image), hands.result())
+            return attach_hands(pose.detect(image), hands.detect(image))
+        found = self._thread.submit(hands.detect, image)
+        return attach_hands(pose.detect(image), found.result())
 
 
-def attach_hands(bodies: Detections, hands: list[Hand]) -> Detections:
-    """Give each hand (best first) to the nearest wrist that has none yet, whatever its label says.
+def attach_hands(bodies: Detections, found: Detections) -> Detections:
+    """Give each hand found, surest first, to the nearest wrist that has none yet, whatever its label says.
 
     Returns
     -------
     The bodies with their hands, then instances of the hands that found no free wrist.
     """
-    keypoints_px, scores = bodies.keypoints_px.copy(), bodies.scores.copy()
-    free = np.ones((len(bodies), 2), dtype=bool)
-    left_over = []
-    for hand in hands:
-        if not free.any():
-            left_over.append(hand)
-            continue
-        _, score, positions_px = hand
-        distances = np.linalg.norm(keypoints_px[:, _WRISTS] - positions_px[0], axis=-1)
-        body, side = np.unravel_index(np.argmin(np.where(free, distances, np.inf)), free.shape)
-        free[body, side] = False
-        indices = list(_SIDES.values())[side]
-        keypoints_px[body, indices], scores[body, indices] = positions_px, score
-    rest = _pair(left_over)
-    return Detections(
-        np.concatenate([keypoints_px, rest.keypoints_px]),
-        np.concatenate([scores, rest.scores]),
-        np.concatenate([bodies.person_scores, rest.person_scores]),
-    )
-
-
-def _pair(hands: list[Hand]) -> Detections:
-    """Instances of the k-th best left with the k-th best right hand."""
-    lefts, rights = ([hand for hand in hands if hand[0] == side] for side in ("Left", "Right"))
-    pairs = [[hand for hand in pair if hand] for pair in zip_longest(lefts, rights)]
-    keypoints_px = np.full((len(pairs), N_KEYPOINTS, 2), np.nan)
-    scores = np.zeros((len(pairs), N_KEYPOINTS))
-    for row, pair in enumerate(pairs):
-        for side, score, positions_px in pair:
-            indices = _SIDES[side]
-            keypoints_px[row, indices], scores[row, indices] = positions_px, score
-    return Detections(keypoints_px, scores, np.array([np.mean([hand[1] for hand in pair]) for pair in pairs]))
+    hands = Hands.of(found)
+    chosen = nearest_first(bodies.keypoints_px[:, _WRISTS], hands, np.full((len(bodies), 2), -1))
+    rest = np.setdiff1d(np.arange(len(hands)), chosen)
+    return give_hands(bodies, hands, chosen).and_also(in_pairs(hands.take(rest)))
 
 
 def _bundle(task: str, model: str | Path | None) -> tuple[bytes, dict]:

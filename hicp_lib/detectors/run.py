@@ -20,7 +20,14 @@ from tqdm import tqdm
 
 from hicp_lib.annotations import read_annotations
 from hicp_lib.detectors.base import Detections
-from hicp_lib.detectors.cache import Timed, cache_folder, read_result, result_path, write_result
+from hicp_lib.detectors.cache import (
+    Timed,
+    cache_folder,
+    image_sha256,
+    read_result,
+    result_path,
+    write_result,
+)
 from hicp_lib.detectors.pool import DetectorPool, single_threaded_opencv
 from hicp_lib.images import read_image
 
@@ -92,7 +99,8 @@ def detect_images(
     InputError
         If an image cannot be read, or the detector cannot be made.
     """
-    pool = DetectorPool(name, options)
+    workers = max(1, min(workers or n_cores(), len(paths) or 1))
+    pool = DetectorPool(name, options, workers)
     takes_boxes = boxes_px is not None and getattr(pool.first, "takes_boxes", False)
     jobs = {key: (Path(path), boxes_px[key] if takes_boxes else None) for key, path in paths.items()}
     if dask is None:
@@ -107,22 +115,20 @@ def detect_images(
 
 
 def _in_threads(
-    pool: DetectorPool, jobs: dict[Key, tuple[Path, np.ndarray | None]], workers: int | None
+    pool: DetectorPool, jobs: dict[Key, tuple[Path, np.ndarray | None]], workers: int
 ) -> Iterator[tuple[Key, Timed]]:
-    workers = max(1, min(workers or n_cores(), len(jobs) or 1))
     folder = cache_folder(pool.first)
     with single_threaded_opencv(), ThreadPoolExecutor(workers) as executor:
-        calls = executor.map(lambda job: _detect_one(pool, *job, folder, workers), jobs.values())
+        calls = executor.map(lambda job: _detect_one(pool, *job, folder), jobs.values())
         yield from zip(jobs, calls, strict=True)
 
 
-def _detect_one(
-    pool: DetectorPool, path: Path, boxes_px: np.ndarray | None, folder: Path, workers: int
-) -> Timed:
-    kept = result_path(folder, path, boxes_px)
+def _detect_one(pool: DetectorPool, path: Path, boxes_px: np.ndarray | None, folder: Path) -> Timed:
+    sha256 = image_sha256(path)
+    kept = result_path(folder, sha256, boxes_px)
     result = read_result(kept)
     if result is None:
-        result = pool.detect(read_image(path), boxes_px, workers)
+        result = pool.detect(read_image(path), boxes_px, sha256)
         write_result(kept, result)
     return result
 

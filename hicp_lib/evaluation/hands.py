@@ -22,13 +22,12 @@ from hicp_lib.keypoints import LEFT_HAND, RIGHT_HAND, SIGMAS
 
 FOUND_OKS = 0.5
 
-# Parts of a combination, as options of `hicp_lib.detectors.combined.Combined`; the last is its default. They
-# look at the same places, so what a look showed is kept.
+# Parts of a combination, as options of `hicp_lib.detectors.combined.Combined`; the last is its default.
 INGREDIENTS: dict[str, dict] = {
-    "whole image": {"looks": "image", "arbitrate": False, "keep_looks": True},
-    "wrist squares": {"looks": "wrists", "arbitrate": False, "keep_looks": True},
-    "all looks": {"arbitrate": False, "keep_looks": True},
-    "all looks, arbitrated": {"keep_looks": True},
+    "whole image": {"looks": "image", "arbitrate": False},
+    "wrist squares": {"looks": "wrists", "arbitrate": False},
+    "all looks": {"arbitrate": False},
+    "all looks, arbitrated": {},
 }
 
 

@@ -100,7 +100,7 @@ def test_each_way_of_looking_finds_the_hands_of_a_good_body(looks):
 def test_the_body_detector_runs_once():
     detector = combine(body(ARMS))
     detector.detect(image_with(LEFT_ROOT))
-    assert detector._body.calls == 1
+    assert detector.parts["body"].calls == 1
 
 
 def test_hands_missed_in_the_whole_image_are_found_at_the_wrists():
@@ -201,7 +201,7 @@ def test_annotated_boxes_reach_a_body_detector_that_takes_them():
     detector = Combined(Boxed(body(ARMS)), FakeHands(), min_side_px=2)
     assert detector.takes_boxes
     detector.detect(image_with(LEFT_ROOT), np.array([[1.0, 2, 3, 4]]))
-    assert detector._body.boxes_px.tolist() == [[1, 2, 3, 4]]
+    assert detector.parts["body"].boxes_px.tolist() == [[1, 2, 3, 4]]
 
 
 def test_settings_tell_everything_the_result_depends_on():

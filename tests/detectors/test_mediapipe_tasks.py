@@ -100,24 +100,25 @@ def make_body(left_wrist, right_wrist) -> Detections:
     return Detections(keypoints_px, scores, np.array([0.7]))
 
 
-def make_hand(side: str, score: float, root) -> tuple:
-    return side, score, np.add(root, np.arange(21)[:, None])
+def make_hands(*hands) -> Detections:
+    """One instance per hand (side, score, root)."""
+    keypoints_px = np.full((len(hands), N_KEYPOINTS, 2), np.nan)
+    scores = np.zeros((len(hands), N_KEYPOINTS))
+    for row, (side, score, root) in enumerate(hands):
+        keypoints_px[row, side], scores[row, side] = np.add(root, np.arange(21)[:, None]), score
+    return Detections(keypoints_px, scores, scores.max(axis=1))
 
 
 def test_a_hand_goes_to_the_nearest_free_wrist_and_the_rest_stand_alone(weights):
     from hicp_lib.detectors.mediapipe_tasks import attach_hands
 
     body = make_body((300, 100), (100, 100))
-    hands = [
-        make_hand("Right", 0.9, (290, 100)),
-        make_hand("Left", 0.8, (285, 100)),
-        make_hand("Left", 0.6, (0, 0)),
-    ]
+    hands = make_hands((RIGHT_HAND, 0.9, (290, 100)), (LEFT_HAND, 0.8, (285, 100)), (LEFT_HAND, 0.6, (0, 0)))
     found = attach_hands(body, hands)
     assert found.keypoints_px[0, LEFT_HAND[0]].tolist() == [290, 100]
     assert found.keypoints_px[0, RIGHT_HAND[0]].tolist() == [285, 100]
     assert found.keypoints_px[1, LEFT_HAND[0]].tolist() == [0, 0]
-    assert found.person_scores.tolist() == [0.7, 0.6]
+    assert found.person_scores == pytest.approx([0.7, 0.6])
     assert np.isnan(body.keypoints_px[0, LEFT_HAND]).all()
     alone = attach_hands(Detections.none(), hands)
     assert alone.person_scores == pytest.approx([0.85, 0.6])
