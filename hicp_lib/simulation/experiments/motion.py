@@ -66,13 +66,26 @@ class Motion:
 
     def at(self, time_s: float) -> Posture:
         """The posture at a time, in seconds."""
-        if time_s <= 0:
+        k = self._move_at(time_s)
+        if k == 0:
             return self.first
+        start_s, end_s = self._ends_s[k - 1 : k + 1]
+        share = minimum_jerk((time_s - start_s) / (end_s - start_s))
+        return between(self._postures[k - 1], self._postures[k], share)
+
+    def still_since_s(self, time_s: float) -> float:
+        """From when on the posture has been that of a time; the time itself where it is changing."""
+        k = start = self._move_at(time_s)
+        while start and self._postures[start - 1] == self._postures[start]:
+            start -= 1
+        return time_s if 0 < start == k else self._ends_s[start]
+
+    def _move_at(self, time_s: float) -> int:
+        """Which movement a time belongs to, from 1 on; 0 before all. Movements up to there are drawn."""
+        if time_s <= 0:
+            return 0
         while self._ends_s[-1] <= time_s:
             move = next(self.moves)
             self._ends_s.append(self._ends_s[-1] + move.duration_s)
             self._postures.append(move.to)
-        k = bisect_right(self._ends_s, time_s)
-        start_s, end_s = self._ends_s[k - 1 : k + 1]
-        share = minimum_jerk((time_s - start_s) / (end_s - start_s))
-        return between(self._postures[k - 1], self._postures[k], share)
+        return bisect_right(self._ends_s, time_s)

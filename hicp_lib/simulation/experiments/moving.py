@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -20,7 +21,7 @@ HEAD_RAD = np.radians([0.0, 0.0, 0.0, 9.0, 0.0, 0.0])
 """Where the robot holds its head: a little up, so that the person is seen from the thighs to the hair."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Moving:
     """A person who moves in a room, with markers on; times in seconds from the first frame."""
 
@@ -31,13 +32,26 @@ class Moving:
 
     def person_at(self, time_s: float) -> PosedBody:
         """The person, not dressed."""
-        return posed(load_body(), self.appearance.shape, self.motion.at(time_s))
+        return _person(self, self.motion.still_since_s(time_s))
 
     def at(self, time_s: float) -> tuple[World, PosedBody]:
         """All there is to see, and the person in it."""
-        person, vertices = self.person_at(time_s), marker_vertices(self.appearance.shape)
-        worn = [*dress(self.appearance, person, 0), *marker_balls(person, vertices, 0)]
-        return replace(self.room, surfaces=[*self.room.surfaces, *worn]), person
+        motion_s = self.motion.still_since_s(time_s)
+        surfaces = [*self.room.surfaces, *_worn(self, motion_s)]
+        return replace(self.room, surfaces=surfaces), _person(self, motion_s)
+
+
+# Whoever keeps still is posed and dressed once.
+@lru_cache(maxsize=4)
+def _person(scene: Moving, motion_s: float) -> PosedBody:
+    return posed(load_body(), scene.appearance.shape, scene.motion.at(motion_s))
+
+
+@lru_cache(maxsize=4)
+def _worn(scene: Moving, motion_s: float) -> list[Surface]:
+    """Clothes, hair and markers."""
+    person, vertices = _person(scene, motion_s), marker_vertices(scene.appearance.shape)
+    return [*dress(scene.appearance, person, 0), *marker_balls(person, vertices, 0)]
 
 
 def moving(seed: int) -> Moving:

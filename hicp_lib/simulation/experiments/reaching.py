@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -66,7 +66,7 @@ SCRIPTS = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Script:
     """A trial ready to be looked at; times in seconds from its beginning.
 
@@ -96,13 +96,24 @@ class Script:
 
     def person_at(self, time_s: float) -> PosedBody:
         """The person, not dressed, in the world."""
-        return posed(self.appearance.shape, self.motion.at(time_s - self.before_s))
+        return _person(self, self.motion.still_since_s(time_s - self.before_s))
 
     def at(self, time_s: float, robot: list[Surface]) -> tuple[World, PosedBody]:
         """All there is to see, with the robot as it is then, and the person in it."""
-        person = self.person_at(time_s)
-        surfaces = [*self.room.surfaces, *dress(self.appearance, person, 0), *robot]
-        return replace(self.room, surfaces=surfaces), person
+        motion_s = self.motion.still_since_s(time_s - self.before_s)
+        surfaces = [*self.room.surfaces, *_worn(self, motion_s), *robot]
+        return replace(self.room, surfaces=surfaces), _person(self, motion_s)
+
+
+# Whoever keeps still is posed and dressed once.
+@lru_cache(maxsize=4)
+def _person(scene: Script, motion_s: float) -> PosedBody:
+    return posed(scene.appearance.shape, scene.motion.at(motion_s))
+
+
+@lru_cache(maxsize=4)
+def _worn(scene: Script, motion_s: float) -> list[Surface]:
+    return dress(scene.appearance, _person(scene, motion_s), 0)
 
 
 @cache

@@ -17,6 +17,7 @@ from hicp_lib.robot.skin import Skin
 FAR_M = 0.6
 """Distances are not told apart beyond this."""
 _STEP_M = 0.01
+_SOME = 32  # of so many vertices one is looked at first
 
 
 def robot_balls(icub: ICub, skin: Skin, posture: Posture) -> tuple[np.ndarray, np.ndarray]:
@@ -47,10 +48,20 @@ def skin_distance_m(balls: tuple[np.ndarray, np.ndarray], vertices_m: np.ndarray
     vertices_m : (v, 3) of the person, root frame
     """
     places, radii = balls
-    low, high = places.min(axis=0) - FAR_M, places.max(axis=0) + FAR_M
-    near = vertices_m[((vertices_m > low) & (vertices_m < high)).all(axis=1)]
-    if not len(near):
-        return FAR_M
-    tree = cKDTree(near, balanced_tree=False, compact_nodes=False)  # asked once, so built in haste
-    gap_m, _ = tree.query(places, distance_upper_bound=FAR_M)
-    return float(np.clip(np.min(gap_m - radii), 0, FAR_M))
+    # Some of the vertices say how far the others may be that count.
+    some_m = _gaps_m(places, vertices_m[::_SOME], FAR_M).min()
+    within_m = float(min(some_m, FAR_M) + radii.max())
+    low, high = places.min(axis=0) - within_m, places.max(axis=0) + within_m
+    near = np.logical_and.reduce(
+        [(column > a) & (column < b) for column, a, b in zip(vertices_m.T, low, high, strict=True)]
+    )
+    gaps_m = _gaps_m(vertices_m[near], places, within_m)
+    return float(np.clip(np.min(gaps_m - radii), 0, FAR_M))
+
+
+def _gaps_m(to_m: np.ndarray, from_m: np.ndarray, within_m: float) -> np.ndarray:
+    """Distances (k,) of points `from_m` (k, 3) from the nearest of `to_m`; infinite beyond `within_m`."""
+    if not len(to_m):
+        return np.full(len(from_m), np.inf)
+    tree = cKDTree(to_m, balanced_tree=False, compact_nodes=False)  # asked once, so built in haste
+    return tree.query(from_m, distance_upper_bound=within_m)[0]

@@ -78,7 +78,7 @@ def watch(
 
     Parameters
     ----------
-    person_at : seconds -> the person, posed in the world
+    person_at : seconds -> the person, posed in the world; while they keep still, the same object saves time
     vertices : (12,), where the markers are on the person's skin
     fixed_m : (k, 3), markers that do not move
     times_s : (n,), increasing
@@ -91,11 +91,15 @@ def watch(
     n_seeing : (n, 12 + k), how many cameras see each
     """
     at = np.unique(np.append(np.arange(0, len(times_s), every), len(times_s) - 1))
-    found, seeing = [], []
+    found, seeing, before = [], [], None
     for time_s in times_s[at]:
         person = person_at(float(time_s))
-        found.append(np.concatenate([markers_m(person, vertices), np.reshape(fixed_m, (-1, 3))]))
-        seeing.append(count_seeing(body_scene(person, obstacles), found[-1], cameras_m))
+        if person is not before:
+            markers = np.concatenate([markers_m(person, vertices), np.reshape(fixed_m, (-1, 3))])
+            n_seeing = count_seeing(body_scene(person, obstacles), markers, cameras_m)
+        found.append(markers)
+        seeing.append(n_seeing)
+        before = person
     nearest = np.rint(np.interp(np.arange(len(times_s)), at, np.arange(len(at)))).astype(int)
     followed = CubicSpline(times_s[at], found)(times_s) if len(at) > 1 else np.array(found)
     return followed, np.array(seeing)[nearest]

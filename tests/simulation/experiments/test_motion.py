@@ -48,6 +48,29 @@ def test_a_motion_passes_through_its_postures_and_stays_in_pauses():
     assert elbow(motion.at(2.5)) == pytest.approx(0.7) and elbow(motion.at(3.6)) == pytest.approx(0.2)
 
 
+def test_a_pause_is_known_by_when_it_began():
+    motion = Motion(A, iter([Move(1.0, A), Move(1.0, B), Move(0.5, B), Move(0.5, B), Move(2.0, A)]))
+    for time_s, since_s in (
+        (-3.0, 0.0),
+        (0.9, 0.0),
+        (1.5, 1.5),
+        (2.0, 2.0),
+        (2.4, 2.0),
+        (2.9, 2.0),
+        (3.5, 3.5),
+    ):
+        assert motion.still_since_s(time_s) == since_s
+        assert motion.at(since_s) == motion.at(time_s)
+
+
+def test_whoever_keeps_still_is_posed_once_and_whoever_moves_is_not(scene):
+    still_s = next(t for t in np.arange(0, 9, 0.05) if scene.motion.at(t) == scene.motion.at(t + 0.1))
+    assert scene.person_at(still_s) is scene.person_at(still_s + 0.1)
+    moves_s = next(t for t in np.arange(0, 9, 0.05) if scene.motion.at(t) != scene.motion.at(t + 0.1))
+    first, then = (scene.person_at(t).vertices_m for t in (moves_s, moves_s + 0.1))
+    assert not np.array_equal(first, then)
+
+
 @pytest.fixture(scope="module")
 def scene():
     return moving(0)
