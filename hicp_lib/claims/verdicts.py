@@ -1,8 +1,9 @@
 """Verdicts: what a run's result files say about each claim.
 
 A test *holds* when the whole 95 % interval of the difference lies on the claimed side, *fails* when
-none of it does, and is *open* otherwise. The difference of two rows with intervals of their own takes
-the widest: that asks for more than a paired comparison would, never for less.
+none of it does, and is *open* otherwise, or where there is no interval (NaN). Tables of differences come
+with intervals of their own, from paired draws; the difference of two rows with an interval each takes the
+widest: that asks for more than a paired comparison would, never for less.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from hicp_lib.claims.statements import Claim, Comparison, Selection
 from hicp_lib.detectors.registry import DETECTORS, command_to_run
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json
+from hicp_lib.rgbd.recording import SIMULATION_FILE
 
 REPRODUCED = "reproduced"
 ON_RENDERED_DATA = "reproduced on rendered data only"
@@ -98,17 +100,19 @@ def verdict_table(verdicts: list[Verdict]) -> pd.DataFrame:
 
 
 def for_reading(table: pd.DataFrame, verdict: str) -> pd.DataFrame:
-    """The claims with one verdict, for a page: claim and test in one column, and nothing that is empty.
+    """The claims with one verdict, for a page: no column for what they do not have.
 
-    `table` from `verdict_table`; columns `section, claim, paper, ours` and, for what could not be tested,
-    `why not, and what would test it`.
+    `table` from `verdict_table`; columns `section, claim` (with what was tested), `paper, ours`, or, for what
+    could not be tested, `section, claim, why not, and what would test it`.
     """
     rows = table[table["verdict"] == verdict]
-    shown = rows[["section", "paper", "ours"]].copy()
-    shown.insert(1, "claim", rows["claim"] + " Tested: " + rows["tested"])
-    if verdict == NOT_TESTABLE:
-        shown["why not, and what would test it"] = rows["why_not"] + ": " + rows["command"]
-    return shown
+    shown = rows[["section"]].assign(claim=rows["claim"] + " Tested: " + rows["tested"])
+    if verdict != NOT_TESTABLE:
+        return shown.assign(paper=rows["paper"], ours=rows["ours"])
+    open_at = rows["ours"].map(lambda ours: "" if ours == "–" else f" ({ours})")
+    return shown.assign(
+        **{"why not, and what would test it": rows["why_not"] + open_at + ": " + rows["command"]}
+    )
 
 
 def verdict_counts(table: pd.DataFrame) -> dict[str, int]:
@@ -120,14 +124,15 @@ def _judge(claim: Claim, results: Path) -> Verdict:
     if not claim.tests:
         return Verdict(claim, NOT_TESTABLE, reason=claim.reason, command=claim.command)
     try:
-        rendered = any(is_rendered(results, test.left.notebook) for test in claim.tests)
+        rendered = any([is_rendered(results, notebook) for notebook in _notebooks(claim)])
         rendered |= claim.only_on == "rendered people"
         if claim.only_on == "photographs" and rendered:
             raise _MissingError("the claim is about photographs; this run saw rendered people", _PHOTOGRAPHS)
-        outcomes, evidence = zip(*(_try(test, claim.unit, results) for test in claim.tests), strict=True)
+        outcomes, evidence = zip(*(_try(test, results) for test in claim.tests), strict=True)
     except _MissingError as missing:
         return Verdict(claim, NOT_TESTABLE, reason=str(missing), command=missing.command)
     ours = "; ".join(dict.fromkeys(text for texts in evidence for text in texts))
+    ours = f"{ours} {claim.unit}".strip()
     if False in outcomes:
         return Verdict(claim, NOT_REPRODUCED, ours)
     if None in outcomes:
@@ -136,7 +141,13 @@ def _judge(claim: Claim, results: Path) -> Verdict:
     return Verdict(claim, ON_RENDERED_DATA if rendered else REPRODUCED, ours)
 
 
-def _try(test: Comparison, unit: str, results: Path) -> tuple[bool | None, list[str]]:
+def _notebooks(claim: Claim) -> set[str]:
+    """The notebooks whose results a claim rests on."""
+    sides = [side for test in claim.tests for side in (test.left, test.right)]
+    return {side.notebook for side in sides if isinstance(side, Selection)}
+
+
+def _try(test: Comparison, results: Path) -> tuple[bool | None, list[str]]:
     """Whether a test holds (None: open), and the quantities it rests on in words."""
     left = select(test.left, results)
     if isinstance(test.right, float):
@@ -148,7 +159,7 @@ def _try(test: Comparison, unit: str, results: Path) -> tuple[bool | None, list[
         reason = f"no two rows of {test.left.table} agree in {', '.join(test.match)}"
         raise _MissingError(reason, "hicp report")
     shown = [a for a, _ in pairs] + ([b for _, b in pairs] if isinstance(test.right, Selection) else [])
-    return holds(test, pairs), [_in_words(quantity, unit) for quantity in shown]
+    return holds(test, pairs), [_in_words(quantity) for quantity in shown]
 
 
 def holds(test: Comparison, pairs: list[tuple[Quantity, Quantity]]) -> bool | None:
@@ -214,22 +225,33 @@ def _quantity(selection: Selection, row: dict[str, Any]) -> Quantity:
         float(row[column or selection.value]) * selection.scale
         for column in (selection.value, selection.low, selection.high)
     )
-    name = " ".join(str(row[column]) for column in selection.name)
+    name = " ".join(_plain(row[column]) for column in selection.name)
     return Quantity(value, *sorted((low, high)), row, name)
 
 
-def _in_words(quantity: Quantity, unit: str) -> str:
+def _plain(label: Any) -> str:
+    """A row's label for reading: 160 for 160.0, "left wrist" for "left_wrist"."""
+    return f"{label:g}" if isinstance(label, float) else str(label).replace("_", " ")
+
+
+def _in_words(quantity: Quantity) -> str:
     text = f"{quantity.name} {quantity.value:.3g}".strip()
     if quantity.low < quantity.high:
         text += f" [{quantity.low:.3g}, {quantity.high:.3g}]"
-    return f"{text} {unit}".strip()
+    return text
 
 
 def is_rendered(results: Path, notebook: str) -> bool:
-    """Whether a notebook's run saw rendered people or simulated recordings, by its stamp."""
+    """Whether a notebook's run saw rendered people or simulated recordings.
+
+    Its stamp names the source and the recordings it was given; one of these may be simulated as well, and
+    says so in its folder.
+    """
     path = results / notebook / "provenance.json"
     if not path.is_file():
         raise _MissingError(f"{notebook} has no results in this run", "hicp report")
     parameters = read_json(path)["parameters"]
-    recordings = [value for name, value in parameters.items() if name.startswith("recording")]
-    return parameters.get("source", "rendered") == "rendered" and not any(recordings)
+    given = [Path(value) for name, value in parameters.items() if name.startswith("recording") and value]
+    if given:
+        return any((folder / SIMULATION_FILE).is_file() for folder in given)
+    return parameters.get("source", "rendered") == "rendered"

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from hicp_lib.claims import verdicts as v
 from hicp_lib.claims.statements import Claim, Comparison, Selection, read_claims
 from hicp_lib.errors import InputError
+from hicp_lib.files import read_json
+from hicp_lib.provenance import DATA_DIR
 
 LOSS = Selection("02", "loss", {"group": "body"}, "change", low="low", high="high")
 
@@ -76,6 +78,30 @@ def test_evidence_names_each_detector_with_its_interval(write):
 def test_rendered_data_qualify_the_verdict(write, parameters, expected):
     results = write(rows(a=(-0.4, -0.5, -0.3)), parameters)
     assert verdict(claim(LOSES), results).verdict == expected
+
+
+def test_a_simulated_recording_is_no_recording_of_a_lab(write, tmp_path):
+    recordings = [tmp_path / "upper", tmp_path / "lower"]
+    for folder in recordings:
+        folder.mkdir()
+    given = {"recording": str(recordings[0]), "recording_lower": str(recordings[1])}
+    results = write(rows(a=(-0.4, -0.5, -0.3)), given)
+    assert verdict(claim(LOSES), results).verdict == v.REPRODUCED
+    (recordings[1] / "simulation.json").write_text("{}")
+    assert verdict(claim(LOSES), results).verdict == v.ON_RENDERED_DATA
+
+
+def test_both_sides_of_a_comparison_tell_what_the_data_were(write):
+    write(rows(b=(0.4, 0.3, 0.5)), {"source": "rendered"}, notebook="02b")
+    results = write(rows(a=(-0.4, -0.5, -0.3)))
+    other = Selection("02b", "loss", {}, "change", low="low", high="high")
+    assert verdict(claim(Comparison("<", LOSS, other)), results).verdict == v.ON_RENDERED_DATA
+
+
+def test_without_an_interval_a_claim_stays_open(write):
+    unknown = float("nan")
+    found = verdict(claim(LOSES), write(rows(a=(-0.4, unknown, unknown))))
+    assert (found.verdict, found.ours) == (v.NOT_TESTABLE, "a -0.4")
 
 
 def test_what_is_always_rendered_stays_so_when_the_run_had_photographs(write):
@@ -173,6 +199,44 @@ def test_greater_and_less_mirror_each_other(value, half, margin):
         assert value > margin and outcome("<", 1) is False
 
 
+@pytest.fixture
+def paper_medians():
+    """The paper's Tables III and IV as notebook 04 saves its own."""
+    paper = read_json(DATA_DIR / "paper.json")["mocap"]
+    table = pd.DataFrame(paper["rows"], columns=paper["columns"]).assign(method="paper")
+    return table.assign(**{name: table["median_cm"] / 100 for name in ("median_m", "low_m", "high_m")})
+
+
+def judged_on(write, medians) -> dict[str, str]:
+    """Verdicts by id on the claims that rest on motion capture alone, shoulders aside (not in the tables)."""
+    results = write(medians, notebook="04_mocap_3d", table="medians")
+    claims = [c for c in read_claims() if c.tests and c.tests[0].left.table == "medians"]
+    return {o.claim.id: o.verdict for o in v.judge(claims, results) if o.claim.id != "shoulders-worst"}
+
+
+def test_the_papers_own_numbers_bear_out_its_claims(write, paper_medians):
+    verdicts = judged_on(write, paper_medians)
+    assert len(verdicts) == 8 and set(verdicts.values()) == {v.REPRODUCED}
+
+
+@pytest.mark.parametrize(
+    ("column", "where", "factor", "refuted"),
+    [
+        ("median_m", "wrist", 3.0, {"wrists-best", "wrists-any", "elbows-worse", "threshold"}),
+        ("median_m", "elbow", 0.5, {"elbows-best", "elbows-worse", "detectron2-elbows", "threshold"}),
+        ("count", "elbow", 0.0, {"openpose-few", "detectron2-scale"}),
+    ],
+)
+def test_other_numbers_refute_them(write, paper_medians, column, where, factor, refuted):
+    changed = paper_medians["keypoint"].str.contains(where) & (
+        (paper_medians["min_score"] == 0.3) | (column == "count")
+    )
+    names = ["median_m", "low_m", "high_m"] if column == "median_m" else ["count"]
+    paper_medians.loc[changed, names] *= factor
+    verdicts = judged_on(write, paper_medians)
+    assert {name for name, verdict in verdicts.items() if verdict == v.NOT_REPRODUCED} == refuted
+
+
 def test_the_committed_claims_can_be_read():
     claims = read_claims()
     assert all(claim.text and claim.statement and claim.section for claim in claims)
@@ -213,5 +277,6 @@ def test_for_reading_every_claim_appears_once(write):
     assert {verdict: len(part) for verdict, part in parts.items() if len(part)} == {
         v.REPRODUCED: 1, v.NOT_TESTABLE: 1,
     }  # fmt: skip
+    assert list(parts[v.REPRODUCED]) == ["section", "claim", "paper", "ours"]
     assert "no robot: buy one" in set(parts[v.NOT_TESTABLE]["why not, and what would test it"])
     assert v.verdict_counts(table)[v.REPRODUCED] == 1
