@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from dataclasses import replace
 
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
 from PIL import Image
 
 from hicp_lib.evaluation.avoidance import SURE
@@ -20,13 +20,12 @@ from hicp_lib.keypoints import LIMBS
 from hicp_lib.plots.avoidance import condition_colour
 from hicp_lib.plots.people import draw_people
 from hicp_lib.plots.style import Figure, in_style, new_figure
-from hicp_lib.robot.home import home_posture
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.segments import body_segments
 from hicp_lib.robot.skin import read_skin
 from hicp_lib.simulation.experiments.avoidance_runs import Run, image, keypoints_m
-from hicp_lib.simulation.experiments.closed_loop import NECK_RAD
+from hicp_lib.simulation.experiments.closed_loop import start_posture
 from hicp_lib.simulation.experiments.reaching import in_root, script
 
 _TURN_RAD, _TILT_RAD = np.radians(35.0), np.radians(18.0)  # of the view: to the side, from above
@@ -53,13 +52,18 @@ def filmstrip(run: Run, times_s: Sequence[float], note: str) -> Figure:
 
 def animation(run: Run, rate_hz: float = 6.0, dpi: int = 64) -> bytes:
     """The same as an animated WebP in real time."""
-    pictures = []
+    pictures, times_s = [], np.arange(0, run.cycles["t_s"].iloc[-1], 1 / rate_hz).tolist()
     with mpl.rc_context({"figure.constrained_layout.use": True, "font.size": 10}):
-        for time_s in np.arange(0, run.cycles["t_s"].iloc[-1], 1 / rate_hz):
-            figure, axes = new_figure(1, 2, 10.4, 4.0, width_ratios=[1.15, 1])
-            _draw_moment(*axes, run, float(time_s))
-            canvas = FigureCanvasAgg(figure)
-            figure.set_dpi(dpi)
+        figure, axes = new_figure(1, 2, 10.4, 4.0, width_ratios=[1.15, 1])
+        canvas = FigureCanvasAgg(figure)
+        figure.set_dpi(dpi)
+        _draw_moment(*axes, run, times_s[0])
+        canvas.draw()
+        figure.set_layout_engine("none")  # all pictures are laid out like the first
+        for time_s in times_s:
+            for drawn in [artist for axis in axes for artist in (*axis.images, *axis.collections)]:
+                drawn.remove()
+            _draw_moment(*axes, run, time_s)
             canvas.draw()
             pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]))
     content = io.BytesIO()
@@ -106,23 +110,21 @@ def _draw_space(axis, run: Run, cycle: pd.Series, frame: pd.Series | None) -> No
 
 
 def _posture(cycle: pd.Series) -> Posture:
-    home = replace(home_posture(load_icub()), neck_rad=NECK_RAD)
-    return home.moved("left", np.array([cycle[f"{joint}_rad"] for joint in ARM_JOINTS]))
+    return start_posture().moved("left", np.array([cycle[f"{joint}_rad"] for joint in ARM_JOINTS]))
 
 
 def _draw_robot(axis, posture: Posture) -> None:
     chains = (posture.angles(name) for name in ("head", "left", "right"))
     points_per_m = 72 * axis.get_position().width * axis.figure.get_figwidth() / np.ptp(_LIMITS_M[0])
-    for segment in body_segments(load_icub(), *chains):
-        u, v = _seen(np.stack([segment.start_m, segment.end_m]))
-        width = 2 * segment.radius_m * points_per_m
-        axis.plot(u, v, color="#C9CED6", lw=width, solid_capstyle="round", zorder=0)
+    segments = body_segments(load_icub(), *chains)
+    ends = np.stack(_seen(np.stack([(s.start_m, s.end_m) for s in segments])), axis=-1)
+    widths = [2 * segment.radius_m * points_per_m for segment in segments]
+    axis.add_collection(LineCollection(ends, linewidths=widths, colors="#C9CED6", capstyle="round", zorder=0))
 
 
 def _draw_limbs(axis, points_m: np.ndarray) -> None:
-    u, v = _seen(points_m)
-    for a, b in LIMBS:
-        axis.plot(u[[a, b]], v[[a, b]], color=_PERSON_COLOUR, lw=1.2, zorder=2)
+    ends = np.stack(_seen(points_m[np.array(LIMBS)]), axis=-1)
+    axis.add_collection(LineCollection(ends, linewidths=1.2, colors=_PERSON_COLOUR, zorder=2))
 
 
 def _seen(points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

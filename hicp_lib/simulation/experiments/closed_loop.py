@@ -8,7 +8,7 @@ their delay.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -68,6 +68,12 @@ class TrueKeypoints:
         return Perception(time_s, points_m, np.ones(points_m.shape[:2]))
 
 
+@cache
+def start_posture() -> Posture:
+    """How the robot stands before anybody comes: the left hand at its post, the head looking at it."""
+    return replace(home_posture(load_icub()), neck_rad=NECK_RAD)
+
+
 def simulate(trial: Trial, eyes: Eyes, avoids: bool = True, settings: Settings | None = None) -> pd.DataFrame:
     """One run of a trial.
 
@@ -78,7 +84,7 @@ def simulate(trial: Trial, eyes: Eyes, avoids: bool = True, settings: Settings |
     radians, and `seen_s`, when the newest image that the loop knows was taken (NaN: none yet)
     """
     scene, icub = script(trial.script, trial.seed), load_icub()
-    posture = replace(home_posture(icub), neck_rad=NECK_RAD)
+    posture = start_posture()
     between_s = next_image_s(0.0, eyes.delay_s, trial.camera_hz)
     loop = _loop(icub, posture, eyes.delay_s + between_s, avoids, settings or Settings())
     period_s, under_way, free_s, rows = loop.controller.settings.period_s, None, 0.0, []
