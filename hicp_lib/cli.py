@@ -118,6 +118,23 @@ def models_show(detector: str, **chosen) -> None:
         say(f"{what:<16} {value}" + (f"  ({why})" if why else ""))
 
 
+@models.command("use")
+@detector_options
+def models_use(detector: str, **chosen) -> None:
+    """Say once which model file a detector runs on; notebooks and commands then take it by its name."""
+    from hicp_lib.detectors.own import keep_own
+    from hicp_lib.detectors.registry import DETECTORS, make_detector
+
+    options = given(**chosen)
+    if detector in DETECTORS and not DETECTORS[detector].needs_model:
+        raise InputError(f"detector {detector!r} has weights of its own; it takes none of yours")
+    make_detector(detector, **options)
+    if "model" not in options:
+        raise InputError(f"detector {detector!r}: no model is named; give it with --model FILE.onnx")
+    keep_own(detector, options)
+    say(f"{detector}: {options['model']}; run it in the report with: hicp report -p detectors {detector}")
+
+
 @hicp.group()
 def scenes() -> None:
     """Rendered people."""
@@ -258,6 +275,7 @@ def evaluate(
     from hicp_lib.evaluation.bootstrap import bootstrap_intervals
     from hicp_lib.evaluation.coco import evaluate as evaluate_detections
     from hicp_lib.evaluation.compare import source_images
+    from hicp_lib.evaluation.resampling import MIN_DRAWN
 
     people = read_annotations(annotations)
     found = read_detections(detections, people)
@@ -273,8 +291,11 @@ def evaluate(
     )
     if not any(map(len, found.values())):
         say(f"{detections}: an empty list: nobody was found in any image")
+    if not any(row["low"] == row["low"] for row in rows):
+        say(f"no intervals: they ask for {MIN_DRAWN} source images at least")
     for row in rows:
-        say(f"{row['metric']:<5} {row['value']:.3f}  [{row['low']:.3f}, {row['high']:.3f}]")
+        interval = f"  [{row['low']:.3f}, {row['high']:.3f}]" if row["low"] == row["low"] else ""
+        say(f"{row['metric']:<5} {row['value']:.3f}{interval}")
 
 
 def _finite(row: dict[str, Any]) -> dict[str, Any]:

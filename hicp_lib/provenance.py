@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import hicp_lib
+from hicp_lib.detectors.own import own_sha256
 from hicp_lib.files import sha256_bytes, sha256_file
 
 ROOT = Path(hicp_lib.__file__).resolve().parent.parent
@@ -111,10 +112,13 @@ def versions() -> dict[str, str]:
 
 
 def weights_sha256() -> dict[str, str]:
-    """SHA-256 of each weight file by name, from the registry; a detector loads no file that differs."""
+    """SHA-256 of each weight file by name, from the registry; a detector loads no file that differs.
+
+    Further ones are of what the user named for detectors, by these.
+    """
     registry = DATA_DIR / "detectors.json"
     weights = json.loads(registry.read_text())["weights"] if registry.is_file() else {}
-    return {name: row["sha256"] for name, row in weights.items()}
+    return {name: row["sha256"] for name, row in weights.items()} | own_sha256()
 
 
 def machine() -> dict[str, Any]:

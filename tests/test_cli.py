@@ -101,17 +101,24 @@ def test_image_numbers_are_those_of_coco_or_the_order_of_names(tmp_path):
 
 def test_evaluation_of_perfect_detections(capsys, tmp_path):
     keypoints = [value for i in range(136) for value in (100 + i, 50 + 2 * i, 2)]
-    person = {"id": 1, "image_id": 5, "category_id": 1, "iscrowd": 0, "keypoints": keypoints}
+    person = {"category_id": 1, "iscrowd": 0, "keypoints": keypoints}
     person |= {"bbox": [90, 40, 160, 300], "area": 30000, "num_keypoints": 136}
-    image = {"id": 5, "file_name": "5.jpg", "width": 400, "height": 400}
+    image = {"width": 400, "height": 400}
     truth, found = tmp_path / "annotations.json", tmp_path / "detections.json"
-    truth.write_text(json.dumps({"images": [image], "annotations": [person], "categories": [{"id": 1}]}))
-    found.write_text(json.dumps([{"image_id": 5, "category_id": 1, "keypoints": keypoints, "score": 0.9}]))
+
+    def write(n: int) -> None:
+        images = [image | {"id": i, "file_name": f"{i}.jpg"} for i in range(n)]
+        people = [person | {"id": i, "image_id": i} for i in range(n)]
+        results = [{"image_id": i, "category_id": 1, "keypoints": keypoints, "score": 0.9} for i in range(n)]
+        truth.write_text(json.dumps({"images": images, "annotations": people, "categories": [{"id": 1}]}))
+        found.write_text(json.dumps(results))
+
+    write(12)
     arguments = ["evaluate", "--annotations", str(truth), "--detections", str(found), "--group", "hand"]
     assert cli.run([*arguments, "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed["metrics"]["AP"] == pytest.approx({"value": 1.0, "low": 1.0, "high": 1.0})
-    assert printed["n_people"] == 1
+    assert printed["n_people"] == 12
     assert cli.run(arguments) == 0
     assert "AP    1.000  [1.000, 1.000]" in capsys.readouterr().out
     assert "group" in mistake(capsys, *arguments[:-1], "feet")
@@ -121,3 +128,10 @@ def test_evaluation_of_perfect_detections(capsys, tmp_path):
     printed = capsys.readouterr().out
     assert f"{found}: an empty list: nobody was found in any image" in printed
     assert "AP    0.000  [0.000, 0.000]" in printed
+
+    write(9)
+    assert cli.run(arguments) == 0
+    printed = capsys.readouterr().out
+    assert "no intervals: they ask for 10 source images" in printed and "AP    1.000\n" in printed
+    assert cli.run([*arguments, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["metrics"]["AP"] == {"value": 1.0, "low": None, "high": None}

@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import get_args, get_type_hints
 
 from hicp_lib.detectors.base import Detector
+from hicp_lib.detectors.own import own_options
 from hicp_lib.errors import InputError
 
 
@@ -86,9 +87,15 @@ def command_to_run(name: str) -> str:
     return f"hicp detect --detector {name}{model} --dataset DIR --out FILE.json"
 
 
+def command_to_use(name: str) -> str:
+    """The command that says which weights a detector takes from then on, in notebooks too."""
+    return f"hicp models use --detector {name} --model FILE.onnx"
+
+
 def make_detector(name: str, **options) -> Detector:
     """A detector ready to run; `options` are the parameters of its class.
 
+    One that needs a model and is given none takes those kept for it (`hicp_lib.detectors.own`).
     `combined:BODY+HANDS` puts two detectors together (see `hicp_lib.detectors.combined`): its own options,
     those of the hand detector with `hands_` before their names, and all others the body detector's.
 
@@ -105,8 +112,11 @@ def make_detector(name: str, **options) -> Detector:
         )
     entry = DETECTORS[name]
     if entry.needs_model and not options.get("model"):
+        options = own_options(name) | options
+    if entry.needs_model and not options.get("model"):
         raise InputError(
-            f"detector {name!r} needs a weight file of your own; give it with: {command_to_run(name)}"
+            f"detector {name!r} needs a weight file of your own; name it once with: {command_to_use(name)}; "
+            f"or give it with: {command_to_run(name)}"
         )
     detector_class = getattr(import_module(entry.module), entry.class_name)
     _check_options(name, detector_class, options)

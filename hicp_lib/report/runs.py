@@ -138,6 +138,7 @@ def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
         "lock": provenance.lock_sha256(),
         "installed packages": provenance.installed_sha256(),
         "data": provenance.data_sha256(),
+        "weights": provenance.digest(provenance.weights_sha256()),
         "input files": provenance.digest(_inputs(run)),
         "earlier notebooks": provenance.digest(before or []),
     }

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from hicp_lib import cli
+from hicp_lib.detectors.own import own_path
+from hicp_lib.detectors.registry import make_detector
 from hicp_lib.images import write_png
+from hicp_lib.provenance import weights_sha256
 
 from .onnx_models import colour_maps_model, constant_model
 from .test_mmpose import dots
@@ -58,3 +61,32 @@ def test_detect_with_a_model_of_ones_own(capsys, model, tmp_path):
     assert "no option 'boxes'" in mistake(
         capsys, *arguments[:-1], "detectron2", "--model", model, "--boxes", "gt"
     )
+
+
+def test_a_model_named_once_is_taken_from_then_on(capsys, model, tmp_path):
+    use = ["models", "use", "--detector", "mmpose"]
+    before = weights_sha256()
+    assert "hicp models use --detector mmpose" in mistake(capsys, *use)
+    assert "/no.onnx: cannot be read" in mistake(capsys, *use, "--model", "/no.onnx")
+    assert weights_sha256() == before
+    assert cli.run([*use, "--model", model, "-o", "flip_test", "true"]) == 0
+    assert "hicp report -p detectors mmpose" in capsys.readouterr().out
+    assert make_detector("mmpose").settings == make_detector("mmpose", model=model, flip_test=True).settings
+    # What is given at a call comes first; a model given there stands for itself.
+    assert make_detector("mmpose", flip_test=False).settings["flip_test"] is False
+    assert make_detector("mmpose", model=model).settings["flip_test"] is False
+    assert "no model is named" in mistake(capsys, *use, "-o", "flip_test", "false")
+    named = weights_sha256()
+    assert set(named) - set(before) == {"mmpose"}
+    assert cli.run([*use, "--model", model]) == 0
+    assert weights_sha256()["mmpose"] != named["mmpose"]
+
+
+def test_detectors_with_weights_of_their_own_take_no_others(capsys, model):
+    assert "takes none of yours" in mistake(capsys, "models", "use", "--detector", "mediapipe")
+
+
+def test_a_damaged_list_of_own_models_is_told_in_one_line(capsys, model):
+    own_path().parent.mkdir(parents=True, exist_ok=True)
+    own_path().write_text('["mmpose"]')
+    assert "name your files again" in mistake(capsys, "models", "show", "--detector", "mmpose")
