@@ -60,8 +60,8 @@ def graph_class() -> type[Message]:
     return message_factory.GetMessageClass(pool.FindMessageTypeByName("hicp.Graph"))
 
 
-def to_onnx(content: bytes, name: str) -> bytes:
-    """Translate a frozen graph to an ONNX model; equal bytes give equal bytes.
+def to_onnx(content: bytes, name: str) -> onnx.ModelProto:
+    """Translate a frozen graph to an ONNX model.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def to_onnx(content: bytes, name: str) -> bytes:
     except _Unknown as error:
         raise InputError(f"{name}: {error}; convert the network to ONNX by other means") from None
     opset = [helper.make_opsetid("", _OPSET)]
-    return helper.make_model(translated, opset_imports=opset, ir_version=_IR_VERSION).SerializeToString()
+    return helper.make_model(translated, opset_imports=opset, ir_version=_IR_VERSION)
 
 
 class _Unknown(ValueError):

@@ -16,6 +16,7 @@ import numpy as np
 from hicp_lib.detectors.base import Detections
 from hicp_lib.detectors.frozen_graph import to_onnx
 from hicp_lib.detectors.onnx.session import open_content
+from hicp_lib.detectors.onnx.split_channels import split_channels
 from hicp_lib.detectors.paf import PafOptions, PartModel, assemble
 from hicp_lib.detectors.zoo import load, weight_path
 from hicp_lib.files import sha256_bytes
@@ -104,7 +105,8 @@ class OpenPoseMobileNet:
         if net_height_px <= 0 or net_height_px % 16:
             raise ValueError(f"net_height_px must be a positive multiple of 16, not {net_height_px}")
         weights = load(WEIGHTS)
-        self._model = open_content(to_onnx(weights, WEIGHTS), weight_path(WEIGHTS), provider, threads)
+        model = split_channels(to_onnx(weights, WEIGHTS)).SerializeToString()
+        self._model = open_content(model, weight_path(WEIGHTS), provider, threads)
         self._height_px = net_height_px
         self._options = options or PafOptions()
         self.settings = {

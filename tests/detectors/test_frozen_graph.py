@@ -56,7 +56,8 @@ class Graph:
 
 
 def by_onnx_runtime(content: bytes, image: np.ndarray) -> np.ndarray:
-    session = onnxruntime.InferenceSession(to_onnx(content, "graph"), providers=["CPUExecutionProvider"])
+    model = to_onnx(content, "graph").SerializeToString()
+    session = onnxruntime.InferenceSession(model, providers=["CPUExecutionProvider"])
     (output,) = session.run(None, {"image": image})
     return output
 
