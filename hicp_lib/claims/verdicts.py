@@ -16,7 +16,7 @@ from typing import Any
 import pandas as pd
 
 from hicp_lib.claims.statements import Claim, Comparison, Selection
-from hicp_lib.detectors.registry import DETECTORS, command_to_run
+from hicp_lib.detectors.registry import COMBINED, DETECTORS, command_to_use
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json
 from hicp_lib.rgbd.recording import SIMULATION_FILE
@@ -192,13 +192,14 @@ def select(selection: Selection, results: Path) -> list[Quantity]:
         raise InputError(
             f"{path}: a claim asks for column {min(unknown)!r}; there are {', '.join(table.columns)}"
         )
+    table = table[table[selection.value].map(lambda value: value is not None and math.isfinite(value))]
+    present = {name for column in ("detector", "other") if column in table for name in table[column]}
     for column, wanted in selection.where.items():
         table = table[table[column].isin(_values(wanted))]
     for column, unwanted in selection.unlike.items():
         table = table[~table[column].isin(_values(unwanted))]
-    table = table[table[selection.value].map(lambda value: value is not None and math.isfinite(value))]
     if table.empty:
-        raise _absent(selection)
+        raise _absent(selection, present)
     quantities = [_quantity(selection, row) for row in table.to_dict("records")]
     if selection.pick == "each":
         return quantities
@@ -211,13 +212,23 @@ def _values(given: Any) -> list:
     return values + [f"{value}-imported" for value in values if isinstance(value, str)]
 
 
-def _absent(selection: Selection) -> _MissingError:
-    detectors = selection.where.get("detector", [])
-    for name in [detectors] if isinstance(detectors, str) else detectors:
-        if name in DETECTORS:
-            return _MissingError(f"{name} was not run", command_to_run(name))
+def _absent(selection: Selection, present: set[str]) -> _MissingError:
+    """Why a selection is empty: a detector it names was not run, or else its table has no such row."""
+    for column in ("detector", "other"):
+        names = selection.where.get(column, [])
+        for name in [names] if isinstance(names, str) else names:
+            if not present & set(_values(name)):
+                return _MissingError(f"{name} was not run", _command_to_run(name))
     asked = ", ".join(f"{column} {value}" for column, value in selection.where.items())
     return _MissingError(f"{selection.notebook} has no result for {asked}", "hicp report")
+
+
+def _command_to_run(name: str) -> str:
+    """What runs a detector, or a combination of two, in the report."""
+    base = name.removeprefix(COMBINED).partition("+")[0]
+    report = f"hicp report -p detectors mediapipe,{base}" + (f" -p body {base}" if base != name else "")
+    needs_model = base in DETECTORS and DETECTORS[base].needs_model
+    return f"{command_to_use(base)} && {report}" if needs_model else report
 
 
 def _quantity(selection: Selection, row: dict[str, Any]) -> Quantity:

@@ -122,7 +122,13 @@ def test_a_detector_that_was_not_run_gives_the_command(write):
     best = Comparison(">", Selection("02", "loss", {"detector": "mmpose"}, "change"), LOSS)
     found = verdict(claim(best), write(rows(a=(-0.4, -0.5, -0.3))))
     assert (found.verdict, found.reason) == (v.NOT_TESTABLE, "mmpose was not run")
-    assert "hicp detect --detector mmpose" in found.command
+    assert found.command.startswith("hicp models use --detector mmpose --model FILE.onnx && hicp report")
+    pair = Selection("02", "loss", {"detector": ["a"], "other": ["mediapipe", "mmpose"]}, "change")
+    table = rows(a=(-0.4, -0.5, -0.3))
+    results = write([row | {"other": "mediapipe", "group": "hand"} for row in table])
+    assert verdict(claim(Comparison(">", pair, 0.0)), results).verdict == v.NOT_REPRODUCED
+    results = write([row | {"other": "alphapose"} for row in table])
+    assert verdict(claim(Comparison(">", pair, 0.0)), results).reason == "mediapipe was not run"
 
 
 def test_imported_detections_count_as_the_detectors(write):
