@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 import pandas as pd
 
-from hicp_lib.detectors.registry import DETECTORS, command_to_run
+from hicp_lib.detectors.registry import DETECTORS, command_to_run, command_to_use
 from hicp_lib.files import read_json
 from hicp_lib.provenance import DATA_DIR
 
@@ -33,5 +33,6 @@ def _status(name: str, run: Collection[str]) -> str:
     if name in ("mediapipe-pose", "mediapipe-hands") and "mediapipe" in run:
         return "run, within mediapipe"
     if name in DETECTORS:
-        return f"not run; {command_to_run(name)}"
+        command = command_to_use if DETECTORS[name].needs_model else command_to_run
+        return f"not run; {command(name)}"
     return f"not run; hicp import --format {name} --predictions DIR --annotations A.json --out D.json"

@@ -5,6 +5,7 @@ import pytest
 from hicp_lib.detectors.registry import (
     DETECTORS,
     command_to_run,
+    command_to_use,
     default_detector_names,
     detector_names,
     make_detector,
@@ -19,8 +20,11 @@ def test_detectors_that_need_a_model_are_not_run_by_default():
 
 
 @pytest.mark.parametrize("name", sorted(set(DETECTORS) - set(default_detector_names())))
-def test_without_its_model_a_detector_says_the_command(name):
+def test_without_its_model_a_detector_says_the_commands(name, tmp_path, monkeypatch):
+    monkeypatch.setenv("HICP_CACHE", str(tmp_path))
     with pytest.raises(InputError, match=f"hicp detect --detector {name} --model FILE.onnx"):
+        make_detector(name)
+    with pytest.raises(InputError, match=command_to_use(name)):
         make_detector(name)
     assert "--model" in command_to_run(name)
 
