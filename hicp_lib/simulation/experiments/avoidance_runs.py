@@ -6,11 +6,13 @@ weights, and the code and data of simulation, lifting, robot and detectors.
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import time
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import cache
+from multiprocessing.managers import SyncManager
 from pathlib import Path
 
 import cv2
@@ -26,7 +28,7 @@ from hicp_lib.keypoints import N_KEYPOINTS
 from hicp_lib.provenance import DATA_DIR, LIBRARY_DIR, digest, files_sha256, machine
 from hicp_lib.robot.controller import PUBLISHED
 from hicp_lib.simulation.experiments.closed_loop import Trial, TrueKeypoints, simulate, start_posture
-from hicp_lib.simulation.experiments.head_camera import DetectorEyes, Sight, perceived, photograph
+from hicp_lib.simulation.experiments.head_camera import Album, DetectorEyes, Sight, perceived, photograph
 from hicp_lib.simulation.experiments.reaching import in_root, script
 from hicp_lib.simulation.scenes import worker_pool
 
@@ -72,13 +74,14 @@ def run_all(jobs: Iterable[Job]) -> list[Run]:
     """The runs of all jobs, in their order; what is not in the cache is simulated on all cores."""
     jobs = list(jobs)
     missing = [job for job in jobs if not (_folder(job) / "cycles.parquet").is_file()]
-    # The longest first, so that no core is left with one at the end.
-    missing.sort(key=lambda job: job.condition in IDEAL)
+    # The longest first, so that no core is left with one at the end: detectors, the fastest see most.
+    missing.sort(key=lambda job: (job.condition in IDEAL, job.delay_s))
     if len(missing) > 1:
-        with worker_pool(min(len(missing), os.cpu_count() or 1)) as pool:
-            pool.map(_simulate_and_keep, missing, chunksize=1)
-    else:
-        list(map(_simulate_and_keep, missing))
+        with worker_pool(min(len(missing), os.cpu_count() or 1)) as pool, _manager() as manager:
+            album = manager.dict()
+            pool.starmap(_simulate_and_keep, [(job, album) for job in missing], chunksize=1)
+    elif missing:
+        _simulate_and_keep(missing[0], {})
     return [_read(job) for job in jobs]
 
 
@@ -147,13 +150,18 @@ def _timed_s(name: str, time_s: float, rgb: np.ndarray, depth_m: np.ndarray) -> 
     return min(time.perf_counter() - start_s[0], time.process_time() - start_s[1])
 
 
-def _simulate_and_keep(job: Job) -> None:
+def _manager() -> SyncManager:
+    """Holds what processes share."""
+    return multiprocessing.get_context("spawn").Manager()
+
+
+def _simulate_and_keep(job: Job, album: Album) -> None:
     settings = {"settings": PUBLISHED} if job.condition == PUBLISHED_GAINS else {}
     sights: list[Sight] = []
     if job.condition in IDEAL:
         cycles = simulate(job.trial, TrueKeypoints(), avoids=job.condition != NO_AVOIDANCE, **settings)
     else:
-        eyes = DetectorEyes(_detector(job.condition), job.delay_s, job.trial.seed)
+        eyes = DetectorEyes(_detector(job.condition), job.delay_s, job.trial.seed, album)
         cycles, sights = simulate(job.trial, eyes), eyes.sights
     scene = script(job.trial.script, job.trial.seed)
     rows = [_frame(sight, in_root(scene.person_at(sight.perception.time_s).keypoints_m)) for sight in sights]

@@ -72,12 +72,14 @@ class Script:
 
     Attributes
     ----------
+    name : key of `SCRIPTS`
     room : without the person
     appearance : the person's
     motion : what they do
     before_s : how long they are far at first
     """
 
+    name: str
     room: World
     appearance: Appearance
     motion: Motion
@@ -129,7 +131,7 @@ def script(name: str, seed: int = 0, before_s: float = 0.6) -> Script:
         person = posed(appearance.shape, rest)
         seat = chair(rng, (x, y), float(person.heads_m[0, 2]) - 0.11)
     room = furnished(rng, seat, [(x, y - 0.2, 0.8), (x, y + 0.4, 0.7)])
-    return Script(room, appearance, Motion(rest, _moves(rest, ready, near)), before_s)
+    return Script(name, room, appearance, Motion(rest, _moves(rest, ready, near)), before_s)
 
 
 def _moves(rest: Posture, ready: Posture, near: Posture) -> Iterator[Move]:
