@@ -10,7 +10,7 @@ import pandas as pd
 from hicp_lib.evaluation.avoidance import FIELD_M, WITHIN_M
 from hicp_lib.plots.style import Figure, detector_colour, in_style, in_words, legend_entries, new_figure
 from hicp_lib.robot.kinematics import ARM_JOINTS
-from hicp_lib.robot.separation import Separation
+from hicp_lib.robot.separation import Separation, separation_table
 from hicp_lib.simulation.experiments.avoidance_runs import IDEAL, NO_AVOIDANCE, PUBLISHED_GAINS, Run
 from hicp_lib.simulation.experiments.reaching import script
 from hicp_lib.simulation.experiments.skin_distance import FAR_M
@@ -92,25 +92,23 @@ def joint_motion(runs: Sequence[Run], note: str) -> Figure:
 def separation_terms(separations: Mapping[str, Separation], note: str) -> Figure:
     """The terms of the protective separation distance as stacked bars, one per detector."""
     figure, axis = new_figure(1, 1, 8.0, 1.2 + 0.6 * max(len(separations), 1))
-    rows = []
-    for place, (name, separation) in enumerate(separations.items()):
+    for place, separation in enumerate(separations.values()):
         start = 0.0
         for (term, value), colour in zip(separation.terms_m().items(), _TERM_COLOURS, strict=True):
             axis.barh(place, 100 * value, left=100 * start, color=colour, label=term if place == 0 else None)
             start += value
-            rows.append({"detector": name, "term": term, "value": value})
         axis.text(100 * start + 1, place, f"{100 * start:.0f} cm", va="center")
     axis.set_yticks(range(len(separations)), list(separations))
     axis.set_xlabel("protective separation distance (cm)")
     axis.margins(x=0.12)
-    if rows:
+    if separations:
         figure.legend(loc="outside lower center", ncols=2)
     sums = [f"{name} {100 * separation.distance_m:.0f} cm" for name, separation in separations.items()]
     return Figure(
         figure,
         f"Terms of the separation by ISO/TS 15066; nothing here is a safety function. Data: {note}.",
         f"Stacked bars: {in_words(sums)}.",
-        pd.DataFrame(rows, columns=["detector", "term", "value"]),
+        separation_table(separations),
     )
 
 

@@ -8,6 +8,7 @@ nothing in this project is a safety function.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import pandas as pd
@@ -54,11 +55,11 @@ class Separation:
         return sum(self.terms_m().values())
 
 
-def separation_table(separations: dict[str, Separation]) -> pd.DataFrame:
-    """A row per term and what it is computed for: columns `detector`, `term`, `value` (metres)."""
+def separation_table(separations: Mapping[str, Separation]) -> pd.DataFrame:
+    """A row per term and for their sum, of each detector: columns `detector`, `term`, `value` (metres)."""
     rows = [
         {"detector": name, "term": term, "value": value}
         for name, separation in separations.items()
         for term, value in (separation.terms_m() | {"sum": separation.distance_m}).items()
     ]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=["detector", "term", "value"])

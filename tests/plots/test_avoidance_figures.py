@@ -38,7 +38,9 @@ def test_lines_over_time_carry_their_numbers(run):
     assert "22.2" in figure.alt and "not a safety function" in figure.caption
     assert {"script", "detector", "t_s", "distance_m"} <= set(figure.table.columns)
     terms = separation_terms(separations, "made up")
-    assert terms.table["value"].sum() == pytest.approx(separations["mediapipe"].distance_m)
+    values_m = terms.table.set_index("term")["value"]
+    assert values_m["sum"] == pytest.approx(separations["mediapipe"].distance_m)
+    assert values_m.drop("sum").sum() == pytest.approx(values_m["sum"])
 
 
 def test_the_joint_that_turns_most_is_named(run):

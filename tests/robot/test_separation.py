@@ -14,3 +14,4 @@ def test_a_worked_example_of_a_course():
     assert example.distance_m == pytest.approx(1.24)
     table = separation_table({"a": example})
     assert table.loc[table["term"] == "sum", "value"].item() == pytest.approx(1.24)
+    assert separation_table({}).columns.tolist() == table.columns.tolist()
