@@ -17,10 +17,11 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
+from scipy import sparse
 
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import N_KEYPOINTS
@@ -91,6 +92,21 @@ class Body:
         """One column of `fields` by its name in `FIELDS`, (n_v,)."""
         return self.fields[:, FIELDS.index(name)]
 
+    @cached_property
+    def bone_numbers(self) -> dict[str, int]:
+        """Index of each bone by its name."""
+        return {name: number for number, name in enumerate(self.bone_names)}
+
+    # Nearly all weights are zero: products with these read a tenth of the memory.
+
+    @cached_property
+    def sparse_skin_weights(self) -> sparse.csr_array:
+        return sparse.csr_array(self.skin_weights)
+
+    @cached_property
+    def sparse_keypoint_weights(self) -> sparse.csr_array:
+        return sparse.csr_array(self.keypoint_weights)
+
 
 @dataclass(frozen=True, eq=False)
 class PosedBody:
@@ -143,8 +159,7 @@ def pose_body(
     T_world_body : (4, 4), where the person stands and faces; the identity when left out
     """
     weights = shape_weights(body, shape)
-    vertices = np.tensordot(weights, body.vertices_m, 1)
-    heads, _ = _skeleton(body, weights.tobytes())
+    vertices, heads = rest_shape(body, weights)
     rotations, posed_heads = pose_bones(body, weights, pose)
     posed = _skin(body, vertices, rotations, posed_heads - np.einsum("bij,bj->bi", rotations, heads))
     offset = np.array([-posed_heads[0, 0], -posed_heads[0, 1], -posed[:, 2].min()])
@@ -156,7 +171,7 @@ def pose_body(
     return PosedBody(
         vertices_m=posed,
         normals=vertex_normals(posed, body.triangles),
-        keypoints_m=body.keypoint_weights @ points,
+        keypoints_m=body.sparse_keypoint_weights @ points,
         heads_m=posed_heads,
         rotations=T[:3, :3] @ rotations,
     )
@@ -213,17 +228,15 @@ def rotation_matrices(body: Body, pose: Pose | np.ndarray) -> np.ndarray:
     """
     if isinstance(pose, np.ndarray):
         return pose
-    number = {name: i for i, name in enumerate(body.bone_names)}
-    vectors = np.zeros((len(number), 3))
-    matrices = {}
+    number = body.bone_numbers
+    vectors, matrices = {}, {}
     for name, rotation in pose.items():
         if name not in number:
             raise ValueError(f"no bone {name!r} in the body model")
-        if np.shape(rotation) == (3, 3):
-            matrices[number[name]] = rotation
-        else:
-            vectors[number[name]] = rotation
-    result = rotations_from_vectors(vectors)
+        (matrices if np.ndim(rotation) == 2 else vectors)[number[name]] = rotation
+    result = np.tile(np.eye(3), (len(number), 1, 1))
+    if vectors:
+        result[list(vectors)] = rotations_from_vectors(np.array(list(vectors.values()), float))
     if matrices:
         result[list(matrices)] = list(matrices.values())
     return result
@@ -237,6 +250,20 @@ def _skeleton(body: Body, weights: bytes) -> tuple[np.ndarray, np.ndarray]:
     # are so alike that their blends never turn inside out.
     u, _, vt = np.linalg.svd(np.tensordot(blend, body.to_reference, 1))
     return np.tensordot(blend, body.heads_m, 1), u @ vt
+
+
+def rest_shape(body: Body, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n_v, 3) and bone heads (n_bones, 3) at rest of a blend of shapes; not to be written to."""
+    return _rest_vertices(body, weights.tobytes()), _skeleton(body, weights.tobytes())[0]
+
+
+@lru_cache(maxsize=16)
+def _rest_vertices(body: Body, weights: bytes) -> np.ndarray:
+    blend = np.frombuffer(weights, np.float32)
+    mixed = np.flatnonzero(blend)  # mostly one or two shapes
+    vertices = np.tensordot(blend[mixed], body.vertices_m[mixed], 1)
+    vertices.flags.writeable = False
+    return vertices
 
 
 @lru_cache(maxsize=4)
@@ -260,7 +287,7 @@ def _chains(parents: tuple[int, ...]) -> np.ndarray:
 
 def _skin(body: Body, vertices, rotations, translations) -> np.ndarray:
     transforms = np.concatenate([rotations, translations[..., None]], axis=2).astype(np.float32)
-    blended = (body.skin_weights @ transforms.reshape(len(transforms), 12)).reshape(-1, 3, 4)
+    blended = (body.sparse_skin_weights @ transforms.reshape(len(transforms), 12)).reshape(-1, 3, 4)
     return np.einsum("vij,vj->vi", blended[:, :, :3], vertices) + blended[:, :, 3]
 
 

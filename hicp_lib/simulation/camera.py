@@ -63,20 +63,32 @@ def pixel_rays(camera: Camera, pixels_px: np.ndarray | None = None) -> np.ndarra
     their camera-frame z component is 1, so a hit at t lies at depth t.
     """
     if pixels_px is None:
-        u = np.arange(camera.width_px, dtype=np.float32)[None, :]
-        v = np.arange(camera.height_px, dtype=np.float32)[:, None]
-        shape = (camera.height_px, camera.width_px)
+        directions = image_directions(camera).reshape(3, -1)
     else:
-        u, v = np.asarray(pixels_px, np.float32).T
-        shape = u.shape
-    rays = np.empty((*shape, 6), np.float32)
-    rays[..., :3] = camera.centre_m
-    x = (u - np.float32(camera.cx_px)) / np.float32(camera.fx_px)
-    y = (v - np.float32(camera.cy_px)) / np.float32(camera.fy_px)
-    R = camera.T_world_camera[:3, :3].astype(np.float32)
-    for axis in range(3):
-        rays[..., 3 + axis] = R[axis, 0] * x + (R[axis, 1] * y + R[axis, 2])
-    return rays.reshape(-1, 6)
+        across, down = ray_parts(camera, *np.asarray(pixels_px, np.float32).T)
+        directions = across + down
+    return join_rays(camera.centre_m, directions)
+
+
+def image_directions(camera: Camera) -> np.ndarray:
+    """Directions of the rays through all pixel centres, shape (3, height, width), as in `pixel_rays`."""
+    across, down = ray_parts(camera, np.arange(camera.width_px), np.arange(camera.height_px))
+    return across[:, None, :] + down[:, :, None]
+
+
+def ray_parts(camera: Camera, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What columns u (n,) and rows v (m,) add to a ray's direction: (3, n) and (3, m), float32."""
+    x = (u.astype(np.float32) - np.float32(camera.cx_px)) / np.float32(camera.fx_px)
+    y = (v.astype(np.float32) - np.float32(camera.cy_px)) / np.float32(camera.fy_px)
+    right, down, forward = camera.T_world_camera[:3, :3].astype(np.float32).T[..., None]
+    return right * x, down * y + forward
+
+
+def join_rays(origins_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """Rays (n, 6), float32, from origins (3,) or (3, n) and directions (3, n)."""
+    rays = np.empty((directions.shape[1], 6), np.float32)
+    rays[:, :3], rays[:, 3:] = origins_m.T, directions.T
+    return rays
 
 
 def to_camera(camera: Camera, points_m: np.ndarray) -> np.ndarray:

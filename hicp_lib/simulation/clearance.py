@@ -7,10 +7,12 @@ trunk is a stack of elliptic slices, the head an ellipsoid, limbs are rows of ba
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from scipy import sparse
 
-from hicp_lib.simulation.body import REGIONS, Body, Pose, pose_bones, shape_weights
+from hicp_lib.simulation.body import REGIONS, Body, Pose, pose_bones, rest_shape, shape_weights
 
 _N_SLICES = 12
 # Limbs as balls: region, first and last bone head, fractions of the way between them. Most of the
@@ -42,16 +44,15 @@ class Outline:
 def outline(body: Body, shape: int | str | np.ndarray) -> Outline:
     """Measure a shape; `shape` as in `pose_body`."""
     weights = shape_weights(body, shape)
-    heads = np.tensordot(weights, body.heads_m, 1)
-    vertices = np.tensordot(weights, body.vertices_m, 1) - heads[0]
-    heads -= heads[0]
-    trunk = _in(body, "torso") | _in(body, "hips")
-    z = vertices[:, 2]
-    edges = np.linspace(z[trunk].min(), np.percentile(z[trunk], 97), _N_SLICES + 1)
-    parts = [trunk & (z >= low) & (z <= high) for low, high in zip(edges[:-1], edges[1:], strict=True)]
-    parts.append(_in(body, "face") | _in(body, "scalp"))
-    bones = np.array([body.skin_weights[part].sum(axis=0).argmax() for part in parts])
-    low, high = np.stack([np.percentile(vertices.T[:, part], (3, 97), axis=1) for part in parts], axis=1)
+    vertices, heads = rest_shape(body, weights)
+    vertices, heads = vertices - heads[0], heads - heads[0]
+    trunk, head = _vertices_of(body, "torso", "hips"), _vertices_of(body, "face", "scalp")
+    z = vertices[trunk, 2]
+    edges = np.linspace(z.min(), _extent(z[:, None])[1, 0], _N_SLICES + 1)
+    parts = [trunk[(z >= low) & (z <= high)] for low, high in zip(edges[:-1], edges[1:], strict=True)]
+    parts.append(head)
+    bones = _moved_by(body, parts)
+    low, high = np.stack([_extent(vertices[part]) for part in parts], axis=1)
     half_axes = (high - low) / 2
     half_axes[:-1, 2] = (edges[1] - edges[0]) / 2
     radii = {limb[0]: _radius(body, vertices, heads, limb) for limb in (_UPPER_ARM, _FOREARM, _HAND, _THIGH)}
@@ -96,7 +97,7 @@ def _gap(points_a, radii_a, points_b, radii_b) -> float:
 def _balls(body: Body, shape: Outline, heads, limbs, side: str) -> tuple[np.ndarray, np.ndarray]:
     points, radii = [], []
     for region, first, last, fractions in limbs:
-        a, b = (heads[body.bone_names.index(f"{bone}.{side}")] for bone in (first, last))
+        a, b = (heads[body.bone_numbers[f"{bone}.{side}"]] for bone in (first, last))
         points += [a + t * (b - a) for t in fractions]
         radii += [shape.radii_m[region]] * len(fractions)
     return np.array(points), np.array(radii)
@@ -104,11 +105,31 @@ def _balls(body: Body, shape: Outline, heads, limbs, side: str) -> tuple[np.ndar
 
 def _radius(body: Body, vertices, heads, limb) -> float:
     region, first, last, _ = limb
-    a, b = (heads[body.bone_names.index(f"{bone}.L")] for bone in (first, last))
-    own = vertices[_in(body, region) & (vertices[:, 1] > 0)] - a
+    a, b = (heads[body.bone_numbers[f"{bone}.L"]] for bone in (first, last))
+    limb_m = vertices[_vertices_of(body, region)]
+    own = limb_m[limb_m[:, 1] > 0] - a
     along = (b - a) / np.linalg.norm(b - a)
     return float(np.median(np.linalg.norm(own - np.outer(own @ along, along), axis=1)))
 
 
-def _in(body: Body, region: str) -> np.ndarray:
-    return body.regions == REGIONS.index(region)
+def _extent(points: np.ndarray) -> np.ndarray:
+    """The 3rd and 97th percentile of each component, (2, k), of points (n, k)."""
+    ordered = np.sort(points.T, axis=1)
+    below, share = np.divmod(np.array([0.03, 0.97]) * (len(points) - 1), 1)
+    low, high = ordered[:, below.astype(int)], ordered[:, below.astype(int) + 1]
+    return (low + share * (high - low)).T
+
+
+def _moved_by(body: Body, parts: list[np.ndarray]) -> np.ndarray:
+    """The bone that moves most of each part, given as numbers of vertices; (n_parts,)."""
+    ends = np.cumsum([0, *map(len, parts)])
+    numbers = np.concatenate(parts)
+    shape = (len(parts), len(body.skin_weights))
+    members = sparse.csr_array((np.ones(len(numbers), np.float32), numbers, ends), shape=shape)
+    return (members @ body.sparse_skin_weights).toarray().argmax(axis=1)
+
+
+@lru_cache(maxsize=32)
+def _vertices_of(body: Body, *regions: str) -> np.ndarray:
+    """Numbers of the vertices of some regions."""
+    return np.flatnonzero(np.isin(body.regions, [REGIONS.index(region) for region in regions]))

@@ -2,117 +2,112 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from hicp_lib.simulation.raycast import Trace, dot, part_of_image
+from hicp_lib.simulation.raycast import Trace, cross, dot, pick, place
 
 
 @dataclass(frozen=True)
 class View:
-    """A grid of pixels to be shaded together: their rays (n, 6), what these met, and which are wanted.
+    """A grid of an image's pixels, of which n are to be shaded.
 
-    `wanted` has the grid's shape (rows, columns); n = rows * columns.
-    """
-
-    wanted: np.ndarray
-    rays: np.ndarray
-    trace: Trace
-
-    @classmethod
-    def of(cls, trace: Trace, rays: np.ndarray, pixels: tuple[slice, slice], wanted: np.ndarray) -> View:
-        """The view of some rows and columns of an image; `wanted` has the whole image's shape.
-
-        Where nothing was hit, nothing is wanted.
-        """
-        met = trace.part(wanted.shape, pixels)
-        chosen = wanted[pixels]
-        return cls(
-            chosen & (met.surface >= 0).reshape(chosen.shape), part_of_image(rays, wanted.shape, pixels), met
-        )
-
-
-@dataclass
-class Looks:
-    """How things look at a view's wanted pixels, surface by surface; components first, (3, n) or (n,).
-
-    `pixels` are their numbers in the view's grid. For the others see `surfaces.Look`.
+    Attributes
+    ----------
+    pixels : numbers of the n pixels in the grid, row by row, (n,)
+    surface : what is seen, -1 at pixels that are not to be shaded, (rows, columns), int16
+    depth_m, positions_m : of what is seen, (rows, columns) and (3, rows, columns)
+    directions : of the n pixels' rays, (3, n)
+    triangle, barycentric : what they met, (n,) and (n, 2), as in `Trace`
     """
 
     pixels: np.ndarray
+    surface: np.ndarray
+    depth_m: np.ndarray
     positions_m: np.ndarray
-    normals: np.ndarray
-    albedo: np.ndarray
-    glow: np.ndarray
-    height_m: np.ndarray
-    gloss: np.ndarray
-    roughness: np.ndarray
-    softness: np.ndarray
+    directions: np.ndarray
+    triangle: np.ndarray
+    barycentric: np.ndarray
 
     @classmethod
-    def empty(cls, pixels: np.ndarray) -> Looks:
-        """Black, flat and matt all over."""
-        n = len(pixels)
-        vectors = [np.zeros((3, n), np.float32) for _ in range(4)]
-        return cls(pixels, *vectors, *(np.zeros(n, np.float32) for _ in range(4)))
+    def of(
+        cls, trace: Trace, centre_m: np.ndarray, directions: np.ndarray, part: tuple[slice, slice], wanted
+    ) -> View:
+        """Some rows and columns of an image, and of these what is `wanted`, a mask (height, width).
 
-    def part(self, block: slice) -> Looks:
-        """Some of the pixels."""
-        return Looks(*(getattr(self, field.name)[..., block] for field in fields(self)))
+        `trace` and `directions` (3, height, width) are the whole image's. Where nothing was hit, nothing
+        is wanted.
+        """
+        shape = wanted.shape
+        surface = np.where(wanted[part], trace.surface.reshape(shape)[part], np.int16(-1))
+        pixels = np.flatnonzero(surface.ravel() >= 0)
+        depth_m = np.where(surface >= 0, trace.depth_m.reshape(shape)[part], np.float32(0))
+        rays = np.ascontiguousarray(directions[(slice(None), *part)])
+        positions_m = depth_m * rays + centre_m.astype(np.float32)[:, None, None]
+        triangle = np.ascontiguousarray(trace.triangle.reshape(shape)[part]).ravel().take(pixels)
+        barycentric = np.ascontiguousarray(trace.barycentric.reshape(*shape, 2)[part]).reshape(-1, 2)
+        return cls(
+            pixels,
+            surface,
+            depth_m,
+            positions_m,
+            pick(rays.reshape(3, -1), pixels),
+            triangle,
+            barycentric.take(pixels, axis=0),
+        )
 
-    def on_grid(self, name: str, view: View) -> np.ndarray:
-        """One of the arrays for all of the view's pixels in order, zero where nothing is wanted."""
-        values = getattr(self, name)
-        grid = np.zeros((*values.shape[:-1], view.wanted.size), np.float32)
-        grid[..., self.pixels] = values
-        return grid
+    def on_grid(self, values: np.ndarray) -> np.ndarray:
+        """Values of the n pixels (k, n) on the grid, (k, rows, columns), zero elsewhere."""
+        grid = np.zeros((len(values), self.surface.size), np.float32)
+        place(grid, self.pixels, values)
+        return grid.reshape(-1, *self.surface.shape)
+
+    def from_grid(self, grid: np.ndarray) -> np.ndarray:
+        """Values of the n pixels, (k, n), from the grid's (k, rows, columns)."""
+        return pick(grid.reshape(len(grid), -1), self.pixels)
 
 
-def tilt_by_height(normals: np.ndarray, positions_m: np.ndarray, height_m: np.ndarray, view: View) -> None:
-    """Tilt a view's normals (3, n) in place by the slope of heights (n,), from differences between pixels.
+def tilt_by_height(normals: np.ndarray, height_m: np.ndarray, view: View) -> None:
+    """Tilt normals (3, rows, columns) in place by the slope of heights (rows, columns).
 
     Mikkelsen, "Bump mapping unparametrized surfaces on the GPU" (2010); pixels on the last
-    row and column, or beside another surface, keep their normals.
+    row and column, without height or beside another surface keep their normals.
     """
-    shape = view.wanted.shape
-    height = height_m.reshape(shape)
-    surface, depth = view.trace.surface.reshape(shape), view.trace.depth_m.reshape(shape)
-    here, corner = slice(None, -1), (slice(None, -1), slice(None, -1))
-    with np.errstate(invalid="ignore"):
-        inner = (
-            (height[corner] != 0)
-            & (surface[corner] == surface[here, 1:]) & (surface[corner] == surface[1:, here])
-            & (np.abs(depth[here, 1:] - depth[corner]) < 0.03 * depth[corner])
-            & (np.abs(depth[1:, here] - depth[corner]) < 0.03 * depth[corner])
-        )  # fmt: skip
-    r, c = np.nonzero(inner)
-    at = r * shape[1] + c
-    right, below = at + 1, at + shape[1]
-    n = normals[:, at]
-    position = positions_m[:, at]
-    dx, dy = positions_m[:, right] - position, positions_m[:, below] - position
-    hx, hy = height_m[right] - height_m[at], height_m[below] - height_m[at]
-    rx, ry = _cross(dy, n), _cross(n, dx)
+    here, right, below = np.s_[:-1, :-1], np.s_[:-1, 1:], np.s_[1:, :-1]
+    surface, depth = view.surface, view.depth_m
+    step = 0.03 * depth[here]
+    inner = (
+        (height_m[here] != 0)
+        & (surface[here] == surface[right]) & (surface[here] == surface[below])
+        & (np.abs(depth[right] - depth[here]) < step) & (np.abs(depth[below] - depth[here]) < step)
+    )  # fmt: skip
+    n, position = normals[:, *here], view.positions_m[:, *here]
+    rx = cross(view.positions_m[:, *below] - position, n)
+    dx = view.positions_m[:, *right] - position
+    ry = cross(n, dx)
     area = dot(dx, rx)
-    tilted = np.abs(area) * n - np.sign(area) * (hx * rx + hy * ry)
-    normals[:, at] = tilted / np.maximum(np.sqrt(dot(tilted, tilted)), 1e-20)
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    rx *= height_m[right] - height_m[here]
+    ry *= height_m[below] - height_m[here]
+    rx += ry
+    rx *= np.sign(area)
+    tilted = np.abs(area) * n
+    tilted -= rx
+    tilted /= np.maximum(np.sqrt(dot(tilted, tilted)), np.float32(1e-20))
+    np.copyto(n, tilted, where=inner)
 
 
 def sum_within(
-    sums: np.ndarray, surface: np.ndarray, positions_m: np.ndarray, normals: np.ndarray, rounds: int
+    counts: np.ndarray, surface: np.ndarray, positions_m: np.ndarray, normals: np.ndarray, rounds: int
 ) -> np.ndarray:
     """Sum over 4 x 4 pixels that lie on the same surface and close to its tangent plane, several times.
 
     Parameters
     ----------
-    sums : array, shape (k, height, width)
-    surface : array, shape (height, width)
-    positions_m, normals : arrays, shape (3, height, width)
+    counts : array, shape (k, rows, columns), int16, 0 or 1
+    surface : array, shape (rows, columns)
+    positions_m, normals : arrays, shape (3, rows, columns)
+    rounds : at most 3, lest the sums overflow
     """
     alike = {
         (axis, shift): _alike(surface, positions_m, normals, axis, shift)
@@ -120,21 +115,23 @@ def sum_within(
         for shift in (1, 2)
     }
     for axis in (1, 0) * rounds:
-        total = sums.copy()
+        total = counts.copy()
         for shift in (1, 2):
             low, high = _apart(axis, shift)
-            total[low] += sums[high] * alike[axis, shift]
+            total[low] += counts[high] & alike[axis, shift]
             if shift == 1:
-                total[high] += sums[low] * alike[axis, shift]
-        sums = total
-    return sums
+                total[high] += counts[low] & alike[axis, shift]
+        counts = total
+    return counts
 
 
 def _alike(surface, positions_m, normals, axis: int, shift: int) -> np.ndarray:
-    """1 where the pixel `shift` further along an axis continues a pixel's surface, else 0; float32."""
+    """All bits set where the pixel `shift` further along an axis continues a pixel's surface; int16."""
     low, high = _apart(axis, shift)
     off_plane = dot(positions_m[high] - positions_m[low], normals[low])
-    return ((surface[low[1:]] == surface[high[1:]]) & (np.abs(off_plane) < 0.012)).astype(np.float32)
+    same = surface[low[1:]] == surface[high[1:]]
+    same &= np.abs(off_plane) < 0.012
+    return -same.astype(np.int16)
 
 
 def _apart(axis: int, shift: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:

@@ -10,6 +10,7 @@ palm turns forward), deviation towards the thumb, a turn or bend to the person's
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -51,8 +52,8 @@ _GIRDLE_FROM_RAD = np.radians(25.0)
 # Left limbs in the reference stance: direction of the arm, and the hinge the thumb bends about.
 ARM_TILT_RAD = np.radians(9.0)
 _THUMB_HINGE = np.array([0.61, 0.77, -0.18])
-# Rotations seen in a mirror between left and right: factors of a vector's and a matrix's elements.
-_MIRROR = {1: np.array([-1.0, 1.0, -1.0]), 2: np.array([[1.0, -1, 1], [-1, 1, -1], [1, -1, 1]])}
+# Rotations seen in a mirror between left and right: factors of a matrix's elements.
+_MIRROR = np.array([[1.0, -1, 1], [-1, 1, -1], [1, -1, 1]])
 
 
 def within_limits(angles: JointAngles, margin_rad: float = 1e-9) -> bool:
@@ -79,11 +80,20 @@ def pose_from_joints(angles: JointAngles) -> Pose:
     if unknown:
         raise KeyError(f"no joint {unknown[0]!r}")
     pose = _trunk(angles)
-    for side, suffix in (("left", "L"), ("right", "R")):
-        limb = {joint: angles.get(f"{side}_{joint}", 0.0) for joint in _LIMB_LIMITS_DEG}
-        for bone, turn in (_arm(limb) | _hand(limb) | _leg(limb)).items():
-            pose[f"{bone}.{suffix}"] = turn if side == "left" else turn * _MIRROR[turn.ndim]
+    for side in ("left", "right"):
+        for limb, joints in _LIMBS.items():
+            pose |= _limb(limb, side, tuple([angles.get(f"{side}_{joint}", 0.0) for joint in joints]))
     return pose
+
+
+@lru_cache(maxsize=256)  # while a pose is sought, most limbs stay as they are
+def _limb(name: str, side: str, angles: tuple[float, ...]) -> dict[str, np.ndarray]:
+    """Rotations of a limb's bones by the angles of its joints, in the order of `_LIMBS`."""
+    turns = _BONES[name](dict(zip(_LIMBS[name], angles, strict=True)))
+    matrices = {bone: turn if turn.ndim == 2 else rotation(turn) for bone, turn in turns.items()}
+    if side == "left":
+        return {f"{bone}.L": matrix for bone, matrix in matrices.items()}
+    return {f"{bone}.R": matrix * _MIRROR for bone, matrix in matrices.items()}
 
 
 def shoulder_rotation(flexion: float, abduction: float, inward: float) -> np.ndarray:
@@ -169,3 +179,14 @@ def _leg(limb: dict[str, float]) -> dict[str, np.ndarray]:
         "lowerleg01": np.array([0.0, limb["knee_flexion"], 0.0]),
         "foot": np.array([0.0, limb["ankle_flexion"], 0.0]),
     }
+
+
+_BONES = {"arm": _arm, "hand": _hand, "leg": _leg}
+_LIMBS = {
+    limb: tuple(joint for joint in _LIMB_LIMITS_DEG if joint.split("_")[0] in parts)
+    for limb, parts in (
+        ("arm", ("shoulder", "elbow", "forearm", "wrist")),
+        ("hand", ("thumb", *FINGERS)),
+        ("leg", ("hip", "knee", "ankle")),
+    )
+}

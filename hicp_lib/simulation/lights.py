@@ -50,13 +50,17 @@ _STRATA = np.array([0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5])
 _PLACES = np.stack([_STRATA % 8 * 2 + _STRATA // 8, 5 * _STRATA % 16]).astype(np.float32)
 
 
-def sample_offsets(row: np.ndarray, column: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def sample_offsets(cell: np.ndarray, kind: int, rng: np.random.Generator) -> np.ndarray:
     """Points of the unit square, (2, n): 16 points of a lattice that repeat every 4 x 4 pixels, jittered.
 
-    The pixels of either colour of a chessboard cover the square as well.
+    `cell` is each pixel's number in the 4 x 4 pattern, row by row; every `kind` of light has
+    the pattern moved. The pixels of either colour of a chessboard cover the square as well.
     """
-    places = _PLACES[:, (row & 3) * 4 + (column & 3)]
-    return (places + rng.random((2, len(row)), np.float32)) * np.float32(1 / 16)
+    moved = np.roll(_PLACES.reshape(2, 4, 4), (-kind, -3 * kind), axis=(1, 2)).reshape(2, 16)
+    offsets = rng.random((2, len(cell)), np.float32)
+    offsets += moved.take(cell, axis=1)
+    offsets *= np.float32(1 / 16)
+    return offsets
 
 
 def towards_light(light: Light, positions_m: np.ndarray, offsets: np.ndarray) -> np.ndarray:
@@ -69,8 +73,8 @@ def towards_light(light: Light, positions_m: np.ndarray, offsets: np.ndarray) ->
 def hemisphere(normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
     """Cosine-distributed directions about unit normals, (3, n), float32."""
     angle, z = np.float32(2 * np.pi) * offsets[0], 1 - 2 * offsets[1]
-    radius = np.sqrt(np.maximum(1 - z * z, 0))
-    return normals + np.float32(0.98) * np.stack([radius * np.cos(angle), radius * np.sin(angle), z])
+    radius = np.float32(0.98) * np.sqrt(np.maximum(1 - z * z, 0))
+    return normals + np.stack([radius * np.cos(angle), radius * np.sin(angle), np.float32(0.98) * z])
 
 
 def diffuse_and_highlight(
@@ -98,22 +102,40 @@ def diffuse_and_highlight(
     if light.direction is not None:
         strength *= np.clip(-dot(to_light, light.direction.astype(np.float32)), 0, 1)
     n_l = dot(normals, to_light)
-    power = light.power.astype(np.float32)
-    diffuse = np.empty_like(normals)
-    for channel, reach in enumerate((0.40, 0.16, 0.10)):
-        wrap = softness * np.float32(reach)
-        diffuse[channel] = np.maximum((n_l + wrap) / (1 + wrap) ** 2, 0) * strength * power[channel]
-    half = to_light + view
-    half /= np.maximum(np.sqrt(dot(half, half)), 1e-6)
-    n_h = np.clip(dot(normals, half), 0, 1)
+    power = light.power.astype(np.float32)[:, None]
+    lit = np.clip(n_l, 0, 1) * strength
+    diffuse = _creeping(n_l, softness) * (strength * power) if softness.any() else lit * power
+    half = to_light
+    half += view
+    half /= np.maximum(np.sqrt(dot(half, half)), np.float32(1e-6))
+    lit *= gloss
+    lit *= _mirrored(np.clip(dot(normals, half), 0, 1), dot(view, half), roughness)
+    return diffuse, lit * power
+
+
+def _creeping(n_l: np.ndarray, softness: np.ndarray) -> np.ndarray:
+    """Diffuse light by the cosine `n_l` of its angle, where red creeps furthest, (3, n)."""
+    wrap = softness * np.float32([[0.40], [0.16], [0.10]])
+    creeping = n_l + wrap
+    wrap += 1
+    wrap *= wrap
+    creeping /= wrap
+    return np.maximum(creeping, 0, out=creeping)
+
+
+def _mirrored(n_h: np.ndarray, v_h: np.ndarray, roughness: np.ndarray) -> np.ndarray:
+    """GGX's distribution times masking, by the half vector's cosines with normal and view."""
     a2 = roughness * roughness
     a2 *= a2
-    distribution = n_h * n_h * (a2 - 1) + 1
-    distribution = a2 / (distribution * distribution)
-    v_h = dot(view, half)
-    masking = 1 / np.maximum(v_h * v_h * 4 * (roughness + 0.5), 0.1)
-    lit = np.clip(n_l, 0, 1) * strength * gloss * np.minimum(distribution * masking, 60)
-    return diffuse, lit * power[:, None]
+    n_h *= n_h
+    n_h *= a2 - 1
+    n_h += 1
+    n_h *= n_h
+    v_h *= v_h
+    v_h *= 4 * (roughness + np.float32(0.5))
+    n_h *= np.maximum(v_h, np.float32(0.1))
+    a2 /= n_h
+    return np.minimum(a2, 60, out=a2)
 
 
 def ambient_light(ambient: Ambient, normals: np.ndarray) -> np.ndarray:

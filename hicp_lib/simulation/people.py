@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
 from hicp_lib.simulation import clothing, fabrics, footwear, hair, skin
 from hicp_lib.simulation import mesh as g
-from hicp_lib.simulation.body import BODY_FILE, REGIONS, Body, PosedBody, load_body, shape_weights
+from hicp_lib.simulation.body import BODY_FILE, REGIONS, Body, PosedBody, load_body, rest_shape, shape_weights
 from hicp_lib.simulation.surfaces import Material, Surface
 
 Rng = np.random.Generator
@@ -31,7 +31,7 @@ class Worn:
     collar: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Appearance:
     """One person, whatever the pose: shape (weights over the body's shapes), colours, hair, clothes.
 
@@ -155,54 +155,78 @@ def _bottom(rng: Rng, kind: str) -> Worn:
 
 def landmarks_at_rest(body: Body, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices, bone heads and keypoints (136, 3) of a shape at rest, metres, body frame."""
-    rest, heads = np.tensordot(weights, body.vertices_m, 1), np.tensordot(weights, body.heads_m, 1)
-    return rest, heads, body.keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
+    rest, heads = rest_shape(body, weights)
+    return rest, heads, body.sparse_keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
 
 
+@lru_cache(maxsize=4)
 def part_of_vertices(body: Body) -> np.ndarray:
     """Part number of each vertex: its region, plus `RIGHT` on the person's right side."""
     return (body.regions + RIGHT * (body.vertices_m[0, :, 1] < 0)).astype(np.int16)
 
 
+@dataclass(frozen=True)
+class _Fitted:
+    """What stays the same of a person in all poses: sizes, where cloth is cut, paint and hair at rest."""
+
+    rest_m: np.ndarray
+    heads_m: np.ndarray
+    landmarks_m: np.ndarray
+    cuts: fabrics.Cuts
+    paint: np.ndarray
+    hair: g.Mesh | None
+
+
+@lru_cache(maxsize=4)  # those who are seen in many frames
+def _fit(appearance: Appearance) -> _Fitted:
+    body = load_body()
+    rest, heads, landmarks = landmarks_at_rest(body, shape_weights(body, appearance.shape))
+    grown = None
+    if appearance.style is not None:
+        grown = hair.grow(appearance.style, body, rest, landmarks, np.random.default_rng(appearance.seed))
+    paint = skin.paint_coords(body, rest, landmarks)
+    return _Fitted(rest, heads, landmarks, fabrics.make_cuts(landmarks), paint, grown)
+
+
+@cache
+def _always_hidden() -> tuple[np.ndarray, np.ndarray]:
+    """Triangles of the body that are never seen: inside the mouth, as lips are closed; inside shoes."""
+    body = load_body()
+    fields = (("mouth", 0.9), ("leg", 2.06))
+    mouth, feet = ((body.field(name)[body.triangles] > least).all(axis=1) for name, least in fields)
+    return mouth, feet
+
+
 def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface]:
     """Surfaces of a posed person: skin, clothes, hair."""
-    body = load_body()
-    weights = shape_weights(body, appearance.shape)
-    rest, rest_heads, landmarks = landmarks_at_rest(body, weights)
-    rng = np.random.default_rng(appearance.seed)
+    body, fitted = load_body(), _fit(appearance)
     part = part_of_vertices(body)[body.triangles[:, 0]]
-    cuts = fabrics.make_cuts(landmarks)
-    surfaces, hidden = [], np.zeros(len(body.triangles), bool)
-    layers = np.zeros(len(rest), np.float32)
+    mouth, feet = _always_hidden()
+    surfaces, hidden = [], mouth.copy()
+    layers = np.zeros(len(fitted.rest_m), np.float32)
     for worn in sorted(appearance.worn, key=lambda w: w.garment.kind):  # trousers before tops
-        mesh, source = clothing.put_on(worn.garment, posed, rest, worn.folds, layers)
+        mesh, source = clothing.put_on(worn.garment, posed, fitted.rest_m, worn.folds, layers)
         hidden |= clothing.cut_pattern(worn.garment).hidden
-        material = fabrics.cloth_material(worn.fabric, cuts, _LIMBS[worn.garment.kind], worn.trim)
+        material = fabrics.cloth_material(worn.fabric, fitted.cuts, _LIMBS[worn.garment.kind], worn.trim)
         surfaces.append(Surface(mesh, material, person, part[source]))
         if worn.collar:
-            surfaces.append(_collar(worn, mesh, posed, cuts, person))
+            surfaces.append(_collar(worn, mesh, posed, fitted.cuts, person))
     if appearance.skirt is not None:
-        surfaces.append(_skirt(appearance.skirt, body, posed, cuts, person))
+        surfaces.append(_skirt(appearance.skirt, body, posed, fitted.cuts, person))
     if appearance.shoes is not None:
-        hidden |= (body.field("leg")[body.triangles] > 2.06).all(axis=1)
+        hidden |= feet
         surfaces += _shoes(appearance.shoes, posed, person)
-    hidden |= (body.field("mouth")[body.triangles] > 0.9).all(axis=1)  # lips are closed
-    surfaces = _skin(appearance, body, posed, rest, landmarks, ~hidden, part, person) + surfaces
-    material = hair.hair_material(appearance.complexion.hair)
-    if appearance.style is not None:
-        grown = hair.grow(appearance.style, body, rest, landmarks, rng)
-        surfaces.append(_hair(hair.carry(grown, body, posed, rest_heads, landmarks), material, person))
+    surfaces.insert(0, _skin(appearance, posed, fitted.paint, ~hidden, part, person))
+    if fitted.hair is not None:
+        carried = hair.carry(fitted.hair, body, posed, fitted.heads_m, fitted.landmarks_m)
+        surfaces.append(_hair(carried, hair.hair_material(appearance.complexion.hair), person))
     return surfaces
 
 
-def _skin(appearance, body, posed, rest, landmarks, shown, part, person) -> list[Surface]:
-    coords = skin.paint_coords(body, rest, landmarks)
-    covered = 0.0 if appearance.style is None else 1.0
-    material = skin.skin_material(
-        appearance.complexion, covered if covered else appearance.complexion.stubble * 0.3
-    )
-    mesh = g.Mesh(posed.vertices_m, body.triangles[shown], posed.normals, coords)
-    return [Surface(mesh, material, person, part[shown])]
+def _skin(appearance: Appearance, posed: PosedBody, paint, shown, part, person: int) -> Surface:
+    covered = appearance.complexion.stubble * 0.3 if appearance.style is None else 1.0
+    mesh = g.Mesh(posed.vertices_m, load_body().triangles[shown], posed.normals, paint)
+    return Surface(mesh, skin.skin_material(appearance.complexion, covered), person, part[shown])
 
 
 _LIMBS = {"top": "arms", "bottom": "legs"}

@@ -47,7 +47,7 @@ def reach(
     """
     result = dict(angles)
     to_left = np.array([1.0, 1.0 if side == "left" else -1.0, 1.0])
-    bone = {n: i for i, n in enumerate(body.bone_names)}
+    bone = body.bone_numbers
     suffix = side[0].upper()
     shoulder, elbow, wrist = (bone[f"{name}.{suffix}"] for name in ("upperarm01", "lowerarm01", "wrist"))
     for _ in range(_N_ROUNDS):

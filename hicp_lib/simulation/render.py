@@ -9,11 +9,12 @@ import numpy as np
 
 from hicp_lib.simulation import lights
 from hicp_lib.simulation.antialias import edge_pixels, smooth_edges
-from hicp_lib.simulation.camera import Camera, pixel_rays
-from hicp_lib.simulation.filters import Looks, View, tilt_by_height
-from hicp_lib.simulation.raycast import RayScene, Trace, dot, trace_image
+from hicp_lib.simulation.camera import Camera, image_directions
+from hicp_lib.simulation.filters import View, tilt_by_height
+from hicp_lib.simulation.looks import Looks, gather_looks
+from hicp_lib.simulation.raycast import RayScene, dot, place, trace_image
 from hicp_lib.simulation.shadows import visibility
-from hicp_lib.simulation.surfaces import Look, Surface
+from hicp_lib.simulation.surfaces import Surface
 
 _BLOCK = 16_384  # pixels shaded at a time: what the processor's cache holds
 
@@ -54,66 +55,98 @@ def render(world: World, camera: Camera, rng: np.random.Generator) -> Frame:
     Depth and people are exact at every pixel, but only people are shaded there: they are in focus.
     What is around them is shaded at every second row and column, and a little out of focus.
     """
-    scene = RayScene(world.surfaces)
-    rays = pixel_rays(camera)
+    scene, centre_m, directions = RayScene(world.surfaces), camera.centre_m, image_directions(camera)
     shape = (camera.height_px, camera.width_px)
-    trace = trace_image(scene, rays, shape, np.array([s.person >= 0 for s in world.surfaces]))
-    person, part = (labels.reshape(shape) for labels in _labels(scene, trace))
-    around = View.of(trace, rays, (slice(None, None, 2), slice(None, None, 2)), person < 0)
-    image = _enlarge(
-        _paint(world, scene, around, camera, False, rng), around.wanted, trace.surface.reshape(shape)
-    )
-    image.reshape(-1, 3)[trace.surface < 0] = world.backdrop
-    rows, columns = (np.flatnonzero((person >= 0).any(axis=axis)) for axis in (1, 0))
+    trace = trace_image(scene, centre_m, directions, scene.owners[:-1] >= 0)
+    person = scene.owners.take(trace.surface, mode="wrap").reshape(shape)
+    part = scene.parts.take(trace.triangle, mode="wrap").reshape(shape)
+    is_person = person >= 0
+    around = View.of(trace, centre_m, directions, np.s_[::2, ::2], ~is_person)
+    painted = _paint(world, scene, around, camera, False, rng)
+    image = _enlarge(painted, around, trace.surface.reshape(shape), ~is_person)
+    pixels = image.reshape(-1, 3).T
+    place(pixels, np.flatnonzero(trace.surface < 0), np.float32(world.backdrop)[:, None])
+    rows, columns = (np.flatnonzero(is_person.any(axis=axis)) for axis in (1, 0))
     if len(rows):
-        crop = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-        people = View.of(trace, rays, crop, person >= 0)
-        painted = _paint(world, scene, people, camera, True, rng)
-        cv2.copyTo(cv2.merge(list(painted)), people.wanted.astype(np.uint8), image[crop])
-        image = smooth_edges(image, edge_pixels(trace, person >= 0), trace, scene, camera)
+        crop = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        people = View.of(trace, centre_m, directions, crop, is_person)
+        place(pixels, np.flatnonzero(is_person), _paint(world, scene, people, camera, True, rng))
+        image = smooth_edges(image, edge_pixels(trace, is_person), trace, scene, camera)
     return Frame(image, trace.depth_m.reshape(shape), person, part, scene)
 
 
 def _paint(world: World, scene: RayScene, view: View, camera: Camera, sharp: bool, rng) -> np.ndarray:
-    """Linear RGB of a view, (3, rows, columns), black where nothing is wanted."""
-    looks = _gather_looks(scene, view, 1 / camera.fx_px)
-    positions, normals, heights = (
-        looks.on_grid(name, view) for name in ("positions_m", "normals", "height_m")
-    )
-    tilt_by_height(normals, positions, heights, view)
-    looks.normals = normals[:, looks.pixels]
-    seen = visibility(world.lights, scene, view, positions, normals, sharp, rng)
-    image = np.zeros((3, view.wanted.size), np.float32)
-    for start in range(0, len(looks.pixels), _BLOCK):
-        block = looks.part(slice(start, start + _BLOCK))
-        direction = view.rays[block.pixels, 3:].T
-        image[:, block.pixels] = _shade_block(world, block, direction, seen[:, block.pixels])
-    return image.reshape(3, *view.wanted.shape)
+    """Linear RGB of a view's pixels, (3, n)."""
+    looks = gather_looks(scene, view, 1 / camera.fx_px)
+    normals = view.on_grid(looks.normals)
+    if looks.height_m.any():
+        tilt_by_height(normals, view.on_grid(looks.height_m[None])[0], view)
+        looks.normals = view.from_grid(normals)
+    seen = visibility(world.lights, scene, view, normals, sharp, rng)
+    positions_m, painted = view.from_grid(view.positions_m), np.empty_like(looks.normals)
+    for start in range(0, len(view.pixels), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        painted[:, block] = _shade_block(
+            world, looks.part(block), positions_m[:, block], view.directions[:, block], seen[:, block]
+        )
+    return painted
 
 
-def _enlarge(painted: np.ndarray, wanted: np.ndarray, surface: np.ndarray) -> np.ndarray:
+def _shade_block(world: World, looks: Looks, positions_m, direction, seen: np.ndarray) -> np.ndarray:
+    view = direction / -np.sqrt(dot(direction, direction))
+    diffuse = lights.ambient_light(world.ambient, looks.normals)
+    facing = 1 - np.clip(dot(looks.normals, view), 0, 1)
+    facing *= facing
+    fresnel = looks.gloss * (1 + 4 * facing * facing) * (1 - np.float32(0.7) * looks.roughness)
+    # Part of what is hidden returns by bouncing about: crevices are not black.
+    diffuse *= seen[-1] * np.float32(0.85) + np.float32(0.15)
+    highlight = fresnel * diffuse
+    for source, visible in zip(world.lights, seen[:-1], strict=True):
+        more, shine = lights.diffuse_and_highlight(
+            source, positions_m, looks.normals, view, looks.gloss, looks.roughness, looks.softness
+        )
+        more *= visible
+        shine *= visible
+        diffuse += more
+        highlight += shine
+    diffuse *= looks.albedo
+    diffuse += highlight
+    diffuse += looks.glow
+    return diffuse
+
+
+def _enlarge(painted: np.ndarray, view: View, surface: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """From every second pixel to all, (height, width, 3), out of focus; colours run on under people.
 
-    Each pixel takes the colour of the nearest painted one that shows the same surface, so
-    that outlines stay where they are.
+    Each `wanted` pixel takes the colour (3, n) of the nearest painted one that shows the same
+    surface, so that outlines stay where they are.
     """
-    columns = painted.shape[2]
-    coarse_surface = np.where(wanted, surface[::2, ::2], np.int16(-1))
-    wrong = np.flatnonzero(_doubled(coarse_surface, surface.shape) != surface)
+    shape = view.surface.shape
+    coarse = np.zeros((*shape, 4), np.float32)
+    channels = coarse.reshape(-1, 4).T
+    place(channels, view.pixels, [*painted, np.float32(1)])
+    coarse += 1e-4 * cv2.blur(coarse, (9, 9)) + np.float32(1e-9)
+    full = _doubled(coarse, surface.shape)
+    wrong, best = _nearest_alike(view.surface, surface, wanted)
+    place(full.reshape(-1, 4).T, wrong, channels.take(best, axis=1))
+    full = cv2.GaussianBlur(full, (7, 7), 1.1)
+    *colours, weight = cv2.split(full)
+    return cv2.merge([cv2.divide(colour, weight) for colour in colours])
+
+
+def _nearest_alike(coarse: np.ndarray, surface: np.ndarray, wanted: np.ndarray):
+    """Pixels whose coarse one shows another surface, and which coarse pixel to take instead, (n,) both."""
+    doubled = coarse.repeat(2, axis=0).repeat(2, axis=1)[: surface.shape[0], : surface.shape[1]]
+    wrong = np.flatnonzero((doubled != surface) & wanted)
+    padded = np.pad(coarse, 1, constant_values=-2)
     row, column = (numbers // 2 for numbers in np.divmod(wrong, surface.shape[1]))
-    best = row * columns + column
-    coarse_surface = coarse_surface.ravel()
+    middle = (row + 1) * padded.shape[1] + column + 1
+    best, own = middle.copy(), surface.ravel().take(wrong)
     for dv, du in ((-1, -1), (-1, 1), (1, -1), (1, 1), (-1, 0), (0, -1), (1, 0), (0, 1)):
-        near = np.clip(row + dv, 0, painted.shape[1] - 1) * columns + np.clip(column + du, 0, columns - 1)
-        same = coarse_surface[near] == surface.ravel()[wrong]
-        best[same] = near[same]
-    weighted = np.dstack([np.moveaxis(painted, 0, -1) * wanted[..., None], wanted]).astype(np.float32)
-    weighted += 1e-4 * cv2.blur(weighted, (9, 9)) + 1e-9
-    full = _doubled(weighted, surface.shape)
-    full.reshape(-1, 4)[wrong] = weighted.reshape(-1, 4)[best]
-    full = cv2.GaussianBlur(full, (0, 0), 1.1)
-    weight = np.ascontiguousarray(full[..., 3])
-    return cv2.merge([full[..., channel] / weight for channel in range(3)])
+        near = middle + (dv * padded.shape[1] + du)
+        np.copyto(best, near, where=padded.ravel().take(near) == own)
+    row, column = np.divmod(best, padded.shape[1])
+    return wrong, (row - 1) * coarse.shape[1] + column - 1
 
 
 def _doubled(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
@@ -121,49 +154,3 @@ def _doubled(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     height, width = image.shape[:2]
     doubled = cv2.resize(image, (2 * width, 2 * height), interpolation=cv2.INTER_NEAREST)
     return np.ascontiguousarray(doubled[: shape[0], : shape[1]])
-
-
-def _labels(scene: RayScene, trace: Trace) -> tuple[np.ndarray, np.ndarray]:
-    """Person and part per ray, -1 where there is none."""
-    owner = np.array([s.person for s in scene.surfaces] + [-1], np.int16)
-    parts = [np.full(len(s.mesh.triangles), -1) if s.parts is None else s.parts for s in scene.surfaces]
-    return owner[trace.surface], np.concatenate([*parts, [-1]]).astype(np.int16)[trace.triangle]
-
-
-def _gather_looks(scene: RayScene, view: View, pixel_rad: float) -> Looks:
-    wanted = np.flatnonzero(view.wanted)
-    # Sorted by surface, each one's hits lie side by side.
-    pixels = wanted[np.argsort(view.trace.surface[wanted], kind="stable")]
-    bounds = np.searchsorted(view.trace.surface[pixels], np.arange(len(scene.surfaces) + 1))
-    looks = Looks.empty(pixels)
-    trace, rays = view.trace.take(pixels), view.rays.take(pixels, axis=0)
-    for number in np.flatnonzero(np.diff(bounds)):
-        rows = slice(bounds[number], bounds[number + 1])
-        hits = scene.hits(trace.between(rows), rays[rows], number, pixel_rad)
-        look: Look = scene.surfaces[number].material(hits)
-        looks.positions_m[:, rows] = hits.positions_m
-        looks.normals[:, rows] = hits.normals if look.normals is None else look.normals
-        for name in ("albedo", "height_m", "gloss", "roughness", "softness", "glow"):
-            value = getattr(look, name)
-            if np.ndim(value) or value:
-                getattr(looks, name)[..., rows] = value
-    return looks
-
-
-def _shade_block(world: World, looks: Looks, direction: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    view = direction / -np.sqrt(dot(direction, direction))
-    light = lights.ambient_light(world.ambient, looks.normals)
-    facing = 1 - np.clip(dot(looks.normals, view), 0, 1)
-    facing *= facing
-    fresnel = looks.gloss * (1 + 4 * facing * facing) * (1 - 0.7 * looks.roughness)
-    # Part of what is hidden returns by bouncing about: crevices are not black.
-    light *= seen[-1] * 0.85 + 0.15
-    highlight = fresnel * light
-    diffuse = light
-    for number, source in enumerate(world.lights):
-        more, shine = lights.diffuse_and_highlight(
-            source, looks.positions_m, looks.normals, view, looks.gloss, looks.roughness, looks.softness
-        )
-        diffuse += more * seen[number]
-        highlight += shine * seen[number]
-    return looks.albedo * diffuse + highlight + looks.glow

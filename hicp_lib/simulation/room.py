@@ -60,7 +60,8 @@ class _Wall:
         self.centre = np.zeros(3, np.float32)
         self.centre[axis] = sign * half[axis]
 
-    def point(self, u: float, v: float, w: float = 0.0) -> np.ndarray:
+    def point(self, u: float | np.ndarray, v: float, w: float | np.ndarray = 0.0) -> np.ndarray:
+        """A place, or several for u and w of shape (n, 1)."""
         return self.centre + u * self.u + np.array([0, 0, v], np.float32) + w * self.inward
 
     def box(self, u: tuple[float, float], v: tuple[float, float], w: tuple[float, float]) -> g.Mesh:
@@ -160,8 +161,8 @@ def _curtains(rng: Rng, wall: _Wall, span: tuple[float, float], high: float) -> 
     for side in (span[0] - 0.2, span[1] + 0.2 - width):
         u = np.linspace(side, side + width, 40)
         fold = 0.09 + 0.03 * np.sin((u - side) * 2 * np.pi / rng.uniform(0.07, 0.11) + rng.uniform(0, 6))
-        rows = [[wall.point(a, v, w) for a, w in zip(u, fold, strict=True)] for v in (bottom, high + 0.1)]
-        vertices = np.array(rows, np.float32).reshape(-1, 3)
+        rows = [wall.point(u[:, None], v, fold[:, None]) for v in (bottom, high + 0.1)]
+        vertices = np.concatenate(rows).astype(np.float32)
         triangles = g.grid_triangles(2, len(u))
         coords = np.tile(np.c_[(u - side) * 2, u * 0], (2, 1)).astype(np.float32)
         coords[len(u) :, 1] = high - bottom

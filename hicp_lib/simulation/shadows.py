@@ -5,49 +5,55 @@ from __future__ import annotations
 import numpy as np
 
 from hicp_lib.simulation import lights
+from hicp_lib.simulation.camera import join_rays
 from hicp_lib.simulation.filters import View, sum_within
-from hicp_lib.simulation.raycast import RayScene, dot
+from hicp_lib.simulation.raycast import RayScene, dot, pick
 
 AMBIENT_REACH_M = 0.7
+_OFF_SURFACE_M = 0.003  # where rays begin
 
 
 def visibility(
     sources: list[lights.Light],
     scene: RayScene,
     view: View,
-    positions_m: np.ndarray,
     normals: np.ndarray,
     sharp: bool,
     rng: np.random.Generator,
 ) -> np.ndarray:
     """Visible share of each light and (last) of the surroundings, (n_lights + 1, n) in [0, 1].
 
-    `positions_m` and `normals` are those of all of the view's pixels, (3, n).
+    `normals` are those of all of the view's pixels, (3, rows, columns).
     Half of the pixels are asked, by turns, and the filter fills in the others; in a `sharp`
     view it reaches less far.
     """
-    shape = view.wanted.shape
-    turn = (np.arange(shape[0])[:, None] + np.arange(shape[1])) & 1
-    seen = np.zeros((len(sources) + 1, view.wanted.size), np.float32)
+    rows, columns = view.surface.shape
+    cell = (np.arange(rows)[:, None] % 4 * 4 + np.arange(columns) % 4).astype(np.uint8).ravel()
+    turn = (np.arange(rows)[:, None] + np.arange(columns)) % 2
+    n_kinds = len(sources) + 1
+    counts = np.zeros((n_kinds + 2, rows, columns), np.int16)
+    counts[n_kinds:] = turn == 0, turn == 1
+    facing_out = view.from_grid(normals)
+    origins = view.from_grid(view.positions_m) + np.float32(_OFF_SURFACE_M) * facing_out
+    halves = [np.flatnonzero(pick(turn.ravel(), view.pixels) == k) for k in (0, 1)]
     for kind, source in enumerate([*sources, None]):
-        row, column = np.nonzero(view.wanted & (turn == kind % 2))
-        pixels = row * shape[1] + column
-        offsets = lights.sample_offsets(row + kind, column + 3 * kind, rng)
-        facing_out = normals[:, pixels]
-        origins = positions_m[:, pixels] + np.float32(0.003) * facing_out
-        seen[kind, pixels] = 1
-        if source is None:
-            seen[kind, pixels] = ~scene.occluded(
-                origins.T, lights.hemisphere(facing_out, offsets).T, AMBIENT_REACH_M
-            )
-            continue
-        towards = lights.towards_light(source, origins, offsets)
-        facing = np.flatnonzero(dot(towards, facing_out) > 0)  # the rest is dark without asking
-        seen[kind, pixels[facing]] = ~scene.occluded(origins[:, facing].T, towards[:, facing].T, 0.98)
-    surface = np.where(view.wanted.ravel(), view.trace.surface, -1).reshape(shape)
-    positions, directions = (x.reshape(3, *shape) for x in (positions_m, normals))
-    asked = np.stack([turn == 0, turn == 1]).astype(np.float32)
-    sums = np.concatenate([seen.reshape(-1, *shape), asked])
-    sums = sum_within(sums, surface, positions, directions, 2 if sharp else 3)
-    weights = sums[-2:][np.arange(len(seen)) % 2]
-    return np.where(weights > 0, sums[:-2] / np.maximum(weights, 1e-6), 1).reshape(len(seen), -1)
+        asked = halves[kind % 2]
+        pixels = view.pixels.take(asked)
+        offsets = lights.sample_offsets(cell.take(pixels), kind, rng)
+        starts, outwards = pick(origins, asked), pick(facing_out, asked)
+        counts[kind].ravel()[pixels] = _sees(scene, source, starts, outwards, offsets)
+    sums = sum_within(counts, view.surface, view.positions_m, normals, 2 if sharp else 3)
+    sums = view.from_grid(sums).astype(np.float32)
+    weights = sums[n_kinds:].take(np.arange(n_kinds) % 2, axis=0)
+    return np.where(weights > 0, sums[:n_kinds] / np.maximum(weights, 1), np.float32(1))
+
+
+def _sees(scene: RayScene, source: lights.Light | None, origins_m, normals, offsets) -> np.ndarray:
+    """Whether points (3, n) see a point of a light, or of their surroundings (None); (n,), bool."""
+    if source is None:
+        return ~scene.occluded(join_rays(origins_m, lights.hemisphere(normals, offsets)), AMBIENT_REACH_M)
+    towards = lights.towards_light(source, origins_m, offsets)
+    facing = np.flatnonzero(dot(towards, normals) > 0)  # what faces away is dark without asking
+    seen = np.ones(len(origins_m.T), bool)
+    seen[facing] = ~scene.occluded(join_rays(origins_m, towards).take(facing, axis=0), 0.98)
+    return seen

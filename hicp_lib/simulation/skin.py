@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.spatial import KDTree
 
 from hicp_lib.simulation import textures
-from hicp_lib.simulation.body import FIELDS, REGIONS, Body
+from hicp_lib.simulation.body import REGIONS, Body
 from hicp_lib.simulation.materials import hsv, linear
 from hicp_lib.simulation.surfaces import Hits, Look, Material
 
@@ -95,17 +96,23 @@ def paint_coords(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.
     rest_m : array, shape (n_v, 3), the person at rest
     landmarks_m : array, shape (136, 3), the person's keypoints at rest
     """
-    fields = [body.fields[:, FIELDS.index(name)] for name in _PAINTED]
-    eye, mouth = ((body.regions == REGIONS.index(name)).astype(np.float32) for name in ("eye", "mouth"))
-    head = np.isin(
-        body.regions, [REGIONS.index(n) for n in ("face", "scalp", "eyebrow", "lips", "mouth", "neck")]
-    )
+    painted, head, _ = _painted(body)
     flush = np.zeros(len(rest_m), np.float32)
     p = rest_m[head].astype(np.float32)
     face = landmarks_m[26:94].astype(np.float32)
     flush[head] = _cheeks(p, face) + 0.9 * _bump(p, face[30], 0.014) + 0.6 * body.field("ear")[head]
     flush += _knuckles(body, rest_m, landmarks_m)
-    return np.column_stack([rest_m, *fields, eye, mouth, flush]).astype(np.float32)
+    return np.column_stack([rest_m, painted, flush]).astype(np.float32)
+
+
+@lru_cache(maxsize=4)
+def _painted(body: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What is the same for all shapes: columns of coords (n_v, k); numbers of vertices of head and hands."""
+    columns = [body.field(name) for name in _PAINTED]
+    columns += [body.regions == REGIONS.index(name) for name in ("eye", "mouth")]
+    zones = (("face", "scalp", "eyebrow", "lips", "mouth", "neck"), ("hand", "nail"))
+    numbers = [np.flatnonzero(np.isin(body.regions, [REGIONS.index(n) for n in zone])) for zone in zones]
+    return np.column_stack(columns).astype(np.float32), *numbers
 
 
 def _bump(points: np.ndarray, centre: np.ndarray, width_m: float) -> np.ndarray:
@@ -120,9 +127,9 @@ def _cheeks(points: np.ndarray, face: np.ndarray) -> np.ndarray:
 
 def _knuckles(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.ndarray:
     red = np.zeros(len(rest_m), np.float32)
-    hands = np.isin(body.regions, [REGIONS.index("hand"), REGIONS.index("nail")])
+    _, _, hands = _painted(body)
     joints = landmarks_m[[94 + k for k in range(136 - 94) if k % 21 not in (0, 1, 2)]]
-    distance_m, _ = KDTree(joints).query(rest_m[hands])
+    distance_m, _ = KDTree(joints).query(rest_m[hands], distance_upper_bound=0.06)  # infinite beyond
     red[hands] = 0.25 + 0.5 * np.exp(-((distance_m / 0.010) ** 2))
     red += 0.4 * np.exp(-(((body.field("arm") - 1) / 0.08) ** 2)) + 0.3 * np.exp(
         -(((body.field("leg") - 1) / 0.1) ** 2)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from hicp_lib.simulation.mesh import Mesh
 
 
-@dataclass(frozen=True)
+@dataclass
 class Hits:
     """Where rays met one surface: n places.
 
@@ -19,18 +20,17 @@ class Hits:
 
     Attributes
     ----------
-    positions_m : world frame, (3, n)
-    normals : unit, towards the camera's side, (3, n)
-    coords : the mesh's coords, interpolated, (n_coords, n)
-    triangles : index of the triangle within the surface's mesh, (n,)
     footprint_m : how wide one pixel is at the hit, (n,)
+    interpolate : gives the mesh's coords at the hits
     """
 
-    positions_m: np.ndarray
-    normals: np.ndarray
-    coords: np.ndarray
-    triangles: np.ndarray
     footprint_m: np.ndarray
+    interpolate: Callable[[], np.ndarray]
+
+    @cached_property
+    def coords(self) -> np.ndarray:
+        """The mesh's coords, interpolated, (n_coords, n); only made for looks that ask for them."""
+        return self.interpolate()
 
 
 @dataclass
@@ -45,7 +45,6 @@ class Look:
     roughness : of the highlight, (n,) or a number in (0, 1]
     softness : how far light creeps past the terminator, as in skin, (n,) or a number
     glow : light given off, linear RGB, (3, n), (3, 1) or 0
-    normals : replaces the interpolated normals, (3, n), unit
     """
 
     albedo: np.ndarray
@@ -54,7 +53,6 @@ class Look:
     roughness: np.ndarray | float = 0.6
     softness: np.ndarray | float = 0.0
     glow: np.ndarray | float = 0.0
-    normals: np.ndarray | None = None
 
 
 Material = Callable[[Hits], Look]

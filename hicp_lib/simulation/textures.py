@@ -11,6 +11,7 @@ from functools import cache
 
 import cv2
 import numpy as np
+from scipy import fft
 
 _REMAP_COLUMNS = 8192  # OpenCV's remap takes no array longer than 32767
 
@@ -85,12 +86,13 @@ def noise(
     Its amplitude spectrum falls as frequency ** -slope and is flat below `low` cycles per
     tile; `stretch` lengthens the features along (rows, columns).
     """
-    frequency = np.fft.fftfreq(size, 1 / size)
-    radius = np.hypot(frequency[:, None] * stretch[0], frequency[None, :] * stretch[1])
-    amplitude = np.maximum(radius, low) ** -slope
+    rows, columns = fft.fftfreq(size, 1 / size), fft.rfftfreq(size, 1 / size)
+    radius = np.hypot(rows[:, None] * stretch[0], columns * stretch[1]).astype(np.float32)
+    amplitude = np.maximum(radius, low) ** np.float32(-slope)
     amplitude[0, 0] = 0
-    field = np.fft.ifft2(np.fft.fft2(rng.standard_normal((size, size))) * amplitude).real
-    return (field / field.std()).astype(np.float32)
+    spectrum = fft.rfft2(rng.standard_normal((size, size)).astype(np.float32))
+    field = fft.irfft2(spectrum * amplitude, (size, size))
+    return field / field.std()
 
 
 def _rng(number: int) -> np.random.Generator:

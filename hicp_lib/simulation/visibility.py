@@ -88,10 +88,7 @@ def keypoint_visibility(
     trace = scene.trace(rays)
     stretch = np.linalg.norm(rays[:, 3:], axis=1)
     before_m = (depths_m - trace.depth_m) * stretch
-    owner = np.array([s.person for s in scene.surfaces] + [-1])[trace.surface]
-    parts = np.concatenate(
-        [np.full(len(s.mesh.triangles), -1) if s.parts is None else s.parts for s in scene.surfaces] + [[-1]]
-    )[trace.triangle]
+    owner, parts = scene.owners[trace.surface], scene.parts[trace.triangle]
     own = (owner == person) & _ALLOWED[np.arange(N_KEYPOINTS), parts] & (before_m <= _DEPTH_M)
     visible = (before_m <= 0.002) | own
     return pixels_px, np.where(inside, np.where(visible, 2, 1), 0)

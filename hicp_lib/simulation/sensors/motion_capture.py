@@ -61,7 +61,7 @@ def count_seeing(scene: RayScene, points_m: np.ndarray, cameras_m: np.ndarray) -
     """How many cameras see each marker (m, 3) past what is in the scene, (m,)."""
     m, c = len(points_m), len(cameras_m)
     start = np.repeat(points_m, c, axis=0)
-    hidden = scene.occluded(start, np.tile(cameras_m, (m, 1)) - start)
+    hidden = scene.occluded(np.hstack([start, np.tile(cameras_m, (m, 1)) - start]).astype(np.float32))
     return (~hidden).reshape(m, c).sum(axis=1)
 
 
