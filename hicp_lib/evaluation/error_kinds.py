@@ -27,6 +27,7 @@ from hicp_lib.detectors.base import Detections
 from hicp_lib.evaluation.coco import check_detections
 from hicp_lib.evaluation.compare import groups_of, source_images
 from hicp_lib.evaluation.oks import oks, oks_terms
+from hicp_lib.evaluation.visibility_classes import MIN_PEOPLE
 from hicp_lib.keypoints import GROUPS, SIGMAS, mirror
 
 KINDS = ("good", "jitter", "inversion", "swap", "miss", "not given", "not found")
@@ -171,10 +172,18 @@ def _kinds(truth: np.ndarray, other_side: np.ndarray, others: np.ndarray) -> np.
 
 
 def kind_shares(errors: pd.DataFrame, by: str) -> pd.DataFrame:
-    """Share of each kind, every one listed: columns `detector, group, BY, kind, share, n_keypoints`."""
+    """Share of each kind, every one listed; NaN where there are fewer than `MIN_PEOPLE` people.
+
+    Returns
+    -------
+    DataFrame, columns `detector, group, BY, kind, share, n_keypoints, n_people`
+    """
     keys = ["detector", "group", by]
     counts = errors.groupby([*keys, "kind"], sort=False, observed=True).size().unstack("kind", fill_value=0)
     counts = counts.reindex(columns=KINDS, fill_value=0)
-    n = counts.sum(axis=1).rename("n_keypoints").reset_index()
-    long = counts.div(counts.sum(axis=1), axis=0).stack().rename("share").reset_index()
+    people = errors.drop_duplicates({*keys, "subset", "image_id", "annotation_id"})
+    n_people = people.groupby(keys, sort=False, observed=True).size().reindex(counts.index)
+    shares = counts.div(counts.sum(axis=1), axis=0).where(n_people >= MIN_PEOPLE, np.nan, axis=0)
+    n = pd.DataFrame({"n_keypoints": counts.sum(axis=1), "n_people": n_people}).reset_index()
+    long = shares.reset_index().melt(keys, var_name="kind", value_name="share")
     return long.merge(n, on=keys)

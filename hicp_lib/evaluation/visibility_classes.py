@@ -95,11 +95,12 @@ def people_classes(truth: Mapping[str, Annotations]) -> pd.DataFrame:
 
 
 def class_counts(classes: pd.DataFrame) -> pd.DataFrame:
-    """People per class: columns `class`, one per subset, `people`, `judged` (at least `MIN_PEOPLE`)."""
+    """People per class: columns `class`, one per subset, `people`, `judged` ("yes" or "too few")."""
     counts = pd.crosstab(classes["class"], classes["subset"]).reindex(CLASSES, fill_value=0)
     counts = counts[list(dict.fromkeys(classes["subset"]))]
     total = counts.sum(axis=1)
-    return counts.assign(people=total, judged=total >= MIN_PEOPLE).rename_axis(columns=None).reset_index()
+    judged = np.where(total >= MIN_PEOPLE, "yes", "too few")
+    return counts.assign(people=total, judged=judged).rename_axis(columns=None).reset_index()
 
 
 def compare_classes(

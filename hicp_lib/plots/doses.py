@@ -25,6 +25,7 @@ _LABELS = {
     "distance to the border": "distance to the border [of the shorter side]",
     "brightness": "mean brightness [of 255]",
 }
+_UNITS = {"distance": " m", "resolution": " px"}
 _LOGARITHMIC = ("light", "resolution", "distance")
 _SUBSET_STYLES = {"basic": "-", "headless": "--", "close": ":"}
 
@@ -45,23 +46,21 @@ def dose_pictures(annotations: Annotations, folder: Path, person: int = 0) -> Fi
     columns = max(len(pictures) for pictures in rows.values())
     for i, (dose, pictures) in enumerate(rows.items()):
         for j, (level, _) in enumerate(pictures):
-            title = (
-                f"{level:g} m"
-                if dose == "distance"
-                else f"{level:g} px"
-                if dose == "resolution"
-                else f"{level:g}"
-            )
+            title = f"{level:g}{_UNITS.get(dose, '')}"
             figure.figure.axes[i * columns + j].set_title(title, loc="center", fontsize=7, pad=2)
     return figure
 
 
 @in_style
 def dose_curves(table: pd.DataFrame, group: str) -> Figure:
-    """AP and hits of visible keypoints against each dose; `table` from `dose_curves.dose_curves`."""
-    rows = table[(table["group"] == group) & (table["measure"] != "hidden keypoints hit")]
+    """AP and hits of visible keypoints against each dose; `table` from `dose_curves.dose_curves`.
+
+    The numbers behind it have hits of hidden keypoints as well.
+    """
+    table = table[table["group"] == group]
+    rows = table[table["measure"] != "hidden keypoints hit"]
     doses = list(dict.fromkeys(rows["dose"]))
-    figure, axes = _panels(len(doses))
+    figure, axes = _panels(len(doses), "AP, share of hits")
     for axis, dose in zip(axes.flat, doses, strict=False):
         for (detector, measure), part in rows[rows["dose"] == dose].groupby(
             ["detector", "measure"], sort=False
@@ -84,14 +83,14 @@ def dose_curves(table: pd.DataFrame, group: str) -> Figure:
     )
     lows = rows[rows["measure"] == "AP"].groupby(["detector", "dose"], sort=False)["value"].min()
     said = [f"{detector} {value:.2f} for {dose}" for (detector, dose), value in lows.items()]
-    return Figure(figure, caption, f"Curves per dose. Lowest average precision: {in_words(said)}.", rows)
+    return Figure(figure, caption, f"Curves per dose. Lowest average precision: {in_words(said)}.", table)
 
 
 @in_style
 def observed_curves(table: pd.DataFrame, note: str) -> Figure:
     """Hit rate against doses as the data set has them; `table` from `dose_curves.observed_curves`."""
     doses = list(dict.fromkeys(table["dose"]))
-    figure, axes = _panels(len(doses))
+    figure, axes = _panels(len(doses), "share of hits")
     for axis, dose in zip(axes.flat, doses, strict=False):
         for (subset, detector), part in table[table["dose"] == dose].groupby(
             ["subset", "detector"], sort=False
@@ -110,14 +109,14 @@ def observed_curves(table: pd.DataFrame, note: str) -> Figure:
     return Figure(figure, caption, f"Curves per dose. Range of the hit rate: {in_words(said)}.", table)
 
 
-def _panels(n: int):
+def _panels(n: int, label: str):
     columns = min(n, 3)
     rows = -(-n // columns)
     figure, axes = new_figure(rows, columns, 3.7 * columns, 2.9 * rows + 0.5, sharey=True, squeeze=False)
     for axis in axes.flat[n:]:
         axis.set_axis_off()
     for row in axes:
-        row[0].set(ylabel="AP, share of hits")
+        row[0].set(ylabel=label)
     return figure, axes
 
 

@@ -15,7 +15,7 @@ from hicp_lib.evaluation.placed_keypoints import STATES
 from hicp_lib.evaluation.visibility_classes import CLASSES
 from hicp_lib.images import read_image
 from hicp_lib.plots.people import draw_people, picture_grid, visible_scores
-from hicp_lib.plots.style import Figure, detector_colour, in_style, in_words, new_figure
+from hicp_lib.plots.style import Figure, detector_colour, in_style, in_words, legend_entries, new_figure
 
 _GROUPS = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
 _TRUTH_COLOUR = "#39D353"
@@ -52,74 +52,86 @@ def class_examples(
 
 @in_style
 def class_precision(table: pd.DataFrame, note: str) -> Figure:
-    """Average precision per class; `table` from `compare_classes`."""
-    rows = table[table["metric"] == "AP"]
+    """Average precision and recall per class; `table` from `compare_classes`."""
+    rows = table[table["metric"].isin(["AP", "AR"])]
     groups, detectors = (list(dict.fromkeys(rows[name])) for name in ("group", "detector"))
     names = [name for name in CLASSES if name in set(rows["class"])]
     figure, axes = new_figure(
         1, len(groups), 4.8 * len(groups) + 1, 1.3 + 0.42 * len(names), sharey=True, squeeze=False
     )
     for axis, group in zip(axes[0], groups, strict=True):
-        for k, detector in enumerate(detectors):
-            part = rows[(rows["group"] == group) & (rows["detector"] == detector)]
-            y = np.array([names.index(name) for name in part["class"]])
-            y = y + 0.24 * (k - (len(detectors) - 1) / 2)
-            _dots(axis, part, y, detector)
-        people = rows[rows["group"] == group].drop_duplicates("class").set_index("class")
-        few = people.index[people["value"].isna()]
-        for name in few:
-            axis.text(0.02, names.index(name), "too few to judge", va="center", fontsize=8, color="#666666")
-        axis.set(xlabel="average precision (.5:.95)", xlim=(-0.02, 1.0), title=_GROUPS.get(group, group))
+        of_group = rows[rows["group"] == group]
+        for (detector, metric), part in of_group.groupby(["detector", "metric"], sort=False):
+            below = 0.24 * (detectors.index(detector) - (len(detectors) - 1) / 2) + 0.09 * (metric == "AR")
+            y = part["class"].map(names.index) + below
+            _dots(axis, part, y, detector, filled=metric == "AP", label=f"{detector}, {metric}")
+        _say_too_few(axis, names, set(of_group.loc[of_group["value"].isna(), "class"]))
+        axis.set(xlabel="AP (filled), AR (open)", xlim=(-0.02, 1.02), title=_GROUPS.get(group, group))
     counts = rows[rows["group"] == groups[0]].drop_duplicates("class").set_index("class")["n_people"]
     labels = [f"{name} ({counts.get(name, 0)})" for name in names]
     axes[0, 0].set(yticks=range(len(names)), yticklabels=labels, ylim=(len(names) - 0.5, -0.5))
-    _legend(figure, axes[0, 0])
+    _legend(figure, axes, ncols=2)
     caption = (
-        "Average precision by what the picture shows, with the number of people whose body counts; all "
-        f"subsets together; 95 % bootstrap intervals over source images: {note}."
+        "Average precision and recall (OKS .5:.95) by what the picture shows, with the number of people "
+        f"whose body counts; all subsets together; 95 % bootstrap intervals over source images: {note}."
     )
-    best = rows[(rows["group"] == "body") & rows["value"].notna()].sort_values("value", ascending=False)
-    said = [
-        f"{row.detector} {row.value:.2f} for {row['class']}"
-        for _, row in best.groupby("class").head(1).iterrows()
-    ]
-    return Figure(figure, caption, f"Dots per class and detector. Best for bodies: {in_words(said)}.", rows)
+    best = rows.query("group == 'body' and metric == 'AP'").dropna(subset="value")
+    best = best.sort_values("value", ascending=False).groupby("class").head(1)
+    said = [f"{row['detector']} {row['value']:.2f} for {row['class']}" for _, row in best.iterrows()]
+    alt = f"Dots per class and detector. Best average precision for bodies: {in_words(said)}."
+    return Figure(figure, caption, alt, rows)
 
 
-def _dots(axis, rows: pd.DataFrame, y, detector: str) -> None:
-    value = rows["value"].to_numpy(float)
+def _say_too_few(axis, names: list[str], few: set[str]) -> None:
+    """Words in the place of the classes with too few people."""
+    behind = {"facecolor": "white", "edgecolor": "none", "pad": 1}
+    for name in few:
+        place = 0.02, names.index(name)
+        axis.text(*place, "too few to judge", va="center", fontsize=8, color="#666666", bbox=behind)
+
+
+def _dots(axis, rows: pd.DataFrame, y, detector: str, filled: bool = True, label: str = "") -> None:
+    value, colour = rows["value"].to_numpy(float), detector_colour(detector)
     whiskers = np.abs(rows[["low", "high"]].to_numpy(float).T - value)
     axis.errorbar(
-        value, y, xerr=whiskers, fmt="o", color=detector_colour(detector), label=detector, capsize=2, ms=5
-    )
+        value, y, xerr=whiskers, fmt="o", color=colour, mfc=colour if filled else "white",
+        label=label or detector, capsize=2, ms=5,
+    )  # fmt: skip
 
 
-def _legend(figure, axis, **options) -> None:
-    handles, labels = axis.get_legend_handles_labels()
+def _legend(figure, axes, **options) -> None:
     place = {"loc": "outside lower center", "ncols": 4, "fontsize": 9} | options
-    figure.legend(handles, labels, **place)
+    figure.legend(*legend_entries(np.atleast_1d(axes)), **place)
+
+
+def _detector_panels(table: pd.DataFrame, width_in: float, height_in: float, **shared):
+    """The figure, its axes, and for each detector of a table its axis with its rows."""
+    detectors = list(dict.fromkeys(table["detector"])) or ["none given"]
+    size = width_in * len(detectors) + 0.8, height_in
+    figure, axes = new_figure(1, len(detectors), *size, sharey=True, squeeze=False, **shared)
+    for axis, detector in zip(axes[0], detectors, strict=True):
+        axis.set_title(detector)
+    rows = [table[table["detector"] == detector] for detector in detectors]
+    return figure, axes[0], list(zip(axes[0], detectors, rows, strict=True))
 
 
 @in_style
 def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
     """Stacked shares of the kinds of error; `table` from `kind_shares` of one group of keypoints."""
-    detectors = list(dict.fromkeys(table["detector"]))
     order = [name for name in CLASSES if name in set(table[by])] or list(dict.fromkeys(table[by]))
-    figure, axes = new_figure(
-        1, len(detectors), 4.2 * len(detectors) + 1, 1.4 + 0.36 * len(order), sharey=True, squeeze=False
-    )
-    for axis, detector in zip(axes[0], detectors, strict=True):
-        part = table[table["detector"] == detector].pivot(index=by, columns="kind", values="share")
-        part = part.reindex(order)
+    figure, axes, panels = _detector_panels(table, 4.2, 1.5 + 0.36 * len(order))
+    for axis, _, rows in panels:
+        part = rows.pivot(index=by, columns="kind", values="share").reindex(order)
         left = np.zeros(len(part))
         for kind in KINDS:
             axis.barh(range(len(part)), part[kind], left=left, color=_KIND_COLOURS[kind], label=kind)
             left = left + part[kind].to_numpy()
-        axis.set(xlabel="share of labelled keypoints", xlim=(0, 1), title=detector)
+        _say_too_few(axis, order, set(part.index[part.isna().all(axis=1)]))
+        axis.set(xlabel="share of labelled keypoints", xlim=(0, 1))
         axis.grid(axis="y", visible=False)
-    axes[0, 0].set(yticks=range(len(order)), yticklabels=order, ylim=(len(order) - 0.5, -0.5))
-    _legend(figure, axes[0, 0], ncols=len(KINDS), fontsize=8)
-    worst = table[table["kind"] == "miss"]
+    axes[0].set(yticks=range(len(order)), yticklabels=order, ylim=(len(order) - 0.5, -0.5))
+    _legend(figure, axes, ncols=4)
+    worst = table[(table["kind"] == "miss") & table["share"].notna()]
     said = [f"{row['detector']} {row['share']:.2f} on {row[by]}" for _, row in worst.iterrows()]
     caption = (
         "What becomes of labelled keypoints, by the kinds of error of Ronchi and Perona, and those that "
@@ -154,20 +166,16 @@ def head_change(table: pd.DataFrame, note: str) -> Figure:
 @in_style
 def invented_heads(table: pd.DataFrame, note: str) -> Figure:
     """Where head keypoints are put when the head was cut off; `table` from `without_head.invented_heads`."""
-    detectors = list(dict.fromkeys(table["detector"])) or ["none given"]
-    figure, axes = new_figure(
-        1, len(detectors), 4.0 * len(detectors) + 0.8, 4.4, sharex=True, sharey=True, squeeze=False
-    )
-    for axis, detector in zip(axes[0], detectors, strict=True):
-        rows = table[table["detector"] == detector]
+    figure, axes, panels = _detector_panels(table, 4.0, 4.4, sharex=True)
+    for axis, detector, rows in panels:
         dots = axis.scatter(rows["along"], rows["below"], c=rows["score"], s=14, vmin=0, vmax=1, alpha=0.8)
         axis.plot([0, 1, 1, 0, 0], [0, 0, 1, 1, 0], color="#444444", lw=1)
         axis.plot([0, 1], [0, 0], color="#D5272D", lw=2.5, label="where the head was cut off")
         axis.set(xlim=(-0.3, 1.3), ylim=(1.05, -0.6), title=f"{detector} ({len(rows)})")
         axis.set(xlabel="along the cut [of the picture]")
-    axes[0, 0].set(ylabel="below the cut [of the picture]")
+    axes[0].set(ylabel="below the cut [of the picture]")
     figure.colorbar(dots, ax=axes, label="score", shrink=0.8)
-    _legend(figure, axes[0, 0])
+    _legend(figure, axes)
     beyond = table["below"] < 0
     said = [f"{d} {share:.2f}" for d, share in beyond.groupby(table["detector"], sort=False).mean().items()]
     caption = (
@@ -180,22 +188,21 @@ def invented_heads(table: pd.DataFrame, note: str) -> Figure:
 @in_style
 def scores_by_state(table: pd.DataFrame, note: str) -> Figure:
     """Hit rate against score for visible, hidden and outside keypoints; from `scores_by_state`."""
-    detectors = list(dict.fromkeys(table["detector"])) or ["none given"]
-    figure, axes = new_figure(1, len(detectors), 4.2 * len(detectors), 4.2, sharey=True, squeeze=False)
-    for axis, detector in zip(axes[0], detectors, strict=True):
+    figure, axes, panels = _detector_panels(table, 4.2, 4.2)
+    for axis, detector, of_detector in panels:
         for state, (line, marker) in _STATE_STYLES.items():
-            rows = table[(table["detector"] == detector) & (table["state"] == state)]
-            if len(rows):
-                whiskers = np.abs(rows[["low", "high"]].to_numpy().T - rows["value"].to_numpy())
-                axis.errorbar(
-                    rows["score"], rows["value"], yerr=whiskers, ls=line, marker=marker, ms=5, capsize=2,
-                    color=detector_colour(detector), label=state,
-                )  # fmt: skip
+            rows = of_detector[of_detector["state"] == state].astype({"value": float})
+            if rows.empty:
+                continue
+            whiskers = np.abs(rows[["low", "high"]].to_numpy(float).T - rows["value"].to_numpy())
+            axis.errorbar(
+                rows["score"], rows["value"], yerr=whiskers, ls=line, marker=marker, ms=5, capsize=2,
+                color=detector_colour(detector), label=state,
+            )  # fmt: skip
         axis.plot([0, 1], [0, 1], "--", color="#AAAAAA", lw=1)
-        axis.set(xlim=(0, 1.02), ylim=(-0.02, 1.02), xlabel="score", title=detector)
-    axes[0, 0].set(ylabel="share of hits")
-    fullest = max(axes[0], key=lambda axis: len(axis.get_legend_handles_labels()[1]))
-    _legend(figure, fullest)
+        axis.set(xlim=(0, 1.02), ylim=(-0.02, 1.02), xlabel="score")
+    axes[0].set(ylabel="share of hits")
+    _legend(figure, axes)
     top = table[table["state"] == "outside"].groupby("detector", sort=False).tail(1)
     said = [f"{row.detector} {row.value:.2f} at {row.score:.2f}" for row in top.itertuples()]
     caption = (

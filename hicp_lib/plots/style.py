@@ -20,6 +20,7 @@ DETECTOR_COLOURS: dict[str, str] = {
     "mmpose": "#009E73",
     "alphapose": "#7F5FA8",
     "detectron2": "#8C6D31",
+    "combined": "#1F8A9E",
 }
 OTHER_COLOUR = "#595959"
 
@@ -91,8 +92,12 @@ def new_figure(n_rows: int = 1, n_columns: int = 1, width_in: float = 8.0, heigh
 
 
 def detector_colour(name: str) -> str:
-    """The colour of a detector, also of variants such as "mmpose-imported"; others take the neutral grey."""
-    known = [detector for detector in DETECTOR_COLOURS if f"{name}-".startswith(f"{detector}-")]
+    """The colour of a detector, also of variants such as "mmpose-imported"; others take the neutral grey.
+
+    All combinations ("combined:BODY+HANDS") share one.
+    """
+    kind = name.partition(":")[0]
+    known = [detector for detector in DETECTOR_COLOURS if f"{kind}-".startswith(f"{detector}-")]
     return DETECTOR_COLOURS[max(known, key=len)] if known else OTHER_COLOUR
 
 

@@ -96,17 +96,27 @@ def test_only_labelled_keypoints_of_people_who_count_are_judged():
     assert table["hit"].all() and (table["score"] == 0.5).all()
 
 
-def test_shares_of_kinds_add_up_to_one():
-    points = np.stack([GRID] * 4)
-    people = make_annotations(points, range(4))
+def shares_of_four_in(n: int):
+    """Four kinds of people, `n` in all: found with one keypoint off, found, found, not found."""
+    points = np.stack([GRID] * n)
     found = points.copy()
-    found[0, WRIST] += 500
-    run = {i: make_detections(found[i : i + 1]) for i in range(3)}
-    errors = all_errors({"basic": people}, {("basic", "mediapipe-pose"): run})
-    table = kind_shares(errors, "subset").set_index("kind")["share"]
-    assert table.index.tolist() == list(KINDS)
-    assert table["miss"] == pytest.approx(1 / 68) and table["not found"] == pytest.approx(1 / 4)
-    assert table.sum() == pytest.approx(1)
+    found[::4, WRIST] += 500
+    run = {i: make_detections(found[i : i + 1]) for i in range(n) if i % 4 < 3}
+    errors = all_errors({"basic": make_annotations(points, range(n))}, {("basic", "mediapipe-pose"): run})
+    return kind_shares(errors, "subset").set_index("kind")
+
+
+def test_shares_of_kinds_add_up_to_one():
+    table = shares_of_four_in(20)
+    assert table.index.tolist() == list(KINDS) and set(table["n_people"]) == {20}
+    share = table["share"]
+    assert share["miss"] == pytest.approx(1 / 68) and share["not found"] == pytest.approx(1 / 4)
+    assert share.sum() == pytest.approx(1)
+
+
+def test_few_people_are_counted_and_not_judged():
+    table = shares_of_four_in(16)
+    assert table["share"].isna().all() and set(table["n_people"]) == {16}
 
 
 def test_a_detection_goes_to_whom_it_fits_and_not_to_those_nothing_is_known_of():

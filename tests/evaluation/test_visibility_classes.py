@@ -93,9 +93,9 @@ def test_people_are_counted_per_class_and_subset():
         "basic": MIN_PEOPLE - 1,
         "close": 1,
         "people": MIN_PEOPLE,
-        "judged": True,
+        "judged": "yes",
     }
-    assert counts.loc["only legs", "people"] == 1 and not counts.loc["only legs", "judged"]
+    assert counts.loc["only legs", "people"] == 1 and counts.loc["only legs", "judged"] == "too few"
     assert counts["people"].sum() == len(classes) == n
 
 

@@ -14,10 +14,11 @@ DETECTORS = ("mediapipe", "openpose-mobilenet")
 
 def test_precision_per_class_says_which_classes_are_too_small():
     rows = [
-        (name, group, detector, "AP", value, value, value, n)
+        (name, group, detector, metric, value, value, value, n)
         for name, value, n in (("whole upper body", 0.8, 50), ("only legs", np.nan, 3))
         for group in ("body", "hand")
         for detector in DETECTORS
+        for metric in ("AP", "AP50", "AR")
     ]
     columns = ["class", "group", "detector", "metric", "value", "low", "high", "n_people"]
     figure = failures.class_precision(pd.DataFrame(rows, columns=columns), "made up")
@@ -25,15 +26,22 @@ def test_precision_per_class_says_which_classes_are_too_small():
         assert [text.get_text() for text in axis.texts] == ["too few to judge"]
     labels = [label.get_text() for label in figure.figure.axes[0].get_yticklabels()]
     assert labels == ["whole upper body (50)", "only legs (3)"]
+    assert len(figure.figure.axes[0].containers) == 4  # AP and AR of two detectors
     assert "0.80 for whole upper body" in figure.alt and "made up" in figure.caption
 
 
 def test_bars_of_kinds_fill_the_whole_length():
-    rows = [(d, "body", "no head", kind, 1 / len(KINDS), 70) for d in DETECTORS for kind in KINDS]
+    rows = [
+        (d, "body", name, kind, share, 70)
+        for d in DETECTORS
+        for name, share in (("no head", 1 / len(KINDS)), ("only legs", np.nan))
+        for kind in KINDS
+    ]
     table = pd.DataFrame(rows, columns=["detector", "group", "class", "kind", "share", "n_keypoints"])
     figure = failures.error_kinds(table, "class", "made up")
     for axis in figure.figure.axes:
-        assert sum(bar.get_width() for bar in axis.patches) == pytest.approx(1)
+        assert np.nansum([bar.get_width() for bar in axis.patches]) == pytest.approx(1)
+        assert [text.get_text() for text in axis.texts] == ["too few to judge"]
     assert [text.get_text() for text in figure.figure.legends[0].get_texts()] == list(KINDS)
 
 

@@ -110,9 +110,9 @@ def test_drawing_leaves_matplotlib_as_it_was(metrics):
 
 def test_colours_are_fixed_and_distinct():
     assert len(set(DETECTOR_COLOURS.values())) == len(DETECTOR_COLOURS)
-    assert (
-        detector_colour("combined:a+b") == detector_colour("something else") != detector_colour("mediapipe")
-    )
+    assert detector_colour("mmpose-imported") == DETECTOR_COLOURS["mmpose"]
+    assert detector_colour("combined:mmpose+b") == DETECTOR_COLOURS["combined"]
+    assert detector_colour("something else") not in DETECTOR_COLOURS.values()
 
 
 @pytest.mark.parametrize(("items", "text"), [([], "nothing"), (["a"], "a"), (["a", "b", "c"], "a, b and c")])
