@@ -36,9 +36,7 @@ class Moving:
 
     def at(self, time_s: float) -> tuple[World, PosedBody]:
         """All there is to see, and the person in it."""
-        motion_s = self.motion.still_since_s(time_s)
-        surfaces = [*self.room.surfaces, *_worn(self, motion_s)]
-        return replace(self.room, surfaces=surfaces), _person(self, motion_s)
+        return _staged(self, self.motion.still_since_s(time_s))
 
 
 # Whoever keeps still is posed and dressed once.
@@ -48,10 +46,10 @@ def _person(scene: Moving, motion_s: float) -> PosedBody:
 
 
 @lru_cache(maxsize=4)
-def _worn(scene: Moving, motion_s: float) -> list[Surface]:
-    """Clothes, hair and markers."""
+def _staged(scene: Moving, motion_s: float) -> tuple[World, PosedBody]:
     person, vertices = _person(scene, motion_s), marker_vertices(scene.appearance.shape)
-    return [*dress(scene.appearance, person, 0), *marker_balls(person, vertices, 0)]
+    worn = [*dress(scene.appearance, person, 0), *marker_balls(person, vertices, 0)]
+    return replace(scene.room, surfaces=[*scene.room.surfaces, *worn]), person
 
 
 def moving(seed: int) -> Moving:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from hicp_lib.rgbd.camera import transform
@@ -32,11 +34,7 @@ def robot_surfaces(icub: ICub, posture: Posture) -> list[Surface]:
 def _capsule(segment: Segment) -> g.Mesh:
     along = segment.end_m - segment.start_m
     length = float(np.linalg.norm(along))
-    angle = np.linspace(-np.pi / 2, np.pi / 2, 2 * _N_RINGS)
-    ends = np.where(angle > 0, length, 0.0)
-    profile = np.c_[segment.radius_m * np.cos(angle), ends + segment.radius_m * np.sin(angle)]
-    profile[[0, -1], 0] = 1e-4  # poles: triangles keep an area
-    upright = g.lathe(profile, np.zeros(3))
+    upright = _upright_capsule(round(length, 6), segment.radius_m)
     T_world_segment = np.eye(4)
     T_world_segment[:3, :3] = between(np.array([0.0, 0.0, 1.0]), along / length)
     T_world_segment[:3, 3] = segment.start_m
@@ -44,3 +42,13 @@ def _capsule(segment: Segment) -> g.Mesh:
     normals = upright.normals @ T_world_segment[:3, :3].T
     vertices = transform(T_world_segment, upright.vertices_m)
     return g.Mesh(vertices.astype(np.float32), upright.triangles, normals.astype(np.float32), upright.coords)
+
+
+@lru_cache(maxsize=32)
+def _upright_capsule(length_m: float, radius_m: float) -> g.Mesh:
+    """Along z from the origin; the robot's limbs keep their lengths."""
+    angle = np.linspace(-np.pi / 2, np.pi / 2, 2 * _N_RINGS)
+    ends = np.where(angle > 0, length_m, 0.0)
+    profile = np.c_[radius_m * np.cos(angle), ends + radius_m * np.sin(angle)]
+    profile[[0, -1], 0] = 1e-4  # poles: triangles keep an area
+    return g.lathe(profile, np.zeros(3))
