@@ -13,6 +13,7 @@ import json
 import os
 import platform
 import re
+import resource
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -138,6 +139,13 @@ def _cpu_model() -> str:
     except OSError:
         found = None
     return found.group(1).strip() if found else platform.processor() or "unknown"
+
+
+def peak_memory_mb() -> dict[str, int]:
+    """Most memory this process, and the largest of its finished children, ever held: "self", "child"."""
+    unit = 1 if sys.platform == "darwin" else 1024  # bytes there, kibibytes elsewhere
+    of = {"self": resource.RUSAGE_SELF, "child": resource.RUSAGE_CHILDREN}
+    return {name: round(resource.getrusage(who).ru_maxrss * unit / 1e6) for name, who in of.items()}
 
 
 def onnx_providers() -> list[str]:

@@ -30,7 +30,7 @@ import pyarrow.parquet as pq
 from IPython.display import HTML, display
 
 from hicp_lib.files import atomic_path, write_bytes, write_json
-from hicp_lib.provenance import ROOT, provenance, provenance_html
+from hicp_lib.provenance import ROOT, peak_memory_mb, provenance, provenance_html
 from hicp_lib.report import PROFILE_VARIABLE, RESULTS_VARIABLE
 
 if TYPE_CHECKING:
@@ -141,7 +141,7 @@ class Study:
     def finish(self) -> None:
         """Write the values and the provenance stamp, and show the stamp. The last line of every notebook."""
         stamp = {"notebook": self.name, "schema": SCHEMA_VERSION} | provenance(self.parameters)
-        stamp["wall_s"] = round(time.perf_counter() - self._start_s, 2)
+        stamp |= {"wall_s": round(time.perf_counter() - self._start_s, 2), "peak_memory_mb": peak_memory_mb()}
         write_json(self.folder / "values.json", self._values, indent=2)
         write_json(self.folder / "captions.json", self._captions, indent=2)
         write_json(self.folder / "provenance.json", stamp, indent=2)
