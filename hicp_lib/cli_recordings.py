@@ -89,12 +89,13 @@ def lift(folder: Path, detector: str, method: str, out: Path, workers: int | Non
     """Find people in a recording and where their keypoints are in the robot's base frame."""
     from hicp_lib.detectors.run import detect_images
     from hicp_lib.files import atomic_path
-    from hicp_lib.rgbd.keypoints3d import lift_recording, lifting_method
+    from hicp_lib.rgbd.keypoints3d import lift_recording, steps_of
     from hicp_lib.rgbd.recording import open_recording
 
-    recording, lifting = open_recording(folder), lifting_method(method)
+    recording = open_recording(folder)
+    steps_of(method)  # a wrong name is told before anybody is looked for
     found = detect_images(detector, dict(enumerate(recording.rgb_paths)), workers, **given(**chosen))
-    table = lift_recording(recording, [found[k].detections for k in range(len(recording))], lifting)
+    table = lift_recording(recording, [found[k].detections for k in range(len(recording))], method)
     with atomic_path(out) as temporary:
         table.to_parquet(temporary, index=False)
     say(f"{out}: {table['x_m'].notna().sum()} of {len(table)} keypoints in {len(recording)} frames lifted")

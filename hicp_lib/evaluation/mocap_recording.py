@@ -16,12 +16,12 @@ import pandas as pd
 from hicp_lib.detectors.base import Detections
 from hicp_lib.detectors.run import detect_images
 from hicp_lib.errors import InputError
-from hicp_lib.evaluation.lifting_ablation import lifting_ablation
+from hicp_lib.evaluation.lifting_ablation import N_STEPS, lifting_ablation
 from hicp_lib.evaluation.mocap_error import MIN_SCORES, POSITION, TABLE_JOINTS, marker_means, mocap_errors
 from hicp_lib.evaluation.sight import lines_of_sight
 from hicp_lib.evaluation.stability import position_array
 from hicp_lib.rgbd.clicking import CLICKS_FILE, read_clicks
-from hicp_lib.rgbd.keypoints3d import lift_recording
+from hicp_lib.rgbd.keypoints3d import lift_found
 from hicp_lib.rgbd.qualisys import MotionCapture, read_mocap
 from hicp_lib.rgbd.recording import MOCAP_FILE, Recording, open_recording, read_simulation, read_truth
 from hicp_lib.rgbd.registration import (
@@ -37,10 +37,10 @@ from hicp_lib.rgbd.registration import (
     same_clicks,
 )
 from hicp_lib.rgbd.reprojection import by_reprojection
+from hicp_lib.rgbd.robust_lifting import METHODS
 from hicp_lib.rgbd.synchronisation import ClockOffset, clock_offset
 
 SIMULATED_NOTE = "simulated recording (rendered person, simulated D435 and motion capture)"
-METHODS = ("robust", "paper")
 
 
 @dataclass(frozen=True)
@@ -89,16 +89,18 @@ def detect_frames(recording: Recording, detectors: Sequence[str]) -> dict[str, l
 
 
 def lift_frames(
-    recording: Recording, found: Mapping[str, Sequence[Detections]], methods: Sequence[str] = METHODS
-) -> pd.DataFrame:
-    """Everyone's keypoints in space: columns `detector, method` and those of `lift_recording`."""
-    tables = []
-    for detector, detections in found.items():
-        for method in methods:
-            table = lift_recording(recording, detections, method=method)
-            labels = {"detector": detector, "method": method}
-            tables.append(table.assign(**labels)[[*labels, *table.columns]])
-    return pd.concat(tables, ignore_index=True)
+    recording: Recording, found: Mapping[str, Sequence[Detections]]
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Everyone's keypoints in space, columns as of `hicp_lib.rgbd.keypoints3d.lift_found`.
+
+    Returns
+    -------
+    Those by each of `METHODS`; and the first detector's also by every step between them, where true
+    positions are known (for `ablation`)
+    """
+    n_steps = METHODS if read_truth(recording) is None else METHODS | N_STEPS
+    table = lift_found(recording, found, n_steps)
+    return table[table["method"].isin(METHODS)], table[table["detector"] == next(iter(found))]
 
 
 def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame) -> ClockOffset:
@@ -106,7 +108,7 @@ def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame)
 
     Parameters
     ----------
-    points : as from `lift_frames`; those of all detectors and methods are compared at once
+    points : the first of `lift_frames`; those of all detectors and methods are compared at once
 
     Raises
     ------
@@ -200,10 +202,10 @@ def errors_at_joints(
     return errors.merge(lines_of_sight(recording, reference), on=["frame", "keypoint"])
 
 
-def ablation(recording: Recording, found: Mapping[str, Sequence[Detections]]) -> pd.DataFrame | None:
-    """`lifting_ablation` of the first detector's keypoints; None where no true positions are known."""
+def ablation(recording: Recording, stepwise: pd.DataFrame) -> pd.DataFrame | None:
+    """`lifting_ablation` of the second of `lift_frames`; None where no true positions are known."""
     truth = read_truth(recording)
-    return None if truth is None else lifting_ablation(recording, next(iter(found.values())), truth)
+    return None if truth is None else lifting_ablation(stepwise, truth)
 
 
 def _from_clicks(

@@ -81,7 +81,9 @@ def ablation_text(table: pd.DataFrame | None) -> pd.DataFrame:
         return pd.DataFrame({"needs": ["true positions (truth.parquet)"], "here": "not in this recording"})
     changes = [f"{100 * change:+.0f} %" for change in table["p95_change"]]
     errors = {"median [cm]": 100 * table["median_m"], "95th percentile [cm]": 100 * table["p95_m"]}
-    return table[["group", "method", "n_lifted", "n_compared"]].assign(**errors, change=changes)
+    methods = table["method"].replace("robust", "+ hand shapes (robust)")
+    shown = table[["group", "method", "n_lifted", "n_compared"]].assign(method=methods)
+    return shown.assign(**errors, change=changes)
 
 
 def _cell(row: dict) -> str:

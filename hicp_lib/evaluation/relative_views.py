@@ -15,13 +15,12 @@ from hicp_lib.detectors.base import Detections
 from hicp_lib.detectors.run import detect_images
 from hicp_lib.errors import InputError
 from hicp_lib.rgbd.experiments import open_experiment
-from hicp_lib.rgbd.keypoints3d import lift_recording
+from hicp_lib.rgbd.keypoints3d import lift_found
 from hicp_lib.rgbd.recording import Recording, read_joints, read_simulation, read_truth
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
 from hicp_lib.robot.segments import Segment, body_segments
 
 SIMULATED_NOTE = "simulated recordings (rendered person, simulated D435)"
-METHODS = ("robust", "paper")
 
 Found = Mapping[tuple[str, str], Sequence[Detections]]
 
@@ -76,10 +75,8 @@ def detect_views(
     }
 
 
-def lift_views(
-    views: Mapping[str, Recording], found: Found, methods: Sequence[str] = METHODS
-) -> pd.DataFrame:
-    """Everything lifted by every method: columns `view, detector, method` and those of `lift_recording`.
+def lift_views(views: Mapping[str, Recording], found: Found) -> pd.DataFrame:
+    """Everything lifted by every method: columns `view` and those of `lift_found`.
 
     Raises
     ------
@@ -87,11 +84,9 @@ def lift_views(
         If no keypoint was found and lifted in any view, or a depth image cannot be read.
     """
     tables = []
-    for (view, detector), detections in found.items():
-        for method in methods:
-            table = lift_recording(views[view], detections, method=method)
-            labels = {"view": view, "detector": detector, "method": method}
-            tables.append(table.assign(**labels)[[*labels, *table.columns]])
+    for view, recording in views.items():
+        table = lift_found(recording, found_in(found, view))
+        tables.append(table.assign(view=view)[["view", *table.columns]])
     points = pd.concat(tables, ignore_index=True)
     if points["x_m"].isna().all():
         folders = ", ".join(str(recording.folder) for recording in views.values())
@@ -99,6 +94,11 @@ def lift_views(
             f"{folders}: nobody was found and lifted in any image; record people in view, with depth"
         )
     return points
+
+
+def found_in(found: Found, view: str) -> dict[str, Sequence[Detections]]:
+    """Detector -> detections of a view's frames."""
+    return {detector: detections for (of_view, detector), detections in found.items() if of_view == view}
 
 
 def true_positions(views: Mapping[str, Recording]) -> dict[str, pd.DataFrame] | None:

@@ -18,10 +18,11 @@ import pandas as pd
 
 from hicp_lib.detectors.base import Detections
 from hicp_lib.errors import InputError
+from hicp_lib.evaluation.relative_views import found_in
 from hicp_lib.evaluation.stability import MIN_SCORE, PARTS, counted, position_array
 from hicp_lib.keypoints import INDEX, N_KEYPOINTS
 from hicp_lib.rgbd.camera import transform
-from hicp_lib.rgbd.keypoints3d import lift_recording
+from hicp_lib.rgbd.keypoints3d import lift_found, steps_of
 from hicp_lib.rgbd.recording import EXACT_DEPTH_DIR, JOINTS_FILE, Recording, read_joints, read_truth
 from hicp_lib.robot.kinematics import HEAD_JOINTS, ICub, load_icub
 
@@ -32,6 +33,7 @@ JOINT_OFFSET, JOINT_NOISE = "joint readings, constant error", "joint readings, n
 TOGETHER = "2D detection, depth sensor and constant joint error"
 CAUSES = (VIEWPOINT, DEPTH, PIXEL, JOINT_OFFSET, JOINT_NOISE, TOGETHER)
 
+_TRUE = "true pixels"
 _CAMERA_POSITION = ["x_cam_m", "y_cam_m", "z_cam_m"]
 _SAME_POSE_M = 1e-3
 _COLUMNS = ["view", "detector", "part", "cause", "n", "spread_m", "p90_m", "bias_m"]
@@ -40,6 +42,7 @@ _COLUMNS = ["view", "detector", "part", "cause", "n", "spread_m", "p90_m", "bias
 def spread_causes(
     views: Mapping[str, Recording],
     found: Mapping[tuple[str, str], Sequence[Detections]],
+    points: pd.DataFrame,
     method: str = "robust",
     min_score: float = MIN_SCORE,
     joint_error_rad: float = JOINT_ERROR_RAD,
@@ -53,6 +56,7 @@ def spread_causes(
     Parameters
     ----------
     found : (view, detector) -> detections of each frame; the best person counts
+    points : the same lifted by `method`, as `hicp_lib.evaluation.relative_views.lift_views` does
     joint_error_rad : standard deviation of the error of every joint of torso and neck
 
     Returns
@@ -73,15 +77,18 @@ def spread_causes(
             continue
         truth = read_truth(recording)
         true = true_detections(truth, len(recording))
-        known = {VIEWPOINT: _lifted(_exact(recording), true, method), DEPTH: _lifted(recording, true, method)}
+        exact = _lifted(_exact(recording), {_TRUE: true} | found_in(found, view), method)
+        known = {VIEWPOINT: counted(exact[_TRUE], 0.0)}
+        known[DEPTH] = counted(_lifted(recording, {_TRUE: true}, method)[_TRUE], 0.0)
+        of_view = points[(points["view"] == view) & (points["method"] == method)]
+        measured = dict(list(of_view.groupby("detector")))
         poses = wrong_poses(recording, joint_error_rad, N_DRAWS, seed)
-        for (of_view, detector), detections in found.items():
-            if of_view == view:
-                lifted = known | {
-                    PIXEL: _lifted(_exact(recording), detections, method, min_score),
-                    TOGETHER: _lifted(recording, detections, method, min_score),
-                }
-                rows += [(view, detector, *row) for row in _part_rows(recording, truth, lifted, poses)]
+        for detector in found_in(found, view):
+            lifted = known | {
+                PIXEL: counted(exact.get(detector, points[:0]), min_score),
+                TOGETHER: counted(measured.get(detector, points[:0]), min_score),
+            }
+            rows += [(view, detector, *row) for row in _part_rows(recording, truth, lifted, poses)]
     return pd.DataFrame(rows, columns=_COLUMNS)
 
 
@@ -148,9 +155,10 @@ def _exact(recording: Recording) -> Recording:
 
 
 def _lifted(
-    recording: Recording, detections: Sequence[Detections], method: str, min_score: float = 0.0
-) -> pd.DataFrame:
-    return counted(lift_recording(recording, detections, method=method), min_score)
+    recording: Recording, found: Mapping[str, Sequence[Detections]], method: str
+) -> dict[str, pd.DataFrame]:
+    """Table per detector."""
+    return dict(list(lift_found(recording, found, {method: steps_of(method)}).groupby("detector")))
 
 
 def _part_rows(

@@ -12,6 +12,7 @@ hands of this model too, in other sizes; hands of real people differ more from i
 from __future__ import annotations
 
 import zipfile
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -26,6 +27,9 @@ PALM = np.array([0, 5, 9, 13, 17])
 """Keypoints of a hand that do not move against each other: its root and the knuckles."""
 FINGERS = (np.arange(1, 5), *(np.arange(knuckle + 1, knuckle + 4) for knuckle in PALM[1:]))
 """The keypoints of each finger that do, thumb first."""
+_FINGER_OF = np.full(21, -1)
+for _number, _finger in enumerate(FINGERS):
+    _FINGER_OF[_finger] = _number
 
 _LEAST_OF_PALM = 4  # fewer of it found do not tell how it is turned
 _SIZES, _SIZE_SIGMA = (0.88, 0.96, 1.04, 1.12), 0.1
@@ -87,37 +91,84 @@ def fit_hand(
     costs, grid_m, rays : as of `favour_hand_shapes`, for k keypoints of one hand
     which : array, shape (k,), their numbers in the hand, increasing
     """
-    is_palm = np.isin(which, PALM)
-    seen_m = np.median(grid_m[costs[is_palm].argmin(axis=1)])
-    places_m = (rays[:, :2] * seen_m).astype(np.float32)
-    costs = np.minimum(costs, _MOST).astype(np.float32)
-    turns, z_m, shift_m, total = _place_palm(costs[is_palm], grid_m, places_m[is_palm], seen_m,
-                                             which[is_palm], is_right)  # fmt: skip
-    mean_m, square_m2 = np.empty((2, len(total), len(which)))
-    palm = load_hand_shapes()[0, which[is_palm]]
-    mean_m[:, is_palm] = turns[:, 2] @ palm.T + z_m[:, None]
-    square_m2[:, is_palm] = mean_m[:, is_palm] ** 2
-    for finger in FINGERS:
-        mine = np.isin(which, finger)
-        if mine.any():
-            shapes = load_hand_shapes()[:, which[mine]]
-            depth_m, cost = _bend(shapes, turns, z_m, shift_m, costs[mine], grid_m, places_m[mine], seen_m)
-            weights = np.exp((cost.min(axis=1, keepdims=True) - cost) / _LIKELY)
-            weights /= weights.sum(axis=1, keepdims=True)
-            mean_m[:, mine] = np.einsum("ps,psk->pk", weights, depth_m)
-            square_m2[:, mine] = np.einsum("ps,psk->pk", weights, depth_m**2)
-            total = total + cost.min(axis=1)
+    is_palm = _FINGER_OF[which] < 0
+    middle_m = np.median(grid_m[costs[is_palm].argmin(axis=1)])
+    places_m, costs = rays[:, :2].T * middle_m, np.minimum(costs, _MOST)
+    known = middle_m, places_m, grid_m - middle_m, costs
+    seen = _Seen(which, *(array.astype(np.float32) for array in known))
+    palms = _place_palm(seen.take(is_palm), is_right)
+    total, mean_m, square_m2 = palms.cost, *np.empty((2, len(which), len(palms.cost)))
+    mean_m[is_palm], square_m2[is_palm] = palms.behind_m, palms.behind_m**2
+    if not is_palm.all():
+        cost, mean_m[~is_palm], square_m2[~is_palm] = _bend(seen.take(~is_palm), palms)
+        total = total + cost
     weights = np.exp((total.min() - total) / _LIKELY)
     weights /= weights.sum()
-    depth_m = weights @ mean_m
-    return depth_m, np.sqrt(np.maximum(weights @ square_m2 - depth_m**2, 0))
+    behind_m = mean_m @ weights
+    return middle_m + behind_m, np.sqrt(np.maximum(square_m2 @ weights - behind_m**2, 0))
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What is known of k keypoints of a hand, float32.
+
+    Attributes
+    ----------
+    which : array, shape (k,), their numbers in the hand
+    middle_m : how far away the palm's middle seems to be
+    places_m : array, shape (2, k), where they are seen, measured at that depth
+    grid_m, costs : arrays, shapes (g,) and (k, g), depths behind it and what they cost
+    """
+
+    which: np.ndarray
+    middle_m: np.ndarray
+    places_m: np.ndarray
+    grid_m: np.ndarray
+    costs: np.ndarray
+
+    def take(self, some: np.ndarray) -> _Seen:
+        return replace(self, which=self.which[some], places_m=self.places_m[:, some], costs=self.costs[some])
+
+    def apart_m(self, points_m: np.ndarray) -> np.ndarray:
+        """How far from where they are seen points (3, k, ...) about the middle appear, (2, k, ...)."""
+        scale = 1 / (1 + points_m[2] / self.middle_m)
+        return _beside(self.places_m, points_m) - points_m[:2] * scale
+
+    def look_up(self, behind_m: np.ndarray) -> np.ndarray:
+        """What depths (k, ...) behind the middle cost."""
+        per_m = 1 / (self.grid_m[1] - self.grid_m[0])
+        index = np.rint((behind_m - self.grid_m[0]) * per_m)
+        index = np.maximum(np.minimum(index, len(self.grid_m) - 1), 0).astype(np.intp)
+        index += _beside(np.arange(len(self.costs)) * len(self.grid_m), behind_m)
+        return self.costs.take(index)
+
+
+@dataclass(frozen=True)
+class _Palms:
+    """Palms that fit.
+
+    Attributes
+    ----------
+    turns : array, shape (p, 3, 3), times the size
+    z_m : array, shape (p,), how far their middles lie behind where they seem to be
+    shift_m : array, shape (2, p), across the line of sight
+    behind_m : array, shape (k, p), how far their k keypoints found lie behind where the middle seems to be
+    cost : array, shape (p,)
+    """
+
+    turns: np.ndarray
+    z_m: np.ndarray
+    shift_m: np.ndarray
+    behind_m: np.ndarray
+    cost: np.ndarray
 
 
 @cache
-def _turns(is_right: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Turns of the palm times its size, (n, 3, 3), and what the size costs, (n,); left hands mirrored.
+def _turns(is_right: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Turns of the palm times its size, what the size costs, and where its keypoints are then.
 
-    Even over all turns: super-Fibonacci spirals (Alexa, "Super-Fibonacci Spirals", CVPR 2022).
+    Shapes (n, 3, 3), (n,) and (3, 5, n); left hands are mirrored. Even over all turns:
+    super-Fibonacci spirals (Alexa, "Super-Fibonacci Spirals", CVPR 2022).
     """
     share = (np.arange(_N_TURNS) + 0.5) / _N_TURNS
     a = 2 * np.pi * _N_TURNS * share / np.sqrt(2)
@@ -126,43 +177,52 @@ def _turns(is_right: bool) -> tuple[np.ndarray, np.ndarray]:
     quaternions = np.column_stack([near * np.sin(a), near * np.cos(a), far * np.sin(b), far * np.cos(b)])
     turns = Rotation.from_quat(quaternions).as_matrix() * np.array([1 if is_right else -1, 1, 1])[:, None]
     sizes = np.repeat(_SIZES, _N_TURNS)
-    scaled = sizes[:, None, None] * np.tile(turns, (len(_SIZES), 1, 1))
-    return scaled.astype(np.float32), 0.5 * ((sizes - 1) / _SIZE_SIGMA) ** 2
+    scaled = (sizes[:, None, None] * np.tile(turns, (len(_SIZES), 1, 1))).astype(np.float32)
+    palms_m = _turned(load_hand_shapes()[0, PALM], scaled)
+    return scaled, (0.5 * ((sizes - 1) / _SIZE_SIGMA) ** 2).astype(np.float32), palms_m
 
 
-def _place_palm(costs, grid_m, places_m, seen_m, which, is_right):
-    """Palms that fit: turns (p, 3, 3), depths of the middle (p,), shifts across (p, 2), costs (p,)."""
-    turns, total = _turns(is_right)
-    points_m = load_hand_shapes()[0, which] @ np.swapaxes(turns, 1, 2)
-    apart_m = places_m - _across(points_m, seen_m)
+def _place_palm(seen: _Seen, is_right: bool) -> _Palms:
+    turns, total, points_m = _turns(is_right)
+    points_m = points_m[:, np.searchsorted(PALM, seen.which)]
+    apart_m = seen.apart_m(points_m)
     shift_m = apart_m.mean(axis=1)
-    misfit = ((apart_m - shift_m[:, None]) ** 2).sum(axis=2) / _PALM_SIGMA_M**2
-    total = total + np.minimum(misfit, _MOST).sum(axis=1)
+    misfit = ((apart_m - shift_m[:, None]) ** 2).sum(axis=0) / _PALM_SIGMA_M**2
+    total = total + np.minimum(misfit, _MOST).sum(axis=0)
     fitting = np.argpartition(total, _N_FITTING)[:_N_FITTING]
-    z_m = seen_m + np.arange(-_REACH_M, _REACH_M + _STEP_M / 2, _STEP_M)
-    depth_m = points_m[fitting, None, :, 2] + z_m[:, None]
-    total = total[fitting, None] + _look_up(costs, grid_m, depth_m)
+    z_m = np.arange(-_REACH_M, _REACH_M + _STEP_M / 2, _STEP_M, dtype=np.float32)
+    total = total[fitting] + seen.look_up(points_m[2][:, None, fitting] + z_m[:, None]).sum(axis=0)
     best = np.argpartition(total, _N_PLACES, axis=None)[:_N_PLACES]
-    palm, place = np.unravel_index(best, total.shape)
-    return turns[fitting[palm]], z_m[place], shift_m[fitting[palm]], total.ravel()[best]
+    place, palm = np.unravel_index(best, total.shape)
+    palm, z_m = fitting[palm], z_m[place]
+    return _Palms(turns[palm], z_m, shift_m[:, palm], points_m[2][:, palm] + z_m, total.ravel()[best])
 
 
-def _bend(shapes, turns, z_m, shift_m, costs, grid_m, places_m, seen_m):
-    """Depths (p, s, k) of a finger in s shapes on each of p palms, and what each shape costs, (p, s)."""
-    points_m = shapes @ np.swapaxes(turns, 1, 2)[:, None]
-    apart_m = places_m - _across(points_m, seen_m) - shift_m[:, None, None]
-    misfit = (apart_m**2).sum(axis=3) / _FINGER_SIGMA_M**2
-    depth_m = points_m[..., 2] + z_m[:, None, None].astype(np.float32)
-    return depth_m, np.minimum(misfit, _MOST).sum(axis=2) + _look_up(costs, grid_m, depth_m)
+def _bend(seen: _Seen, palms: _Palms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fingers on each palm: what they cost in their best shapes, (p,), and how deep they lie, (k, p).
+
+    That is behind where the middle seems to be, in the mean over shapes by how well they fit; and the mean
+    of its square.
+    """
+    shapes_m = load_hand_shapes()[:, seen.which].swapaxes(0, 1)
+    points_m = _turned(shapes_m.reshape(-1, 3), palms.turns).reshape(3, *shapes_m.shape[:2], -1)
+    misfit = ((seen.apart_m(points_m) - palms.shift_m[:, None, None]) ** 2).sum(axis=0) / _FINGER_SIGMA_M**2
+    behind_m = points_m[2] + palms.z_m
+    finger = _FINGER_OF[seen.which]
+    first = np.flatnonzero(np.diff(finger, prepend=-1))
+    cost = np.add.reduceat(np.minimum(misfit, _MOST) + seen.look_up(behind_m), first, axis=0)
+    least = cost.min(axis=1, keepdims=True)
+    weights = np.exp((least - cost) / _LIKELY)
+    weights /= weights.sum(axis=1, keepdims=True)
+    weighted_m = weights.repeat(np.diff(first, append=len(finger)), axis=0) * behind_m
+    return least.sum(axis=(0, 1)), weighted_m.sum(axis=1), (weighted_m * behind_m).sum(axis=1)
 
 
-def _across(points_m: np.ndarray, seen_m: float) -> np.ndarray:
-    """Where points about the palm's middle are seen, (..., 2), measured at the palm's depth."""
-    return points_m[..., :2] / (1 + points_m[..., 2:] / np.float32(seen_m))
+def _turned(points_m: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Points (k, 3) under every turn (p, 3, 3), shape (3, k, p)."""
+    return points_m @ turns.transpose(1, 2, 0)
 
 
-def _look_up(costs: np.ndarray, grid_m: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
-    """Costs of k keypoints at depths (..., k) of the grid, summed over them."""
-    index = np.rint((depth_m - grid_m[0]) / (grid_m[1] - grid_m[0])).astype(np.intp)
-    index = np.clip(index, 0, len(grid_m) - 1) + np.arange(len(costs)) * len(grid_m)
-    return costs.ravel().take(index).sum(axis=-1)
+def _beside(values: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Values of keypoints with axes appended until they go with arrays of points."""
+    return values[(..., *[None] * (points.ndim - values.ndim))]

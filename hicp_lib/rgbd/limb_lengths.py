@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from operator import itemgetter
+
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from hicp_lib.keypoints import LEFT_HAND
 from hicp_lib.rgbd.body_measures import LEVELS, BodyMeasures, hang_together
 
 # A limb longer or shorter than people's by a share of its length and some more costs 1, and so on with the
 # square up to a most. Limbs of the body seen too short are often the detector's fault; hands are rigid.
-_BODY = {"share": 0.05, "more_m": 0.010, "most_long": 40.0, "most_short": 4.0}
-_HAND = {"share": 0.03, "more_m": 0.003, "most_long": 40.0, "most_short": 20.0}
+_MOST_LONG = 40.0
+_BODY = {"share": 0.05, "more_m": 0.010, "most_short": 4.0}
+_HAND = {"share": 0.03, "more_m": 0.003, "most_short": 20.0}
 
 
 def choose_along_limbs(
@@ -20,12 +24,12 @@ def choose_along_limbs(
 
     The sum over keypoints and limbs is minimised exactly along the tree of limbs, from their ends to the
     root and back (dynamic programming, as in Felzenszwalb and Huttenlocher, "Pictorial Structures for
-    Object Recognition", IJCV 2005, there in the image plane).
+    Object Recognition", IJCV 2005, there in the image plane), limbs equally far from the root at once.
 
     Parameters
     ----------
     costs : array, shape (m, g), of each keypoint at each depth
-    grid_m : array, shape (g,)
+    grid_m : array, shape (g,), evenly spaced
     rays : array, shape (m, 3), lines of sight, z = 1
     found : array, shape (m,), the keypoints, Halpe order, increasing
 
@@ -33,30 +37,87 @@ def choose_along_limbs(
     -------
     array, shape (m,): index into `grid_m`
     """
-    above = hang_together(found)
-    outwards = np.argsort(LEVELS[found], kind="stable")
-    costs = costs.copy()
-    answer = np.zeros((len(found), len(grid_m)), int)
-    for k in outwards[::-1]:
-        if above[k] >= 0:
-            pair = above[k], k
-            total = _length_costs(grid_m, rays[list(pair)], found[list(pair)], measures) + costs[k]
-            answer[k] = total.argmin(axis=1)
-            costs[above[k]] += total.min(axis=1)
-    chosen = np.zeros(len(found), int)
-    for k in outwards:
-        chosen[k] = answer[k, chosen[above[k]]] if above[k] >= 0 else costs[k].argmin()
+    above, g = hang_together(found), len(grid_m)
+    limbs = _limbs_outwards(above, grid_m, rays, found, measures)
+    widest = max((length_costs.shape[2] for _, length_costs in limbs), default=1)
+    padded = np.pad(np.float32(costs), [(0, 0), (widest // 2, widest // 2)], constant_values=np.inf)
+    costs = padded[:, widest // 2 :][:, :g]  # a view: what is added here is seen by those further in
+    answer = np.zeros((len(found), g), int)
+    for ends, length_costs in limbs[::-1]:
+        width = length_costs.shape[2]
+        within = padded[:, (widest - width) // 2 :][:, : g + width - 1]
+        total = sliding_window_view(within, width, axis=1)[ends] + length_costs
+        near, far = total.argmin(axis=2), costs[ends].argmin(axis=1)[:, None]
+        near_cost, far_cost = total.min(axis=2), costs[ends].min(axis=1)[:, None] + _MOST_LONG
+        answer[ends] = np.where(near_cost <= far_cost, near + np.arange(g) - width // 2, far)
+        np.add.at(costs, above[ends], np.minimum(near_cost, far_cost))
+    chosen = costs.argmin(axis=1)  # which counts for those that hang on none
+    for ends, _ in limbs:
+        chosen[ends] = answer[ends, chosen[above[ends]]]
     return chosen
 
 
-def _length_costs(grid_m, rays, pair, measures: BodyMeasures) -> np.ndarray:
-    """What the distance between two keypoints costs for each depth of the first and the second, (g, g)."""
-    (aa, ab), (_, bb) = rays @ rays.T
-    squared = aa * grid_m[:, None] ** 2 + bb * grid_m**2 - 2 * ab * grid_m[:, None] * grid_m
-    length_m = np.sqrt(np.maximum(squared, 0))
-    least_m, most_m = measures.closest_m[tuple(pair)], measures.farthest_m[tuple(pair)]
-    limits = _HAND if pair[1] >= LEFT_HAND[0] else _BODY
-    sigma_m = limits["share"] * most_m + limits["more_m"]
-    too_long = np.maximum(length_m - most_m, 0) / sigma_m
-    too_short = np.maximum(least_m - length_m, 0) / sigma_m
-    return np.minimum(too_long**2, limits["most_long"]) + np.minimum(too_short**2, limits["most_short"])
+def _limbs_outwards(
+    above: np.ndarray, grid_m: np.ndarray, rays: np.ndarray, found: np.ndarray, measures: BodyMeasures
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Limbs that are equally far from the root together, from there outwards.
+
+    Returns
+    -------
+    The ends of n limbs, (n,), and what their lengths cost, (n, g, 2 r + 1): for each depth of the beginning,
+    at each of r steps nearer to r steps further of the end. With more steps all of them are too long by the
+    most that costs. Limbs of hands are short and need few steps, so they are apart from those of the body
+    """
+    step_m = grid_m[1] - grid_m[0]
+    limbs = []
+    for of_hand in (False, True):
+        ends = np.flatnonzero((above >= 0) & ((found >= LEFT_HAND[0]) == of_hand))
+        if len(ends) == 0:
+            continue
+        pairs = np.stack([above[ends], ends])
+        limits = _Limits(found[pairs], measures)
+        reach = min(int(limits.farthest_m.max() / step_m) + 1, len(grid_m) - 1)
+        ends_m = grid_m[:, None] + step_m * np.arange(-reach, reach + 1)
+        length_costs = _length_costs(grid_m[:, None], ends_m, rays[pairs], limits)
+        levels = LEVELS[found[ends]]
+        for level in np.unique(levels):
+            limbs.append((level, ends[levels == level], length_costs[levels == level]))
+    return [(ends, length_costs) for _, ends, length_costs in sorted(limbs, key=itemgetter(0))]
+
+
+class _Limits:
+    """Of n limbs, arrays (n, 1, 1): least and most length, what more or less than that costs 1, and how many
+    times that counts when it is too short."""
+
+    def __init__(self, pairs: np.ndarray, measures: BodyMeasures):
+        is_hand = pairs[1] >= LEFT_HAND[0]
+        share, more_m, most_short = (np.where(is_hand, _HAND[name], _BODY[name]) for name in _BODY)
+        most_m = measures.farthest_m[*pairs]
+        limits = measures.closest_m[*pairs], most_m, share * most_m + more_m, np.sqrt(most_short)
+        self.least_m, self.most_m, self.sigma_m, self.most_short = np.float32(limits)[..., None, None]
+
+    @property
+    def farthest_m(self) -> np.ndarray:
+        """Where a limb is too long by the most that costs."""
+        return self.most_m + np.sqrt(_MOST_LONG) * self.sigma_m
+
+
+def _length_costs(first_m: np.ndarray, second_m: np.ndarray, rays: np.ndarray, limits: _Limits) -> np.ndarray:
+    """What the distances between n pairs of keypoints cost, (n, g, h), float32.
+
+    The depths of the first are (g, 1), of the second (g, h); `rays` (2, n, 3) are those of both.
+    """
+    first_m, second_m, rays = (array.astype(np.float32) for array in (first_m, second_m, rays))
+    aa, bb, ab = ((a * b).sum(axis=1)[:, None, None] for a, b in (rays[[0, 0]], rays[[1, 1]], rays))
+    values = bb * second_m  # from here on in place, as memory is what takes the time
+    values -= 2 * ab * first_m
+    values *= second_m
+    values += aa * first_m**2
+    length_m = np.sqrt(np.maximum(values, 0, out=values), out=values)
+    nearest_m = np.maximum(length_m, limits.least_m)
+    values -= np.minimum(nearest_m, limits.most_m, out=nearest_m)
+    values /= limits.sigma_m
+    np.maximum(values, -limits.most_short, out=values)
+    np.minimum(values, np.float32(np.sqrt(_MOST_LONG)), out=values)
+    values *= values
+    return values

@@ -17,7 +17,6 @@ _SAMPLES = 7  # per side of the neighbourhood
 _STEEP_M = 0.03  # a larger difference between the pixels on both sides is a depth step
 _ON_STEP = 1.0  # cost of a surface there
 _HIDDEN, _IN_FRONT = 6.0, 20.0  # cost of lying behind the nearest surface, and in front of it
-_FAR_APART = 1e3
 
 
 @dataclass(frozen=True)
@@ -80,16 +79,24 @@ def look_around(
 
 
 def costs_of_depths(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
-    """What it costs each keypoint to be at each depth of a grid, (m, g): the least over what explains it.
+    """What each depth of an even grid costs each keypoint, (m, g): the least over what explains it.
 
     It is on the line of sight of a surface sampled, or hidden behind one; in front of all of them it
     would be seen.
     """
-    apart = (grid_m - candidates.depth_m[:, :, None]) / candidates.sigma_m[:, None, None]
-    apart = np.fmin(apart * apart, _FAR_APART)  # also where there is no candidate
-    seen = (apart + candidates.cost[:, :, None]).min(axis=1)
     nearest_m = np.nanmin(candidates.depth_m, axis=1)
-    return np.minimum(seen, np.where(grid_m > nearest_m[:, None], _HIDDEN, _IN_FRONT))
+    beyond_m = np.concatenate([[np.inf], grid_m, [np.inf]])  # what is not on the grid ends up at its ends
+    costs = np.where(beyond_m > nearest_m[:, None], _HIDDEN, _IN_FRONT)
+    keypoint, sample = np.nonzero(np.isfinite(candidates.depth_m))
+    depth_m, cost = candidates.depth_m[keypoint, sample], candidates.cost[keypoint, sample]
+    # A surface explains only depths near it for less than `_IN_FRONT`.
+    step_m = grid_m[1] - grid_m[0]
+    reach = int(np.sqrt(_IN_FRONT) * candidates.sigma_m.max(initial=0) / step_m + 0.5)
+    nearest = np.rint((depth_m - grid_m[0]) / step_m).astype(int) + 1
+    place = np.clip(nearest + np.arange(-reach, reach + 1)[:, None], 0, len(beyond_m) - 1)
+    apart = (beyond_m[place] - depth_m) / candidates.sigma_m[keypoint]
+    np.minimum.at(costs.reshape(-1), keypoint * len(beyond_m) + place, apart * apart + cost)
+    return costs[:, 1:-1]
 
 
 def settle(candidates: Candidates, chosen_m: np.ndarray, grid_step_m: float) -> np.ndarray:

@@ -27,95 +27,99 @@ study.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from hicp_lib.keypoints import BODY, FACE, N_KEYPOINTS
-from hicp_lib.rgbd.body_measures import BodyMeasures, load_measures
+from hicp_lib.rgbd.body_measures import load_measures
 from hicp_lib.rgbd.camera import Intrinsics
 from hicp_lib.rgbd.hand_shapes import favour_hand_shapes
 from hicp_lib.rgbd.lifting import LIFTED, MIN_DEPTH_M, NO_DEPTH, Lifted, lift
 from hicp_lib.rgbd.limb_lengths import choose_along_limbs
-from hicp_lib.rgbd.near_surfaces import costs_of_depths, look_around, settle
+from hicp_lib.rgbd.near_surfaces import Candidates, costs_of_depths, look_around, settle
 
 STEPS = ("below_surface", "near_surfaces", "limb_lengths", "hand_shapes")
 """What goes beyond the paper; limb lengths choose among near surfaces, hand shapes are chosen with them."""
 
+METHODS = {"robust": len(STEPS), "paper": 0}
+"""Ways of lifting, by how many of `STEPS` they take."""
+
 _REACH_M, _GRID_M = 0.90, 0.02  # grid of depths around the person's middle
+_IN_BODY, _IN_FACE = (np.isin(np.arange(N_KEYPOINTS), part) for part in (BODY, FACE))
 
 
-def lift_robust(
-    keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intrinsics, steps: Collection[str] = STEPS
-) -> Lifted:
+def lift_robust(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intrinsics) -> Lifted:
     """Lift the keypoints of everyone in an image; this module's head says how.
 
-    Parameters and errors as in `lifting.lift`; `steps`, some of `STEPS`, is for finding out what each
-    brings. With near surfaces, keypoints are lifted when there is depth within 30 mm (body and feet) or
-    10 mm (face and hands) of them.
+    Parameters and errors as in `lifting.lift`. Keypoints are lifted when there is depth within 30 mm (body
+    and feet) or 10 mm (face and hands) of them.
     """
-    if unknown := set(steps) - set(STEPS):
-        raise ValueError(f"no step {', '.join(sorted(unknown))}; there are {', '.join(STEPS)}")
-    for step, needed in (("limb_lengths", "near_surfaces"), ("hand_shapes", "limb_lengths")):
-        if step in steps and needed not in steps:
-            raise ValueError(f"{step} needs {needed}")
-    measures = load_measures()
-    below_m = measures.below_skin_m if "below_surface" in steps else np.zeros(N_KEYPOINTS)
+    return lift_in_steps(keypoints_px, depth_m, intrinsics, [len(STEPS)])[0]
+
+
+def lift_in_steps(
+    keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intrinsics, n_steps: Sequence[int]
+) -> list[Lifted]:
+    """Lift the keypoints of everyone in an image with the first of `STEPS`: what each brings.
+
+    Parameters and errors as in `lifting.lift`; `n_steps`, how many of the steps, for each result: 0 for the
+    paper's method. What results have in common is worked out once.
+    """
     depth_m = np.asarray(depth_m, np.result_type(depth_m, np.float32))
     paper = lift(keypoints_px, depth_m, intrinsics)
-    if "near_surfaces" not in steps:
-        away_m = np.linalg.norm(paper.points_m, axis=2)
-        return Lifted(paper.points_m * (1 + below_m / away_m)[..., None], paper.reason)
-    points_m, reason = paper.points_m.copy(), paper.reason.copy()
-    limbs = measures if "limb_lengths" in steps else None
-    for person, pixels_px in enumerate(np.asarray(keypoints_px, float)):
-        found = np.flatnonzero(np.isin(reason[person], (LIFTED, NO_DEPTH)))
+    below_m = load_measures().below_skin_m
+    away_m = np.linalg.norm(paper.points_m, axis=2)
+    lifted = {0: paper, 1: Lifted(paper.points_m * (1 + below_m / away_m)[..., None], paper.reason)}
+    beyond = sorted(set(n_steps) - lifted.keys())
+    points_m = np.full((len(beyond), *paper.points_m.shape), np.nan)
+    for person, pixels_px in enumerate(np.asarray(keypoints_px, float) if beyond else ()):
+        found = np.flatnonzero(np.isin(paper.reason[person], (LIFTED, NO_DEPTH)))
         first_m = paper.points_m[person, found, 2]
         if np.isfinite(first_m).any():
-            image = pixels_px[found], depth_m, intrinsics
-            points_m[person, found] = _lift_person(
-                found, first_m, *image, below_m, limbs, "hand_shapes" in steps
-            )
-    reason[np.isfinite(points_m[..., 2])] = LIFTED
-    reason[(reason == LIFTED) & np.isnan(points_m[..., 2])] = NO_DEPTH
-    return Lifted(points_m, reason)
+            grid_m, candidates = _depths(found, first_m, pixels_px[found], depth_m, intrinsics)
+            seen = np.flatnonzero(np.isfinite(candidates.depth_m).any(axis=1))
+            chosen_m = _choose(found[seen], grid_m, candidates.take(seen), beyond)
+            points_m[:, person, found[seen]] = list(chosen_m)
+    for n, points in zip(beyond, points_m, strict=True):
+        reason = np.where(paper.reason == LIFTED, NO_DEPTH, paper.reason)
+        lifted[n] = Lifted(points, np.where(np.isfinite(points[..., 2]), LIFTED, reason).astype(np.int8))
+    return [lifted[n] for n in n_steps]
 
 
-METHODS = {"paper": lift, "robust": lift_robust}
+def _depths(
+    found: np.ndarray, first_m: np.ndarray, pixels_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intrinsics
+) -> tuple[np.ndarray, Candidates]:
+    """Depths in question for one person (g,), and what is seen around the keypoints found (m,).
 
-
-def _lift_person(
-    found: np.ndarray,
-    first_m: np.ndarray,
-    pixels_px: np.ndarray,
-    depth_m: np.ndarray,
-    intrinsics: Intrinsics,
-    below_m: np.ndarray,
-    limbs: BodyMeasures | None,
-    with_hands: bool,
-) -> np.ndarray:
-    """Found keypoints of one person, (m, 3); `first_m` (m,) are the paper's depths, `below_m` of all 136."""
+    `first_m` (m,) are the paper's depths, `pixels_px` has the shape (m, 2).
+    """
     middle_m = _middle_m(found, first_m)
     nearest_m, farthest_m = max(middle_m - _REACH_M, MIN_DEPTH_M), middle_m + _REACH_M
     # What is seen may be the wall: the neighbourhood is never smaller than at the person's middle.
     near_m = np.clip(np.fmin(first_m, middle_m), nearest_m, None)
-    candidates = look_around(found, pixels_px, near_m, depth_m, intrinsics, below_m)
-    seen = np.flatnonzero(np.isfinite(candidates.depth_m).any(axis=1))
-    candidates = candidates.take(seen)
-    grid_m = np.arange(nearest_m, farthest_m, _GRID_M)
-    costs = costs_of_depths(candidates, grid_m)
-    if with_hands:
-        costs = favour_hand_shapes(costs, grid_m, candidates.rays, found[seen])
-    chosen = costs.argmin(axis=1)
-    if limbs is not None:
-        on = np.flatnonzero(~np.isin(found[seen], FACE))
-        chosen[on] = choose_along_limbs(costs[on], grid_m, candidates.rays[on], found[seen[on]], limbs)
-    points_m = np.full((len(found), 3), np.nan)
-    points_m[seen] = candidates.rays * settle(candidates, grid_m[chosen], _GRID_M)[:, None]
-    return points_m
+    candidates = look_around(found, pixels_px, near_m, depth_m, intrinsics, load_measures().below_skin_m)
+    return np.arange(nearest_m, farthest_m, _GRID_M), candidates
+
+
+def _choose(
+    found: np.ndarray, grid_m: np.ndarray, candidates: Candidates, n_steps: Sequence[int]
+) -> Iterator[np.ndarray]:
+    """Points (m, 3) of one person's keypoints after two steps or more, for each number of them."""
+    of_surfaces = costs_of_depths(candidates, grid_m)
+    with_limbs = np.flatnonzero(~_IN_FACE[found])
+    for n in n_steps:
+        costs, steps = of_surfaces, STEPS[:n]
+        if "hand_shapes" in steps:
+            costs = favour_hand_shapes(costs, grid_m, candidates.rays, found)
+        chosen = costs.argmin(axis=1)
+        if "limb_lengths" in steps:
+            on = costs[with_limbs], grid_m, candidates.rays[with_limbs], found[with_limbs]
+            chosen[with_limbs] = choose_along_limbs(*on, load_measures())
+        yield candidates.rays * settle(candidates, grid_m[chosen], _GRID_M)[:, None]
 
 
 def _middle_m(found: np.ndarray, first_m: np.ndarray) -> float:
     """About how far away the person is: the median depth of the body, of everything without one."""
-    body_m = first_m[np.isin(found, BODY)]
+    body_m = first_m[_IN_BODY[found]]
     return float(np.nanmedian(body_m if np.isfinite(body_m).any() else first_m))

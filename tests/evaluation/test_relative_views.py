@@ -64,7 +64,7 @@ def test_everything_found_is_lifted_by_every_method(lab, monkeypatch):
     )  # fmt: skip
     found = relative_views.detect_views(views, ["mediapipe"])
     assert list(found) == [("still", "mediapipe")] and len(found["still", "mediapipe"]) == 2
-    points = relative_views.lift_views(views, found, ["paper", "robust"])
+    points = relative_views.lift_views(views, found)
     assert list(points.columns[:3]) == ["view", "detector", "method"]
     assert points.groupby("method")["frame"].apply(list).to_dict() == {"paper": [0, 1], "robust": [0, 1]}
     at = points[points["method"] == "paper"][["x_m", "y_m", "z_m"]].to_numpy()

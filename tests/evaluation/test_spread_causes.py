@@ -7,6 +7,7 @@ import pytest
 from hicp_lib.detectors.base import Detections
 from hicp_lib.errors import InputError
 from hicp_lib.evaluation import spread_causes as module
+from hicp_lib.evaluation.relative_views import lift_views
 from hicp_lib.evaluation.spread_causes import (
     CAUSES,
     DEPTH,
@@ -81,7 +82,8 @@ def table(recording):
         )
         for person in true
     ]
-    return spread_causes({"upper": recording}, {("upper", "mediapipe"): found}, method="paper")
+    views, found = {"upper": recording}, {("upper", "mediapipe"): found}
+    return spread_causes(views, found, lift_views(views, found), method="paper")
 
 
 def spread_m(table, cause):
@@ -157,4 +159,4 @@ def test_real_recordings_have_no_causes(recording, tmp_path):
     writer.finish()
     real = open_recording(tmp_path / "real")
     assert is_simulated(recording) and not is_simulated(real)
-    assert spread_causes({"own": real}, {("own", "mediapipe"): [Detections.none()]}).empty
+    assert spread_causes({"own": real}, {("own", "mediapipe"): [Detections.none()]}, pd.DataFrame()).empty

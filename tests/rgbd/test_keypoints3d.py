@@ -8,7 +8,7 @@ from hicp_lib.detectors.base import Detections
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import INDEX
 from hicp_lib.rgbd.camera import Intrinsics, deproject
-from hicp_lib.rgbd.keypoints3d import lift_recording
+from hicp_lib.rgbd.keypoints3d import lift_found, lift_recording
 from hicp_lib.rgbd.recording import open_recording
 from hicp_lib.rgbd.recording_writer import RecordingWriter
 
@@ -62,6 +62,22 @@ def test_one_row_per_detected_keypoint_in_both_frames(recording):
     expected = [0.1 - seen[2], 0.2 + seen[0], 0.3 - seen[1]]
     np.testing.assert_allclose(wrist[["x_m", "y_m", "z_m"]].astype(float), expected, atol=0.02)
     assert table.loc[table["reason"] != "lifted", ["x_m", "x_cam_m"]].isna().all(axis=None)
+
+
+def test_several_detectors_and_methods_give_what_each_gives_alone(recording):
+    found = {
+        "one": [detections({"score": 0.5, "left_wrist": (30.0, 20.0), "nose": (12.3, 7.0)}), detections()],
+        "nobody": [detections(), detections()],
+        "other": [detections({"score": 0.5, "nose": (33.0, 25.0)})] * 2,
+    }
+    table = lift_found(recording, found)
+    assert list(table.drop_duplicates(["detector", "method"])["detector"]) == ["one"] * 2 + ["other"] * 2
+    for (detector, method), rows in table.groupby(["detector", "method"]):
+        alone = lift_recording(recording, found[detector], method)
+        labels = ["detector", "method"]
+        pd.testing.assert_frame_equal(rows.drop(columns=labels).reset_index(drop=True), alone)
+    with pytest.raises(InputError, match="2 frames, but detections of 1"):
+        lift_found(recording, {"one": found["one"], "few": found["one"][:1]})
 
 
 @pytest.mark.parametrize("method", ["paper", "robust"])

@@ -11,8 +11,8 @@ from hicp_lib.keypoints import HANDS, INDEX
 from hicp_lib.rgbd.body_measures import load_measures
 from hicp_lib.rgbd.camera import Intrinsics, deproject
 from hicp_lib.rgbd.lifting import LIFTED, NO_DEPTH, NOT_DETECTED, OUTSIDE_IMAGE, lift
-from hicp_lib.rgbd.limb_lengths import _length_costs, choose_along_limbs
-from hicp_lib.rgbd.robust_lifting import METHODS, STEPS, lift_robust
+from hicp_lib.rgbd.limb_lengths import choose_along_limbs
+from hicp_lib.rgbd.robust_lifting import STEPS, lift_in_steps, lift_robust
 from hicp_lib.simulation.body import load_body, pose_body
 from hicp_lib.simulation.camera import Camera, look_at, pixel_rays
 from hicp_lib.simulation.camera import project as project_world
@@ -35,7 +35,7 @@ def keypoints(**places_px) -> np.ndarray:
 def test_no_other_choice_of_depths_costs_less(seed):
     rng = np.random.default_rng(seed)
     found = np.sort([INDEX[name] for name in (*ARM, "nose")])
-    grid_m = np.linspace(0.8, 1.4, 5)
+    grid_m = np.linspace(0.8, rng.uniform(1.1, 2.5), 5)
     costs = rng.uniform(0, 10, (4, 5))
     rays = np.column_stack([rng.uniform(-0.5, 0.5, (4, 2)), np.ones(4)])
     measures = load_measures()
@@ -44,17 +44,27 @@ def test_no_other_choice_of_depths_costs_less(seed):
     def total(depths) -> float:
         limbs = [(1, 2), (2, 3)]  # shoulder to elbow to wrist; the nose hangs on a shoulder not found
         return sum(costs[k, d] for k, d in enumerate(depths)) + sum(
-            _length_costs(grid_m, rays[[a, b]], found[[a, b]], measures)[depths[a], depths[b]]
-            for a, b in limbs
+            length_cost(*(grid_m[depths[k]] * rays[k] for k in limb), found[list(limb)], measures)
+            for limb in limbs
         )
 
-    assert total(chosen) == pytest.approx(min(map(total, itertools.product(range(5), repeat=4))))
+    assert total(chosen) == pytest.approx(min(map(total, itertools.product(range(5), repeat=4))), rel=1e-5)
+
+
+def length_cost(begin_m, end_m, pair, measures) -> float:
+    """Of a limb of the body: as the head of `limb_lengths` says."""
+    length_m, least_m, most_m = (
+        np.linalg.norm(begin_m - end_m), measures.closest_m[*pair], measures.farthest_m[*pair]
+    )  # fmt: skip
+    sigma_m = 0.05 * most_m + 0.010
+    if length_m > most_m:
+        return min(((length_m - most_m) / sigma_m) ** 2, 40.0)
+    return min((max(least_m - length_m, 0) / sigma_m) ** 2, 4.0)
 
 
 def test_before_a_wall_a_keypoint_is_as_deep_as_below_the_skin():
     depth_m = np.full((240, 320), 1.5)
-    for steps in (STEPS[:1], STEPS[:2], STEPS):
-        lifted = lift_robust(keypoints(left_wrist=(210.3, 80.7)), depth_m, CAMERA, steps)
+    for lifted in lift_in_steps(keypoints(left_wrist=(210.3, 80.7)), depth_m, CAMERA, [1, 2, len(STEPS)]):
         point = lifted.points_m[0, INDEX["left_wrist"]]
         skin = lift(keypoints(left_wrist=(210.3, 80.7)), depth_m, CAMERA).points_m[0, INDEX["left_wrist"]]
         below_m = load_measures().below_skin_m[INDEX["left_wrist"]]
@@ -95,20 +105,26 @@ def test_reasons_are_the_papers():
     assert lift_robust(np.empty((0, 136, 2)), depth_m, CAMERA).points_m.shape == (0, 136, 3)
 
 
-def test_steps_are_checked():
-    assert METHODS["paper"] is lift and METHODS["robust"] is lift_robust
-    with pytest.raises(ValueError, match="no step smoothing"):
-        lift_robust(keypoints(), np.ones((240, 320)), CAMERA, ["smoothing"])
-    with pytest.raises(ValueError, match="hand_shapes needs limb_lengths"):
-        lift_robust(keypoints(), np.ones((240, 320)), CAMERA, ["near_surfaces", "hand_shapes"])
-    with pytest.raises(ValueError, match="needs near_surfaces"):
-        lift_robust(keypoints(), np.ones((240, 320)), CAMERA, ["limb_lengths"])
+def test_steps_together_give_what_each_gives_alone():
+    rng = np.random.default_rng(4)
+    depth_m = 1.2 + 0.3 * rng.random((240, 320))
+    people_px = rng.uniform(20, 220, (2, 136, 2))
+    people_px[1, HANDS[:21]] = np.nan
+    together = lift_in_steps(people_px, depth_m, CAMERA, [3, 0, 4, 2, 1])
+    for n, lifted in zip([3, 0, 4, 2, 1], together, strict=True):
+        alone = lift_in_steps(people_px, depth_m, CAMERA, [n])[0]
+        np.testing.assert_array_equal(lifted.points_m, alone.points_m)
+        np.testing.assert_array_equal(lifted.reason, alone.reason)
+    np.testing.assert_array_equal(together[1].points_m, lift(people_px, depth_m, CAMERA).points_m)
+    np.testing.assert_array_equal(together[2].points_m, lift_robust(people_px, depth_m, CAMERA).points_m)
+    assert not np.array_equal(together[0].points_m, together[3].points_m, equal_nan=True)
 
 
 def test_joints_of_people_are_found_closer_than_by_the_paper():
     """Depth of the body model alone, 1 m away before a wall; keypoints where they truly appear."""
     body, rng = load_body(), np.random.default_rng(3)
-    errors = {name: [] for name in METHODS}
+    methods = {"paper": lift, "robust": lift_robust}
+    errors = {name: [] for name in methods}
     for shape, kind in ((3, "reaching"), (9, "pointing"), (5, "reaching_both"), (1, "face")):
         person = pose_body(body, shape, sample_pose(rng, body, kind, shape))
         middle = person.keypoints_m[INDEX["neck"]] - [0, 0, 0.25]
@@ -119,10 +135,10 @@ def test_joints_of_people_are_found_closer_than_by_the_paper():
         pixels_px, z = project_world(camera, person.keypoints_m)
         truth_m = deproject(CAMERA, pixels_px, z)
         joints = [*(INDEX[f"{s}_{j}"] for s in ("left", "right") for j in ("elbow", "wrist")), *HANDS]
-        for name, method in METHODS.items():
+        for name, method in methods.items():
             lifted = method(pixels_px[None], depth_m, CAMERA).points_m[0]
             errors[name].append(np.linalg.norm(lifted - truth_m, axis=1)[joints])
-    both = np.isfinite(np.array([np.concatenate(errors[name]) for name in METHODS])).all(axis=0)
+    both = np.isfinite(np.array([np.concatenate(errors[name]) for name in methods])).all(axis=0)
     paper_m, robust_m = (np.concatenate(errors[name])[both] for name in ("paper", "robust"))
     assert np.median(robust_m) < 0.7 * np.median(paper_m)
     assert np.quantile(robust_m, 0.95) < 0.7 * np.quantile(paper_m, 0.95)
