@@ -100,19 +100,18 @@ def verdict_table(verdicts: list[Verdict]) -> pd.DataFrame:
 
 
 def for_reading(table: pd.DataFrame, verdict: str) -> pd.DataFrame:
-    """The claims with one verdict, for a page: no column for what they do not have.
+    """The claims with one verdict, for a page.
 
-    `table` from `verdict_table`; columns `section, claim` (with what was tested), `paper, ours`, or, for what
-    could not be tested, `section, claim, why not, and what would test it`.
+    `table` from `verdict_table`; columns `section, claim` (with what was tested), `paper` and `ours`, or in the
+    place of the last, for what could not be tested, `why not, and what would test it`.
     """
     rows = table[table["verdict"] == verdict]
-    shown = rows[["section"]].assign(claim=rows["claim"] + " Tested: " + rows["tested"])
+    shown = rows[["section"]].assign(claim=rows["claim"] + " Tested: " + rows["tested"], paper=rows["paper"])
     if verdict != NOT_TESTABLE:
-        return shown.assign(paper=rows["paper"], ours=rows["ours"])
+        return shown.assign(ours=rows["ours"])
     open_at = rows["ours"].map(lambda ours: "" if ours == "–" else f" ({ours})")
-    return shown.assign(
-        **{"why not, and what would test it": rows["why_not"] + open_at + ": " + rows["command"]}
-    )
+    reasons = rows["why_not"] + open_at + ": " + rows["command"]
+    return shown.assign(**{"why not, and what would test it": reasons})
 
 
 def verdict_counts(table: pd.DataFrame) -> dict[str, int]:
