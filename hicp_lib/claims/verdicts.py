@@ -102,8 +102,8 @@ def verdict_table(verdicts: list[Verdict]) -> pd.DataFrame:
 def for_reading(table: pd.DataFrame, verdict: str) -> pd.DataFrame:
     """The claims with one verdict, for a page.
 
-    `table` from `verdict_table`; columns `section, claim` (with what was tested), `paper` and `ours`, or in the
-    place of the last, for what could not be tested, `why not, and what would test it`.
+    `table` from `verdict_table`; columns `section, claim` (with what was tested), `paper` and `ours`, or in
+    the place of the last, for what could not be tested, `why not, and what would test it`.
     """
     rows = table[table["verdict"] == verdict]
     shown = rows[["section"]].assign(claim=rows["claim"] + " Tested: " + rows["tested"], paper=rows["paper"])
