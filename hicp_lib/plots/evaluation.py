@@ -34,29 +34,11 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
         `subset, group, detector, metric, value, low, high` (interval bounds at 95 %)
     data_note : on what data, e.g. "rendered people"; becomes part of the caption
     """
-    subsets, groups = list(dict.fromkeys(table["subset"])), list(dict.fromkeys(table["group"]))
-    figure, axes = new_figure(
-        len(groups),
-        len(subsets),
-        4.4 * len(subsets),
-        4.0 * len(groups),
-        sharex=True,
-        sharey=True,
-        squeeze=False,
-    )
-    for i, group in enumerate(groups):
-        for j, subset in enumerate(subsets):
-            axis = axes[i, j]
-            for detector, rows in table.query("subset == @subset and group == @group").groupby(
-                "detector", sort=False
-            ):
-                _scatter_detector(axis, rows.set_index("metric"), detector)
-            axis.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")
-            axis.set_title(f"{subset.capitalize()} · {_GROUP_TITLES.get(group, group)}")
-            if i == len(groups) - 1:
-                axis.set_xlabel("average recall")
-            if j == 0:
-                axis.set_ylabel("average precision")
+    figure, axes, panels = _panels(table, 4.0, "average recall", "average precision")
+    for axis, rows in panels:
+        for detector, of_detector in rows.groupby("detector", sort=False):
+            _scatter_detector(axis, of_detector.set_index("metric"), detector)
+        axis.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")
     _legend(figure, axes, list(dict.fromkeys(table["detector"])))
     caption = (
         f"Average precision against average recall per detector, on {data_note}. The shape is the OKS "
@@ -64,6 +46,26 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
         "whiskers are 95 % bootstrap intervals over images."
     )
     return Figure(figure, caption, _describe_best(table), table)
+
+
+def _panels(table: pd.DataFrame, height_in: float, x_label: str, y_label: str):
+    """A panel for each group of keypoints (down) and subset (across).
+
+    Returns the figure, its axes (groups, subsets), and each axis with its rows of the table.
+    """
+    subsets, groups = list(dict.fromkeys(table["subset"])), list(dict.fromkeys(table["group"]))
+    size = 4.4 * len(subsets), height_in * len(groups)
+    figure, axes = new_figure(len(groups), len(subsets), *size, sharex=True, sharey=True, squeeze=False)
+    panels = []
+    for of_group, group in zip(axes, groups, strict=True):
+        for axis, subset in zip(of_group, subsets, strict=True):
+            axis.set_title(f"{subset.capitalize()} · {_GROUP_TITLES.get(group, group)}")
+            panels.append((axis, table[(table["subset"] == subset) & (table["group"] == group)]))
+    for axis in axes[-1]:
+        axis.set_xlabel(x_label)
+    for axis in axes[:, 0]:
+        axis.set_ylabel(y_label)
+    return figure, axes, panels
 
 
 def _scatter_detector(axis, rows: pd.DataFrame, detector: str) -> None:
@@ -141,38 +143,17 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
 
     `table` has one row per person: columns `subset, group, detector, oks` (0 when nobody was found).
     """
-    subsets, groups = list(dict.fromkeys(table["subset"])), list(dict.fromkeys(table["group"]))
-    figure, axes = new_figure(
-        len(groups),
-        len(subsets),
-        4.4 * len(subsets),
-        3.2 * len(groups),
-        sharex=True,
-        sharey=True,
-        squeeze=False,
-    )
+    label = "share of people at least as good"
+    figure, axes, panels = _panels(table, 3.2, "OKS of the best detection", label)
     medians = []
-    for (i, group), (j, subset) in ((a, b) for a in enumerate(groups) for b in enumerate(subsets)):
-        axis = axes[i, j]
-        for detector, rows in table.query("subset == @subset and group == @group").groupby(
-            "detector", sort=False
-        ):
-            oks = np.sort(rows["oks"].to_numpy())
+    for axis, rows in panels:
+        for (subset, group, detector), people in rows.groupby(["subset", "group", "detector"], sort=False):
+            oks = np.sort(people["oks"].to_numpy())
             share = 1 - np.arange(len(oks)) / len(oks)
-            axis.step(
-                np.r_[0, oks, 1],
-                np.r_[1, share, 0],
-                color=detector_colour(detector),
-                where="pre",
-                label=detector,
-            )
+            steps = np.r_[0, oks, 1], np.r_[1, share, 0]
+            axis.step(*steps, color=detector_colour(detector), where="pre", label=detector)
             medians.append(f"{detector} {np.median(oks):.2f} ({subset} {group})")
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
-        axis.set_title(f"{subset.capitalize()} · {_GROUP_TITLES.get(group, group)}")
-        if i == len(groups) - 1:
-            axis.set_xlabel("OKS of the best detection")
-        if j == 0:
-            axis.set_ylabel("share of people at least as good")
     handles, labels = legend_entries(axes)
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9)
     caption = (
