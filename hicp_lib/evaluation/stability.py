@@ -81,13 +81,14 @@ def within_distance(
     """
     rows = []
     reference = "median" if truth is None else "truth"
+    weights_of = {n: draw_counts(n, n_resamples, seed) for n in set(n_frames.values())}
     for case, part, found_m, true_m in _cases(points, n_frames, truth, min_score):
-        weights = draw_counts(len(found_m), n_resamples, seed)
+        weights = weights_of[len(found_m)]
         shares = np.zeros((len(weights), len(thresholds_m)))
         for k in range(found_m.shape[1]):
             distances = _distances(found_m[:, k], None if true_m is None else true_m[:, k], weights)
             for j, threshold_m in enumerate(thresholds_m):
-                shares[:, j] += (weights * (distances <= threshold_m)).sum(axis=1) / found_m.size * 3
+                shares[:, j] += np.einsum("dn,dn->d", weights, distances <= threshold_m) / found_m.size * 3
         found = float(np.isfinite(found_m[..., 0]).mean())
         for threshold_m, *numbers in zip(thresholds_m, *with_interval(shares), strict=True):
             rows.append((*case, part, reference, threshold_m, *numbers, found))
@@ -113,8 +114,9 @@ def spread_and_bias(
     the truth. For a hand, the mean of each over its keypoints; NaN where nothing was found
     """
     rows = []
+    weights_of = {n: draw_counts(n, n_resamples, seed) for n in set(n_frames.values())}
     for case, part, found_m, true_m in _cases(points, n_frames, truth, min_score):
-        weights = draw_counts(len(found_m), n_resamples, seed)
+        weights = weights_of[len(found_m)]
         row = dict(zip(CASE, case, strict=True)) | {
             "part": part,
             "n_images": float(np.isfinite(found_m[..., 0]).sum(axis=0).mean()),
@@ -145,7 +147,7 @@ def _cases(
 ) -> Iterator[tuple[tuple[str, str, str], str, np.ndarray, np.ndarray | None]]:
     """Case, part, positions found and true positions (None without truth) of every part a detector gives."""
     given = {
-        detector: {name.split()[1] for name in PARTS if set(PARTS[name]) & set(rows["keypoint"])}
+        detector: {name.split()[1] for name in PARTS if set(PARTS[name]) & set(rows["keypoint"].unique())}
         for detector, rows in points.groupby("detector", sort=False)
     }
     found = dict(list(counted(points, min_score).groupby(CASE, sort=False)))
@@ -168,7 +170,8 @@ def _distances(found_m: np.ndarray, true_m: np.ndarray | None, weights: np.ndarr
     """Distances of one keypoint's positions (n, 3): to the truth (1, n), or each draw's median (draws, n)."""
     if true_m is not None:
         return np.linalg.norm(found_m - true_m, axis=1)[None]
-    return np.linalg.norm(found_m - _median_position(found_m, weights)[:, None], axis=2)
+    median_m = _median_position(found_m, weights)
+    return np.sqrt(sum((found_m[:, i] - median_m[:, i, None]) ** 2 for i in range(3)))
 
 
 def _distances_drawn(
