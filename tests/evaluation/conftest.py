@@ -1,7 +1,7 @@
 """Fixtures of the evaluation's tests: the makers of `made_people`, by the names tests ask for."""
 
 import pytest
-from made_people import make_annotations, make_detections, make_scene
+from made_people import make_annotations, make_detections, make_scene, make_world
 
 
 @pytest.fixture
@@ -17,3 +17,8 @@ def detected():
 @pytest.fixture
 def scene():
     return make_scene
+
+
+@pytest.fixture
+def world():
+    return make_world()

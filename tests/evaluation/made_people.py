@@ -4,6 +4,13 @@ import numpy as np
 
 from hicp_lib.annotations import Annotations, ImageInfo
 from hicp_lib.detectors.base import Detections
+from hicp_lib.keypoints import HEAD, INDEX, N_KEYPOINTS
+
+# A person in a source image; the crop starts at (100, 200) and shows what is below the head.
+POINTS = np.random.default_rng(3).uniform([120, 220], [700, 600], (N_KEYPOINTS, 2))
+POINTS[HEAD] = np.random.default_rng(4).uniform([300, 150], [400, 190], (len(HEAD), 2))
+CROP = [100, 200, 740, 680]
+HIDDEN, UNKNOWN = INDEX["left_wrist"], INDEX["right_ankle"]
 
 
 def make_annotations(keypoints_px, image_ids, *, visibility=None, areas_px2=20_000.0, boxes_px=None, crowd=(),
@@ -53,3 +60,16 @@ def make_scene(seed: int, n_images: int = 40) -> tuple[Annotations, dict[int, De
         found = np.concatenate([copies, strangers])
         detections[i] = make_detections(found, np.round(rng.random(len(found)), 2))
     return annotations, detections
+
+
+def make_world():
+    """Source annotations; the same person in Headless; a detection that is right, also outside."""
+    source_flags = np.full((1, N_KEYPOINTS), 2.0)
+    source_flags[0, UNKNOWN] = 0
+    source = make_annotations(POINTS[None], [7], visibility=source_flags, first_id=5)
+    flags = source_flags.copy()
+    flags[0, HEAD], flags[0, HIDDEN] = 0, 1
+    about = {"source_id": 5, "source_image_id": 7, "crop_px": CROP, "cut_side": "top"}
+    truth = {"headless": make_annotations(POINTS[None] - CROP[:2], [5], visibility=flags, extras=[about])}
+    found = {("headless", "mediapipe-pose"): {5: make_detections(POINTS[None] - CROP[:2])}}
+    return source, truth, found
