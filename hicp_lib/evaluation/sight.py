@@ -33,16 +33,17 @@ def lines_of_sight(recording: Recording, positions: pd.DataFrame) -> pd.DataFram
     centre) and `sight`: "clear", "hidden" (the median depth of 5 x 5 pixels is more than
     `IN_FRONT_M` nearer), "outside" the image, "no depth" there, or "unknown" where the position is
     """
-    tables = []
-    for frame, rows in positions.groupby("frame", sort=False):
-        points_m = transform(np.linalg.inv(recording.T_base_cam[frame]), rows[_POSITION].to_numpy(float))
-        known = np.isfinite(points_m).all(axis=1)
-        sights = np.full(len(rows), "unknown", dtype=object)
-        margins_m = rows["keypoint"].str.split("_").str[1].map(IN_FRONT_M).to_numpy(float)
-        sights[known] = _sights(points_m[known], margins_m[known], recording, int(frame))
-        distances_m = np.linalg.norm(points_m, axis=1)
-        tables.append(rows[["frame", "keypoint"]].assign(distance_m=distances_m, sight=sights))
-    return pd.concat(tables).loc[positions.index]
+    frames = positions["frame"].to_numpy()
+    T_cam_base = np.linalg.inv(recording.T_base_cam)[frames]
+    points_m = transform(T_cam_base, positions[_POSITION].to_numpy(float)[:, None])[:, 0]
+    margins_m = positions["keypoint"].str.split("_").str[1].map(IN_FRONT_M).to_numpy(float)
+    known = np.isfinite(points_m).all(axis=1)
+    sights = np.full(len(positions), "unknown", dtype=object)
+    for frame in np.unique(frames[known]):
+        here = known & (frames == frame)
+        sights[here] = _sights(points_m[here], margins_m[here], recording, int(frame))
+    distances_m = np.linalg.norm(points_m, axis=1)
+    return positions[["frame", "keypoint"]].assign(distance_m=distances_m, sight=sights)
 
 
 def _sights(points_m: np.ndarray, margins_m: np.ndarray, recording: Recording, frame: int) -> list[str]:
