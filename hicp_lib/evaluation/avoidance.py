@@ -12,7 +12,7 @@ from hicp_lib.robot.home import HOME_M
 from hicp_lib.robot.loop import AVOIDING
 from hicp_lib.robot.separation import Separation
 from hicp_lib.simulation.experiments.avoidance_runs import IDEAL, NO_AVOIDANCE, Run, keypoints_m
-from hicp_lib.simulation.experiments.reaching import script
+from hicp_lib.simulation.experiments.reaching import LEAVES_S, PHASES_S
 
 WITHIN_M = (0.05, 0.10, 0.20)
 FIELD_M = 0.25
@@ -94,7 +94,7 @@ def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> d
 def _metrics(run: Run) -> dict:
     cycles, job = run.cycles, run.job
     t, distance, away = (cycles[name].to_numpy() for name in ("t_s", "distance_m", "hand_error_m"))
-    period_s, scene = t[1] - t[0], script(job.trial.script, job.trial.seed)
+    period_s = t[1] - t[0]
     row = {"script": job.trial.script, "detector": job.condition, "delay_s": job.delay_s}
     row["min_distance_m"] = distance.min()
     row |= {f"under_{round(100 * m)}cm_s": period_s * (distance < m).sum() for m in WITHIN_M}
@@ -102,11 +102,10 @@ def _metrics(run: Run) -> dict:
     row["retreat_m"] = away.max()
     begins = (cycles["status"] == AVOIDING) & (cycles["status"].shift() != AVOIDING)
     row["false_retreats"] = int((begins & (distance >= FIELD_M)).sum())
-    row["idle_error_m"] = away[t < scene.before_s].mean()
+    row["idle_error_m"] = away[t < PHASES_S["far"]].mean()
     far = np.flatnonzero(away > BACK_M)
-    left_s = scene.leaves_s[1]
     back = far[-1] + 1 if len(far) else 0
-    row["back_s"] = max(0.0, t[back] - left_s) if 0 < back < len(t) else np.nan
+    row["back_s"] = max(0.0, t[back] - LEAVES_S[1]) if 0 < back < len(t) else np.nan
     return row | _sightings(run, t[distance < FIELD_M])
 
 

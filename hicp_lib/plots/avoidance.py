@@ -12,7 +12,7 @@ from hicp_lib.plots.style import Figure, detector_colour, in_style, in_words, le
 from hicp_lib.robot.kinematics import ARM_JOINTS
 from hicp_lib.robot.separation import Separation, separation_table
 from hicp_lib.simulation.experiments.avoidance_runs import IDEAL, NO_AVOIDANCE, PUBLISHED_GAINS, Run
-from hicp_lib.simulation.experiments.reaching import script
+from hicp_lib.simulation.experiments.reaching import LEAVES_S, NEAR_S
 from hicp_lib.simulation.experiments.skin_distance import FAR_M
 
 _STYLES = {NO_AVOIDANCE: ":", PUBLISHED_GAINS: "--"}
@@ -36,7 +36,7 @@ def over_time(runs: Sequence[Run], separations: Mapping[str, Separation], note: 
     figure, axes = new_figure(3, len(names), **size, sharex=True, sharey="row", squeeze=False)
     for column, name in zip(axes.T, names, strict=True):
         column[0].set_title(name)
-        _phases(column, runs, name)
+        _phases(column)
         for run in runs:
             if run.job.trial.script == name:
                 _lines(column, run)
@@ -70,7 +70,7 @@ def joint_motion(runs: Sequence[Run], note: str) -> Figure:
     for axis, run in zip(axes[0], runs, strict=True):
         angles = run.cycles[[f"{joint}_rad" for joint in ARM_JOINTS]].to_numpy()
         turned_deg = np.degrees(angles - angles[0])
-        _phases([axis], runs, run.job.trial.script)
+        _phases([axis])
         for number, joint in enumerate(ARM_JOINTS):
             style = "--" if joint.startswith("torso") else "-"
             axis.plot(run.cycles["t_s"], turned_deg[:, number], style, lw=1.4, label=joint.replace("_", " "))
@@ -123,12 +123,10 @@ def _lines(column, run: Run) -> None:
             column[0].axhline(100 * level, color="#DDDDDD", lw=0.6)
 
 
-def _phases(axes, runs: Sequence[Run], name: str) -> None:
+def _phases(axes) -> None:
     """Shade the time from when the person is as near as they go until they begin to leave."""
-    trial = next(run.job.trial for run in runs if run.job.trial.script == name)
-    scene = script(name, trial.seed)
     for axis in axes:
-        axis.axvspan(scene.near_s, scene.leaves_s[0], color="#F0F0F0", lw=0)
+        axis.axvspan(NEAR_S, LEAVES_S[0], color="#F0F0F0", lw=0)
 
 
 def _most_turned(run: Run) -> str:

@@ -16,7 +16,7 @@ from hicp_lib.robot.home import HOME_M
 from hicp_lib.robot.loop import AVOIDING, FREE
 from hicp_lib.simulation.experiments.avoidance_runs import IDEAL, Job, Run
 from hicp_lib.simulation.experiments.closed_loop import Trial
-from hicp_lib.simulation.experiments.reaching import script
+from hicp_lib.simulation.experiments.reaching import LEAVES_S
 
 T = np.arange(380) * 0.02
 NAME = "sitting, hand"
@@ -24,8 +24,7 @@ NAME = "sitting, hand"
 
 def made_up(condition: str, least_m: float, retreats: bool, seen_until_s: float | None = None) -> Run:
     """The person is `least_m` away from 2 to 4 s; the hand is off its post from 1.8 s to 0.5 s after."""
-    scene = script(NAME)
-    away = (T >= 1.8) & (T < scene.leaves_s[1] + 0.5) & retreats
+    away = (T >= 1.8) & (T < LEAVES_S[1] + 0.5) & retreats
     distance = np.interp(T, [1.0, 2.0, 4.0, 5.0], [0.6, least_m, least_m, 0.6])
     cycles = pd.DataFrame(
         {

@@ -30,8 +30,12 @@ from hicp_lib.simulation.render import World
 from hicp_lib.simulation.rotations import about
 from hicp_lib.simulation.surfaces import Surface
 
-PHASES_S = {"ready": 0.9, "approach": 1.1, "near": 1.4, "leave": 1.0}
-"""How long the person takes to get ready, to approach, stays near, and takes to leave."""
+PHASES_S = {"far": 0.6, "ready": 0.9, "approach": 1.1, "near": 1.4, "leave": 1.0}
+"""How long the person is far, takes to get ready, to approach, stays near, and takes to leave."""
+NEAR_S = PHASES_S["far"] + PHASES_S["ready"] + PHASES_S["approach"]
+"""When the person is as near as they go."""
+LEAVES_S = NEAR_S + PHASES_S["near"], sum(PHASES_S.values())
+"""When the person begins to leave, and has left."""
 CONTACT_M = 0.01
 PELVIS_LEAN = "pelvis_flexion"  # a joint of the scripts only: the whole trunk bends at the hips
 
@@ -75,34 +79,21 @@ class Script:
     name : key of `SCRIPTS`
     room : without the person
     appearance : the person's
-    motion : what they do
-    before_s : how long they are far at first
+    motion : what they do, from when they begin to get ready
     """
 
     name: str
     room: World
     appearance: Appearance
     motion: Motion
-    before_s: float
-
-    @property
-    def near_s(self) -> float:
-        """When the person is as near as they go."""
-        return self.before_s + PHASES_S["ready"] + PHASES_S["approach"]
-
-    @property
-    def leaves_s(self) -> tuple[float, float]:
-        """When the person begins to leave, and has left."""
-        stays = self.before_s + sum(PHASES_S.values())
-        return stays - PHASES_S["leave"], stays
 
     def person_at(self, time_s: float) -> PosedBody:
         """The person, not dressed, in the world."""
-        return _person(self, self.motion.still_since_s(time_s - self.before_s))
+        return _person(self, self.motion.still_since_s(time_s - PHASES_S["far"]))
 
     def at(self, time_s: float, robot: list[Surface]) -> tuple[World, PosedBody]:
         """All there is to see, with the robot as it is then, and the person in it."""
-        motion_s = self.motion.still_since_s(time_s - self.before_s)
+        motion_s = self.motion.still_since_s(time_s - PHASES_S["far"])
         surfaces = [*self.room.surfaces, *_worn(self, motion_s), *robot]
         return replace(self.room, surfaces=surfaces), _person(self, motion_s)
 
@@ -119,7 +110,7 @@ def _worn(scene: Script, motion_s: float) -> list[Surface]:
 
 
 @cache
-def script(name: str, seed: int = 0, before_s: float = 0.6) -> Script:
+def script(name: str, seed: int = 0) -> Script:
     """A script of `SCRIPTS`; the seed draws the person and the room. The same in every process."""
     staging = SCRIPTS[name]
     rng = np.random.default_rng(np.random.SeedSequence([seed, 4, *name.encode()]))
@@ -131,7 +122,7 @@ def script(name: str, seed: int = 0, before_s: float = 0.6) -> Script:
         person = posed(appearance.shape, rest)
         seat = chair(rng, (x, y), float(person.heads_m[0, 2]) - 0.11)
     room = furnished(rng, seat, [(x, y - 0.2, 0.8), (x, y + 0.4, 0.7)])
-    return Script(name, room, appearance, Motion(rest, _moves(rest, ready, near)), before_s)
+    return Script(name, room, appearance, Motion(rest, _moves(rest, ready, near)))
 
 
 def _moves(rest: Posture, ready: Posture, near: Posture) -> Iterator[Move]:

@@ -11,7 +11,7 @@ from hicp_lib.robot.loop import Perception
 from hicp_lib.robot.skin import read_skin
 from hicp_lib.simulation.experiments import closed_loop
 from hicp_lib.simulation.experiments.closed_loop import Trial, TrueKeypoints, next_image_s, simulate
-from hicp_lib.simulation.experiments.reaching import CONTACT_M, SCRIPTS, in_root, script
+from hicp_lib.simulation.experiments.reaching import CONTACT_M, LEAVES_S, NEAR_S, SCRIPTS, in_root, script
 from hicp_lib.simulation.experiments.robot_surfaces import robot_surfaces
 from hicp_lib.simulation.experiments.skin_distance import FAR_M, robot_balls, skin_distance_m
 from hicp_lib.simulation.joints import within_limits
@@ -26,18 +26,18 @@ def balls():
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_a_script_brings_the_person_to_the_hand_and_away_again(name, balls):
     scene = script(name)
-    person_m = {t: in_root(scene.person_at(t).vertices_m) for t in (0.0, scene.near_s, scene.leaves_s[1])}
+    person_m = {t: in_root(scene.person_at(t).vertices_m) for t in (0.0, NEAR_S, LEAVES_S[1])}
     far, near, left = (skin_distance_m(balls, vertices) for vertices in person_m.values())
     assert near == pytest.approx(CONTACT_M, abs=0.005)
     assert far == pytest.approx(left) and far > 0.2
-    nearest = np.linalg.norm(person_m[scene.near_s] - HOME_M["left"], axis=1).min()
+    nearest = np.linalg.norm(person_m[NEAR_S] - HOME_M["left"], axis=1).min()
     assert nearest < 0.1
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_joints_of_a_script_stay_within_their_limits(name):
     scene = script(name)
-    for t in np.arange(0, scene.leaves_s[1], 0.5):
+    for t in np.arange(0, LEAVES_S[1], 0.5):
         joints = dict(scene.motion.at(t).joints)
         joints.pop("pelvis_flexion", None)
         assert within_limits(joints)
