@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 
 
 @dataclass(frozen=True)
@@ -88,11 +89,19 @@ def cut(triangles: np.ndarray, field: np.ndarray) -> Cut:
     edges = np.concatenate(corners)
     edges = np.where((edges[..., :1] > edges[..., 1:]), edges[..., ::-1], edges)
     n = len(field)
-    unique, inverse = np.unique(edges[..., 0].astype(np.int64) * n + edges[..., 1], return_inverse=True)
+    keys = edges[..., 0].astype(np.int64) * n + edges[..., 1]
+    whole = edges[..., 0] == edges[..., 1]
+    vertices = np.flatnonzero(np.bincount(edges[..., 0][whole], minlength=n))
+    unique = np.sort(np.concatenate([vertices * (n + 1), np.unique(keys[~whole])]))
+    # As `np.unique` would number them, but nearly all are whole vertices, which a table finds.
+    number = np.empty(n, np.int32)
+    number[vertices] = np.searchsorted(unique, vertices * (n + 1))
+    numbers = number.take(edges[..., 0], mode="clip")
+    numbers[~whole] = np.searchsorted(unique, keys[~whole])
     i, j = np.divmod(unique, n)
     gap = field[i] - field[j]
     t = np.where(i == j, 0.0, field[i] / np.where(gap == 0, 1.0, gap))
-    return Cut(i, j, t.astype(np.float32), inverse.reshape(-1, 3).astype(np.int32), np.concatenate(source))
+    return Cut(i, j, t.astype(np.float32), numbers, np.concatenate(source))
 
 
 def _edges(*corners: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -101,13 +110,10 @@ def _edges(*corners: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
 
 def neighbours(triangles: np.ndarray, n_vertices: int, most: int = 8) -> np.ndarray:
     """Neighbouring vertices, (n_vertices, most); a row with fewer repeats them, or the vertex itself."""
-    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(
-        np.int64
-    )
-    keys = np.unique(np.concatenate([pairs @ [n_vertices, 1], pairs @ [1, n_vertices]]))
-    vertex, other = np.divmod(keys, n_vertices)
-    count = np.bincount(vertex, minlength=n_vertices)
-    first = np.cumsum(count) - count
+    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    ends = np.concatenate([pairs, pairs[:, ::-1]]).T
+    joined = sparse.coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(n_vertices, n_vertices)).tocsr()
+    first, count, other = joined.indptr[:-1], np.diff(joined.indptr), joined.indices
     place = first[:, None] + np.arange(most) % np.maximum(np.minimum(count, most), 1)[:, None]
     rows = other[np.minimum(place, len(other) - 1)]
     return np.where(count[:, None] > 0, rows, np.arange(n_vertices)[:, None])

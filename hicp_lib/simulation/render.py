@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -27,6 +28,11 @@ class World:
     lights: list[lights.Light]
     ambient: lights.Ambient
     backdrop: np.ndarray
+
+    @cached_property
+    def rays(self) -> RayScene:
+        """The surfaces, ready to be traced; made once for all frames in which nothing moves."""
+        return RayScene(self.surfaces)
 
 
 @dataclass(frozen=True)
@@ -55,7 +61,7 @@ def render(world: World, camera: Camera, rng: np.random.Generator) -> Frame:
     Depth and people are exact at every pixel, but only people are shaded there: they are in focus.
     What is around them is shaded at every second row and column, and a little out of focus.
     """
-    scene, centre_m, directions = RayScene(world.surfaces), camera.centre_m, image_directions(camera)
+    scene, centre_m, directions = world.rays, camera.centre_m, image_directions(camera)
     shape = (camera.height_px, camera.width_px)
     trace = trace_image(scene, centre_m, directions, scene.owners[:-1] >= 0)
     person = scene.owners.take(trace.surface, mode="wrap").reshape(shape)
