@@ -24,11 +24,14 @@ def align_to_colour(depth_m: np.ndarray, left: Camera, colour: Camera) -> np.nda
     middle = np.float32(colour.fx_px * shift_m) / z
     middle += scale * (np.arange(left.width_px, dtype=np.float32) - np.float32(left.cx_px))
     middle += np.float32(colour.cx_px)
-    first, last = (np.rint(middle + side * scale / 2).astype(np.int32) for side in (-1, 1))
     wide = np.full((left.height_px, colour.width_px + 2), np.inf, np.float32)  # a column for each side's rest
-    start = np.arange(left.height_px)[:, None] * wide.shape[1] + 1
+    start = np.arange(left.height_px, dtype=np.int32)[:, None] * np.int32(wide.shape[1]) + np.int32(1)
+    first, last = (
+        np.clip(np.rint(middle + side * scale / 2), -1, colour.width_px).astype(np.int32) + start
+        for side in (-1, 1)
+    )
     for step in range(int(np.ceil(scale)) + 1):
-        at = np.clip(np.minimum(first + step, last), -1, colour.width_px) + start
+        at = np.minimum(first + np.int32(step), last)
         np.minimum.at(wide.reshape(-1), at.reshape(-1), z.reshape(-1))
     return _stretch_rows(wide[:, 1:-1], left, colour)
 
