@@ -3,7 +3,8 @@
 In the image a finger behind the hand is often found where it is, but what is seen there is the hand in
 front of it. The palm is rigid and fingers bend in known ways: of many turns and sizes of the palm those are
 kept that fit its keypoints in the image and what is seen there, and on each of them every finger takes the
-bends that fit best. The mean of the good ones, weighted by how well they fit, is where the joints are.
+bends that fit best. The mean of the good ones, weighted by how well they fit, is where the joints are; it
+decides on those that have some other part of the hand before them, the rest are where they are seen.
 
 The shapes are the body model's with fingers bent at random (`tools/measure_hands.py`). Rendered people have
 hands of this model too, in other sizes; hands of real people differ more from it.
@@ -20,7 +21,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from hicp_lib.errors import InputError
-from hicp_lib.keypoints import LEFT_HAND, RIGHT_HAND
+from hicp_lib.keypoints import HAND_LIMBS, LEFT_HAND, RIGHT_HAND
 
 SHAPES_FILE = Path(__file__).parents[2] / "data" / "hand_shapes.npz"
 PALM = np.array([0, 5, 9, 13, 17])
@@ -39,7 +40,8 @@ _REACH_M, _STEP_M = 0.15, 0.01  # depths tried around the palm as it is seen
 _PALM_SIGMA_M, _FINGER_SIGMA_M = 0.008, 0.010  # misfit across the line of sight that costs 1
 _MOST = 9.0  # of the cost of a keypoint's misfit, and of its depth
 _LIKELY = 2.0  # a fit that costs so much more weighs 1/e of the best
-_DEPTH_SIGMA_M, _MOST_DEPTH = 0.010, 20.0  # cost of depths other than the fit's
+_DEPTH_SIGMA_M, _MOST_DEPTH = 0.010, 20.0  # cost of depths other than the fit's, where it decides
+_BESIDE_M, _BEHIND_M = 0.015, 0.010  # a keypoint so near a limb in the image, so far behind it, is hidden
 
 
 @cache
@@ -61,7 +63,7 @@ def load_hand_shapes(path: Path = SHAPES_FILE) -> np.ndarray:
 def favour_hand_shapes(
     costs: np.ndarray, grid_m: np.ndarray, rays: np.ndarray, found: np.ndarray
 ) -> np.ndarray:
-    """Costs (m, g) of depths, those of fingers with what depths other than the hand's shape gives cost more.
+    """Costs (m, g) of depths; for what a hand hides, other depths than its shape gives cost more.
 
     Parameters
     ----------
@@ -76,8 +78,9 @@ def favour_hand_shapes(
         which = found[rows] - hand[0]
         if np.isin(PALM, which).sum() >= _LEAST_OF_PALM:
             mean_m, spread_m = fit_hand(costs[rows], grid_m, rays[rows], which, is_right)
-            sigma_m = np.hypot(_DEPTH_SIGMA_M, spread_m)[:, None]
-            costs[rows] += np.minimum(((grid_m - mean_m[:, None]) / sigma_m) ** 2, _MOST_DEPTH)
+            apart = (grid_m - mean_m[:, None]) / np.hypot(_DEPTH_SIGMA_M, spread_m)[:, None]
+            is_hidden = hidden_by_limbs(rays[rows, :2], mean_m, which)
+            costs[rows[is_hidden]] += np.minimum(apart[is_hidden] ** 2, _MOST_DEPTH)
     return costs
 
 
@@ -106,6 +109,28 @@ def fit_hand(
     weights /= weights.sum()
     behind_m = mean_m @ weights
     return middle_m + behind_m, np.sqrt(np.maximum(square_m2 @ weights - behind_m**2, 0))
+
+
+def hidden_by_limbs(slopes: np.ndarray, depth_m: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Which of k keypoints of a hand lie behind a limb of it that they are no end of, (k,).
+
+    Parameters
+    ----------
+    slopes, depth_m : arrays, shapes (k, 2) and (k,), x / z and z
+    which : array, shape (k,), their numbers in the hand
+    """
+    row = np.full(21, -1)
+    row[which] = np.arange(len(which))
+    limbs = row[np.array(HAND_LIMBS)]
+    begin, end = limbs[(limbs >= 0).all(axis=1)].T
+    places_m = slopes * np.median(depth_m)
+    along_m = places_m[end] - places_m[begin]
+    from_begin_m = places_m[:, None] - places_m[begin]
+    share = np.clip((from_begin_m * along_m).sum(axis=2) / np.maximum((along_m**2).sum(axis=1), 1e-12), 0, 1)
+    beside_m = np.linalg.norm(from_begin_m - share[..., None] * along_m, axis=2)
+    behind_m = depth_m[:, None] - depth_m[begin] - share * (depth_m[end] - depth_m[begin])
+    is_end = (np.arange(len(which))[:, None] == begin) | (np.arange(len(which))[:, None] == end)
+    return ((beside_m < _BESIDE_M) & (behind_m > _BEHIND_M) & ~is_end).any(axis=1)
 
 
 @dataclass(frozen=True)

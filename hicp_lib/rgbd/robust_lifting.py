@@ -11,13 +11,13 @@ What exact truth shows to go wrong with it, and the steps here that mend it:
 - It takes what hides a joint, and what is beside a limb that the detector missed. *limb_lengths*: depths
   of all keypoints are chosen together, so that they cost least while limbs have lengths that people have.
   Then a joint may also lie behind what is seen, at a cost.
-- It takes the front of a hand for the fingers behind it. *hand_shapes*: the depths of a hand's keypoints are
-  drawn to those of the hand that fits best, palm and bent fingers, behind what is seen where it must be.
+- It takes the front of a hand for the fingers behind it. *hand_shapes*: of the hand that fits best, palm and
+  bent fingers, what lies behind another part of it is drawn to the depth it has there.
 
 Tried as well and left out, as they brought nothing: the mode of depth around the keypoint instead of the
 cheapest candidate, scores of the detector as weights of limbs, the person's true size for the limbs'
 lengths instead of everybody's, knuckles that hang on each other instead of on the hand's root, a finer grid
-of depths, and a lower cost of being hidden. Keypoints of the face need no limbs: they are taken at the
+of depths, more turns of the hand, and a lower cost of being hidden. Keypoints of the face need no limbs: they are taken at the
 cheapest of the surfaces near them.
 
 Measures of people come from the body model (`body_measures`, `hand_shapes`). The costs (there, and in
