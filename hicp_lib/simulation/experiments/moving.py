@@ -52,6 +52,7 @@ def _staged(scene: Moving, motion_s: float) -> tuple[World, PosedBody]:
     return replace(scene.room, surfaces=[*scene.room.surfaces, *worn]), person
 
 
+@lru_cache(maxsize=1)
 def moving(seed: int) -> Moving:
     """The scene of a seed: who moves how, in what room. The same in every process."""
     rng = np.random.default_rng(np.random.SeedSequence([seed, 3]))
