@@ -17,8 +17,8 @@ What exact truth shows to go wrong with it, and the steps here that mend it:
 Tried as well and left out, as they brought nothing: the mode of depth around the keypoint instead of the
 cheapest candidate, scores of the detector as weights of limbs, the person's true size for the limbs'
 lengths instead of everybody's, knuckles that hang on each other instead of on the hand's root, a finer grid
-of depths, more turns of the hand, and a lower cost of being hidden. Keypoints of the face need no limbs: they are taken at the
-cheapest of the surfaces near them.
+of depths, more turns of the hand, and a lower cost of being hidden. Keypoints of the face need no limbs:
+they are taken at the cheapest of the surfaces near them.
 
 Measures of people come from the body model (`body_measures`, `hand_shapes`). The costs (there, and in
 `near_surfaces` and `limb_lengths`) were chosen by hand on rendered people who are in no recording of the
