@@ -60,7 +60,7 @@ def flat_coordinates(cuts: Cuts, coords: np.ndarray, limbs: str) -> tuple[np.nda
         rows = np.flatnonzero(panel == number)
         if len(rows) == 0:
             continue
-        local = rest[:, rows] - np.float32(cuts.origins_m[number])[:, None]
+        local = rest.take(rows, axis=1) - np.float32(cuts.origins_m[number])[:, None]
         axis, front = np.float32(cuts.axes[number]), np.float32(cuts.fronts[number])
         side = np.cross(axis, front).astype(np.float32)
         around = np.arctan2(side @ local, front @ local) * np.float32(cuts.radii_m[number])

@@ -43,8 +43,8 @@ class Texture:
         result = np.empty((self.levels[0].shape[2], uv_m.shape[1]), np.float32)
         for number in range(level.min(), level.max() + 1):
             rows = np.flatnonzero(level == number)
-            if len(rows):
-                result[:, rows] = self._lookup(number, uv_m[:, rows])
+            for channel, found in zip(result, self._lookup(number, uv_m.take(rows, axis=1)), strict=True):
+                channel[rows] = found
         return result
 
     def _lookup(self, number: int, uv_m: np.ndarray) -> np.ndarray:
