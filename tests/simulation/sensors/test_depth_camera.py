@@ -59,6 +59,14 @@ def test_noise_is_correlated_over_the_matching_window_and_no_further():
     assert correlation[0] > 0.9 and 0.3 < correlation[1] < 0.8 and abs(correlation[2]) < 0.05
 
 
+def test_noise_of_one_frame_says_nothing_of_the_next_ones():
+    settings = replace(D435, disparity_step_px=0, depth_units_per_m=0, width_px=1700)
+    wall = [_wall(1.0)]
+    noise = np.stack([_raw(wall, settings, seed)[:, 80:].ravel() for seed in range(4)]).astype(float) - 1.0
+    assert np.abs(np.corrcoef(noise) - np.eye(4)).max() < 0.05
+    assert noise.std() == pytest.approx(3.77e-3, rel=0.05)  # in an image wider than the noise that is kept
+
+
 @pytest.mark.parametrize("mode", [D435, D435_VGA])
 @pytest.mark.parametrize("z_m", [0.3, 0.5, 1.0, 2.0])
 def test_the_left_edge_has_a_band_as_wide_as_the_disparity(mode, z_m):
