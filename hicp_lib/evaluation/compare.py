@@ -19,6 +19,7 @@ from hicp_lib.detectors.registry import DETECTORS
 from hicp_lib.evaluation.bootstrap import bootstrap_difference, difference, intervals, resample
 from hicp_lib.evaluation.coco import Evaluation, evaluate, person_oks
 from hicp_lib.evaluation.engine import METRICS
+from hicp_lib.evaluation.reading import wide, with_bounds
 from hicp_lib.keypoints import GROUPS, N_KEYPOINTS
 
 Found = Mapping[tuple[str, str], Mapping[int, Detections]]
@@ -142,16 +143,10 @@ def people_oks(truth: Mapping[str, Annotations], found: Found) -> pd.DataFrame:
 def metrics_text(table: pd.DataFrame, group: str) -> pd.DataFrame:
     """One group of a `compare` table for reading: "0.71 [0.65, 0.77]" per subset, detector and metric."""
     rows = table[table["group"] == group]
-    text = [
-        f"{value:.2f} [{low:.2f}, {high:.2f}]" if value == value else "–"
-        for value, low, high in zip(rows["value"], rows["low"], rows["high"], strict=True)
-    ]
-    wide = rows.assign(text=text).pivot(
-        index=["subset", "detector", "n_people"], columns="metric", values="text"
-    )
-    order = rows[["subset", "detector", "n_people"]].drop_duplicates().itertuples(index=False, name=None)
-    wide = wide.reindex(list(order))[list(METRICS)]
-    return wide.rename_axis(columns=None).reset_index().rename(columns={"n_people": "people"})
+    bounds = rows[["value", "low", "high"]].itertuples(index=False, name=None)
+    rows = rows.assign(text=[with_bounds(*numbers) for numbers in bounds])
+    table = wide(rows, ["subset", "detector", "n_people"], "metric", METRICS)
+    return table.rename(columns={"n_people": "people"})
 
 
 def detection_times(runs: Mapping[tuple[str, str], Mapping[int, Timed]]) -> pd.DataFrame:

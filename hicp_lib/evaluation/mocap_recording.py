@@ -40,8 +40,6 @@ from hicp_lib.rgbd.reprojection import by_reprojection
 from hicp_lib.rgbd.robust_lifting import METHODS
 from hicp_lib.rgbd.synchronisation import ClockOffset, clock_offset
 
-SIMULATED_NOTE = "simulated recording (rendered person, simulated D435 and motion capture)"
-
 
 @dataclass(frozen=True)
 class Registered:
@@ -57,11 +55,6 @@ class Registered:
     fits: list[Registration]
     exact: np.ndarray | None
     clicks: pd.DataFrame
-
-
-def data_note(recording: Recording) -> str:
-    """What the recording is, in the words of captions."""
-    return SIMULATED_NOTE if read_simulation(recording) else f"recording {recording.folder.name}"
 
 
 def open_mocap(recording: Recording) -> MotionCapture:

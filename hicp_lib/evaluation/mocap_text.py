@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.evaluation.mocap_error import JOINTS, TABLE_JOINTS
+from hicp_lib.evaluation.reading import wide, with_bounds
 from hicp_lib.rgbd.synchronisation import ClockOffset
 
 _CASE = ["detector", "method"]
@@ -50,9 +51,9 @@ def shoulders_and_centres(medians: pd.DataFrame, min_score: float) -> pd.DataFra
 
 def fractions_text(fractions: pd.DataFrame) -> pd.DataFrame:
     """Fractions within each distance as "0.71 [0.65, 0.77]", a column per joint."""
-    bounds = fractions[["value", "low", "high"]].itertuples(index=False)
+    bounds = fractions[["value", "low", "high"]].itertuples(index=False, name=None)
     within = [f"{100 * limit:g} cm" for limit in fractions["threshold_m"]]
-    text = [f"{value:.2f} [{low:.2f}, {high:.2f}]" for value, low, high in bounds]
+    text = [with_bounds(*numbers) for numbers in bounds]
     return _wide(fractions.assign(within=within, text=text), [*_CASE, "within"], "keypoint", JOINTS)
 
 
@@ -101,9 +102,6 @@ def _cm(value_m: float) -> str:
 def _wide(
     rows: pd.DataFrame, index: list[str], columns: str, order: Sequence[str] | None = None
 ) -> pd.DataFrame:
-    """`text` of every row and value of `columns`, rows in the order they come in."""
-    wide = rows.pivot(index=index, columns=columns, values="text")
-    wide = wide.reindex(list(dict.fromkeys(rows[index].itertuples(index=False, name=None))))
-    wide = wide[[name for name in order or dict.fromkeys(rows[columns]) if name in wide]]
-    wide = wide.rename(columns=lambda name: name.replace("_", " ")).rename_axis(columns=None)
-    return wide.reset_index().rename(columns={"method": "lifting"})
+    """`wide` with joints and methods as one reads them."""
+    table = wide(rows, index, columns, order).rename(columns={"method": "lifting"})
+    return table.rename(columns=lambda name: name.replace("_", " "))

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import pandas as pd
 
+from hicp_lib.evaluation.reading import wide, with_bounds
+
 _ROW = ["view", "detector", "part"]
 _DISTANCES = {"spread_m": "spread [cm]", "bias_m": "bias [cm]", "error_m": "error [cm]"}
 
@@ -17,10 +19,9 @@ def shares_text(table: pd.DataFrame | None, threshold_m: float) -> pd.DataFrame:
         return _not_available("true positions (truth.parquet)")
     rows = table[table["threshold_m"] == threshold_m]
     text = [
-        _with_bounds(*numbers)
-        for numbers in rows[["value", "low", "high"]].itertuples(index=False, name=None)
+        with_bounds(*numbers) for numbers in rows[["value", "low", "high"]].itertuples(index=False, name=None)
     ]
-    return _wide(rows.assign(text=text), "method")
+    return wide(rows.assign(text=text), _ROW, "method")
 
 
 def distances_text(table: pd.DataFrame) -> pd.DataFrame:
@@ -29,7 +30,7 @@ def distances_text(table: pd.DataFrame) -> pd.DataFrame:
     for name, title in _DISTANCES.items():
         if name in table:
             numbers_cm = 100 * table[[name, f"{name}_low", f"{name}_high"]]
-            shown[title] = [_with_bounds(*row, digits=1) for row in numbers_cm.itertuples(index=False)]
+            shown[title] = [with_bounds(*row, digits=1) for row in numbers_cm.itertuples(index=False)]
     return shown
 
 
@@ -38,19 +39,8 @@ def causes_text(table: pd.DataFrame) -> pd.DataFrame:
     if table.empty:
         return _not_available("what a simulated recording has: truth, depth without errors, joints")
     text = [f"{100 * s:.1f} / {100 * b:.1f}" for s, b in zip(table["spread_m"], table["bias_m"], strict=True)]
-    return _wide(table.assign(text=text), "cause")
+    return wide(table.assign(text=text), _ROW, "cause")
 
 
 def _not_available(needed: str) -> pd.DataFrame:
     return pd.DataFrame({"needs": [needed], "here": "not available for this recording"})
-
-
-def _with_bounds(value: float, low: float, high: float, digits: int = 2) -> str:
-    return f"{value:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]" if value == value else "–"
-
-
-def _wide(rows: pd.DataFrame, columns: str) -> pd.DataFrame:
-    """`text` of every row and value of `columns`, both in the order they come in."""
-    wide = rows.pivot(index=_ROW, columns=columns, values="text")
-    wide = wide.reindex(list(dict.fromkeys(rows[_ROW].itertuples(index=False, name=None))))
-    return wide[list(dict.fromkeys(rows[columns]))].rename_axis(columns=None).reset_index()

@@ -16,11 +16,9 @@ from hicp_lib.detectors.run import detect_images
 from hicp_lib.errors import InputError
 from hicp_lib.rgbd.experiments import open_experiment
 from hicp_lib.rgbd.keypoints3d import lift_found
-from hicp_lib.rgbd.recording import Recording, read_joints, read_simulation, read_truth
+from hicp_lib.rgbd.recording import Recording, read_joints, read_truth
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
 from hicp_lib.robot.segments import Segment, body_segments
-
-SIMULATED_NOTE = "simulated recordings (rendered person, simulated D435)"
 
 Found = Mapping[tuple[str, str], Sequence[Detections]]
 
@@ -52,13 +50,6 @@ def open_views(
 def _names(folders: Sequence[str]) -> list[str]:
     names = [Path(folder).name for folder in folders]
     return names if len(set(names)) == len(names) else list(folders)
-
-
-def data_note(views: Mapping[str, Recording]) -> str:
-    """What the recordings are, in the words of captions."""
-    if all(read_simulation(recording) for recording in views.values()):
-        return SIMULATED_NOTE
-    return f"recording{'s' if len(views) > 1 else ''} {' and '.join(views)}"
 
 
 def detect_views(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from hicp_lib.files import cache_dir
 from hicp_lib.provenance import digest
-from hicp_lib.rgbd.recording import RGB_LIST, Recording, first_frames, open_recording
+from hicp_lib.rgbd.recording import RGB_LIST, Recording, first_frames, open_recording, read_simulation
 
 
 def open_experiment(
@@ -40,3 +41,13 @@ def open_experiment(
     if (folder / RGB_LIST).is_file():
         return open_recording(folder)
     return simulate_recording(folder, scenario, n_frames=n, seed=seed, progress=sys.stderr.isatty())
+
+
+def data_note(recordings: Mapping[str, Recording]) -> str:
+    """What recordings are, by their names, in the words of captions."""
+    plural = "s" if len(recordings) > 1 else ""
+    if not all(read_simulation(recording) for recording in recordings.values()):
+        return f"recording{plural} {' and '.join(recordings)}"
+    has_mocap = any(recording.mocap_path for recording in recordings.values())
+    sensors = "D435 and motion capture" if has_mocap else "D435"
+    return f"simulated recording{plural} (rendered person, simulated {sensors})"

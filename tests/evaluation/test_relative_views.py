@@ -11,6 +11,7 @@ from hicp_lib.errors import InputError
 from hicp_lib.evaluation import relative_views
 from hicp_lib.keypoints import INDEX
 from hicp_lib.rgbd.camera import Intrinsics
+from hicp_lib.rgbd.experiments import data_note
 from hicp_lib.rgbd.recording import JOINTS_FILE, SIMULATION_FILE, TRUTH_FILE
 from hicp_lib.rgbd.recording_writer import RecordingWriter
 from hicp_lib.robot.kinematics import HEAD_JOINTS
@@ -40,7 +41,8 @@ def test_recordings_of_a_lab_are_called_after_their_folders(lab):
     both = relative_views.open_views(str(lab / "a/still"), str(lab / "b/still"))
     assert list(both) == [str(lab / "a/still"), str(lab / "b/still")]  # equal names would not tell them apart
     assert [len(recording) for recording in both.values()] == [2, 2]
-    assert relative_views.data_note({"still": both[str(lab / "a/still")]}) == "recording still"
+    assert data_note({"still": both[str(lab / "a/still")]}) == "recording still"
+    assert data_note(dict.fromkeys("ab", both[str(lab / "a/still")])) == "recordings a and b"
 
 
 def test_without_a_folder_both_views_are_simulated(monkeypatch):
@@ -92,4 +94,4 @@ def test_truth_joints_and_simulation_are_known_only_where_they_are(lab):
     assert relative_views.true_positions(views) is None and set(relative_views.true_positions(alone)) == set(
         alone
     )
-    assert relative_views.data_note(alone) == relative_views.SIMULATED_NOTE != relative_views.data_note(views)
+    assert data_note(alone) == "simulated recording (rendered person, simulated D435)" != data_note(views)

@@ -1,0 +1,29 @@
+"""What the tables of several tests have in common when they are made for reading."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+
+def with_bounds(value: float, low: float, high: float, digits: int = 2) -> str:
+    """A value with its interval as "0.71 [0.65, 0.77]"; a dash where it is NaN."""
+    return f"{value:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]" if value == value else "–"
+
+
+def wide(
+    rows: pd.DataFrame, index: Sequence[str], columns: str, order: Sequence[str] | None = None
+) -> pd.DataFrame:
+    """The column `text` with a column per value of `columns`, rows in the order they come in.
+
+    Parameters
+    ----------
+    index : columns that name a row of the result
+    order : of the new columns, those that occur; the order they come in when left out
+    """
+    index = list(index)
+    table = rows.pivot(index=index, columns=columns, values="text")
+    table = table.reindex(list(dict.fromkeys(rows[index].itertuples(index=False, name=None))))
+    table = table[[name for name in order or dict.fromkeys(rows[columns]) if name in table]]
+    return table.rename_axis(columns=None).reset_index()
