@@ -8,8 +8,10 @@ import pandas as pd
 
 
 def with_bounds(value: float, low: float, high: float, digits: int = 2) -> str:
-    """A value with its interval as "0.71 [0.65, 0.77]"; a dash where it is NaN."""
-    return f"{value:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]" if value == value else "–"
+    """A value with its interval as "0.71 [0.65, 0.77]", alone where it has none; a dash where it is NaN."""
+    if value != value:
+        return "–"
+    return f"{value:.{digits}f}" + (f" [{low:.{digits}f}, {high:.{digits}f}]" if low == low else "")
 
 
 def wide(

@@ -9,7 +9,7 @@ from hicp_lib.evaluation.reading import wide, with_bounds
 def test_a_value_stands_with_its_interval_and_nothing_is_a_dash():
     assert with_bounds(0.714, 0.65, 0.7749) == "0.71 [0.65, 0.77]"
     assert with_bounds(12.34, 11.0, 13.06, digits=1) == "12.3 [11.0, 13.1]"
-    assert with_bounds(np.nan, np.nan, np.nan) == "–"
+    assert with_bounds(np.nan, np.nan, np.nan) == "–" and with_bounds(0.714, np.nan, np.nan) == "0.71"
 
 
 def test_rows_and_columns_come_in_their_order():
