@@ -6,12 +6,22 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from hicp_lib.detectors.base import Detections
 from hicp_lib.errors import InputError
+from hicp_lib.evaluation.lifting_ablation import N_STEPS
 from hicp_lib.evaluation.mocap_error import JOINTS, MARKERS, TABLE_JOINTS
-from hicp_lib.evaluation.mocap_recording import find_clock, medians_under, open_mocap, register
+from hicp_lib.evaluation.mocap_recording import (
+    ablation,
+    find_clock,
+    lift_frames,
+    medians_under,
+    open_mocap,
+    register,
+)
+from hicp_lib.keypoints import INDEX
 from hicp_lib.rgbd.camera import Intrinsics, project, transform
 from hicp_lib.rgbd.qualisys import MotionCapture
-from hicp_lib.rgbd.recording import Recording, first_frames, open_recording
+from hicp_lib.rgbd.recording import TRUTH_FILE, Recording, first_frames, open_recording
 from hicp_lib.rgbd.recording_writer import RecordingWriter
 
 CAMERA = Intrinsics(320, 240, 300.0, 300.0, 159.5, 119.5)
@@ -103,6 +113,24 @@ def test_what_is_missing_is_said_in_one_line(laboratory):
         register(recording, mocap, OFFSET_S)
     with pytest.raises(InputError, match="has no mocap.tsv"):
         open_mocap(recording)
+
+
+def test_every_step_is_lifted_where_it_can_be_judged(laboratory):
+    recording, _ = laboratory
+    pixels, scores = np.full((1, 136, 2), np.nan), np.zeros((1, 136))
+    pixels[0, INDEX["left_wrist"]], scores[0, INDEX["left_wrist"]] = (20.0, 120.0), 0.9
+    found = dict.fromkeys(("one", "other"), [Detections(pixels, scores, np.ones(1))] * 2)
+    points, stepwise = lift_frames(recording, found)
+    assert list(points["method"].unique()) == list(stepwise["method"].unique()) == ["robust", "paper"]
+    assert ablation(recording, stepwise) is None
+    wrist = {"keypoint": "left_wrist", "x_m": -2.9, "y_m": -1.4, "z_m": 0.4, "u_px": 20.0, "v_px": 120.0}
+    truth = pd.DataFrame([{"frame": k, "t_s": 0.0, **wrist, "visible": 2} for k in (0, 1)])
+    truth.to_parquet(recording.folder / TRUTH_FILE)
+    again, stepwise = lift_frames(recording, found)
+    pd.testing.assert_frame_equal(again.reset_index(drop=True), points.reset_index(drop=True))
+    assert set(stepwise["detector"]) == {"one"} and set(stepwise["method"]) == set(N_STEPS)
+    table = ablation(recording, stepwise)
+    assert table["method"].tolist() == list(N_STEPS) and (table["n_compared"] == 2).all()
 
 
 def moving_points(times_s: np.ndarray) -> np.ndarray:
