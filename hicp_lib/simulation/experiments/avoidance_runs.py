@@ -73,16 +73,17 @@ class Run:
 def run_all(jobs: Iterable[Job]) -> list[Run]:
     """The runs of all jobs, in their order; what is not in the cache is simulated on all cores."""
     jobs = list(jobs)
-    missing = [job for job in jobs if not (_folder(job) / "cycles.parquet").is_file()]
+    folders = {job: _folder(job) for job in jobs}
+    missing = [job for job, folder in folders.items() if not (folder / "cycles.parquet").is_file()]
     # The longest first, so that no core is left with one at the end: detectors, the fastest see most.
     missing.sort(key=lambda job: (job.condition in IDEAL, job.delay_s))
     if len(missing) > 1:
         with worker_pool(min(len(missing), os.cpu_count() or 1)) as pool, _manager() as manager:
             album = manager.dict()
-            pool.starmap(_simulate_and_keep, [(job, album) for job in missing], chunksize=1)
+            pool.starmap(_simulate_and_keep, [(job, folders[job], album) for job in missing], chunksize=1)
     elif missing:
-        _simulate_and_keep(missing[0], {})
-    return [_read(job) for job in jobs]
+        _simulate_and_keep(missing[0], folders[missing[0]], {})
+    return [_read(job, folders[job]) for job in jobs]
 
 
 def of_condition(runs: Iterable[Run], condition: str) -> list[Run]:
@@ -155,7 +156,7 @@ def _manager() -> SyncManager:
     return multiprocessing.get_context("spawn").Manager()
 
 
-def _simulate_and_keep(job: Job, album: Album) -> None:
+def _simulate_and_keep(job: Job, folder: Path, album: Album) -> None:
     settings = {"settings": PUBLISHED} if job.condition == PUBLISHED_GAINS else {}
     sights: list[Sight] = []
     if job.condition in IDEAL:
@@ -165,7 +166,6 @@ def _simulate_and_keep(job: Job, album: Album) -> None:
         cycles, sights = simulate(job.trial, eyes), eyes.sights
     scene = script(job.trial.script, job.trial.seed)
     rows = [_frame(sight, in_root(scene.person_at(sight.perception.time_s).keypoints_m)) for sight in sights]
-    folder = _folder(job)
     _write(folder / "frames.parquet", pd.DataFrame(rows))
     _write(folder / "cycles.parquet", cycles)
 
@@ -211,8 +211,8 @@ def _code() -> str:
     return files_sha256([*library, *data], LIBRARY_DIR.parent)
 
 
-def _read(job: Job) -> Run:
-    return Run(job, *(pd.read_parquet(_folder(job) / f"{name}.parquet") for name in ("cycles", "frames")))
+def _read(job: Job, folder: Path) -> Run:
+    return Run(job, *(pd.read_parquet(folder / f"{name}.parquet") for name in ("cycles", "frames")))
 
 
 def _write(path: Path, table: pd.DataFrame) -> None:

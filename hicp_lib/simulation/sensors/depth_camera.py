@@ -10,8 +10,6 @@ for units, range and alignment; the book's page on simulated sensors has the for
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from statistics import NormalDist
 
 import cv2
 import numpy as np
@@ -21,6 +19,7 @@ from hicp_lib.simulation.camera import Camera, pixel_rays
 from hicp_lib.simulation.people import RIGHT
 from hicp_lib.simulation.raycast import RayScene
 from hicp_lib.simulation.sensors.depth_alignment import align_to_colour
+from hicp_lib.simulation.sensors.depth_noise import correlated_noise, patches
 
 Rng = np.random.Generator
 
@@ -147,7 +146,7 @@ def _measure(scene: RayScene, view: Camera, first_column: int, settings: DepthCa
         measured_px, clear = _edges(true_px, settings, rng)
         valid &= clear
     if settings.subpixel_rms_px:
-        noise = _correlated_noise(true_px.shape, settings.window_px, rng)
+        noise = correlated_noise(true_px.shape, settings.window_px, rng)
         measured_px = measured_px + np.float32(settings.subpixel_rms_px) * noise
     if settings.disparity_step_px:
         measured_px = np.rint(measured_px / settings.disparity_step_px) * settings.disparity_step_px
@@ -159,7 +158,7 @@ def _measure(scene: RayScene, view: Camera, first_column: int, settings: DepthCa
     if settings.shadow:
         valid &= ~_hidden_from_right(true_px)
     if settings.hair_holes and hair.any():
-        valid &= ~(hair & _patches(hair.shape, settings.hair_holes, settings.window_px, rng))
+        valid &= ~(hair & patches(hair.shape, settings.hair_holes, settings.window_px, rng))
     return _to_depth(measured_px, valid, settings)
 
 
@@ -236,13 +235,13 @@ def _edges(true_px: np.ndarray, settings: DepthCamera, rng: Rng) -> tuple[np.nda
     rows, columns = np.nonzero(cv2.dilate(step.astype(np.uint8), box))
     low, high = (f(true_px, box)[rows, columns] for f in (cv2.erode, cv2.dilate))
     mean = cv2.blur(true_px, (settings.window_px, settings.window_px))[rows, columns]
-    jitter = _correlated_noise(true_px.shape, settings.window_px, rng)[rows, columns]
+    jitter = correlated_noise(true_px.shape, settings.window_px, rng)[rows, columns]
     share = (mean - low) / np.maximum(high - low, 1e-6) - 0.5 + _EDGE_GROWTH + _EDGE_JITTER * jitter
     share = np.clip(0.5 + share * (settings.window_px / settings.edge_px), 0, 1)
     measured, clear = true_px.copy(), np.ones(true_px.shape, bool)
     measured[rows, columns] = low + share * (high - low)
     between = (share > 0) & (share < 1)
-    holes = _patches(true_px.shape, settings.edge_holes, settings.window_px, rng)
+    holes = patches(true_px.shape, settings.edge_holes, settings.window_px, rng)
     clear[rows[between], columns[between]] = ~holes[rows[between], columns[between]]
     return measured, clear
 
@@ -259,31 +258,3 @@ def _hidden_from_right(true_px: np.ndarray) -> np.ndarray:
     for offset in (0, 1):
         np.maximum.at(nearest, (at + offset).ravel(), true_px.ravel())
     return nearest[np.rint(column).astype(np.int32) + start] > true_px + _STEP_PX
-
-
-def _correlated_noise(shape: tuple[int, int], window_px: int, rng: Rng) -> np.ndarray:
-    """Normal noise of variance 1, smooth over a matching window, float32: a random piece of the kept one."""
-    tile = _noise_tile(window_px)
-    start = rng.integers(tile.shape)
-    rows, columns = (np.arange(n) + first for n, first in zip(shape, start, strict=True))
-    return tile.take(rows, axis=0, mode="wrap").take(columns, axis=1, mode="wrap")
-
-
-@lru_cache(maxsize=4)
-def _noise_tile(window_px: int) -> np.ndarray:
-    """Noise that goes on at its other side, (1536, 1536): drawing it anew would cost more than matching."""
-    white = np.random.default_rng(window_px).standard_normal((1536, 1536), np.float32)
-    sigma = np.sqrt((window_px**2 - 1) / 12)  # the window's own standard deviation
-    if sigma == 0:
-        return white
-    reach = int(3 * sigma)
-    kernel = cv2.getGaussianKernel(2 * reach + 1, sigma)
-    smooth = cv2.sepFilter2D(np.pad(white, reach, mode="wrap"), -1, kernel, kernel)
-    return smooth[reach:-reach, reach:-reach] / np.float32((kernel**2).sum())
-
-
-def _patches(shape: tuple[int, int], share: float, window_px: int, rng: Rng) -> np.ndarray:
-    """Patches as large as a matching window that cover a share of the image."""
-    if not 0 < share < 1:
-        return np.full(shape, share >= 1)
-    return _correlated_noise(shape, window_px, rng) > NormalDist().inv_cdf(1 - share)
