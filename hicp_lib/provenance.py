@@ -141,11 +141,10 @@ def _cpu_model() -> str:
     return found.group(1).strip() if found else platform.processor() or "unknown"
 
 
-def peak_memory_mb() -> dict[str, int]:
-    """Most memory this process, and the largest of its finished children, ever held: "self", "child"."""
+def peak_memory_mb() -> int:
+    """Most memory this process ever held, without other processes it started."""
     unit = 1 if sys.platform == "darwin" else 1024  # bytes there, kibibytes elsewhere
-    of = {"self": resource.RUSAGE_SELF, "child": resource.RUSAGE_CHILDREN}
-    return {name: round(resource.getrusage(who).ru_maxrss * unit / 1e6) for name, who in of.items()}
+    return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6)
 
 
 def onnx_providers() -> list[str]:

@@ -88,7 +88,7 @@ def test_the_stamp_says_what_was_run(study, shown, tmp_path):
     assert stamp["weights_sha256"] == {row["name"]: row["sha256"] for row in list_weights()}
     assert stamp["versions"]["numpy"] == np.__version__
     assert stamp["machine"]["cores"] >= 1
-    assert 20 < stamp["peak_memory_mb"]["self"] < 100_000 and stamp["peak_memory_mb"]["child"] >= 0
+    assert 20 < stamp["peak_memory_mb"] < 100_000
     assert "seed = 3" in shown[0]
     assert stamp["lock_sha256"][:12] in shown[0]
 
