@@ -195,6 +195,7 @@ def error_dependence(table: pd.DataFrame, note: str) -> Figure:
             axis.set(
                 yticks=[1, 2, 5, 10, 20, 50], yticklabels=["1", "2", "5", "10", "20", "50"], ylim=(0.7, 80)
             )
+            axis.minorticks_off()
         row[0].set(ylabel="distance from the markers [cm]")
     _legend(figure, axes.flat)
     caption = (

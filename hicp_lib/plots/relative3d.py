@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullLocator
 
 from hicp_lib.detectors.base import Detections
 from hicp_lib.plots.people import draw_people, picture_grid
@@ -156,10 +156,10 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
 
 
 def _plain_ticks(axis) -> None:
-    """Ticks of a logarithmic axis at 1, 2, 3 and 5, written as plain numbers."""
-    axis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))
+    """Ticks of a logarithmic axis at 1, 2 and 5, written as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(NullFormatter())
+    axis.set_minor_locator(NullLocator())
 
 
 def _part_legend(figure, axis, detectors: Sequence[str]) -> None:
