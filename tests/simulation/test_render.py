@@ -7,10 +7,13 @@ from hicp_lib.keypoints import INDEX
 from hicp_lib.simulation import lights, materials
 from hicp_lib.simulation import mesh as g
 from hicp_lib.simulation.body import load_body, pose_body
-from hicp_lib.simulation.camera import Camera, look_at
+from hicp_lib.simulation.camera import Camera, image_directions, look_at
+from hicp_lib.simulation.filters import View
+from hicp_lib.simulation.looks import gather_looks
 from hicp_lib.simulation.people import part_of_vertices
-from hicp_lib.simulation.raycast import RayScene
+from hicp_lib.simulation.raycast import RayScene, trace_image
 from hicp_lib.simulation.render import World, render
+from hicp_lib.simulation.shadows import visibility
 from hicp_lib.simulation.surfaces import Surface
 from hicp_lib.simulation.visibility import keypoint_visibility
 
@@ -69,6 +72,30 @@ def test_shadows_are_dark_and_light_is_not_below_zero():
     assert image.min() >= 0
     assert image[30, 40] < 0.5 * lit[30, 40]
     assert image[55, 5] == pytest.approx(lit[55, 5], rel=0.1)
+
+
+def test_frames_of_one_world_are_those_of_worlds_made_anew():
+    ball = Surface(_sphere([0, 0, 1], 0.5), GREY, person=0)
+    kept = _world([ball])
+    for eye in ([0, -3, 1], [1, -3, 1.5]):
+        camera = Camera(80, 60, 70.0, 70.0, 39.5, 29.5, look_at(eye, [0, 0, 1]))
+        again = render(kept, camera, np.random.default_rng(1))
+        fresh = render(_world([ball]), camera, np.random.default_rng(1))
+        assert (again.radiance == fresh.radiance).all() and (again.depth_m == fresh.depth_m).all()
+        assert again.rays is kept.rays
+
+
+def test_a_ball_alone_is_in_nobodys_shadow():
+    """What turns away from the lamp is dark by its angle; it is no shadow that would spread to its edge."""
+    lamp = lights.Light(np.array([3.0, -3, 1]), np.array([0.1, 0, 0]), np.array([0, 0, 0.1]), np.ones(3))
+    scene = RayScene([Surface(_sphere([0, 0, 1], 0.5), GREY, person=0)])
+    directions = image_directions(CAMERA)
+    trace = trace_image(scene, CAMERA.centre_m, directions, np.array([True]))
+    view = View.of(trace, CAMERA.centre_m, directions, np.s_[:, :], np.ones((60, 80), bool))
+    normals = view.on_grid(gather_looks(scene, view, 1 / 70).normals)
+    seen = visibility([lamp], scene, view, normals, True, np.random.default_rng(0))
+    assert seen.shape == (2, len(view.pixels)) and len(view.pixels) > 400
+    assert (seen == 1).all()
 
 
 @pytest.fixture(scope="module")
