@@ -261,7 +261,9 @@ def is_rendered(results: Path, notebook: str) -> bool:
     if not path.is_file():
         raise _MissingError(f"{notebook} has no results in this run", "hicp report")
     parameters = read_json(path)["parameters"]
-    given = [Path(value) for name, value in parameters.items() if name.startswith("recording") and value]
-    if given:
-        return any((folder / SIMULATION_FILE).is_file() for folder in given)
-    return parameters.get("source", "rendered") == "rendered"
+    recordings = [value for name, value in parameters.items() if name.startswith("recording")]
+    if parameters.get("source", "" if recordings else "rendered") == "rendered":
+        return True
+    given = [Path(folder) for folder in recordings if folder]
+    simulated = not given or any((folder / SIMULATION_FILE).is_file() for folder in given)
+    return bool(recordings) and simulated

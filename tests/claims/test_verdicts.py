@@ -73,6 +73,9 @@ def test_evidence_names_each_detector_with_its_interval(write):
         ({"recording": ""}, v.ON_RENDERED_DATA),
         ({"recording": "mine"}, v.REPRODUCED),
         ({"source": "halpe"}, v.REPRODUCED),
+        ({"source": "rendered", "recording": "mine"}, v.ON_RENDERED_DATA),
+        ({"source": "halpe", "recording": ""}, v.ON_RENDERED_DATA),
+        ({}, v.ON_RENDERED_DATA),
     ],
 )
 def test_rendered_data_qualify_the_verdict(write, parameters, expected):
