@@ -73,6 +73,7 @@ def models() -> None:
 @models.command("list")
 def models_list() -> None:
     """List the weight files, their licences, and whether they are here."""
+    from hicp_lib.detectors.own import all_own_options
     from hicp_lib.detectors.published import published, status
     from hicp_lib.detectors.zoo import list_weights
 
@@ -84,6 +85,8 @@ def models_list() -> None:
         size = "     ? MB" if model.size_bytes is None else f"{model.size_bytes / 1e6:6.1f} MB"
         row = f"{model.name:<32} {status(model):<10} {size}  {model.licence or 'licence ?':<12}"
         say(f"{row} {model.use or 'not run here'}: {model.note}")
+    for name, options in all_own_options().items():
+        say(f"yours: {name} with {', '.join(f'{key} {value}' for key, value in options.items())}")
 
 
 @models.command("fetch")

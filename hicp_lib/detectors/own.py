@@ -19,37 +19,14 @@ def own_path() -> Path:
     return cache_dir() / "own_detectors.json"
 
 
-def own_options(name: str) -> dict[str, Any]:
-    """Options kept for a detector; none where nothing was kept.
+def all_own_options() -> dict[str, dict[str, Any]]:
+    """Options kept, by detector.
 
     Raises
     ------
     InputError
         If the file is not one of options.
     """
-    return _read().get(name, {})
-
-
-def keep_own(name: str, options: dict[str, Any]) -> None:
-    """Keep a detector's options, files by their absolute path, in the place of those kept before."""
-    kept = {key: str(value.resolve()) if isinstance(value, Path) else value for key, value in options.items()}
-    write_json(own_path(), _read() | {name: kept}, indent=2)
-
-
-def own_sha256() -> dict[str, str]:
-    """By detector, one SHA-256 of its options with the content of their files."""
-    return {
-        name: sha256_bytes(json.dumps({key: _identity(value) for key, value in kept.items()}).encode())
-        for name, kept in _read().items()
-    }
-
-
-def _identity(value: Any) -> Any:
-    is_file = isinstance(value, str) and Path(value).is_file()
-    return sha256_file(value) if is_file else value
-
-
-def _read() -> dict[str, dict[str, Any]]:
     path = own_path()
     kept = read_json(path) if path.is_file() else {}
     if not isinstance(kept, dict) or not all(isinstance(options, dict) for options in kept.values()):
@@ -57,3 +34,27 @@ def _read() -> dict[str, dict[str, Any]]:
             f"{path}: expected options by detector; delete it, and name your files again with hicp models use"
         )
     return kept
+
+
+def own_options(name: str) -> dict[str, Any]:
+    """Options kept for a detector; none where nothing was kept."""
+    return all_own_options().get(name, {})
+
+
+def keep_own(name: str, options: dict[str, Any]) -> None:
+    """Keep a detector's options, files by their absolute path, in the place of those kept before."""
+    kept = {key: str(Path(value).resolve()) if _is_file(value) else value for key, value in options.items()}
+    write_json(own_path(), all_own_options() | {name: kept}, indent=2)
+
+
+def own_sha256() -> dict[str, str]:
+    """By detector, one SHA-256 of its options with the content of their files."""
+    digests = {}
+    for name, kept in all_own_options().items():
+        content = {key: sha256_file(value) if _is_file(value) else value for key, value in kept.items()}
+        digests[name] = sha256_bytes(json.dumps(content).encode())
+    return digests
+
+
+def _is_file(value: Any) -> bool:
+    return isinstance(value, str | Path) and Path(value).is_file()

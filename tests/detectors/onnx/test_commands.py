@@ -1,12 +1,13 @@
 """The command on users' models: what is assumed is printed, mistakes are one line, results are written."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hicp_lib import cli
-from hicp_lib.detectors.own import own_path
+from hicp_lib.detectors.own import keep_own, own_options, own_path
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.images import write_png
 from hicp_lib.provenance import weights_sha256
@@ -80,6 +81,16 @@ def test_a_model_named_once_is_taken_from_then_on(capsys, model, tmp_path):
     assert set(named) - set(before) == {"mmpose"}
     assert cli.run([*use, "--model", model]) == 0
     assert weights_sha256()["mmpose"] != named["mmpose"]
+    capsys.readouterr()
+    assert cli.run(["models", "list"]) == 0
+    assert f"yours: mmpose with model {model}" in capsys.readouterr().out
+
+
+def test_files_are_kept_by_their_whole_path_however_they_were_named(model, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    keep_own("openpose", {"model": Path("m.onnx"), "hand_model": "m.onnx", "threads": 1})
+    monkeypatch.chdir(tmp_path.parent)
+    assert own_options("openpose") == {"model": model, "hand_model": model, "threads": 1}
 
 
 def test_detectors_with_weights_of_their_own_take_no_others(capsys, model):
