@@ -47,19 +47,20 @@ def weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     array, shape (draws,): what `np.nanmedian` of the repeated values is; NaN where none was drawn
     """
     rows = np.atleast_2d(values)
-    some = np.isfinite(rows).any(axis=0)
-    rows, weights = rows[:, some], weights[:, some]
-    if not some.any():
+    some = np.flatnonzero(np.isfinite(rows).any(axis=0))
+    if len(some) == 0:
         return np.full(len(weights), np.nan)
+    rows = rows[:, some]
     order = np.argsort(rows, axis=1)  # NaN last
-    drawn = weights[:, order[0]] if len(rows) == 1 else np.take_along_axis(weights, order, axis=1)
+    columns = some[order]
+    drawn = weights.take(columns[0], axis=1) if len(rows) == 1 else np.take_along_axis(weights, columns, 1)
     n_finite = np.isfinite(rows).sum(axis=1)[:, None]
-    if n_finite.min() < rows.shape[1]:
-        drawn = np.where(np.arange(rows.shape[1]) < n_finite, drawn, 0)
+    if n_finite.min() < len(some):
+        drawn = np.where(np.arange(len(some)) < n_finite, drawn, 0)
     counts = np.cumsum(drawn, axis=1)
     total = counts[:, -1]
     row = np.arange(len(weights)) if len(rows) > 1 else 0
-    # The two in the middle, or the one twice.
-    places = [(counts < rank[:, None]).sum(axis=1) for rank in ((total + 1) // 2, total // 2 + 1)]
-    lower, upper = (rows[row, order[row, np.minimum(place, rows.shape[1] - 1)]] for place in places)
+    # The first that reach the ranks in the middle; with an odd number it is one rank twice.
+    places = [(counts >= rank[:, None]).argmax(axis=1) for rank in ((total + 1) // 2, total // 2 + 1)]
+    lower, upper = (rows[row, order[row, place]] for place in places)
     return np.where(total > 0, (lower + upper) / 2, np.nan)
