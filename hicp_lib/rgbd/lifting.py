@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -124,10 +125,13 @@ def windows(
     steps = np.arange(-half_px, half_px + 1)
     height, width = depth_m.shape
     rows, columns = rows[:, None] + steps, columns[:, None] + steps
-    inside_rows, inside_columns = np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)
+    inside_rows, inside_columns = (
+        np.maximum(np.minimum(at, n - 1), 0) for at, n in ((rows, height), (columns, width))
+    )
     pieces = depth_m.take((inside_rows * width)[:, :, None] + inside_columns[:, None, :])
-    pieces[rows != inside_rows] = 0
-    np.swapaxes(pieces, 1, 2)[columns != inside_columns] = 0
+    for beyond, lines in ((rows != inside_rows, pieces), (columns != inside_columns, pieces.swapaxes(1, 2))):
+        if beyond.any():
+            lines[beyond] = 0
     return pieces, rows, columns
 
 
@@ -147,26 +151,44 @@ def _of_like_size(half_px: np.ndarray) -> Iterator[np.ndarray]:
 
 def _half_widths(depth_m, rows, columns, radius_px: np.ndarray) -> np.ndarray:
     """Half widths of the neighbourhoods in whole pixels, (n,); `radius_px` is fx r, (n,), pixels x metres."""
-    half = _nearest_that_reaches(depth_m, rows, columns, radius_px, 2)
-    lost = np.flatnonzero(half < 0)
-    if len(lost):  # in the middle of larger holes; the least depth of all bounds the search
-        least_m = np.where(has_depth(depth_m), depth_m, np.inf).min()
-        reach = int(radius_px[lost].max() / max(least_m, MIN_DEPTH_M))
+    half = _sizes(radius_px, depth_m[rows, columns])
+    lost, reach = np.flatnonzero(half < 0), 0
+    while len(lost):  # in holes; no corner of a neighbourhood is farther away than that of the least depth
+        limit = int(np.ceil(np.sqrt(2) * radius_px[lost].max() / MIN_DEPTH_M))
+        if reach >= limit:
+            break
+        reach = min(max(16 * reach, 2), limit)
         half[lost] = _nearest_that_reaches(depth_m, rows[lost], columns[lost], radius_px[lost], reach)
+        lost = lost[half[lost] < 0]
     return np.maximum(half, 0)  # a hole that nothing reaches is alone, and has no depth
 
 
+def _sizes(radius_px: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
+    """Half widths at some depths, whole numbers; -1 where there is no depth."""
+    sizes = radius_px / np.maximum(depth_m, MIN_DEPTH_M)
+    return np.where(has_depth(depth_m), sizes, -1).astype(int)
+
+
 def _nearest_that_reaches(depth_m, rows, columns, radius_px, reach: int) -> np.ndarray:
-    """Half width that the nearest pixel sets whose neighbourhood reaches the middle, (n,); -1: none."""
+    """Half width that the nearest pixel sets whose neighbourhood reaches the middle, (n,).
+
+    -1 where there is none within `reach` pixels.
+    """
     pieces, _, _ = windows(depth_m, rows, columns, reach)
+    order, away = _disk(reach)
+    sizes = _sizes(radius_px[:, None], pieces.reshape(len(rows), -1)[:, order])
+    reaches = sizes >= away
+    nearest = reaches.argmax(axis=1)
+    return np.where(reaches.any(axis=1), sizes[np.arange(len(rows)), nearest], -1)
+
+
+@cache
+def _disk(reach: int) -> tuple[np.ndarray, np.ndarray]:
+    """Pixels of a square window at most `reach` from its middle, nearest first, and how wide each must be."""
     steps = np.arange(-reach, reach + 1)
-    steps_v, steps_u = (part.ravel() for part in np.meshgrid(steps, steps, indexing="ij"))
-    order = np.argsort(steps_u**2 + steps_v**2, kind="stable")
-    depth = pieces.reshape(len(rows), len(order))[:, order]
-    sizes = np.floor(radius_px[:, None] / np.maximum(depth, MIN_DEPTH_M))
-    sizes[~has_depth(depth)] = -1
-    nearest = (sizes >= np.maximum(abs(steps_u), abs(steps_v))[order]).argmax(axis=1)
-    return sizes[np.arange(len(rows)), nearest].astype(int)
+    square = steps**2 + steps[:, None] ** 2
+    order = np.argsort(square, axis=None, kind="stable")[: np.count_nonzero(square <= reach**2)]
+    return order, np.maximum(abs(steps), abs(steps[:, None])).ravel()[order]
 
 
 def _medians(depth_m, rows, columns, half_px, intrinsics: Intrinsics) -> np.ndarray:
