@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from operator import itemgetter
 
 import numpy as np
@@ -17,9 +19,55 @@ _BODY = {"share": 0.05, "more_m": 0.010, "most_short": 4.0}
 _HAND = {"share": 0.03, "more_m": 0.003, "most_short": 20.0}
 
 
-def choose_along_limbs(
-    costs: np.ndarray, grid_m: np.ndarray, rays: np.ndarray, found: np.ndarray, measures: BodyMeasures
-) -> np.ndarray:
+@dataclass(frozen=True)
+class Limbs:
+    """Some limbs that are equally far from the root.
+
+    Attributes
+    ----------
+    begin, end : arrays, shape (n,), rows of the keypoints at their ends, `begin` nearer to the root
+    costs : array, shape (n, g, 2 r + 1), what their lengths cost: for each depth of the beginning, at each of
+        r steps nearer to r steps further of the end. With more steps all of them are too long by the most
+        that costs
+    """
+
+    begin: np.ndarray
+    end: np.ndarray
+    costs: np.ndarray
+
+
+def limbs_outwards(
+    grid_m: np.ndarray, rays: np.ndarray, found: np.ndarray, measures: BodyMeasures
+) -> list[Limbs]:
+    """All limbs of a person, from the root of the tree outwards.
+
+    Limbs of hands are short and need few steps, so they are apart from those of the body.
+
+    Parameters
+    ----------
+    grid_m : array, shape (g,), depths, evenly spaced
+    rays : array, shape (m, 3), lines of sight, z = 1
+    found : array, shape (m,), the keypoints, Halpe order, increasing
+    """
+    above, step_m = hang_together(found), grid_m[1] - grid_m[0]
+    limbs = []
+    for of_hand in (False, True):
+        end = np.flatnonzero((above >= 0) & ((found >= LEFT_HAND[0]) == of_hand))
+        if len(end) == 0:
+            continue
+        pairs = np.stack([above[end], end])
+        limits = _Limits(found[pairs], measures)
+        reach = min(int(limits.farthest_m.max() / step_m) + 1, len(grid_m) - 1)
+        ends_m = grid_m[:, None] + step_m * np.arange(-reach, reach + 1)
+        costs = _length_costs(grid_m[:, None], ends_m, rays[pairs], limits)
+        levels = LEVELS[found[end]]
+        for level in np.unique(levels):
+            alike = levels == level
+            limbs.append((level, Limbs(*pairs[:, alike], costs[alike])))
+    return [of_level for _, of_level in sorted(limbs, key=itemgetter(0))]
+
+
+def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> np.ndarray:
     """The depths that cost least in all.
 
     The sum over keypoints and limbs is minimised exactly along the tree of limbs, from their ends to the
@@ -28,61 +76,30 @@ def choose_along_limbs(
 
     Parameters
     ----------
-    costs : array, shape (m, g), of each keypoint at each depth
-    grid_m : array, shape (g,), evenly spaced
-    rays : array, shape (m, 3), lines of sight, z = 1
-    found : array, shape (m,), the keypoints, Halpe order, increasing
+    costs : array, shape (m, g), of each keypoint at each depth of the limbs' grid
+    limbs : from the root outwards, as `limbs_outwards` gives them
 
     Returns
     -------
-    array, shape (m,): index into `grid_m`
+    array, shape (m,): index into the grid
     """
-    above, g = hang_together(found), len(grid_m)
-    limbs = _limbs_outwards(above, grid_m, rays, found, measures)
-    widest = max((length_costs.shape[2] for _, length_costs in limbs), default=1)
+    g = costs.shape[1]
+    widest = max((some.costs.shape[2] for some in limbs), default=1)
     padded = np.pad(np.float32(costs), [(0, 0), (widest // 2, widest // 2)], constant_values=np.inf)
     costs = padded[:, widest // 2 :][:, :g]  # a view: what is added here is seen by those further in
-    answer = np.zeros((len(found), g), int)
-    for ends, length_costs in limbs[::-1]:
-        width = length_costs.shape[2]
+    answers = []
+    for some in limbs[::-1]:
+        width = some.costs.shape[2]
         within = padded[:, (widest - width) // 2 :][:, : g + width - 1]
-        total = sliding_window_view(within, width, axis=1)[ends] + length_costs
-        near, far = total.argmin(axis=2), costs[ends].argmin(axis=1)[:, None]
-        near_cost, far_cost = total.min(axis=2), costs[ends].min(axis=1)[:, None] + _MOST_LONG
-        answer[ends] = np.where(near_cost <= far_cost, near + np.arange(g) - width // 2, far)
-        np.add.at(costs, above[ends], np.minimum(near_cost, far_cost))
+        total = sliding_window_view(within, width, axis=1)[some.end] + some.costs
+        near, far = total.argmin(axis=2), costs[some.end].argmin(axis=1)[:, None]
+        near_cost, far_cost = total.min(axis=2), costs[some.end].min(axis=1)[:, None] + _MOST_LONG
+        answers.append(np.where(near_cost <= far_cost, near + np.arange(g) - width // 2, far))
+        np.add.at(costs, some.begin, np.minimum(near_cost, far_cost))
     chosen = costs.argmin(axis=1)  # which counts for those that hang on none
-    for ends, _ in limbs:
-        chosen[ends] = answer[ends, chosen[above[ends]]]
+    for some, answer in zip(limbs, answers[::-1], strict=True):
+        chosen[some.end] = np.take_along_axis(answer, chosen[some.begin, None], axis=1)[:, 0]
     return chosen
-
-
-def _limbs_outwards(
-    above: np.ndarray, grid_m: np.ndarray, rays: np.ndarray, found: np.ndarray, measures: BodyMeasures
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Limbs that are equally far from the root together, from there outwards.
-
-    Returns
-    -------
-    The ends of n limbs, (n,), and what their lengths cost, (n, g, 2 r + 1): for each depth of the beginning,
-    at each of r steps nearer to r steps further of the end. With more steps all of them are too long by the
-    most that costs. Limbs of hands are short and need few steps, so they are apart from those of the body
-    """
-    step_m = grid_m[1] - grid_m[0]
-    limbs = []
-    for of_hand in (False, True):
-        ends = np.flatnonzero((above >= 0) & ((found >= LEFT_HAND[0]) == of_hand))
-        if len(ends) == 0:
-            continue
-        pairs = np.stack([above[ends], ends])
-        limits = _Limits(found[pairs], measures)
-        reach = min(int(limits.farthest_m.max() / step_m) + 1, len(grid_m) - 1)
-        ends_m = grid_m[:, None] + step_m * np.arange(-reach, reach + 1)
-        length_costs = _length_costs(grid_m[:, None], ends_m, rays[pairs], limits)
-        levels = LEVELS[found[ends]]
-        for level in np.unique(levels):
-            limbs.append((level, ends[levels == level], length_costs[levels == level]))
-    return [(ends, length_costs) for _, ends, length_costs in sorted(limbs, key=itemgetter(0))]
 
 
 class _Limits:

@@ -36,7 +36,7 @@ from hicp_lib.rgbd.body_measures import load_measures
 from hicp_lib.rgbd.camera import Intrinsics
 from hicp_lib.rgbd.hand_shapes import favour_hand_shapes
 from hicp_lib.rgbd.lifting import LIFTED, MIN_DEPTH_M, NO_DEPTH, Lifted, lift
-from hicp_lib.rgbd.limb_lengths import choose_along_limbs
+from hicp_lib.rgbd.limb_lengths import choose_along_limbs, limbs_outwards
 from hicp_lib.rgbd.near_surfaces import Candidates, costs_of_depths, look_around, settle
 
 STEPS = ("below_surface", "near_surfaces", "limb_lengths", "hand_shapes")
@@ -107,15 +107,15 @@ def _choose(
 ) -> Iterator[np.ndarray]:
     """Points (m, 3) of one person's keypoints after two steps or more, for each number of them."""
     of_surfaces = costs_of_depths(candidates, grid_m)
-    with_limbs = np.flatnonzero(~_IN_FACE[found])
+    on = np.flatnonzero(~_IN_FACE[found])  # what hangs on limbs
+    limbs = limbs_outwards(grid_m, candidates.rays[on], found[on], load_measures())
     for n in n_steps:
         costs, steps = of_surfaces, STEPS[:n]
         if "hand_shapes" in steps:
             costs = favour_hand_shapes(costs, grid_m, candidates.rays, found)
         chosen = costs.argmin(axis=1)
         if "limb_lengths" in steps:
-            on = costs[with_limbs], grid_m, candidates.rays[with_limbs], found[with_limbs]
-            chosen[with_limbs] = choose_along_limbs(*on, load_measures())
+            chosen[on] = choose_along_limbs(costs[on], limbs)
         yield candidates.rays * settle(candidates, grid_m[chosen], _GRID_M)[:, None]
 
 

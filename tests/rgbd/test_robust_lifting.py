@@ -11,7 +11,7 @@ from hicp_lib.keypoints import HANDS, INDEX
 from hicp_lib.rgbd.body_measures import load_measures
 from hicp_lib.rgbd.camera import Intrinsics, deproject
 from hicp_lib.rgbd.lifting import LIFTED, NO_DEPTH, NOT_DETECTED, OUTSIDE_IMAGE, lift
-from hicp_lib.rgbd.limb_lengths import choose_along_limbs
+from hicp_lib.rgbd.limb_lengths import choose_along_limbs, limbs_outwards
 from hicp_lib.rgbd.robust_lifting import STEPS, lift_in_steps, lift_robust
 from hicp_lib.simulation.body import load_body, pose_body
 from hicp_lib.simulation.camera import Camera, look_at, pixel_rays
@@ -39,7 +39,7 @@ def test_no_other_choice_of_depths_costs_less(seed):
     costs = rng.uniform(0, 10, (4, 5))
     rays = np.column_stack([rng.uniform(-0.5, 0.5, (4, 2)), np.ones(4)])
     measures = load_measures()
-    chosen = choose_along_limbs(costs, grid_m, rays, found, measures)
+    chosen = choose_along_limbs(costs, limbs_outwards(grid_m, rays, found, measures))
 
     def total(depths) -> float:
         limbs = [(1, 2), (2, 3)]  # shoulder to elbow to wrist; the nose hangs on a shoulder not found
