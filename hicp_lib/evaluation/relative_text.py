@@ -13,15 +13,35 @@ _ROW = ["view", "detector", "part"]
 _DISTANCES = {"spread_m": "spread [cm]", "bias_m": "bias [cm]", "error_m": "error [cm]"}
 
 
-def shares_text(table: pd.DataFrame | None, threshold_m: float) -> pd.DataFrame:
-    """Shares within a distance as "0.71 [0.65, 0.77]", a column per method; `table` of `within_distance`."""
+def shares_text(
+    table: pd.DataFrame | None, threshold_m: float, caption: str = ""
+) -> tuple[pd.DataFrame, str]:
+    """Shares within a distance as "0.71 [0.65, 0.77]", a column per method; `table` of `within_distance`.
+
+    Returns
+    -------
+    The table, and the caption with a sentence that counts the cases in which either method is ahead.
+    """
     if table is None:
-        return _not_available("true positions (truth.parquet)")
+        return _not_available("true positions (truth.parquet)"), caption
     rows = table[table["threshold_m"] == threshold_m]
     text = [
         with_bounds(*numbers) for numbers in rows[["value", "low", "high"]].itertuples(index=False, name=None)
     ]
-    return wide(rows.assign(text=text), _ROW, "method")
+    return wide(rows.assign(text=text), _ROW, "method"), f"{caption}{_higher(rows)}"
+
+
+def _higher(rows: pd.DataFrame) -> str:
+    """How often each of two methods has the higher share, in words."""
+    shares = rows.pivot(index=_ROW, columns="method", values="value")
+    if shares.shape[1] != 2:
+        return ""
+    first, second = shares
+    more = (shares[first] - shares[second]).dropna()
+    return (
+        f" Of {len(more)} cases, {first} has the higher share in {(more > 0).sum()}, {second} in "
+        f"{(more < 0).sum()}."
+    )
 
 
 def distances_text(table: pd.DataFrame) -> pd.DataFrame:

@@ -12,10 +12,11 @@ def test_shares_have_a_column_per_method_and_the_order_they_came_in():
                                ("a", "left hand", "robust", np.nan), ("a", "left hand", "paper", 0.2))
             for t in (0.05, 0.1)]  # fmt: skip
     columns = ["view", "detector", "method", "part", "threshold_m", "value", "low", "high"]
-    table = shares_text(pd.DataFrame(rows, columns=columns), 0.05)
+    table, caption = shares_text(pd.DataFrame(rows, columns=columns), 0.05, "Shares.")
     assert list(table) == ["view", "detector", "part", "robust", "paper"]
     assert table.iloc[0].tolist() == ["upper", "b", "left wrist", "0.70 [0.60, 0.80]", "0.50 [0.40, 0.60]"]
     assert table.iloc[1]["robust"] == "–"
+    assert caption == "Shares. Of 1 cases, paper has the higher share in 0, robust in 1."
 
 
 def test_distances_are_in_centimetres_and_unknown_ones_left_out():
@@ -44,5 +45,5 @@ def test_causes_have_a_column_each():
 
 
 def test_what_is_not_there_is_said():
-    assert "not available" in shares_text(None, 0.05)["here"].item()
+    assert "not available" in shares_text(None, 0.05)[0]["here"].item()
     assert "not available" in causes_text(pd.DataFrame(columns=["view", "cause", "spread_m"]))["here"].item()
