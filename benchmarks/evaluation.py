@@ -15,13 +15,13 @@ import io
 import json
 import platform
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
+from timing import best_seconds
 
 from hicp_lib.annotations import Annotations, ImageInfo, read_annotations, write_annotations
 from hicp_lib.detectors.base import Detections
@@ -49,21 +49,11 @@ def make_people(n: int) -> tuple[Annotations, dict[int, Detections]]:
     return people, {i: Detections(found[i], np.ones((N_FOUND, 136)), scores[i]) for i in range(n)}
 
 
-def seconds(work: Callable[[], object], repeats: int = 3) -> float:
-    """The best of some runs."""
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return min(times)
-
-
 def reading(people: Annotations) -> dict:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "annotations.json"
         write_annotations(path, people)
-        ours, base = seconds(lambda: read_annotations(path)), seconds(lambda: json.loads(path.read_bytes()))
+        ours, base = best_seconds(lambda: read_annotations(path), lambda: json.loads(path.read_bytes()))
     return {"what": "read annotations / json.loads", "ours_s": ours, "baseline_s": base}
 
 
@@ -71,10 +61,10 @@ def similarity(people: Annotations, found: dict[int, Detections]) -> dict:
     sigmas = SIGMAS["halpe"][COCO_17]
     truth, labelled = people.keypoints_px[:, None, COCO_17], people.visibility[:, None, COCO_17] > 0
     points = np.stack([found[i].keypoints_px[:, COCO_17] for i in people.images])
-    ours = seconds(
-        lambda: oks(truth, labelled, people.boxes_px[:, None], people.areas_px2[:, None], points, sigmas)
+    ours, base = best_seconds(
+        lambda: oks(truth, labelled, people.boxes_px[:, None], people.areas_px2[:, None], points, sigmas),
+        _pycocotools_oks(people, found, sigmas),
     )
-    base = seconds(_pycocotools_oks(people, found, sigmas))
     return {"what": "OKS of all pairs / COCOeval.computeOks", "ours_s": ours, "baseline_s": base}
 
 
@@ -100,13 +90,13 @@ def _pycocotools_oks(
 
 def bootstrapping(people: Annotations, found: dict[int, Detections], n_draws: int = 3) -> dict:
     evaluation = evaluate(people, found)
-    ours = seconds(lambda: bootstrap_intervals(evaluation, N_RESAMPLES), repeats=1)
+    (ours,) = best_seconds(lambda: bootstrap_intervals(evaluation, N_RESAMPLES), turns=1)
     # A draw costs pycocotools what the whole set costs.
-    base = seconds(lambda: evaluate(people, found), repeats=n_draws) * N_RESAMPLES
+    (draw,) = best_seconds(lambda: evaluate(people, found), turns=n_draws)
     return {
         "what": f"{N_RESAMPLES} draws from matches / pycocotools anew",
         "ours_s": ours,
-        "baseline_s": base,
+        "baseline_s": draw * N_RESAMPLES,
     }
 
 

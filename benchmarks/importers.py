@@ -15,11 +15,11 @@ import json
 import platform
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from timing import best_seconds
 
 from hicp_lib.annotations import Annotations, ImageInfo
 from hicp_lib.importers.importing import import_predictions, write_imported
@@ -54,16 +54,6 @@ def make_people(n: int) -> tuple[Annotations, dict[str, list[Person]]]:
     return annotations, found
 
 
-def seconds(work: Callable[[], object], repeats: int = 3) -> float:
-    """The best of some runs."""
-    times = []
-    for _ in range(repeats):
-        start = time.process_time()
-        work()
-        times.append(time.process_time() - start)
-    return min(times)
-
-
 def parse(path: Path) -> None:
     """The baseline."""
     for file in sorted(path.iterdir()) if path.is_dir() else [path]:
@@ -89,10 +79,12 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             path, out = Path(folder) / "native", Path(folder) / "detections.json"
             write(path)
-            ours = seconds(lambda: import_predictions(format, path, annotations))  # noqa: B023
-            base = seconds(lambda: parse(path))  # noqa: B023
+            ours, base = best_seconds(
+                lambda: import_predictions(format, path, annotations),  # noqa: B023
+                lambda: parse(path),  # noqa: B023
+            )
             imported = import_predictions(format, path, annotations)
-            writing = seconds(lambda: write_imported(out, imported), repeats=1)  # noqa: B023
+            (writing,) = best_seconds(lambda: write_imported(out, imported), turns=1)  # noqa: B023
         row = {"format": format, "ours_s": ours, "baseline_s": base}
         rows.append(row | {"ratio": ours / base, "write_s": writing})
         print(

@@ -12,11 +12,10 @@ from __future__ import annotations
 import argparse
 import json
 import platform
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from timing import best_seconds
 
 from hicp_lib.keypoints import INDEX
 from hicp_lib.rgbd.camera import Intrinsics, deproject
@@ -65,28 +64,21 @@ def lift_one_by_one(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: I
     return points_m
 
 
-def seconds(work: Callable[[], object], repeats: int) -> float:
-    """The best of some runs."""
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return min(times)
-
-
 def compare(view: str) -> dict:
     frame = (*make_frame(*VIEWS[view]), INTRINSICS)
     ours_m, base_m = lift(*frame).points_m, lift_one_by_one(*frame)
     both = np.isfinite(base_m)
     if not np.allclose(ours_m[both], base_m[both], atol=1e-6):
         raise SystemExit(f"{view}: the loop gives other points")
+    ours_s, base_s, robust_s = best_seconds(
+        lambda: lift(*frame), lambda: lift_one_by_one(*frame), lambda: lift_robust(*frame), turns=100
+    )
     return {
         "what": f"lift a frame, {view}",
         "n_lifted": int(np.isfinite(ours_m[..., 2]).sum()),
-        "ours_s": seconds(lambda: lift(*frame), 300),
-        "baseline_s": seconds(lambda: lift_one_by_one(*frame), 20),
-        "robust_s": seconds(lambda: lift_robust(*frame), 20),
+        "ours_s": ours_s,
+        "baseline_s": base_s,
+        "robust_s": robust_s,
     }
 
 
