@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 
@@ -23,18 +25,48 @@ def of_animation(run: Run, note: str) -> tuple[str, str]:
     return caption, alt
 
 
+def runs_text(metrics: pd.DataFrame) -> pd.DataFrame:
+    """A run per row: how near the person came, for how long, what the robot did; dashes for what did not."""
+    shown = metrics[["script", "detector"]].copy()
+    shown["least distance [cm]"] = _cm(metrics["min_distance_m"])
+    shown["nearer than 10 cm [s]"] = metrics["under_10cm_s"].map("{:.2f}".format)
+    shown["gives way after [s]"] = metrics["reaction_s"].map(_or_dash("{:.2f}"))
+    shown["retreat [cm]"] = _cm(metrics["retreat_m"])
+    shown["back after [s]"] = metrics["back_s"].map(_or_dash("{:.2f}"))
+    return shown.assign(**{"false retreats": metrics["false_retreats"]})
+
+
+def enough_text(verdicts: pd.DataFrame) -> pd.DataFrame:
+    """Least distance, as times that without avoidance, whether it is enough; of `against_no_avoidance`."""
+    shown = verdicts[["script", "detector"]].copy()
+    shown["least distance [cm]"] = _cm(verdicts["min_distance_m"])
+    shown["times that without"] = verdicts["value"].map("{:.1f}".format)
+    shown["enough"] = [f"no: {why}" if why else "yes" for why in verdicts["why"]]
+    return shown
+
+
 def losses(metrics: pd.DataFrame) -> pd.DataFrame:
     """Per script and detector: share of images in which the person was found while near, longest loss."""
     rows = metrics[~metrics["detector"].isin(IDEAL)]
-    columns = ["script", "detector", "seen_share", "blind_s", "reaction_s", "min_distance_m"]
-    return rows[columns].rename(columns={"seen_share": "value"}).reset_index(drop=True)
+    shown = rows[["script", "detector"]].copy()
+    shown["found in images [%]"] = (100 * rows["seen_share"]).map(_or_dash("{:.0f}"))
+    shown["longest loss [s]"] = rows["blind_s"].map(_or_dash("{:.2f}"))
+    return shown.reset_index(drop=True)
 
 
 def error_table(errors: pd.DataFrame) -> pd.DataFrame:
-    """Number of sure keypoints near the hand, median and 95th percentile of their errors (metres)."""
-    by = errors[errors["near"]].groupby(["detector", "script"])["error_m"]
-    table = pd.DataFrame({"keypoints": by.size(), "value": by.median(), "percentile_95_m": by.quantile(0.95)})
-    return table.reset_index()
+    """Number of sure keypoints near the hand, median and 95th percentile of their errors."""
+    by = errors[errors["near"]].groupby(["script", "detector"], sort=False)["error_m"]
+    table = pd.DataFrame({"keypoints": by.size(), "median [cm]": _cm(by.median())})
+    return table.assign(**{"95th percentile [cm]": _cm(by.quantile(0.95))}).reset_index()
+
+
+def _cm(lengths_m: pd.Series) -> pd.Series:
+    return (100 * lengths_m).map(_or_dash("{:.1f}"))
+
+
+def _or_dash(pattern: str) -> Callable[[float], str]:
+    return lambda value: "–" if value != value else pattern.format(value)
 
 
 def values(metrics: pd.DataFrame, verdicts: pd.DataFrame) -> dict[str, object]:

@@ -23,8 +23,6 @@ _EVERY = 5  # control periods between rows of the tables
 
 def condition_colour(name: str) -> str:
     """Black shades for the conditions without a detector, the detector's own colour otherwise."""
-    if name.startswith("combined:"):
-        return "#009E73"
     return "#111111" if name in IDEAL else detector_colour(name)
 
 

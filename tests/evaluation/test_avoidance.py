@@ -10,7 +10,14 @@ from hicp_lib.evaluation.avoidance import (
     metrics,
     separations,
 )
-from hicp_lib.evaluation.avoidance_text import error_table, losses, of_animation, values
+from hicp_lib.evaluation.avoidance_text import (
+    enough_text,
+    error_table,
+    losses,
+    of_animation,
+    runs_text,
+    values,
+)
 from hicp_lib.keypoints import INDEX
 from hicp_lib.robot.home import HOME_M
 from hicp_lib.robot.loop import AVOIDING, FREE
@@ -109,7 +116,9 @@ def test_errors_do_not_mind_the_side_and_feed_the_separation(runs):
     assert set(found) == {"sees", "loses"}
     assert found["sees"].human_uncertainty_m == pytest.approx(0.03)
     assert found["sees"].reaction_s == pytest.approx(0.12)
-    assert len(error_table(errors)) == 2
+    shown = error_table(errors)
+    assert shown["detector"].tolist() == ["sees", "loses"]
+    assert shown["median [cm]"].tolist() == shown["95th percentile [cm]"].tolist() == ["3.0", "3.0"]
 
 
 def test_numbers_for_the_prose(runs):
@@ -118,5 +127,10 @@ def test_numbers_for_the_prose(runs):
     assert said["min_distance_m_ground_truth"] == pytest.approx(0.06)
     assert said["enough"] == ["sitting, hand: sees"] and len(said["not_enough"]) == 2
     assert losses(table)["detector"].tolist() == ["sees", "loses", "blind"]
+    read = runs_text(table).set_index("detector")
+    assert read.loc["ground truth", "least distance [cm]"] == "6.0"
+    assert read.loc["no avoidance", "back after [s]"] == "–"
+    enough = enough_text(against_no_avoidance(table)).set_index("detector")["enough"]
+    assert enough["sees"] == "yes" and enough["blind"].startswith("no: the detector never finds")
     caption, alt = of_animation(runs[3], "made up")
     assert "sees" in caption and "3.0 cm" in alt
