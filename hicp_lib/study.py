@@ -85,6 +85,7 @@ class Study:
         write_bytes(self.folder / f"{name}.{kind}", content)
         downloads = [kind]
         if figure.table is not None:
+            figure.figure.set_layout_engine("none")  # what was found for the PNG holds for the SVG
             write_bytes(self.folder / f"{name}.svg", _rendered(figure.figure, "svg"))
             self.save(name, figure.table)
             _write_csv(self.folder / f"{name}.csv", figure.table)
