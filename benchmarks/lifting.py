@@ -71,7 +71,7 @@ def compare(view: str) -> dict:
     if not np.allclose(ours_m[both], base_m[both], atol=1e-6):
         raise SystemExit(f"{view}: the loop gives other points")
     ours_s, base_s, robust_s = best_seconds(
-        lambda: lift(*frame), lambda: lift_one_by_one(*frame), lambda: lift_robust(*frame), turns=100
+        lambda: lift(*frame), lambda: lift_one_by_one(*frame), lambda: lift_robust(*frame), turns=20, calls=10
     )
     return {
         "what": f"lift a frame, {view}",

@@ -37,6 +37,7 @@ LIFTED, NOT_DETECTED, OUTSIDE_IMAGE, NO_DEPTH = range(4)
 MIN_DEPTH_M = 0.1  # nearer than depth cameras measure; bounds the neighbourhood
 
 _BLOCK = 1 << 20  # pixels gathered at a time
+_LITTLE = 1 << 14  # pixels that cost less to look at than another round
 
 
 @dataclass(frozen=True)
@@ -157,7 +158,8 @@ def _half_widths(depth_m, rows, columns, radius_px: np.ndarray) -> np.ndarray:
         limit = int(np.ceil(np.sqrt(2) * radius_px[lost].max() / MIN_DEPTH_M))
         if reach >= limit:
             break
-        reach = min(max(16 * reach, 2), limit)
+        is_little = len(lost) * (2 * limit + 1) ** 2 <= _LITTLE
+        reach = limit if reach and is_little else min(max(4 * reach, 2), limit)
         half[lost] = _nearest_that_reaches(depth_m, rows[lost], columns[lost], radius_px[lost], reach)
         lost = lost[half[lost] < 0]
     return np.maximum(half, 0)  # a hole that nothing reaches is alone, and has no depth
@@ -177,9 +179,9 @@ def _nearest_that_reaches(depth_m, rows, columns, radius_px, reach: int) -> np.n
     pieces, _, _ = windows(depth_m, rows, columns, reach)
     order, away = _disk(reach)
     sizes = _sizes(radius_px[:, None], pieces.reshape(len(rows), -1)[:, order])
-    reaches = sizes >= away
-    nearest = reaches.argmax(axis=1)
-    return np.where(reaches.any(axis=1), sizes[np.arange(len(rows)), nearest], -1)
+    nearest = (sizes >= away).argmax(axis=1)  # the first, and the first of all where there is none
+    sizes = sizes[np.arange(len(rows)), nearest]
+    return np.where(sizes >= away[nearest], sizes, -1)
 
 
 @cache
