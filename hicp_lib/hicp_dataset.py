@@ -37,9 +37,7 @@ SUBSETS = ("basic", "headless")
 _EDGES = ("left", "top", "right", "bottom")
 
 
-def plan(
-    annotations: Annotations, min_pixels: int = 20_000, headless_min_pixels: int = 1
-) -> pd.DataFrame:
+def plan(annotations: Annotations, min_pixels: int = 20_000, headless_min_pixels: int = 1) -> pd.DataFrame:
     """Decide, for every annotated person, on the crops.
 
     Parameters
