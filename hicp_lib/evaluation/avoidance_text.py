@@ -33,7 +33,7 @@ def runs_text(metrics: pd.DataFrame) -> pd.DataFrame:
     shown["gives way after [s]"] = metrics["reaction_s"].map(_or_dash("{:.2f}"))
     shown["retreat [cm]"] = _cm(metrics["retreat_m"])
     shown["back after [s]"] = metrics["back_s"].map(_or_dash("{:.2f}"))
-    return shown.assign(**{"false retreats": metrics["false_retreats"]})
+    return shown
 
 
 def enough_text(verdicts: pd.DataFrame) -> pd.DataFrame:

@@ -20,7 +20,7 @@ DETECTOR_COLOURS: dict[str, str] = {
     "mmpose": "#009E73",
     "alphapose": "#7F5FA8",
     "detectron2": "#8C6D31",
-    "combined": "#1F8A9E",
+    "combined": "#882255",
 }
 OTHER_COLOUR = "#595959"
 
