@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from hicp_lib.evaluation.resampling import MIN_DRAWN
+
 
 def block_length(errors: np.ndarray) -> int:
     """Length of the blocks, in frames, for medians and fractions of `errors`.
@@ -42,12 +44,13 @@ def draw_blocks(n_frames: int, length: int, n_resamples: int, seed: int) -> np.n
     """How often each frame is drawn, shape (1 + n_resamples, n_frames); the first row is once each.
 
     Every other row is made of blocks of `length` frames that start anywhere, the last one cut so that
-    as many frames are drawn as there are.
+    as many frames are drawn as there are. Fewer than `resampling.MIN_DRAWN` blocks are not drawn again.
     """
     rng = np.random.default_rng(seed)
     n_blocks = -(-n_frames // length)
+    n_resamples = n_resamples if n_blocks >= MIN_DRAWN else 0
     starts = rng.integers(n_frames - length + 1, size=(n_resamples, n_blocks, 1))
-    frames = (starts + np.arange(length)).reshape(n_resamples, -1)[:, :n_frames]
+    frames = (starts + np.arange(length)).reshape(n_resamples, n_blocks * length)[:, :n_frames]
     counts = np.zeros((1 + n_resamples, n_frames), dtype=int)
     counts[0] = 1
     np.add.at(counts, (np.arange(1, 1 + n_resamples)[:, None], frames), 1)
