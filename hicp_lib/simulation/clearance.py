@@ -113,7 +113,7 @@ def _radius(body: Body, vertices, heads, limb) -> float:
 
 
 def _extent(points: np.ndarray) -> np.ndarray:
-    """The 3rd and 97th percentile of each component, (2, k), of points (n, k)."""
+    """The 3rd and 97th percentile of each component, (2, k), of points (n, k); `np.percentile` is slower."""
     ordered = np.sort(points.T, axis=1)
     below, share = np.divmod(np.array([0.03, 0.97]) * (len(points) - 1), 1)
     low, high = ordered[:, below.astype(int)], ordered[:, below.astype(int) + 1]

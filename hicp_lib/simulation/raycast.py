@@ -116,10 +116,10 @@ def trace_image(scene: RayScene, centre_m: np.ndarray, directions: np.ndarray, f
     with np.errstate(divide="ignore"):  # infinite where nothing is
         np.reciprocal(depth_m, out=depth_m)
     depth_m[every_second] = coarse.depth_m.reshape(coarse_shape)
-    triangles = np.ascontiguousarray(triangle.repeat(2, axis=0).repeat(2, axis=1)[:height, :width])
+    triangles = np.ascontiguousarray(doubled(triangle, (height, width)))
     barycentric = np.empty((height, width, 2), np.float32)
     barycentric[every_second] = coarse.barycentric.reshape(*coarse_shape, 2)
-    unknown = np.repeat(np.repeat(~plain, 2, axis=0), 2, axis=1)[:height, :width]
+    unknown = doubled(~plain, (height, width))
     unknown[every_second] = False
     rest = np.flatnonzero(unknown)
     traced = scene.trace(join_rays(centre_m, pick(directions.reshape(3, -1), rest)))
@@ -144,6 +144,11 @@ def _inside_one(triangle: np.ndarray, inner: np.ndarray) -> np.ndarray:
         plain[:-1, :-1] &= here == other
     plain[-1], plain[:, -1] = False, False
     return cv2.erode(plain.view(np.uint8), np.ones((3, 3), np.uint8)).view(bool)
+
+
+def doubled(values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Each place (rows, columns) as two by two, cut to `shape`."""
+    return values.repeat(2, axis=0).repeat(2, axis=1)[: shape[0], : shape[1]]
 
 
 def _between(values: np.ndarray, height: int, width: int) -> np.ndarray:

@@ -17,7 +17,7 @@ import numpy as np
 from hicp_lib.simulation.body import REGIONS
 from hicp_lib.simulation.camera import Camera, pixel_rays
 from hicp_lib.simulation.people import RIGHT
-from hicp_lib.simulation.raycast import RayScene
+from hicp_lib.simulation.raycast import RayScene, doubled
 from hicp_lib.simulation.sensors.depth_alignment import align_to_colour
 from hicp_lib.simulation.sensors.depth_noise import correlated_noise, patches
 
@@ -192,14 +192,14 @@ def _true_disparity(scene: RayScene, view: Camera, focal_baseline: float) -> tup
     full[::2, 1::2] = ((coarse + right) / 2)[:, : shape[1] // 2]
     full[1::2, ::2] = ((coarse + below) / 2)[: shape[0] // 2]
     full[1::2, 1::2] = ((right + below) / 2)[: shape[0] // 2, : shape[1] // 2]
-    unknown = _doubled(_bent(coarse), shape)
+    unknown = doubled(_bent(coarse), shape)
     unknown[::2, ::2] = False
     rows, columns = np.nonzero(unknown)
     rays = pixel_rays(view, np.stack([columns, rows], axis=1))
     full[rows, columns] = focal_baseline / scene.trace(rays).depth_m
     is_hair = np.array([s.parts is not None and np.isin(s.parts, _HAIR_PARTS).all() for s in scene.surfaces])
     hair = np.append(is_hair, False)[trace.surface].reshape(coarse_shape)
-    return full, _doubled(hair, shape)
+    return full, doubled(hair, shape)
 
 
 def _every_second(view: Camera) -> Camera:
@@ -216,11 +216,6 @@ def _bent(coarse_px: np.ndarray) -> np.ndarray:
     down = np.abs(coarse_px[:-2, 1:-1] + coarse_px[2:, 1:-1] - 2 * inner)
     bent[1:-1, 1:-1] = np.maximum(across, down) > _CURVED_PX
     return cv2.dilate(bent, np.ones((3, 3), np.uint8)).astype(bool)
-
-
-def _doubled(mask: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Each pixel of a mask as two by two, cut to `shape`."""
-    return mask.repeat(2, axis=0).repeat(2, axis=1)[: shape[0], : shape[1]]
 
 
 def _edges(true_px: np.ndarray, settings: DepthCamera, rng: Rng) -> tuple[np.ndarray, np.ndarray]:

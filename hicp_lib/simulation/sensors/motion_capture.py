@@ -16,6 +16,7 @@ from scipy.interpolate import CubicSpline
 from hicp_lib.rgbd.camera import transform
 from hicp_lib.rgbd.qualisys import MotionCapture
 from hicp_lib.simulation.body import PosedBody
+from hicp_lib.simulation.camera import join_rays
 from hicp_lib.simulation.mesh import Mesh
 from hicp_lib.simulation.raycast import RayScene
 from hicp_lib.simulation.rotations import rotation
@@ -61,7 +62,7 @@ def count_seeing(scene: RayScene, points_m: np.ndarray, cameras_m: np.ndarray) -
     """How many cameras see each marker (m, 3) past what is in the scene, (m,)."""
     m, c = len(points_m), len(cameras_m)
     start = np.repeat(points_m, c, axis=0)
-    hidden = scene.occluded(np.hstack([start, np.tile(cameras_m, (m, 1)) - start]).astype(np.float32))
+    hidden = scene.occluded(join_rays(start.T, (np.tile(cameras_m, (m, 1)) - start).T))
     return (~hidden).reshape(m, c).sum(axis=1)
 
 
