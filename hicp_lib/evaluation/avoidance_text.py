@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
+from hicp_lib.evaluation.reading import in_cm
 from hicp_lib.simulation.experiments.avoidance_runs import IDEAL, NO_AVOIDANCE, PUBLISHED_GAINS, Run
 from hicp_lib.simulation.experiments.avoidance_runs import TRUE_KEYPOINTS as TRUE
 
@@ -28,10 +29,10 @@ def of_animation(run: Run, note: str) -> tuple[str, str]:
 def runs_text(metrics: pd.DataFrame) -> pd.DataFrame:
     """A run per row: how near the person came, for how long, what the robot did; dashes for what did not."""
     shown = metrics[["script", "detector"]].copy()
-    shown["least distance [cm]"] = _cm(metrics["min_distance_m"])
+    shown["least distance [cm]"] = metrics["min_distance_m"].map(in_cm)
     shown["nearer than 10 cm [s]"] = metrics["under_10cm_s"].map("{:.2f}".format)
     shown["gives way after [s]"] = metrics["reaction_s"].map(_or_dash("{:.2f}"))
-    shown["retreat [cm]"] = _cm(metrics["retreat_m"])
+    shown["retreat [cm]"] = metrics["retreat_m"].map(in_cm)
     shown["back after [s]"] = metrics["back_s"].map(_or_dash("{:.2f}"))
     return shown
 
@@ -39,7 +40,7 @@ def runs_text(metrics: pd.DataFrame) -> pd.DataFrame:
 def enough_text(verdicts: pd.DataFrame) -> pd.DataFrame:
     """Least distance, as times that without avoidance, whether it is enough; of `against_no_avoidance`."""
     shown = verdicts[["script", "detector"]].copy()
-    shown["least distance [cm]"] = _cm(verdicts["min_distance_m"])
+    shown["least distance [cm]"] = verdicts["min_distance_m"].map(in_cm)
     shown["times that without"] = verdicts["value"].map("{:.1f}".format)
     shown["enough"] = [f"no: {why}" if why else "yes" for why in verdicts["why"]]
     return shown
@@ -57,12 +58,8 @@ def losses(metrics: pd.DataFrame) -> pd.DataFrame:
 def error_table(errors: pd.DataFrame) -> pd.DataFrame:
     """Number of sure keypoints near the hand, median and 95th percentile of their errors."""
     by = errors[errors["near"]].groupby(["script", "detector"], sort=False)["error_m"]
-    table = pd.DataFrame({"keypoints": by.size(), "median [cm]": _cm(by.median())})
-    return table.assign(**{"95th percentile [cm]": _cm(by.quantile(0.95))}).reset_index()
-
-
-def _cm(lengths_m: pd.Series) -> pd.Series:
-    return (100 * lengths_m).map(_or_dash("{:.1f}"))
+    table = pd.DataFrame({"keypoints": by.size(), "median [cm]": by.median().map(in_cm)})
+    return table.assign(**{"95th percentile [cm]": by.quantile(0.95).map(in_cm)}).reset_index()
 
 
 def _or_dash(pattern: str) -> Callable[[float], str]:

@@ -19,7 +19,7 @@ from hicp_lib.detectors.registry import DETECTORS
 from hicp_lib.evaluation.bootstrap import bootstrap_difference, difference, intervals, resample
 from hicp_lib.evaluation.coco import Evaluation, evaluate, person_oks
 from hicp_lib.evaluation.engine import METRICS
-from hicp_lib.evaluation.reading import wide, with_bounds
+from hicp_lib.evaluation.reading import bounds_of, wide
 from hicp_lib.keypoints import GROUPS, N_KEYPOINTS
 
 Found = Mapping[tuple[str, str], Mapping[int, Detections]]
@@ -143,8 +143,7 @@ def people_oks(truth: Mapping[str, Annotations], found: Found) -> pd.DataFrame:
 def metrics_text(table: pd.DataFrame, group: str) -> pd.DataFrame:
     """One group of a `compare` table for reading: "0.71 [0.65, 0.77]" per subset, detector and metric."""
     rows = table[table["group"] == group]
-    bounds = rows[["value", "low", "high"]].itertuples(index=False, name=None)
-    rows = rows.assign(text=[with_bounds(*numbers) for numbers in bounds])
+    rows = rows.assign(text=bounds_of(rows))
     table = wide(rows, ["subset", "detector", "n_people"], "metric", METRICS)
     return table.rename(columns={"n_people": "people"})
 

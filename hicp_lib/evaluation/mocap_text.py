@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.evaluation.mocap_error import JOINTS, TABLE_JOINTS
-from hicp_lib.evaluation.reading import wide, with_bounds
+from hicp_lib.evaluation.reading import bounds_of, in_cm, wide
 from hicp_lib.rgbd.synchronisation import ClockOffset
 
 _CASE = ["detector", "method"]
@@ -45,16 +45,15 @@ def shoulders_and_centres(medians: pd.DataFrame, min_score: float) -> pd.DataFra
     """Median distance [cm] from the markers' mean and, where known, from the joint's centre: "4.0 / 2.1"."""
     rows = medians[medians["min_score"] == min_score]
     pairs = zip(rows["median_m"], rows["centre_median_m"], strict=True)
-    rows = rows.assign(text=[f"{_cm(markers)} / {_cm(centre)}" for markers, centre in pairs])
+    rows = rows.assign(text=[f"{in_cm(markers)} / {in_cm(centre)}" for markers, centre in pairs])
     return _wide(rows, _CASE, "keypoint", JOINTS)
 
 
 def fractions_text(fractions: pd.DataFrame) -> pd.DataFrame:
     """Fractions within each distance as "0.71 [0.65, 0.77]", a column per joint."""
-    bounds = fractions[["value", "low", "high"]].itertuples(index=False, name=None)
     within = [f"{100 * limit:g} cm" for limit in fractions["threshold_m"]]
-    text = [with_bounds(*numbers) for numbers in bounds]
-    return _wide(fractions.assign(within=within, text=text), [*_CASE, "within"], "keypoint", JOINTS)
+    rows = fractions.assign(within=within, text=bounds_of(fractions))
+    return _wide(rows, [*_CASE, "within"], "keypoint", JOINTS)
 
 
 def registrations_text(table: pd.DataFrame) -> pd.DataFrame:
@@ -72,7 +71,7 @@ def registrations_text(table: pd.DataFrame) -> pd.DataFrame:
 
 def costs_text(table: pd.DataFrame) -> pd.DataFrame:
     """`medians_under`'s table: median error [cm] of elbows and wrists, a column per registration."""
-    rows = table.assign(text=[_cm(value) for value in table["median_m"]])
+    rows = table.assign(text=[in_cm(value) for value in table["median_m"]])
     return _wide(rows, [*_CASE, "part"], "registration")
 
 
@@ -91,12 +90,8 @@ def _cell(row: dict) -> str:
     if row["count"] == 0:
         return "0"
     given = np.isfinite(row["low_m"])
-    interval = f" [{_cm(row['low_m'])}, {_cm(row['high_m'])}]" if given else ""
-    return f"{row['count']:.0f} / {_cm(row['median_m'])}{interval}"
-
-
-def _cm(value_m: float) -> str:
-    return f"{100 * value_m:.1f}" if np.isfinite(value_m) else "–"
+    interval = f" [{in_cm(row['low_m'])}, {in_cm(row['high_m'])}]" if given else ""
+    return f"{row['count']:.0f} / {in_cm(row['median_m'])}{interval}"
 
 
 def _wide(

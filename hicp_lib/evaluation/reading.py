@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import pandas as pd
@@ -12,6 +13,16 @@ def with_bounds(value: float, low: float, high: float, digits: int = 2) -> str:
     if value != value:
         return "–"
     return f"{value:.{digits}f}" + (f" [{low:.{digits}f}, {high:.{digits}f}]" if low == low else "")
+
+
+def bounds_of(rows: pd.DataFrame) -> list[str]:
+    """`with_bounds` of each row's `value, low, high`."""
+    return [with_bounds(*row) for row in rows[["value", "low", "high"]].itertuples(index=False, name=None)]
+
+
+def in_cm(length_m: float) -> str:
+    """A length in metres as centimetres, "1.2"; a dash where it is NaN."""
+    return f"{100 * length_m:.1f}" if math.isfinite(length_m) else "–"
 
 
 def wide(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from hicp_lib.evaluation.reading import wide, with_bounds
+from hicp_lib.evaluation.reading import bounds_of, wide, with_bounds
 
 _ROW = ["view", "detector", "part"]
 _DISTANCES = {"spread_m": "spread [cm]", "bias_m": "bias [cm]", "error_m": "error [cm]"}
@@ -25,10 +25,7 @@ def shares_text(
     if table is None:
         return _not_available("true positions (truth.parquet)"), caption
     rows = table[table["threshold_m"] == threshold_m]
-    text = [
-        with_bounds(*numbers) for numbers in rows[["value", "low", "high"]].itertuples(index=False, name=None)
-    ]
-    return wide(rows.assign(text=text), _ROW, "method"), f"{caption}{_higher(rows)}"
+    return wide(rows.assign(text=bounds_of(rows)), _ROW, "method"), f"{caption}{_higher(rows)}"
 
 
 def _higher(rows: pd.DataFrame) -> str:
