@@ -262,8 +262,8 @@ def is_rendered(results: Path, notebook: str) -> bool:
         raise _MissingError(f"{notebook} has no results in this run", "hicp report")
     parameters = read_json(path)["parameters"]
     recordings = [value for name, value in parameters.items() if name.startswith("recording")]
-    if parameters.get("source", "" if recordings else "rendered") == "rendered":
-        return True
-    given = [Path(folder) for folder in recordings if folder]
-    simulated = not given or any((folder / SIMULATION_FILE).is_file() for folder in given)
-    return bool(recordings) and simulated
+    made = [parameters["source"] == "rendered"] if "source" in parameters else []
+    if recordings:
+        given = [Path(folder) for folder in recordings if folder]
+        made.append(not given or any((folder / SIMULATION_FILE).is_file() for folder in given))
+    return any(made) or not made  # a notebook that takes neither makes all it looks at
