@@ -21,12 +21,13 @@ from pathlib import Path
 from typing import Any
 
 import hicp_lib
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.detectors.own import own_sha256
-from hicp_lib.files import sha256_bytes, sha256_file
+from hicp_lib.errors import InputError
+from hicp_lib.files import read_json, sha256_bytes, sha256_file
 
 ROOT = Path(hicp_lib.__file__).resolve().parent.parent
 LOCK_PATH = ROOT / "environment.lock"
-DATA_DIR = ROOT / "data"
 LIBRARY_DIR = ROOT / "hicp_lib"
 
 _SHOWN_VERSIONS = (
@@ -49,8 +50,17 @@ def digest(value: Any) -> str:
 
 
 def files_sha256(paths: Iterable[Path], base: Path) -> str:
-    """One SHA-256 over the names (relative to `base`) and contents of files, independent of their order."""
-    return digest({path.relative_to(base).as_posix(): sha256_file(path) for path in paths})
+    """One SHA-256 over the names (relative to `base`) and contents of files, independent of their order.
+
+    Raises
+    ------
+    InputError
+        If there is none of them: the hash of nothing would call two results alike that are not.
+    """
+    hashes = {path.relative_to(base).as_posix(): sha256_file(path) for path in paths}
+    if not hashes:
+        raise InputError(f"{base}: the files that a result follows from are not there; install hicp anew")
+    return digest(hashes)
 
 
 def library_sha256() -> str:
@@ -117,8 +127,7 @@ def weights_sha256() -> dict[str, str]:
 
     Further ones are of what the user named for detectors, by these.
     """
-    registry = DATA_DIR / "detectors.json"
-    weights = json.loads(registry.read_text())["weights"] if registry.is_file() else {}
+    weights = read_json(DATA_DIR / "detectors.json")["weights"]
     return {name: row["sha256"] for name, row in weights.items()} | own_sha256()
 
 

@@ -6,10 +6,11 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.files import cache_dir, read_json, sha256_file
 from hicp_lib.hicp_dataset import create_hicp
-from hicp_lib.provenance import DATA_DIR, LIBRARY_DIR, digest, files_sha256, input_sha256
+from hicp_lib.provenance import LIBRARY_DIR, digest, files_sha256, input_sha256
 
 # What annotations and crops are written by: a change there makes scenes and crops anew.
 _WRITING_MODULES = (

@@ -6,9 +6,9 @@ from collections.abc import Collection
 
 import pandas as pd
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.detectors.registry import DETECTORS, command_to_run, command_to_use
 from hicp_lib.files import read_json
-from hicp_lib.provenance import DATA_DIR
 
 _SURVEY_FILE = DATA_DIR / "survey.json"
 

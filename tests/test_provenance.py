@@ -9,6 +9,7 @@ import subprocess
 import pytest
 
 from hicp_lib import provenance
+from hicp_lib.errors import InputError
 
 
 @pytest.mark.parametrize("kind", ["library", "data"])
@@ -30,6 +31,12 @@ def test_one_byte_of_any_file_changes_the_hash(tmp_path, monkeypatch, kind):
         assert hash_of() == whole
     files[0].rename(files[0].with_name(f"renamed{files[0].suffix}"))
     assert hash_of() != whole
+
+
+def test_the_hash_of_nothing_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(provenance, "DATA_DIR", tmp_path / "nowhere")
+    with pytest.raises(InputError, match="nowhere: .* are not there; install hicp anew"):
+        provenance.data_sha256()
 
 
 def test_without_git_or_a_checkout_the_commit_is_unknown(tmp_path, monkeypatch):

@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.files import write_bytes
 from hicp_lib.keypoints import HANDS, INDEX
-from hicp_lib.provenance import DATA_DIR
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
 from hicp_lib.simulation.camera import inside_image, project
 from hicp_lib.simulation.experiments.laboratory import COLOUR, robot_camera

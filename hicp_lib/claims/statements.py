@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json
-from hicp_lib.provenance import DATA_DIR
 
 CLAIMS_FILE = DATA_DIR / "claims.json"
 RELATIONS = (">", "<", "within")

@@ -17,12 +17,13 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from urllib.parse import urlsplit
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.detectors.url_download import download
 from hicp_lib.detectors.zoo import weights_dir
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json, sha256_bytes, sha256_file, write_bytes, write_json
 
-REGISTRY_PATH = Path(__file__).resolve().parents[2] / "data" / "published_weights.json"
+REGISTRY_PATH = DATA_DIR / "published_weights.json"
 # No published model comes near it; a server or an archive that gives more is not to be believed.
 MAX_BYTES = 1 << 30
 

@@ -15,11 +15,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.detectors.pip_download import download
 from hicp_lib.errors import InputError
 from hicp_lib.files import cache_dir, read_json, sha256_bytes, sha256_file, write_bytes
 
-REGISTRY_PATH = Path(__file__).resolve().parents[2] / "data" / "detectors.json"
+REGISTRY_PATH = DATA_DIR / "detectors.json"
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,12 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.evaluation.resampling import weighted_median, with_interval
 from hicp_lib.evaluation.stability import THRESHOLDS_M
 from hicp_lib.evaluation.time_blocks import block_length, draw_blocks
 from hicp_lib.files import read_json
-from hicp_lib.provenance import DATA_DIR
 from hicp_lib.rgbd.camera import transform
 from hicp_lib.rgbd.qualisys import MotionCapture
 from hicp_lib.rgbd.synchronisation import interpolate_mocap

@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import FACE, HAND_LIMBS, INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 
-MEASURES_FILE = Path(__file__).parents[2] / "data" / "body_measures.npz"
+MEASURES_FILE = DATA_DIR / "body_measures.npz"
 
 
 def _parents() -> np.ndarray:

@@ -20,10 +20,11 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import HAND_LIMBS, LEFT_HAND, RIGHT_HAND
 
-SHAPES_FILE = Path(__file__).parents[2] / "data" / "hand_shapes.npz"
+SHAPES_FILE = DATA_DIR / "hand_shapes.npz"
 PALM = np.array([0, 5, 9, 13, 17])
 """Keypoints of a hand that do not move against each other: its root and the knuckles."""
 FINGERS = (np.arange(1, 5), *(np.arange(knuckle + 1, knuckle + 4) for knuckle in PALM[1:]))

@@ -14,12 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json
 from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
 
-SKIN_FILE = Path(__file__).parents[2] / "data" / "icub_skin.json"
+SKIN_FILE = DATA_DIR / "icub_skin.json"
 COLUMNS = ["x_mm", "y_mm", "z_mm", "normal_x", "normal_y", "normal_z"]
 
 

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json
 
-ICUB_FILE = Path(__file__).parents[2] / "data" / "icub.json"
+ICUB_FILE = DATA_DIR / "icub.json"
 COLUMNS = ["joint", "link", "a_m", "d_m", "alpha_deg", "offset_deg"]
 
 

@@ -23,12 +23,13 @@ from pathlib import Path
 import numpy as np
 from scipy import sparse
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import N_KEYPOINTS
 from hicp_lib.simulation.mesh import vertex_normals
 from hicp_lib.simulation.rotations import rotations_from_vectors
 
-BODY_FILE = Path(__file__).parents[2] / "data" / "body.npz"
+BODY_FILE = DATA_DIR / "body.npz"
 
 REGIONS = (
     "hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh", "shin", "foot",

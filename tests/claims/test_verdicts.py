@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from hicp_lib.claims import verdicts as v
 from hicp_lib.claims.statements import Claim, Comparison, Selection, read_claims
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json
-from hicp_lib.provenance import DATA_DIR
 
 LOSS = Selection("02", "loss", {"group": "body"}, "change", low="low", high="high")
 

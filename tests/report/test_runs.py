@@ -94,6 +94,7 @@ def test_every_dependency_is_in_the_key(tmp_path, monkeypatch, library):
     run, _ = tiny_run(tmp_path, START, FINISH, images=str(images))
     (tmp_path / "data").mkdir()
     (tmp_path / "data" / "paper.json").write_text("{}")
+    (tmp_path / "data" / "detectors.json").write_text('{"weights": {}}')
     lock = tmp_path / "environment.lock"
     lock.write_text("numpy==1")
     monkeypatch.setattr(provenance, "DATA_DIR", tmp_path / "data")

@@ -19,13 +19,14 @@ import cv2
 import numpy as np
 import pandas as pd
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.detectors.base import Detections, Detector
 from hicp_lib.detectors.cache import identity
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.errors import InputError
 from hicp_lib.files import atomic_path, cache_dir, read_json, write_json
 from hicp_lib.keypoints import N_KEYPOINTS
-from hicp_lib.provenance import DATA_DIR, LIBRARY_DIR, digest, files_sha256, machine
+from hicp_lib.provenance import LIBRARY_DIR, digest, files_sha256, machine
 from hicp_lib.robot.controller import PUBLISHED
 from hicp_lib.simulation.experiments.closed_loop import Trial, TrueKeypoints, simulate, start_posture
 from hicp_lib.simulation.experiments.head_camera import Album, DetectorEyes, Sight, perceived, photograph

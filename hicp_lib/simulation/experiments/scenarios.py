@@ -9,8 +9,8 @@ from functools import cache
 import numpy as np
 import pandas as pd
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
-from hicp_lib.provenance import DATA_DIR
 from hicp_lib.robot.kinematics import HEAD_JOINTS
 from hicp_lib.simulation.body import PosedBody
 from hicp_lib.simulation.experiments.mocap import Capture, capture

@@ -15,9 +15,10 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json, write_json
-from hicp_lib.provenance import DATA_DIR, LIBRARY_DIR, files_sha256
+from hicp_lib.provenance import LIBRARY_DIR, files_sha256
 from hicp_lib.rgbd.c3d import MAX_FRAMES as MAX_C3D_FRAMES
 from hicp_lib.rgbd.qualisys import write_c3d, write_tsv
 from hicp_lib.rgbd.recording import EXACT_DEPTH_DIR, MOCAP_FILE, RGB_LIST, Recording, open_recording
