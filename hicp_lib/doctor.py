@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hicp_lib import provenance
+from hicp_lib.checkout import working_folder
 from hicp_lib.errors import InputError
 from hicp_lib.files import cache_dir
 from hicp_lib.system_libraries import DEBIAN_PACKAGES, missing_packages
@@ -42,7 +43,7 @@ def run_checks() -> list[Check]:
         check_imports(_IMPORTS),
         check_weights(),
         *check_folder("cache", cache_dir(), "set HICP_CACHE to a folder you may write to"),
-        *check_folder("results", provenance.ROOT / "results", "give yourself the right to write there"),
+        *check_folder("results", working_folder() / "results", "give yourself the right to write there"),
     ]
 
 
