@@ -22,17 +22,20 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
-from IPython.display import HTML, display
 
 from hicp_lib.checkout import working_folder
+from hicp_lib.extras import needs
 from hicp_lib.files import atomic_path, write_bytes, write_json
 from hicp_lib.provenance import peak_memory_mb, provenance, provenance_html
 from hicp_lib.report import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
+
+with needs("report"):
+    import matplotlib as mpl
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+    from IPython.display import HTML, display
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
