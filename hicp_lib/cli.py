@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 
 import click
 
+from hicp_lib import __version__
 from hicp_lib.cli_calibration import calibration
 from hicp_lib.cli_models import models
 from hicp_lib.cli_options import PATH, WORKERS, detector_options, given, say
@@ -57,6 +58,7 @@ def _fail(message: object, code: int) -> int:
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__)
 def hicp() -> None:
     """Human keypoint detection at close range: data, detectors, evaluation, report."""
 
