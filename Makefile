@@ -44,6 +44,7 @@ setup: $(INSTALLED) system
 
 # The locked environment. mediapipe's wheel declares two packages that the study leaves out
 # (see pyproject.toml), hence --no-deps: the lock is complete by itself.
+# Editable the plain way: else every start of Python imports a finder for the package data.
 # A marker tells an installation that was cut off: it is made anew.
 $(INSTALLED): environment.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' || \
@@ -57,7 +58,8 @@ $(INSTALLED): environment.lock pyproject.toml
 	@$(BIN)/python -m pip install -qq --no-deps --no-compile --only-binary :all: --require-hashes \
 	  -r environment.lock || { echo "make: the environment could not be installed; it needs the package" \
 	  "index, 4 GB of disk and, on Linux, glibc 2.35 (Debian 12, Ubuntu 22.04) or newer" >&2; exit 1; }
-	@$(BIN)/python -m pip install -qq --no-deps --no-build-isolation --no-index --editable .
+	@$(BIN)/python -m pip install -qq --no-deps --no-build-isolation --no-index --editable . \
+	  --config-settings editable_mode=compat
 	@rm $(INSTALLING) && touch $(INSTALLED)
 
 # Libraries that Open3D loads and a bare Debian lacks: installed where that is allowed.
@@ -75,7 +77,8 @@ system: $(INSTALLED)
 lock:
 	@command -v $(UV) >/dev/null || { echo "make: uv is missing; run: pip install uv" >&2; exit 1; }
 	@$(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-annotate \
-	  --group test --group build --custom-compile-command "make lock" --output-file environment.lock pyproject.toml
+	  --all-extras --group mediapipe --group test --group build --custom-compile-command "make lock" \
+	  --output-file environment.lock pyproject.toml
 
 clean:
 	@rm -rf _build results

@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 
 import click
 
+from hicp_lib import __version__
 from hicp_lib.cli_calibration import calibration
 from hicp_lib.cli_models import models
 from hicp_lib.cli_options import PATH, WORKERS, detector_options, given, say
@@ -57,6 +58,7 @@ def _fail(message: object, code: int) -> int:
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__)
 def hicp() -> None:
     """Human keypoint detection at close range: data, detectors, evaluation, report."""
 
@@ -239,13 +241,16 @@ def _finite(row: dict[str, Any]) -> dict[str, Any]:
 @click.option("--profile", default="full", show_default=True, help="A profile of notebooks/profiles.toml.")
 @click.option("-p", "--parameter", "pairs", nargs=2, multiple=True, metavar="NAME VALUE",
               help="A notebook parameter; may be repeated.")  # fmt: skip
-def report(profile: str, pairs: tuple[tuple[str, str], ...]) -> int:
+@click.option("--results", "root", type=PATH,
+              help="Where results/ and _build/ are written; the working folder if not given.")  # fmt: skip
+def report(profile: str, pairs: tuple[tuple[str, str], ...], root: Path | None) -> int:
     """Run the notebooks and build the book; what has not changed is not done again."""
+    from hicp_lib.checkout import sources, working_folder
     from hicp_lib.report.build import make_report
     from hicp_lib.report.runs import RunError
 
     try:
-        make_report(profile, list(pairs), say)
+        make_report(profile, list(pairs), say, sources(), root or working_folder())
     except RunError as error:
         return _fail(error, 1)
     return 0

@@ -38,8 +38,9 @@ def models_fetch(names: tuple[str, ...]) -> None:
     """Get the weight files that are not here, and check each against its hash.
 
     NAME is a weight file, a detector, or a published model; without any, all weight files are fetched,
-    and no published model.
+    and no published model. MediaPipe itself comes with its detectors' weights.
     """
+    from hicp_lib.detectors.mediapipe_program import fetch_program, is_wanted
     from hicp_lib.detectors.published import fetch_published, published
     from hicp_lib.detectors.zoo import fetch
 
@@ -48,6 +49,8 @@ def models_fetch(names: tuple[str, ...]) -> None:
     if others or not names:
         for name in fetch(others or None):
             say(f"fetched {name}")
+        if is_wanted(others) and fetch_program():
+            say("fetched MediaPipe")
     for name in by_name:
         model = fetch_published(name)
         how = f"hicp detect --detector {model.use} {model.path} ..." if model.use else model.note

@@ -83,19 +83,23 @@ def import_(out: Path, bag: Path | None, folder: Path | None, poses: Path | None
 @click.option("--recording", "folder", type=PATH, required=True, help="Folder of the recording.")
 @detector_options
 @click.option("--method", default="robust", show_default=True, help="Or paper: the paper's method.")
-@click.option("--out", type=PATH, required=True, help="Parquet file to write.")
+@click.option("--out", type=PATH, required=True, help="Table to write: FILE.parquet, or FILE.csv.")
 @click.option("--workers", type=WORKERS, help="Threads; all cores if not given.")
 def lift(folder: Path, detector: str, method: str, out: Path, workers: int | None, **chosen) -> None:
     """Find people in a recording and where their keypoints are in the robot's base frame."""
     from hicp_lib.detectors.run import detect_images
+    from hicp_lib.extras import require
     from hicp_lib.files import atomic_path
     from hicp_lib.rgbd.keypoints3d import lift_recording, steps_of
     from hicp_lib.rgbd.recording import open_recording
 
+    is_csv = out.suffix == ".csv"
+    if not is_csv:
+        require("analysis", "pyarrow")
     recording = open_recording(folder)
     steps_of(method)  # a wrong name is told before anybody is looked for
     found = detect_images(detector, dict(enumerate(recording.rgb_paths)), workers, **given(**chosen))
     table = lift_recording(recording, [found[k].detections for k in range(len(recording))], method)
     with atomic_path(out) as temporary:
-        table.to_parquet(temporary, index=False)
+        table.to_csv(temporary, index=False) if is_csv else table.to_parquet(temporary, index=False)
     say(f"{out}: {table['x_m'].notna().sum()} of {len(table)} keypoints in {len(recording)} frames lifted")

@@ -14,8 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hicp_lib import provenance
+from hicp_lib.checkout import working_folder
 from hicp_lib.errors import InputError
 from hicp_lib.files import cache_dir
+from hicp_lib.opencv_files import WANTED, overwritten
 from hicp_lib.system_libraries import DEBIAN_PACKAGES, missing_packages
 
 PYTHONS = ((3, 11), (3, 14))
@@ -39,10 +41,11 @@ def run_checks() -> list[Check]:
         check_python(),
         check_system_libraries(),
         check_locked_versions(provenance.LOCK_PATH),
+        check_opencv(),
         check_imports(_IMPORTS),
         check_weights(),
         *check_folder("cache", cache_dir(), "set HICP_CACHE to a folder you may write to"),
-        *check_folder("results", provenance.ROOT / "results", "give yourself the right to write there"),
+        *check_folder("results", working_folder() / "results", "give yourself the right to write there"),
     ]
 
 
@@ -64,6 +67,8 @@ def check_system_libraries() -> Check:
 def check_locked_versions(lock_path: Path) -> Check:
     """That what is installed is what the lock says."""
     remedy = "rm .venv/.installed; make report"
+    if provenance.CHECKOUT is None:
+        return Check("locked environment", True, "none: hicp was installed without a checkout")
     try:
         locked = dict(locked_versions(lock_path.read_text()))
     except OSError as error:
@@ -106,6 +111,12 @@ def _import_error(name: str) -> str:
     except Exception as error:  # a broken library may raise anything
         return " ".join(str(error).split()) or type(error).__name__
     return ""
+
+
+def check_opencv() -> Check:
+    """That OpenCV's files are those of the build without a display, and no other distribution's."""
+    fault = overwritten()
+    return Check("OpenCV", fault is None, *(fault or (f"{WANTED} {_installed(WANTED)}",)))
 
 
 def check_weights() -> Check:

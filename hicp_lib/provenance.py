@@ -20,15 +20,14 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-import hicp_lib
+from hicp_lib.checkout import CHECKOUT
 from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.detectors.own import own_sha256
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json, sha256_bytes, sha256_file
 
-ROOT = Path(hicp_lib.__file__).resolve().parent.parent
-LOCK_PATH = ROOT / "environment.lock"
-LIBRARY_DIR = ROOT / "hicp_lib"
+LIBRARY_DIR = Path(__file__).resolve().parent
+LOCK_PATH = (CHECKOUT or LIBRARY_DIR) / "environment.lock"
 
 _SHOWN_VERSIONS = (
     "numpy",
@@ -74,7 +73,7 @@ def data_sha256() -> str:
 
 
 def lock_sha256() -> str:
-    """SHA-256 of `environment.lock`, or "missing"."""
+    """SHA-256 of the checkout's `environment.lock`, or "missing" (as where hicp was installed)."""
     return sha256_file(LOCK_PATH) if LOCK_PATH.is_file() else "missing"
 
 
@@ -97,7 +96,10 @@ def input_sha256(path: Path) -> str:
 
 
 def git_state() -> dict[str, Any]:
-    """Commit of the checkout and how many files differ from it; "unknown" without git or a checkout."""
+    """Commit of the library's checkout, and how many files differ; "unknown" without git or a checkout.
+
+    An installed library may lie within somebody else's repository, whose commit says nothing of it.
+    """
     commit = _git("rev-parse", "HEAD")
     status = _git("status", "--porcelain")
     return {
@@ -107,8 +109,10 @@ def git_state() -> dict[str, Any]:
 
 
 def _git(*arguments: str) -> str | None:
+    if CHECKOUT is None:
+        return None
     try:
-        done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, timeout=20)
+        done = subprocess.run(["git", *arguments], cwd=CHECKOUT, capture_output=True, text=True, timeout=20)
     except (OSError, subprocess.TimeoutExpired):
         return None
     return done.stdout.strip() if done.returncode == 0 else None

@@ -6,8 +6,8 @@
     study.value("n_basic", len(basic))
     study.finish()
 
-A notebook opened in Jupyter writes to `results/interactive/<name>/`; `hicp report` runs it into
-`results/<profile>/<name>/`. The book takes every number and figure from there.
+A notebook opened in Jupyter writes to `results/interactive/<name>/` of the study it lies in; `hicp report`
+runs it into `results/<profile>/<name>/`. The book takes every number and figure from there.
 """
 
 from __future__ import annotations
@@ -22,16 +22,20 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
-from IPython.display import HTML, display
 
+from hicp_lib.checkout import working_folder
+from hicp_lib.extras import needs
 from hicp_lib.files import atomic_path, write_bytes, write_json
-from hicp_lib.provenance import ROOT, peak_memory_mb, provenance, provenance_html
-from hicp_lib.report import PROFILE_VARIABLE, RESULTS_VARIABLE
+from hicp_lib.provenance import peak_memory_mb, provenance, provenance_html
+from hicp_lib.report import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
+
+with needs("report"):
+    import matplotlib as mpl
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+    from IPython.display import HTML, display
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -65,11 +69,12 @@ class Study:
 
     def __init__(self, name: str, /, **parameters: Any):
         profile = os.environ.get(PROFILE_VARIABLE, "interactive")
-        results = Path(os.environ.get(RESULTS_VARIABLE) or ROOT / "results" / profile)
+        kept = working_folder() / "results"
+        results = Path(os.environ.get(RESULTS_VARIABLE) or kept / profile)
         self.name = name
         self.parameters = _plain(parameters)
         self.folder = results / name
-        self.results = ROOT / "results" / ("full" if profile == "interactive" else profile)
+        self.results = Path(os.environ.get(EARLIER_RESULTS_VARIABLE) or kept / "full")
         self._link = f"../results/{profile}/{name}"
         self._values: dict[str, Any] = {}
         self._captions: dict[str, dict[str, str]] = {}

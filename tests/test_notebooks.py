@@ -9,13 +9,13 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from hicp_lib.provenance import ROOT
+from hicp_lib.checkout import CHECKOUT
 from hicp_lib.report.build import make_report
 from hicp_lib.report.checks import book_problems
 from hicp_lib.report.notebooks import PARAMETERS_TAG, read_notebooks
 from hicp_lib.report.runs import first_problem
 
-NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+NOTEBOOKS = sorted((CHECKOUT / "notebooks").glob("*.ipynb"))
 STRIP = "strip it: .venv/bin/jupyter nbconvert --clear-output --inplace notebooks/*.ipynb"
 
 
@@ -56,11 +56,11 @@ def test_notebooks_tell_and_the_library_does(notebook):
 @pytest.fixture(scope="session")
 def book() -> Path:
     """The book of the quick profile: made now, or what an earlier run left if nothing has changed."""
-    return make_report("quick", [], print).parent
+    return make_report("quick", [], print, sources=CHECKOUT, root=CHECKOUT).parent
 
 
 def test_every_cell_of_the_quick_report_ran(book):
-    executed = sorted((ROOT / "_build" / "notebooks" / "quick").glob("*.ipynb"))
+    executed = sorted((CHECKOUT / "_build" / "notebooks" / "quick").glob("*.ipynb"))
     assert [path.name for path in executed] == [path.name for path in NOTEBOOKS]
     for path in executed:
         assert first_problem(path) is None
@@ -73,8 +73,8 @@ def test_the_quick_report_needs_no_network_and_every_image_has_words(book):
 
 
 def test_results_carry_their_provenance_and_no_number_that_is_none(book):
-    for notebook in read_notebooks(ROOT / "notebooks"):
-        folder = ROOT / "results" / "quick" / notebook.name
+    for notebook in read_notebooks(CHECKOUT / "notebooks"):
+        folder = CHECKOUT / "results" / "quick" / notebook.name
         stamp = json.loads((folder / "provenance.json").read_text())
         assert set(stamp["parameters"]) == set(notebook.defaults)
         for path in folder.glob("*.json"):

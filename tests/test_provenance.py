@@ -9,6 +9,7 @@ import subprocess
 import pytest
 
 from hicp_lib import provenance
+from hicp_lib.checkout import CHECKOUT
 from hicp_lib.errors import InputError
 
 
@@ -40,8 +41,11 @@ def test_the_hash_of_nothing_is_refused(tmp_path, monkeypatch):
 
 
 def test_without_git_or_a_checkout_the_commit_is_unknown(tmp_path, monkeypatch):
-    monkeypatch.setattr(provenance, "ROOT", tmp_path)
+    monkeypatch.setattr(provenance, "CHECKOUT", tmp_path)
     assert provenance.git_state() == {"commit": "unknown", "changed_files": None}
+    monkeypatch.setattr(provenance, "CHECKOUT", None)
+    assert provenance.git_state() == {"commit": "unknown", "changed_files": None}
+    monkeypatch.setattr(provenance, "CHECKOUT", CHECKOUT)
 
     def missing(*arguments, **keywords):
         raise FileNotFoundError("git")

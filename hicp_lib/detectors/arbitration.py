@@ -16,11 +16,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from hicp_lib.detectors.base import Detections
 from hicp_lib.detectors.hand_squares import Arms
+from hicp_lib.extras import needs
 from hicp_lib.keypoints import LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
+
+with needs("mediapipe"):
+    from scipy.optimize import linear_sum_assignment
 
 SIDES = np.stack([LEFT_HAND, RIGHT_HAND])
 _REFUSED = 1e6  # a distance no hand is assigned at; finite, as the solver wants it

@@ -2,9 +2,9 @@
 
 A frozen graph is a protobuf message that holds a network with its weights. Of its message types only the
 fields a convolutional network needs are declared here, with the numbers they have in TensorFlow's own
-`graph.proto`, `node_def.proto`, `attr_value.proto`, `tensor.proto` and `tensor_shape.proto`; a parser passes
-over the others. One operation becomes one ONNX node. TensorFlow's arrays are (batch, height, width,
-channels), ONNX's (batch, channels, height, width).
+`graph.proto`, `node_def.proto`, `attr_value.proto`, `tensor.proto` and `tensor_shape.proto`. One operation
+becomes one ONNX node. TensorFlow's arrays are (batch, height, width, channels), ONNX's (batch, channels,
+height, width).
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ from functools import cache
 
 import numpy as np
 import onnx
-from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.message import DecodeError, Message
 from onnx import helper, numpy_helper
 
+from hicp_lib.detectors.protobuf import Messages, message_class
 from hicp_lib.errors import InputError
 
-# Message -> field -> (number, type); a type in brackets is a list of it.
-_MESSAGES: dict[str, dict[str, tuple[int, str]]] = {
+_MESSAGES: Messages = {
     "Graph": {"node": (1, "[Node]")},
     "Node": {"name": (1, "string"), "op": (2, "string"), "input": (3, "[string]"), "attr": (5, "[Entry]")},
     "Entry": {"key": (1, "string"), "value": (2, "Value")},
@@ -43,21 +42,7 @@ _OPSET, _IR_VERSION = 17, 8
 @cache
 def graph_class() -> type[Message]:
     """The protobuf class of a frozen graph."""
-    kinds = descriptor_pb2.FieldDescriptorProto
-    file = descriptor_pb2.FileDescriptorProto(name="frozen_graph.proto", package="hicp", syntax="proto3")
-    for message_name, fields in _MESSAGES.items():
-        message = file.message_type.add(name=message_name)
-        for field_name, (number, kind) in fields.items():
-            label = kinds.LABEL_REPEATED if kind.startswith("[") else kinds.LABEL_OPTIONAL
-            field = message.field.add(name=field_name, number=number, label=label)
-            kind = kind.strip("[]")
-            if kind in _MESSAGES:
-                field.type, field.type_name = kinds.TYPE_MESSAGE, f".hicp.{kind}"
-            else:
-                field.type = getattr(kinds, f"TYPE_{kind.upper()}")
-    pool = descriptor_pool.DescriptorPool()
-    pool.Add(file)
-    return message_factory.GetMessageClass(pool.FindMessageTypeByName("hicp.Graph"))
+    return message_class(_MESSAGES, "Graph")
 
 
 def to_onnx(content: bytes, name: str) -> onnx.ModelProto:

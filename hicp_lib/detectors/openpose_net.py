@@ -14,11 +14,10 @@ import cv2
 import numpy as np
 
 from hicp_lib.detectors.base import Detections
-from hicp_lib.detectors.frozen_graph import to_onnx
 from hicp_lib.detectors.onnx.session import open_content
-from hicp_lib.detectors.onnx.split_channels import split_channels
 from hicp_lib.detectors.paf import PafOptions, PartModel, assemble
 from hicp_lib.detectors.zoo import load, weight_path
+from hicp_lib.extras import needs
 from hicp_lib.files import sha256_bytes
 from hicp_lib.keypoints import to_halpe
 
@@ -104,6 +103,9 @@ class OpenPoseMobileNet:
     ) -> None:
         if net_height_px <= 0 or net_height_px % 16:
             raise ValueError(f"net_height_px must be a positive multiple of 16, not {net_height_px}")
+        with needs("openpose-mobilenet"):
+            from hicp_lib.detectors.frozen_graph import to_onnx
+            from hicp_lib.detectors.onnx.split_channels import split_channels
         weights = load(WEIGHTS)
         model = split_channels(to_onnx(weights, WEIGHTS)).SerializeToString()
         self._model = open_content(model, weight_path(WEIGHTS), provider, threads)

@@ -60,7 +60,7 @@ def download(requirement: str, sha256: str, options: list[str], target: Path) ->
             return f"Python could not be started: {error.strerror}"
     if run.returncode == 0 and target.is_file():
         return None
-    return _reason(run.stderr) or f"pip ended with code {run.returncode} and gave no {target.name}"
+    return reason(run.stderr) or f"pip ended with code {run.returncode} and gave no {target.name}"
 
 
 def _write_back_end(package: Path, requirement: str) -> None:
@@ -70,7 +70,7 @@ def _write_back_end(package: Path, requirement: str) -> None:
     (package / "build_meta.py").write_text(_BACK_END.format(name=name.replace("-", "_"), version=version))
 
 
-def _reason(stderr: str) -> str:
+def reason(stderr: str) -> str:
     """The last error pip printed, as one line."""
     lines = [line.strip() for line in stderr.splitlines() if line.strip()]
     errors = [line.removeprefix("ERROR:").strip() for line in lines if line.upper().startswith("ERROR")]

@@ -1,9 +1,9 @@
 """Weights their authors publish for download: fetched one by one, by name, and never by default.
 
 `data/published_weights.json` names each download with its licence and, where known, its size and
-SHA-256. Where the hash is not known, the first fetch records it in `data/published_weights.lock.json`,
-to be committed; a download that differs later is refused. Of an archive one member is read, in memory;
-nothing is unpacked and nothing fetched is executed.
+SHA-256. Where the hash is not known, the first fetch records it in the cache, in
+`published_weights.lock.json` (a committed one in `data/` comes first); a download that differs later is
+refused. Of an archive one member is read, in memory; nothing is unpacked and nothing fetched is executed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.detectors.url_download import download
 from hicp_lib.detectors.zoo import weights_dir
 from hicp_lib.errors import InputError
-from hicp_lib.files import read_json, sha256_bytes, sha256_file, write_bytes, write_json
+from hicp_lib.files import cache_dir, read_json, sha256_bytes, sha256_file, write_bytes, write_json
 
 REGISTRY_PATH = DATA_DIR / "published_weights.json"
 # No published model comes near it; a server or an archive that gives more is not to be believed.
@@ -73,8 +73,8 @@ def published_dir() -> Path:
 
 
 def lock_path() -> Path:
-    """File of the hashes recorded on first use, to be committed."""
-    return REGISTRY_PATH.with_suffix(".lock.json")
+    """The user's file of the hashes recorded on first use."""
+    return cache_dir() / "published_weights.lock.json"
 
 
 def published() -> dict[str, Published]:
@@ -215,14 +215,19 @@ def _leads_out(name: str) -> bool:
 
 
 def _records() -> dict[str, dict[str, str]]:
-    if not lock_path().exists():
+    """The user's records, and in their place those that came with the library."""
+    return _read_records(lock_path()) | _read_records(REGISTRY_PATH.with_suffix(".lock.json"))
+
+
+def _read_records(path: Path) -> dict[str, dict[str, str]]:
+    if not path.exists():
         return {}
-    records = read_json(lock_path())
+    records = read_json(path)
     keys = {"url", "sha256", "file_sha256"}
     if not isinstance(records, dict) or any(
         not isinstance(record, dict) or record.keys() != keys for record in records.values()
     ):
-        raise InputError(f"{lock_path()}: not a record of hashes; restore the committed file")
+        raise InputError(f"{path}: not a record of hashes; restore it, or delete it to record them anew")
     return records
 
 
@@ -231,6 +236,7 @@ def _record(model: Published, sha256: str, file_sha256: str) -> None:
     records = _records()
     record = {"url": model.url, "sha256": sha256, "file_sha256": file_sha256}
     if model.name not in records:
-        write_json(lock_path(), dict(sorted((records | {model.name: record}).items())), indent=1)
+        own = _read_records(lock_path()) | {model.name: record}
+        write_json(lock_path(), dict(sorted(own.items())), indent=1)
     elif records[model.name]["file_sha256"] != file_sha256:
         raise InputError(f"{lock_path()}: {model.name} is recorded with another hash; restore that file")

@@ -18,12 +18,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import isotonic_regression
 
 from hicp_lib.detectors.base import Detections
 from hicp_lib.errors import InputError
 from hicp_lib.evaluation.resampling import draw_counts, with_interval
+from hicp_lib.extras import needs
 from hicp_lib.keypoints import GROUPS
+
+with needs("analysis"):
+    from scipy.optimize import isotonic_regression
 
 N_BINS = 10
 

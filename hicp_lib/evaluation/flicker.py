@@ -22,11 +22,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-from OneEuroFilter import OneEuroFilter
 
 from hicp_lib.detectors.base import Detections
 from hicp_lib.evaluation.shares import mean_with_interval
+from hicp_lib.extras import needs
 from hicp_lib.keypoints import COCO_17
+
+with needs("analysis"):
+    from OneEuroFilter import OneEuroFilter
 
 MIN_SCORE = 0.3
 MAJORITY_OF = 3

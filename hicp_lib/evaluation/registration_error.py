@@ -6,13 +6,16 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
-from scipy.spatial.transform import Rotation
 
+from hicp_lib.extras import needs
 from hicp_lib.rgbd.camera import project, transform
 from hicp_lib.rgbd.qualisys import MotionCapture
 from hicp_lib.rgbd.recording import Recording
 from hicp_lib.rgbd.registration import Registration
 from hicp_lib.rgbd.synchronisation import interpolate_mocap
+
+with needs("analysis"):
+    from scipy.spatial.transform import Rotation
 
 
 def compare_registrations(

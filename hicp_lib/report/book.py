@@ -64,7 +64,7 @@ def _key(folders: Folders) -> str:
     """Digest of all that the book is made of; the runs' stamps stand for notebooks and their results."""
     return provenance.digest(
         {
-            "pages": _hashes(folders.root / "book"),
+            "pages": _hashes(folders.sources / "book"),
             "runs": {path.name: sha256_file(path) for path in folders.executed.glob("*.json")},
             "library": provenance.library_sha256(),
             "data": provenance.data_sha256(),
@@ -88,7 +88,7 @@ def _hashes(folder: Path) -> dict[str, str]:
 
 def _assemble(source: Path, folders: Folders) -> None:
     """Fill the pages, put the executed notebooks and the scripts beside them."""
-    shutil.copytree(folders.root / "book", source)
+    shutil.copytree(folders.sources / "book", source)
     results = Results(folders.results, folders.profile)
     footer = provenance.provenance_html(_book_stamp(folders))
     for page in source.rglob("*.md"):

@@ -9,21 +9,22 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from hicp_lib.errors import InputError
-from hicp_lib.provenance import ROOT
 from hicp_lib.report.book import build_book
 from hicp_lib.report.notebooks import parse_overrides, read_notebooks, read_profile
 from hicp_lib.report.runs import Folders, Run, run_all
 
 
 def make_report(
-    profile: str, pairs: list[tuple[str, str]], say: Callable[[str], None], root: Path = ROOT
+    profile: str, pairs: list[tuple[str, str]], say: Callable[[str], None], sources: Path, root: Path
 ) -> Path:
-    """Run the notebooks of `root/notebooks` under a profile of `profiles.toml` there, and build the book.
+    """Run the notebooks of a study under a profile of its `notebooks/profiles.toml`, and build the book.
 
     Parameters
     ----------
     pairs : parameter names and values, as text, that override the profile's
     say : takes one line of progress
+    sources : holds `notebooks` and `book`
+    root : `results` and `_build` are written below it
 
     Returns
     -------
@@ -37,8 +38,8 @@ def make_report(
         When a notebook fails, or the book has a fault.
     """
     start_s = time.perf_counter()
-    notebooks = read_notebooks(root / "notebooks")
-    chosen = read_profile(root / "notebooks" / "profiles.toml", profile, notebooks)
+    notebooks = read_notebooks(sources / "notebooks")
+    chosen = read_profile(sources / "notebooks" / "profiles.toml", profile, notebooks)
     overrides = parse_overrides(pairs, notebooks)
     runs = [
         Run(
@@ -48,7 +49,7 @@ def make_report(
         )
         for notebook in notebooks
     ]
-    folders = Folders(root, profile)
+    folders = Folders(sources, root.resolve(), profile)
     with _alone(folders):
         run_all(runs, folders, say)
         page, is_new = build_book(folders)

@@ -27,7 +27,7 @@ import nbformat
 from hicp_lib import provenance
 from hicp_lib.errors import InputError
 from hicp_lib.files import sha256_file, write_json
-from hicp_lib.report import PROFILE_VARIABLE, RESULTS_VARIABLE
+from hicp_lib.report import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
 from hicp_lib.report.notebooks import Notebook, is_path
 from hicp_lib.report.schedule import run_when_ready
 
@@ -41,8 +41,15 @@ class RunError(RuntimeError):
 
 @dataclass(frozen=True)
 class Folders:
-    """Where the runs of one profile go, below the root of the checkout."""
+    """Where the runs of one profile come from and go to.
 
+    Attributes
+    ----------
+    sources : holds `notebooks` and `book`
+    root : results and the built book go below it
+    """
+
+    sources: Path
     root: Path
     profile: str
 
@@ -192,7 +199,7 @@ def run_notebook(run: Run, key: dict[str, Any], folders: Folders, children: _Chi
     staging = Path(tempfile.mkdtemp(prefix=f".run-{name}-", dir=folders.executed))
     copy = staging / f"{name}.ipynb"
     try:
-        status = children.execute(run, copy, staging, folders.profile)
+        status = children.execute(run, copy, staging, folders)
         _check(run, status, copy, staging)
         if provenance.library_sha256() != key["library"]:
             raise RunError(f"{name}: hicp_lib was changed while it ran; run the report again")
@@ -278,7 +285,7 @@ class _Children:
         for process in list(self._running):
             process.stdin.close()
 
-    def execute(self, run: Run, copy: Path, staging: Path, profile: str) -> int | None:
+    def execute(self, run: Run, copy: Path, staging: Path, folders: Folders) -> int | None:
         """Run the notebook into `copy`; the exit code, or None when it hit the wall limit."""
         if self._ended:
             raise RunError(f"{run.notebook.name}: was not run, the report was stopped")
@@ -294,7 +301,7 @@ class _Children:
                 stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=log,
-                env=_environment(staging, profile, private),
+                env=_environment(staging, folders, private),
                 # What ends the report's whole process group must not end this one before it has
                 # ended the kernel's workers.
                 start_new_session=True,
@@ -310,12 +317,13 @@ class _Children:
                 self._running.discard(process)
 
 
-def _environment(staging: Path, profile: str, private: str) -> dict[str, str]:
+def _environment(staging: Path, folders: Folders, private: str) -> dict[str, str]:
     """A kernel's environment: nothing of the user's own set-up may move a number or a pixel."""
     matplotlib = find_spec("matplotlib")
     return os.environ | {
         RESULTS_VARIABLE: str(staging / "results"),
-        PROFILE_VARIABLE: profile,
+        EARLIER_RESULTS_VARIABLE: str(folders.results.resolve()),
+        PROFILE_VARIABLE: folders.profile,
         "IPYTHONDIR": private,
         "JUPYTER_RUNTIME_DIR": private,
         "JUPYTER_PREFER_ENV_PATH": "1",

@@ -7,11 +7,14 @@ import sys
 import tempfile
 from pathlib import Path
 
-import ezc3d
 import numpy as np
 
 from hicp_lib.errors import InputError
+from hicp_lib.extras import needs
 from hicp_lib.files import atomic_path
+
+with needs("analysis"):
+    import ezc3d
 
 _UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
 _MAX_RATE_HZ = 1e5

@@ -17,11 +17,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pandas as pd
-import plotly.graph_objects as go
 
 from hicp_lib.errors import InputError
+from hicp_lib.extras import needs
 from hicp_lib.files import write_bytes
 from hicp_lib.rgbd.recording import Recording, read_rgb
+
+with needs("report"):
+    import plotly.graph_objects as go
 
 CLICKS_FILE = "clicks.csv"
 COLUMNS = ["frame", "marker", "u_px", "v_px"]

@@ -18,11 +18,11 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import HAND_LIMBS, LEFT_HAND, RIGHT_HAND
+from hicp_lib.quaternions import matrices_from_quaternions
 
 SHAPES_FILE = DATA_DIR / "hand_shapes.npz"
 PALM = np.array([0, 5, 9, 13, 17])
@@ -201,7 +201,7 @@ def _turns(is_right: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     b = 2 * np.pi * _N_TURNS * share / 1.533751168755204288118041
     near, far = np.sqrt(share), np.sqrt(1 - share)
     quaternions = np.column_stack([near * np.sin(a), near * np.cos(a), far * np.sin(b), far * np.cos(b)])
-    turns = Rotation.from_quat(quaternions).as_matrix() * np.array([1 if is_right else -1, 1, 1])[:, None]
+    turns = matrices_from_quaternions(quaternions) * np.array([1 if is_right else -1, 1, 1])[:, None]
     sizes = np.repeat(_SIZES, _N_TURNS)
     scaled = (sizes[:, None, None] * np.tile(turns, (len(_SIZES), 1, 1))).astype(np.float32)
     palms_m = _turned(load_hand_shapes()[0, PALM], scaled)

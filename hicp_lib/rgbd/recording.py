@@ -19,10 +19,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from hicp_lib.errors import InputError
+from hicp_lib.extras import needs
 from hicp_lib.files import read_json
 from hicp_lib.images import read_image
 from hicp_lib.rgbd.camera import Intrinsics, read_camera
@@ -211,6 +210,9 @@ def _read_table(recording: Recording, name: str, columns: tuple[str, ...]) -> pd
     path = recording.folder / name
     if not path.is_file():
         return None
+    with needs("analysis"):
+        import pyarrow as pa
+        import pyarrow.parquet as pq
     try:
         table = pq.read_table(path).to_pandas()
     except (OSError, pa.ArrowException) as error:

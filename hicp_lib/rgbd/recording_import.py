@@ -15,12 +15,12 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.errors import InputError
+from hicp_lib.extras import needs
 from hicp_lib.files import atomic_path, read_json
 from hicp_lib.rgbd.camera import Intrinsics, read_camera, write_camera
 from hicp_lib.rgbd.recording import CAMERA_FILE, DEPTH_LIST, POSES_FILE, RGB_LIST
 from hicp_lib.rgbd.recording_writer import depth_name, refuse_used_folder, rgb_name, write_depth, write_rgb
 from hicp_lib.rgbd.tum import read_poses, write_file_list, write_poses
-from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
 
 _IMAGE_KINDS = (".png", ".jpg", ".jpeg")
 
@@ -53,6 +53,8 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> PoseSourc
     path = Path(path)
     if path.suffix.lower() != ".csv":
         return PoseSource(*read_poses(path))
+    from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub  # not in every installation
+
     columns = ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)]
     try:
         table = pd.read_csv(path)
@@ -144,7 +146,8 @@ def import_bag(bag: str | Path, out: str | Path, poses: PoseSource) -> int:
 
 def _open_bag(bag: Path):
     """Open3D's reader, opened."""
-    import open3d as o3d
+    with needs("render"):
+        import open3d as o3d
 
     if not hasattr(o3d.t.io, "RSBagReader"):
         raise InputError(

@@ -11,15 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import least_squares
-from scipy.spatial.transform import Rotation
 
 from hicp_lib.errors import InputError
+from hicp_lib.extras import needs
 from hicp_lib.rgbd.camera import Intrinsics, project, transform
 from hicp_lib.rgbd.qualisys import MotionCapture
 from hicp_lib.rgbd.recording import Recording
 from hicp_lib.rgbd.registration import Registration
 from hicp_lib.rgbd.synchronisation import interpolate_mocap
+
+with needs("analysis"):
+    from scipy.optimize import least_squares
+    from scipy.spatial.transform import Rotation
 
 _MIN_CLICKS = 6
 # A click further off than this counts ever less.

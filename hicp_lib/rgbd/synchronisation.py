@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import fftconvolve, savgol_filter
 
 from hicp_lib.errors import InputError
+from hicp_lib.extras import needs
+
+with needs("analysis"):
+    from scipy.signal import fftconvolve, savgol_filter
 
 # At 100 Hz: up to three frames missing in a row are bridged.
 MAX_GAP_S = 0.045

@@ -12,10 +12,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from hicp_lib.errors import InputError
 from hicp_lib.files import write_bytes
+from hicp_lib.quaternions import matrices_from_quaternions, quaternions_from_matrices
 
 MAX_DIFFERENCE_S = 0.02  # images and poses further apart in time do not belong together
 _UNIT_TOLERANCE = 0.01  # a quaternion's length may differ from 1 by this much: files are rounded
@@ -64,7 +64,7 @@ def read_poses(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
             )
     table = _not_empty(path, np.array(rows).reshape(-1, 8))
     T_base_cam = np.tile(np.eye(4), (len(table), 1, 1))
-    T_base_cam[:, :3, :3] = Rotation.from_quat(table[:, 4:]).as_matrix()
+    T_base_cam[:, :3, :3] = matrices_from_quaternions(table[:, 4:])
     T_base_cam[:, :3, 3] = table[:, 1:4]
     return table[:, 0], T_base_cam
 
@@ -78,7 +78,7 @@ def write_file_list(path: str | Path, times_s: np.ndarray, names: Sequence[str])
 def write_poses(path: str | Path, times_s: np.ndarray, T_base_cam: np.ndarray) -> None:
     """Write poses T_base_cam (n, 4, 4), whole or not at all; w is not negative."""
     T = np.asarray(T_base_cam, float)
-    quaternions = Rotation.from_matrix(T[:, :3, :3]).as_quat(canonical=True)
+    quaternions = quaternions_from_matrices(T[:, :3, :3])
     rows = np.column_stack([T[:, :3, 3], quaternions])
     lines = [
         " ".join([f"{time_s:.6f}", *(f"{value:.9f}" for value in row)])

@@ -185,6 +185,16 @@ def test_one_flipped_bit_in_an_archive_of_unknown_hash_fails_its_checksum(server
     refused("net", "not a sound zip archive")
 
 
+def test_nothing_is_written_beside_the_registry_and_what_is_recorded_there_comes_first(server, tmp_path):
+    published.fetch_published("net")
+    assert [path.name for path in (tmp_path / "data").iterdir()] == ["published.json"]
+    shipped = json.loads(published.lock_path().read_text())
+    shipped["net"]["sha256"] = "0" * 64
+    (tmp_path / "data" / "published.lock.json").write_text(json.dumps(shipped))
+    published.published()["net"].path.unlink()
+    refused("net", r"SHA-256 is .* has changed")
+
+
 def test_a_file_without_a_record_is_fetched_anew(server):
     path = published.fetch_published("net").path
     published.lock_path().unlink()
@@ -293,10 +303,10 @@ def test_a_process_that_was_cut_off_still_downloads_as_the_user_would(server, mo
 
 @pytest.mark.parametrize("content", ["[]", '{"net": 1}', '{"net": {"sha256": "0"}}', "{"])
 def test_a_broken_record_is_told_and_kept(server, content):
-    published.lock_path().write_text(content)
     published.published_dir().mkdir(parents=True)
+    published.lock_path().write_text(content)
     published.published()["net"].path.write_bytes(CONTENT)
-    refused("net", r"published\.lock\.json: ")
+    refused("net", r"published_weights\.lock\.json: ")
     assert published.lock_path().read_text() == content
 
 

@@ -9,7 +9,7 @@ import pytest
 from tiny_study import FINISH, MEASURE, START, write_notebook
 
 from hicp_lib import provenance
-from hicp_lib.provenance import ROOT
+from hicp_lib.checkout import CHECKOUT
 
 
 @pytest.fixture(autouse=True)
@@ -31,9 +31,9 @@ def study(tmp_path: Path) -> Path:
     )
     book = tmp_path / "book"
     book.mkdir()
-    shutil.copytree(ROOT / "book" / "_static", book / "_static")
-    shutil.copy(ROOT / "book" / "_config.yml", book)
-    shutil.copy(ROOT / "book" / "references.bib", book)
+    shutil.copytree(CHECKOUT / "book" / "_static", book / "_static")
+    shutil.copy(CHECKOUT / "book" / "_config.yml", book)
+    shutil.copy(CHECKOUT / "book" / "references.bib", book)
     (book / "_toc.yml").write_text(
         "format: jb-book\nroot: index\nchapters:\n- file: notebooks/00_first\n- file: notebooks/01_second\n"
     )

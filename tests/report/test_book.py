@@ -14,7 +14,7 @@ from hicp_lib.report.runs import Folders, RunError
 
 def test_report_of_two_notebooks(study):
     lines: list[str] = []
-    page = make_report("quick", [("scale", "2")], lines.append, root=study)
+    page = make_report("quick", [("scale", "2")], lines.append, sources=study, root=study)
     book = page.parent
     assert page == study / "_build" / "book" / "quick" / "index.html"
     assert "The seed is 3." in page.read_text(), "the profile's parameter reaches the prose"
@@ -29,30 +29,30 @@ def test_report_of_two_notebooks(study):
     assert str(page) in lines[-1]
 
     lines.clear()
-    make_report("quick", [("scale", "2")], lines.append, root=study)
+    make_report("quick", [("scale", "2")], lines.append, sources=study, root=study)
     assert lines[:3] == ["00_first: unchanged", "01_second: unchanged", "book: unchanged"]
 
     home = study / "book" / "index.md"
     home.write_text(home.read_text() + "\nMore.\n")
-    make_report("quick", [("scale", "2")], lines.append, root=study)
+    make_report("quick", [("scale", "2")], lines.append, sources=study, root=study)
     assert "More." in page.read_text()
     assert lines[-2] == "book: built"
 
     written = page.read_text()
     page.write_text(written + " ")
-    make_report("quick", [("scale", "2")], lines.append, root=study)
+    make_report("quick", [("scale", "2")], lines.append, sources=study, root=study)
     assert lines[-2] == "book: built", "a page that was changed is built anew"
 
     home.write_text(home.read_text() + "\n{doc}`nowhere`\n")
     with pytest.raises(RunError, match=r"book: book/index.md:\d+: WARNING: unknown document: 'nowhere'"):
-        make_report("quick", [("scale", "2")], lines.append, root=study)
+        make_report("quick", [("scale", "2")], lines.append, sources=study, root=study)
     home.write_text("# Home\n\n![](_static/x.png)\n")
     shutil.copy(matplotlib.get_data_path() + "/images/home.png", study / "book" / "_static" / "x.png")
     with pytest.raises(RunError, match=r"book: index.html: image without alt text: _images/x.png"):
-        make_report("quick", [("scale", "2")], lines.append, root=study)
+        make_report("quick", [("scale", "2")], lines.append, sources=study, root=study)
     home.write_text("# Home\n\n{{ value('00_first', 'none') }}\n")
     with pytest.raises(InputError, match="needs 'none'"):
-        make_report("quick", [("scale", "2")], lines.append, root=study)
+        make_report("quick", [("scale", "2")], lines.append, sources=study, root=study)
     assert not list(book.parent.glob(".build-*"))
 
 
@@ -66,16 +66,16 @@ def test_report_of_two_notebooks(study):
 )
 def test_mistakes_are_told_before_anything_runs(study, profile, pairs, expected):
     with pytest.raises(InputError, match=expected):
-        make_report(profile, pairs, print, root=study)
-    assert not Folders(study, profile).results.exists()
+        make_report(profile, pairs, print, sources=study, root=study)
+    assert not Folders(study, study, profile).results.exists()
 
 
 def test_two_reports_of_one_profile_do_not_mix(study):
     import fcntl
 
-    folder = Folders(study, "quick").executed
+    folder = Folders(study, study, "quick").executed
     folder.mkdir(parents=True)
     with open(folder / ".lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         with pytest.raises(InputError, match="another report of this profile is being made"):
-            make_report("quick", [], print, root=study)
+            make_report("quick", [], print, sources=study, root=study)

@@ -34,10 +34,10 @@ def write_notebook(path: Path, *cells: str, parameters: str = PARAMETERS) -> Pat
 def tiny_run(folder: Path, *cells: str, **parameters) -> tuple[Run, Folders]:
     """One notebook of these cells, with its parameters, in a checkout of its own."""
     notebook = read_notebook(write_notebook(folder / "notebooks" / "05_tiny.ipynb", *cells))
-    return Run(notebook, notebook.defaults | parameters), Folders(folder, "quick")
+    return Run(notebook, notebook.defaults | parameters), Folders(folder, folder, "quick")
 
 
-def pretend_to_execute(children, run: Run, copy: Path, staging: Path, profile: str) -> int:
+def pretend_to_execute(children, run: Run, copy: Path, staging: Path, folders: Folders) -> int:
     """In place of `_Children.execute`: leaves what a run leaves, without starting a kernel."""
     notebook = read(run.notebook.path, as_version=4)
     for cell in notebook.cells:

@@ -9,19 +9,27 @@ from __future__ import annotations
 import threading
 import weakref
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
-import onnx
 import onnxruntime
+from google.protobuf.message import DecodeError, Message
 
+from hicp_lib.detectors.protobuf import Messages, message_class
 from hicp_lib.detectors.published import check_use
 from hicp_lib.errors import InputError
 from hicp_lib.files import sha256_bytes
 
 _DTYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
 _FATAL_ONLY = 4
+# Of ONNX's own `onnx.proto`, what is asked of a model before it runs; the package `onnx` can do far more.
+_MESSAGES: Messages = {
+    "Model": {"graph": (7, "Graph")},
+    "Graph": {"node": (1, "[Node]"), "initializer": (5, "[Tensor]")},
+    "Node": {"input": (1, "[string]"), "op_type": (4, "string")},
+    "Tensor": {"dims": (1, "[int64]"), "name": (8, "string")},
+}
 
 
 @dataclass(frozen=True)
@@ -169,16 +177,21 @@ def _start(path: Path, content: bytes, provider: str, threads: int) -> onnxrunti
     return session
 
 
-def _read_graph(path: Path, content: bytes) -> onnx.GraphProto:
+@cache
+def _model_class() -> type[Message]:
+    return message_class(_MESSAGES, "Model")
+
+
+def _read_graph(path: Path, content: bytes) -> Message:
     try:
-        return onnx.load_model_from_string(content).graph
-    except Exception:  # protobuf's error for what it cannot decode, which onnx gives no name of its own
+        return _model_class().FromString(content).graph
+    except DecodeError:
         raise InputError(
             f"{path}: is not an ONNX file or is cut off ({len(content)} bytes); get it again, or export it"
         ) from None
 
 
-def _first_convolution_channels(graph: onnx.GraphProto) -> int | None:
+def _first_convolution_channels(graph: Message) -> int | None:
     dims = {tensor.name: tensor.dims for tensor in graph.initializer}
     weights = [node.input[1] for node in graph.node if node.op_type == "Conv" and len(node.input) > 1]
     return next((int(dims[name][1]) for name in weights if len(dims.get(name, ())) > 1), None)
