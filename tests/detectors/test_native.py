@@ -239,3 +239,38 @@ print(os.waitpid(pid, 0)[1], len(detector.detect(image)))
 def test_a_forked_copy_has_a_process_of_its_own(weights):
     run = run_script(_FORKED, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert run.communicate() == ("0 0\n", "")
+
+
+_ONNX = """
+import os, sys
+if sys.argv[1:]:
+    import onnxruntime
+import numpy as np
+from hicp_lib.detectors.registry import make_detector
+make_detector("openpose-mobilenet").detect(np.zeros((60, 70, 3), np.uint8))
+print("ORT_DISABLE_TELEMETRY" in os.environ)
+"""
+
+
+@pytest.mark.parametrize("loaded_before", [(), ("plainly",)])
+def test_onnx_runtime_tells_its_vendor_nothing(weights, tmp_path, monkeypatch, loaded_before):
+    """What it would send lies in the user's cache folder, by an identifier; the second run is a control."""
+    for name in ("CI", "ORT_DISABLE_TELEMETRY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HICP_CACHE", str(weights.parent))
+    monkeypatch.setenv("https_proxy", "http://127.0.0.1:9")
+    for name in ("HOME", "XDG_CACHE_HOME"):
+        monkeypatch.setenv(name, str(tmp_path))
+    run = run_script(_ONNX, *loaded_before, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert run.communicate() == ("False\n", "")
+    assert any(path.name == "deviceid" for path in tmp_path.rglob("*")) == bool(loaded_before)
+
+
+def test_an_image_that_ends_the_process_is_named(own_cache, photograph, tmp_path, monkeypatch):
+    from hicp_lib.detectors import run
+    from hicp_lib.images import write_png
+
+    write_png(tmp_path / "a.png", photograph)
+    monkeypatch.setattr(native, "LIMIT_S", 0.02)
+    with pytest.raises(NativeError, match=r"^.*a\.png: mediapipe-hands: its process gave no answer"):
+        run.detect_images("mediapipe-hands", {0: tmp_path / "a.png"}, progress=False)
