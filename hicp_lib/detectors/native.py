@@ -8,6 +8,7 @@ it stays so.
 
 from __future__ import annotations
 
+import mmap
 import os
 import signal
 import subprocess
@@ -29,6 +30,7 @@ _NOWHERE = {
     **{name: "http://127.0.0.1:9" for name in ("http_proxy", "https_proxy", "all_proxy")},
     "no_proxy": "localhost",
 }
+_FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1"}  # NumPy's, which have nothing to do there
 # A call takes milliseconds, and a start seconds on a busy machine.
 LIMIT_S = 120.0
 
@@ -79,11 +81,11 @@ class NativeProcess:
             raise InputError(
                 f"{self._name}: an image of {image.dtype} {image.shape}; expected uint8 (height, width, 3)"
             )
-        pixels = np.ascontiguousarray(image)
         with self._lock:
             child = self._started()
+            child.show(image)
             remedy = "run it again, and without this image if it fails there again"
-            head, body = self._answer(child, ({"shape": image.shape}, pixels.reshape(-1).data), remedy)
+            head, body = self._answer(child, ({"shape": image.shape},), remedy)
         return np.frombuffer(body).reshape(head["shape"])
 
     def _started(self) -> _Child:
@@ -114,17 +116,27 @@ class _Child:
     def __init__(self, program: Path) -> None:
         self.owner = os.getpid()
         self._stderr = tempfile.TemporaryFile()
+        self._shared, self._pixels = _unnamed_file(), b""
         self._process = subprocess.Popen(
-            [sys.executable, "-P", str(program)],
+            [sys.executable, "-P", str(program), str(self._shared.fileno())],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._stderr,
             env=child_environment(),
+            pass_fds=[self._shared.fileno()],
             start_new_session=True,  # an interrupt from the keyboard is for the caller
         )
-        self._close = weakref.finalize(self, _close, self._process, self._stderr, self.owner)
+        files = self._process.stdin, self._process.stdout, self._stderr, self._shared
+        self._close = weakref.finalize(self, _close, self._process, files, self.owner)
 
-    def ask(self, head: dict, body: bytes | memoryview) -> tuple[dict, bytearray]:
+    def show(self, image: np.ndarray) -> None:
+        """Put an image where the program sees it."""
+        if image.size > len(self._pixels):
+            self._shared.truncate(image.size)
+            self._pixels = mmap.mmap(self._shared.fileno(), image.size)
+        np.ndarray(image.shape, np.uint8, self._pixels)[...] = image
+
+    def ask(self, head: dict, body: bytes = b"") -> tuple[dict, bytearray]:
         """Send a message and wait for the answer; EOFError or OSError if the program has ended."""
         send(self._process.stdin, head, body)
         return receive(self._process.stdout)
@@ -142,11 +154,18 @@ class _Child:
 def child_environment() -> dict[str, str]:
     """This process's environment, but with every way out led to a closed port."""
     nowhere = _NOWHERE | {name.upper(): value for name, value in _NOWHERE.items()}
-    return dict(os.environ) | nowhere
+    return os.environ | _FEW_THREADS | nowhere
 
 
-def _close(process: subprocess.Popen, stderr: BinaryIO, owner: int) -> None:
-    for file in (process.stdin, process.stdout, stderr):
+def _unnamed_file() -> BinaryIO:
+    """A file in memory, where the system has such."""
+    if hasattr(os, "memfd_create"):
+        return open(os.memfd_create("pixels"), "r+b", buffering=0)
+    return tempfile.TemporaryFile(buffering=0)
+
+
+def _close(process: subprocess.Popen, files: tuple[BinaryIO, ...], owner: int) -> None:
+    for file in files:
         with suppress(OSError):  # what was not sent any more
             file.close()
     if owner == os.getpid():
