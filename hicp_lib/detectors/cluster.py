@@ -35,7 +35,7 @@ from hicp_lib.detectors.cache import (
     result_path,
     write_result,
 )
-from hicp_lib.detectors.pool import DetectorPool
+from hicp_lib.detectors.pool import DetectorPool, naming
 from hicp_lib.errors import InputError
 from hicp_lib.images import decode_image
 
@@ -234,7 +234,8 @@ def _detect_here(
             f"worker {worker.address}: would find something else, for these differ from here: "
             f"{', '.join(differing)}; install the same environment and weights, and start it anew"
         )
-    return pool.detect(decode_image(content, path), boxes_px)
+    with naming(path):
+        return pool.detect(decode_image(content, path), boxes_px)
 
 
 @lru_cache(maxsize=2)

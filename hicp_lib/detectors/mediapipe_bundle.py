@@ -3,25 +3,27 @@
 MediaPipe's Tasks API reads a `.task` bundle: a zip, stored and aligned, of two TFLite models.
 The package index has the models but no bundles. They go in as they are, except that the model of
 the pose landmarks lacks the metadata that tells the task how to scale pixels. It is added here:
-this model takes [0, 1], as MediaPipe's own graph for the same file feeds it.
+this model takes [0, 1], as MediaPipe's own graph for the same file feeds it. What MediaPipe has for that is
+plain Python and is loaded file by file: MediaPipe itself runs in a process of its own only.
 """
 
 from __future__ import annotations
 
 import io
 import zipfile
-from functools import lru_cache
+from functools import cache, lru_cache
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
-import flatbuffers
 import numpy as np
-from mediapipe.tasks.metadata import metadata_schema_py_generated as metadata
-from mediapipe.tasks.metadata import schema_py_generated as tflite
-from mediapipe.tasks.python.metadata.metadata_writers.model_asset_bundle_utils import AlignZipFile
 
+from hicp_lib.detectors.mediapipe_program import program_folder
 from hicp_lib.detectors.published import check_use
 from hicp_lib.detectors.zoo import load
 from hicp_lib.errors import InputError
+from hicp_lib.extras import needs
 
 # Task -> member of the bundle -> (weight file, (mean, std) of the pixel scaling to be declared).
 BUNDLES: dict[str, dict[str, tuple[str, tuple[float, float] | None]]] = {
@@ -42,10 +44,11 @@ def assemble(task: str) -> bytes:
     Raises
     ------
     InputError
-        If a weight file is absent or damaged.
+        If MediaPipe or a weight file is absent, or one is damaged.
     """
     bundle = io.BytesIO()
-    with AlignZipFile(bundle, mode="w", alignment=4) as archive:
+    utilities = _of_mediapipe("tasks/python/metadata/metadata_writers/model_asset_bundle_utils.py")
+    with utilities.AlignZipFile(bundle, mode="w", alignment=4) as archive:
         for member, (weight, scaling) in BUNDLES[task].items():
             model = load(weight) if scaling is None else _with_scaling(load(weight), *scaling)
             # ZipInfo without a date: 1980, so the bytes do not depend on the clock.
@@ -77,6 +80,7 @@ def read_bundle(task: str, path: str | Path) -> bytes:
 @lru_cache(maxsize=4)
 def _with_scaling(model: bytes, mean: float, std: float) -> bytes:
     """Append TFLite metadata that declares (pixel - mean) / std for an RGB input."""
+    tflite = _of_mediapipe("tasks/metadata/schema_py_generated.py")
     tree = tflite.ModelT.InitFromPackedBuf(model, 0)
     block = tflite.BufferT()
     block.data = np.frombuffer(_scaling_metadata(mean, std), dtype=np.uint8)
@@ -88,6 +92,7 @@ def _with_scaling(model: bytes, mean: float, std: float) -> bytes:
 
 
 def _scaling_metadata(mean: float, std: float) -> bytes:
+    metadata = _of_mediapipe("tasks/metadata/metadata_schema_py_generated.py")
     scaling = metadata.NormalizationOptionsT()
     scaling.mean, scaling.std = [mean] * 3, [std] * 3
     unit = metadata.ProcessUnitT()
@@ -106,7 +111,20 @@ def _scaling_metadata(mean: float, std: float) -> bytes:
     return _pack(root, b"M001")
 
 
-def _pack(tree: tflite.ModelT | metadata.ModelMetadataT, identifier: bytes) -> bytes:
-    builder = flatbuffers.Builder(0)
+def _pack(tree: Any, identifier: bytes) -> bytes:
+    with needs("mediapipe"):
+        from flatbuffers import Builder
+
+    builder = Builder(0)
     builder.Finish(tree.Pack(builder), identifier)
     return bytes(builder.Output())
+
+
+@cache
+def _of_mediapipe(file: str) -> ModuleType:
+    """One file of the package, as a module that nobody else sees."""
+    path = program_folder() / file
+    spec = spec_from_file_location(f"{__name__}.{path.stem}", path)
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

@@ -18,24 +18,21 @@ What MediaPipe gives and what is made of it:
 
 from __future__ import annotations
 
-import weakref
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import mediapipe
 import numpy as np
-from mediapipe.tasks.python import BaseOptions, vision
 
-from hicp_lib.detectors import mediapipe_bundle
+from hicp_lib.detectors import mediapipe_bundle, mediapipe_child
 from hicp_lib.detectors.arbitration import Hands, give_hands, in_pairs, nearest_first
 from hicp_lib.detectors.base import Detections
-from hicp_lib.detectors.native import keep_offline, quiet_stderr
+from hicp_lib.detectors.mediapipe_program import program_folder, program_version
+from hicp_lib.detectors.native import NativeProcess
+from hicp_lib.errors import InputError
 from hicp_lib.files import sha256_bytes
 from hicp_lib.keypoints import COCO_17, to_halpe
 
-_SIDES = {"Left": 0, "Right": 1}
 _WRISTS = [9, 10]
-_N_HAND = 21
 
 
 class MediaPipePose:
@@ -51,25 +48,17 @@ class MediaPipePose:
     name = "mediapipe-pose"
 
     def __init__(self, num_poses: int = 1, min_score: float = 0.5, model: str | Path | None = None) -> None:
-        bundle, identity = _bundle("pose", model)
+        self._process, identity = _process(self.name, "pose", num_poses, min_score, model)
         self.settings = {"num_poses": num_poses, "min_score": min_score, **identity}
-        options = vision.PoseLandmarkerOptions(
-            base_options=BaseOptions(model_asset_buffer=bundle),
-            num_poses=num_poses,
-            min_pose_detection_confidence=min_score,
-            min_pose_presence_confidence=min_score,
-        )
-        self._task = _Task(vision.PoseLandmarker, options)
+        self.start = self._process.start
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
-        people = self._task.detect(image).pose_landmarks
-        if not people:
+        people = self._process.ask(image)
+        if not len(people):
             return Detections.none()
-        visibility = np.array([[point.visibility for point in person] for person in people])
-        scores = to_halpe(np.clip(visibility, 0, 1), "mediapipe_pose33", axis=-1, fill=0.0)
-        positions_px = np.stack([_positions_px(person, image) for person in people])
-        keypoints_px = to_halpe(positions_px, "mediapipe_pose33", axis=-2)
+        scores = to_halpe(np.clip(people[..., 2], 0, 1), "mediapipe_pose33", axis=-1, fill=0.0)
+        keypoints_px = to_halpe(_positions_px(people[..., :2], image), "mediapipe_pose33", axis=-2)
         return Detections(keypoints_px, scores, scores[:, COCO_17].mean(axis=1))
 
 
@@ -89,27 +78,17 @@ class MediaPipeHands:
     name = "mediapipe-hands"
 
     def __init__(self, num_hands: int = 2, min_score: float = 0.5, model: str | Path | None = None) -> None:
-        bundle, identity = _bundle("hand", model)
+        self._process, identity = _process(self.name, "hand", num_hands, min_score, model)
         self.settings = {"num_hands": num_hands, "min_score": min_score, **identity}
-        options = vision.HandLandmarkerOptions(
-            base_options=BaseOptions(model_asset_buffer=bundle),
-            num_hands=num_hands,
-            min_hand_detection_confidence=min_score,
-            min_hand_presence_confidence=min_score,
-        )
-        self._task = _Task(vision.HandLandmarker, options)
+        self.start = self._process.start
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find hands in an RGB image, shape (height, width, 3), uint8, paired into instances."""
-        found = self._task.detect(image)
-        if not found.hand_landmarks:
+        hands = self._process.ask(image)
+        if not len(hands):
             return Detections.none()
-        labels = [sides[0] for sides in found.handedness]
-        scores = np.array([[min(label.score, 1.0)] * _N_HAND for label in labels])
-        positions_px = np.stack([_positions_px(hand, image) for hand in found.hand_landmarks])
-        return in_pairs(
-            Hands(positions_px, scores, np.array([_SIDES[label.category_name] for label in labels]))
-        )
+        scores = np.repeat(np.minimum(hands[:, :1, 1], 1.0), mediapipe_child.N_HAND, axis=1)
+        return in_pairs(Hands(_positions_px(hands[:, 1:], image), scores, hands[:, 0, 0].astype(int)))
 
 
 class MediaPipe:
@@ -137,6 +116,11 @@ class MediaPipe:
         }  # fmt: skip
         self.settings = {name: part.settings for name, part in self.parts.items()}
 
+    def start(self) -> None:
+        """Start both if they work side by side: the times of two starts at once do not add up."""
+        for part in self.parts.values() if self._thread else ():
+            part.start()
+
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
         pose, hands = self.parts.values()
@@ -159,37 +143,31 @@ def attach_hands(bodies: Detections, found: Detections) -> Detections:
     return give_hands(bodies, hands, chosen).and_also(in_pairs(hands.take(rest)))
 
 
-def _bundle(task: str, model: str | Path | None) -> tuple[bytes, dict]:
-    """Bundle bytes, and what identifies them in a detector's settings."""
+def _process(
+    name: str, task: str, n: int, min_score: float, model: str | Path | None
+) -> tuple[NativeProcess, dict]:
+    """MediaPipe's task in a process of its own, and what identifies its models in a detector's settings.
+
+    Its start takes half a second and waits for the first image; a bundle of the user's own is tried at once.
+    """
+    if n < 1 or not 0 <= min_score <= 1:
+        raise InputError(
+            f"{name}: finds {n} at scores from {min_score}; expected 1 or more, and a score from 0 to 1"
+        )
     bundle = mediapipe_bundle.read_bundle(task, model) if model else mediapipe_bundle.assemble(task)
-    return bundle, {"bundle_sha256": sha256_bytes(bundle), "mediapipe": mediapipe.__version__}
+    process = NativeProcess(
+        [mediapipe_child.__file__, str(program_folder().parent)],
+        {"task": task, "n": n, "min_score": min_score},
+        bundle,
+        name=f"{model}: cannot be used by {name}" if model else name,
+        remedy="give another .task file" if model else "run: hicp doctor",
+    )
+    if model:
+        process.start()
+    return process, {"bundle_sha256": sha256_bytes(bundle), "mediapipe": program_version()}
 
 
-class _Task:
-    """A running MediaPipe task: silent, contacting nobody, closed before the interpreter is torn down."""
-
-    def __init__(self, task: type, options: object) -> None:
-        keep_offline()
-        with quiet_stderr():
-            self._task = task.create_from_options(options)
-        weakref.finalize(self, _close, self._task)
-
-    def detect(self, image: np.ndarray) -> object:
-        pixels = mediapipe.Image(image_format=mediapipe.ImageFormat.SRGB, data=np.ascontiguousarray(image))
-        with quiet_stderr():
-            return self._task.detect(pixels)
-
-
-def _close(task: object) -> None:
-    try:
-        task.close()
-    except RuntimeError:
-        # At interpreter exit the task's executor is gone already, and closing again from
-        # __del__ would print a traceback; the process frees the rest.
-        task._handle = None
-
-
-def _positions_px(landmarks: list, image: np.ndarray) -> np.ndarray:
-    """Landmarks as (n, 2) pixels with pixel centres at integers."""
+def _positions_px(fractions: np.ndarray, image: np.ndarray) -> np.ndarray:
+    """Landmarks (..., 2) as pixels with pixel centres at integers."""
     height, width = image.shape[:2]
-    return np.array([(point.x * width, point.y * height) for point in landmarks]) - 0.5
+    return fractions * (width, height) - 0.5

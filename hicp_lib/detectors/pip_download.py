@@ -7,12 +7,11 @@ back end written on the spot answers in its place: the version is known from the
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
-
-from hicp_lib.detectors.native import user_environment
 
 _BACK_END = """
 from pathlib import Path
@@ -48,7 +47,7 @@ def download(requirement: str, sha256: str, options: list[str], target: Path) ->
             *(sys.executable, "-m", "pip", "download", "--quiet", "--no-input", "--no-deps"),
             *("--require-hashes", "--requirement", str(pinned), "--dest", str(target.parent), *options),
         ]
-        environment = user_environment() | {
+        environment = os.environ | {
             "PYTHONPATH": str(Path(folder) / "back_end"),
             "PIP_DISABLE_PIP_VERSION_CHECK": "1",
         }

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import queue
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import cv2
 import numpy as np
 
 from hicp_lib.detectors.cache import Timed
 from hicp_lib.detectors.kept import Runner
+from hicp_lib.detectors.native import NativeError
 from hicp_lib.detectors.registry import make_detector
 
 
@@ -55,11 +58,35 @@ class DetectorPool:
 
 
 @contextmanager
-def single_threaded_opencv() -> Iterator[None]:
-    """Hold OpenCV to one thread: the images are what is spread."""
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(1)
+def naming(path: str | Path) -> Iterator[None]:
+    """Name the image in what is told of a library that failed on it."""
     try:
         yield
-    finally:
-        cv2.setNumThreads(before)
+    except NativeError as error:
+        raise NativeError(f"{path}: {error}") from None
+
+
+class _OneThread:
+    """Holds OpenCV to one thread: the images are what is spread.
+
+    The number is the whole process's: the first of several who want it sets it, the last one restores it.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._depth, self._before = threading.Lock(), 0, 0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._depth == 0:
+                self._before = cv2.getNumThreads()
+                cv2.setNumThreads(1)
+            self._depth += 1
+
+    def __exit__(self, *_) -> None:
+        with self._lock:
+            self._depth -= 1
+            if self._depth == 0:
+                cv2.setNumThreads(self._before)
+
+
+single_threaded_opencv = _OneThread()

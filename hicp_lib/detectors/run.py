@@ -28,7 +28,7 @@ from hicp_lib.detectors.cache import (
     result_path,
     write_result,
 )
-from hicp_lib.detectors.pool import DetectorPool, single_threaded_opencv
+from hicp_lib.detectors.pool import DetectorPool, naming, single_threaded_opencv
 from hicp_lib.images import read_image
 
 Key = TypeVar("Key", bound=Hashable)
@@ -118,7 +118,7 @@ def _in_threads(
     pool: DetectorPool, jobs: dict[Key, tuple[Path, np.ndarray | None]], workers: int
 ) -> Iterator[tuple[Key, Timed]]:
     folder = cache_folder(pool.first)
-    with single_threaded_opencv(), ThreadPoolExecutor(workers) as executor:
+    with single_threaded_opencv, ThreadPoolExecutor(workers) as executor:
         calls = executor.map(lambda job: _detect_one(pool, *job, folder), jobs.values())
         yield from zip(jobs, calls, strict=True)
 
@@ -128,7 +128,8 @@ def _detect_one(pool: DetectorPool, path: Path, boxes_px: np.ndarray | None, fol
     kept = result_path(folder, sha256, boxes_px)
     result = read_result(kept)
     if result is None:
-        result = pool.detect(read_image(path), boxes_px, sha256)
+        with naming(path):
+            result = pool.detect(read_image(path), boxes_px, sha256)
         write_result(kept, result)
     return result
 

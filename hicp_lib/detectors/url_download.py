@@ -5,9 +5,7 @@ from __future__ import annotations
 from http.client import HTTPException
 from pathlib import Path
 from urllib.parse import urlsplit
-from urllib.request import OpenerDirector, ProxyHandler, Request, build_opener, proxy_bypass_environment
-
-from hicp_lib.detectors.native import user_environment
+from urllib.request import Request, build_opener
 
 # Without an answer for so long, the server is given up.
 TIMEOUT_S = 30.0
@@ -23,7 +21,7 @@ def download(url: str, target: Path, max_bytes: int) -> str | None:
     """
     request = Request(url, headers={"User-Agent": "hicp"})
     try:
-        with _opener(url).open(request, timeout=TIMEOUT_S) as response, open(target, "wb") as file:
+        with build_opener().open(request, timeout=TIMEOUT_S) as response, open(target, "wb") as file:
             if urlsplit(response.url).scheme != urlsplit(url).scheme:
                 return f"led to {response.url}"
             # Without the announced size, a connection that broke off would pass for a whole file.
@@ -37,13 +35,3 @@ def download(url: str, target: Path, max_bytes: int) -> str | None:
     except (OSError, HTTPException, ValueError) as error:
         return " ".join(str(error).split()).strip("<>") or type(error).__name__
     return None
-
-
-def _opener(url: str) -> OpenerDirector:
-    """An opener with the user's proxies, also in a process that `keep_offline` has cut off."""
-    # Sorted, so that a variable in small letters wins over the same one in capitals.
-    variables = sorted(user_environment().items())
-    proxies = {k.lower().removesuffix("_proxy"): v for k, v in variables if k.lower().endswith("_proxy")}
-    if proxy_bypass_environment(urlsplit(url).hostname or "", proxies):
-        proxies = {}
-    return build_opener(ProxyHandler({scheme: proxy for scheme, proxy in proxies.items() if proxy}))

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 from dataclasses import dataclass
+from importlib.util import find_spec, module_from_spec
+from types import ModuleType
 
 import numpy as np
-from pycocotools.coco import COCO
-from pycocotools.cocoeval import COCOeval
 
 OKS_THRESHOLDS = np.linspace(0.5, 0.95, 10)
 RECALLS = np.linspace(0.0, 1.0, 101)
@@ -17,6 +15,18 @@ MAX_DETECTIONS = 20
 # Where a keypoint that is not given is put: so far off that it adds 0 to OKS. pycocotools must not
 # see NaN: comparisons with NaN fail, and then everything matches.
 _FAR_PX = -1e12
+
+
+def _quiet(name: str) -> ModuleType:
+    """A module of pycocotools as a copy that prints nothing: the caller's standard output is left alone."""
+    spec = find_spec(f"pycocotools.{name}")
+    module = module_from_spec(spec)
+    module.print = lambda *_: None
+    spec.loader.exec_module(module)
+    return module
+
+
+COCO, COCOeval = _quiet("coco").COCO, _quiet("cocoeval").COCOeval
 
 
 @dataclass(frozen=True)
@@ -78,14 +88,13 @@ def run(
     precision (10, 101), recall (10,) : per OKS threshold; NaN when nobody counts
     Matches
     """
-    with contextlib.redirect_stdout(io.StringIO()):
-        engine = COCOeval(_index(image_ids, truth), _index(image_ids, found), "keypoints")
-        engine.params.kpt_oks_sigmas = sigmas
-        engine.params.maxDets = [MAX_DETECTIONS]
-        engine.params.iouThrs, engine.params.recThrs = OKS_THRESHOLDS, RECALLS
-        engine.params.areaRng, engine.params.areaRngLbl = [[0.0, np.inf]], ["all"]
-        engine.evaluate()
-        engine.accumulate()
+    engine = COCOeval(_index(image_ids, truth), _index(image_ids, found), "keypoints")
+    engine.params.kpt_oks_sigmas = sigmas
+    engine.params.maxDets = [MAX_DETECTIONS]
+    engine.params.iouThrs, engine.params.recThrs = OKS_THRESHOLDS, RECALLS
+    engine.params.areaRng, engine.params.areaRngLbl = [[0.0, np.inf]], ["all"]
+    engine.evaluate()
+    engine.accumulate()
     precision, recall = engine.eval["precision"][:, :, 0, 0, 0], engine.eval["recall"][:, 0, 0, 0]
     return np.where(precision < 0, np.nan, precision), np.where(recall < 0, np.nan, recall), _matches(engine)
 

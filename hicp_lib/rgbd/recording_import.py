@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from hicp_lib.environment import with_variables
 from hicp_lib.errors import InputError
 from hicp_lib.extras import needs
 from hicp_lib.files import atomic_path, read_json
@@ -146,7 +147,7 @@ def import_bag(bag: str | Path, out: str | Path, poses: PoseSource) -> int:
 
 def _open_bag(bag: Path):
     """Open3D's reader, opened."""
-    with needs("render"):
+    with needs("render"), with_variables(OPEN3D_DISABLE_WEB_VISUALIZER="true"):
         import open3d as o3d
 
     if not hasattr(o3d.t.io, "RSBagReader"):

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from functools import cached_property
 
 import cv2
 import numpy as np
 
-# Open3D would announce and start its web viewer in every notebook that renders.
-os.environ.setdefault("OPEN3D_DISABLE_WEB_VISUALIZER", "true")
-
-import open3d as o3d  # noqa: E402
-
+from hicp_lib.environment import with_variables
 from hicp_lib.simulation.camera import join_rays
 from hicp_lib.simulation.surfaces import Surface
+
+# Open3D would announce and start its web viewer in every notebook that renders.
+with with_variables(OPEN3D_DISABLE_WEB_VISUALIZER="true"):
+    import open3d as o3d
 
 N_THREADS = 1  # frames are rendered in parallel by processes; one scene takes calls from one thread only
 

@@ -20,6 +20,7 @@ import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.annotations import Annotations, ImageInfo, write_annotations
+from hicp_lib.environment import with_variables
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json, sha256_bytes, sha256_file, write_bytes, write_json
 from hicp_lib.keypoints import N_KEYPOINTS
@@ -139,15 +140,11 @@ def worker_pool(workers: int) -> Iterator[multiprocessing.pool.Pool]:
     linear algebra library reads its number of threads when it is loaded.
     """
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        context = multiprocessing.get_context("spawn")
-        with context.Pool(workers, initializer=cv2.setNumThreads, initargs=(1,)) as pool:
-            yield pool
-    finally:
-        for name, value in before.items():
-            os.environ.pop(name) if value is None else os.environ.update({name: value})
+    context = multiprocessing.get_context("spawn")
+    with with_variables(**dict.fromkeys(names, "1")):
+        pool = context.Pool(workers, initializer=cv2.setNumThreads, initargs=(1,))
+    with pool:
+        yield pool
 
 
 def _render_one(job: tuple[str, int, int]) -> None:

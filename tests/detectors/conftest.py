@@ -11,6 +11,10 @@ import pytest
 import hicp_lib
 from hicp_lib.images import write_png
 
+from .plain_people import render_person
+
+N_PEOPLE = 8
+
 # The detector "slow", and the code under test wherever it is.
 _SOURCES = [str(Path(__file__).parent), str(Path(hicp_lib.__file__).parents[1])]
 _HICP = "import sys, slow_detector; from hicp_lib import cli; sys.exit(cli.run(sys.argv[1:]))"
@@ -59,3 +63,9 @@ class Slow:
 @pytest.fixture
 def slow(tmp_path) -> Slow:
     return Slow(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def people():
+    """Rendered people with known keypoints, hands of some 60 pixels beside the shoulders."""
+    return [render_person(seed, distance_m=1.4) for seed in range(N_PEOPLE)]

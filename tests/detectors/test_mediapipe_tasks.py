@@ -12,19 +12,12 @@ import numpy as np
 import pytest
 
 from hicp_lib.detectors.base import Detections
+from hicp_lib.detectors.native import child_environment
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 
-from .plain_people import render_person
-
-N_PEOPLE = 8
-
-
-@pytest.fixture(scope="module")
-def people():
-    """Rendered people with known keypoints, hands of some 60 pixels beside the shoulders."""
-    return [render_person(seed, distance_m=1.4) for seed in range(N_PEOPLE)]
+from .conftest import N_PEOPLE
 
 
 def hand_errors(positions_px: np.ndarray, truth_px: np.ndarray) -> tuple[float, float]:
@@ -167,11 +160,10 @@ def test_bundles_are_equal_every_time_and_a_bundle_can_be_given(weights, tmp_pat
 
 def test_every_model_declares_once_how_pixels_are_scaled(weights):
     """The pose detector takes [-1, 1], the others [0, 1], as MediaPipe's own graphs feed them."""
-    from mediapipe.tasks.metadata import metadata_schema_py_generated as metadata
-    from mediapipe.tasks.metadata import schema_py_generated as tflite
-
     from hicp_lib.detectors import mediapipe_bundle
 
+    generated = "tasks/metadata/{}schema_py_generated.py"
+    tflite, metadata = (mediapipe_bundle._of_mediapipe(generated.format(kind)) for kind in ("", "metadata_"))
     ranges = {}
     for task in ("pose", "hand"):
         with zipfile.ZipFile(io.BytesIO(mediapipe_bundle.assemble(task))) as bundle:
@@ -206,6 +198,32 @@ def test_a_file_that_is_no_bundle_is_refused(tmp_path):
         make_detector("mediapipe-hands", model=path)
 
 
+def test_damaged_members_are_told_at_once(weights, tmp_path):
+    path = tmp_path / "hand.task"
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as file:
+        for member in ("hand_detector.tflite", "hand_landmarks_detector.tflite"):
+            file.writestr(member, b"TFL3" + bytes(1000))
+    path.write_bytes(content.getvalue())
+    with pytest.raises(InputError, match=r"hand\.task: cannot be used by .*; give another \.task") as told:
+        make_detector("mediapipe-hands", model=path)
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("options", [{"num_hands": 0}, {"min_score": 1.1}, {"min_score": float("nan")}])
+def test_options_out_of_bounds_are_refused_before_the_first_image(weights, options):
+    with pytest.raises(InputError, match="^mediapipe-hands: .*expected 1 or more, and a score from 0 to 1$"):
+        make_detector("mediapipe-hands", **options)
+
+
+@pytest.mark.parametrize(
+    "image", [np.zeros((9, 9), np.uint8), np.zeros((9, 9, 3)), np.zeros((0, 9, 3), np.uint8)]
+)
+def test_what_is_no_image_is_refused(weights, image):
+    with pytest.raises(InputError, match=r"expected uint8 \(height, width, 3\)"):
+        make_detector("mediapipe-hands").detect(image)
+
+
 def test_a_damaged_weight_is_refused(own_cache):
     path = own_cache / "weights" / "palm_detection_full.tflite"
     content = bytearray(path.read_bytes())
@@ -235,50 +253,58 @@ def proxy():
 
 
 _RUN = """
-import os, time, numpy as np
-from hicp_lib.detectors import native
-{before}
+import time, numpy as np
 from hicp_lib.detectors.registry import make_detector
 detector = make_detector("mediapipe-hands")
 detector.detect(np.zeros((50, 50, 3), np.uint8))
-detector._task._task.close()
+del detector
 time.sleep(1)
-make_detector("mediapipe-pose")
+"""
+# What the library's own process does, and then what it never does: close the task.
+_CLOSE = """
+import time
+from hicp_lib.detectors import mediapipe_bundle, mediapipe_child
+task = mediapipe_child.landmarker(mediapipe_bundle.assemble("hand"), "hand", 2, 0.5)
+task.close()
+time.sleep(1)
 """
 
 
-def run_behind(proxy, before: str = "") -> subprocess.CompletedProcess:
-    address = f"http://127.0.0.1:{proxy.server_address[1]}"
-    environment = os.environ | {"https_proxy": address, "no_proxy": "", "NO_PROXY": ""}
-    return subprocess.run(
-        [sys.executable, "-c", _RUN.format(before=before)], env=environment, capture_output=True, text=True
-    )
+@pytest.fixture
+def behind(proxy, monkeypatch):
+    """An environment in which all goes through the proxy."""
+    monkeypatch.setenv("https_proxy", f"http://127.0.0.1:{proxy.server_address[1]}")
+    for name in ("no_proxy", "NO_PROXY"):
+        monkeypatch.setenv(name, "")
+    return proxy
 
 
-def test_mediapipe_says_nothing_and_contacts_nobody(weights, proxy):
-    """Its usage metrics would go out when the task is closed; see `hicp_lib.detectors.native`."""
-    run = run_behind(proxy)
+def run_script(script: str, environment: dict | None = None) -> subprocess.CompletedProcess:
+    return subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True)
+
+
+def test_mediapipe_says_nothing_and_contacts_nobody(weights, behind):
+    run = run_script(_RUN)
     assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
-    assert proxy.requests == []
+    assert behind.requests == []
 
 
-def test_the_proxy_would_have_seen_it(weights, proxy):
-    """The control to the test above: without `keep_offline` the library does try."""
-    run = run_behind(proxy, before="native.keep_offline = lambda: None")
-    assert run.returncode == 0
-    assert any(request.startswith("CONNECT") for request in proxy.requests)
+def test_it_would_send_metrics_but_for_its_process_environment(weights, behind):
+    assert run_script(_CLOSE).returncode == 0
+    assert any(request.startswith("CONNECT") for request in behind.requests)
+    behind.requests.clear()
+    assert run_script(_CLOSE, child_environment()).returncode == 0
+    assert behind.requests == []
 
 
 def test_no_exception_from_the_proxy_lets_it_out(monkeypatch):
     from urllib.request import getproxies_environment, proxy_bypass_environment
 
-    from hicp_lib.detectors import native
-
-    monkeypatch.setattr(native, "_before", {})
     for name, value in {"https_proxy": "http://gate:3128", "no_proxy": "*", "NO_PROXY": "*"}.items():
         monkeypatch.setenv(name, value)
-    native.keep_offline()
+    environment = child_environment()
+    assert os.environ["https_proxy"] == "http://gate:3128"
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
     assert getproxies_environment()["https"] == "http://127.0.0.1:9"
     assert not proxy_bypass_environment("metrics.example.com")
-    user = native.user_environment()
-    assert (user["https_proxy"], user["no_proxy"]) == ("http://gate:3128", "*")

@@ -17,7 +17,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 
 from hicp_lib import cli
-from hicp_lib.detectors import native, published
+from hicp_lib.detectors import published
 from hicp_lib.detectors.onnx.session import open_model
 from hicp_lib.detectors.zoo import weights_dir
 from hicp_lib.errors import InputError
@@ -74,7 +74,6 @@ def server(tmp_path, monkeypatch):
     for name in list(os.environ):
         if name.lower().endswith("_proxy"):
             monkeypatch.delenv(name)
-    monkeypatch.setattr(native, "_before", {})
     monkeypatch.setenv("HICP_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(published, "REGISTRY_PATH", tmp_path / "data" / "published.json")
     (tmp_path / "data").mkdir()
@@ -287,17 +286,14 @@ def test_without_network_one_line_says_where_to_put_the_file_and_there_it_is_tak
     assert published.fetch_published("net").path.read_bytes() == CONTENT
 
 
-def test_a_process_that_was_cut_off_still_downloads_as_the_user_would(server, monkeypatch):
-    """Proxies are those from before `keep_offline`; here one that is used, then one that is not."""
-    for name in native._NOWHERE:
-        monkeypatch.setenv(name, "")  # restored after the test
+def test_downloads_take_the_users_proxies_as_they_are_now(server, monkeypatch):
+    """Here one that is used, then one that is not."""
     register(server, url="http://published.invalid/net.zip")
     server.files["http://published.invalid/net.zip"] = server.files["/a/net.zip"]
     monkeypatch.setenv("http_proxy", server.url)
-    native.keep_offline()
     assert published.fetch_published("net").path.read_bytes() == CONTENT
     monkeypatch.setenv("http_proxy", "http://127.0.0.1:9")
-    monkeypatch.setitem(native._before, "no_proxy", "127.0.0.1")
+    monkeypatch.setenv("no_proxy", "127.0.0.1")
     assert published.fetch_published("plain").path.read_bytes() == CONTENT
 
 

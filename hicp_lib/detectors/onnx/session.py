@@ -13,13 +13,18 @@ from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
-import onnxruntime
 from google.protobuf.message import DecodeError, Message
 
 from hicp_lib.detectors.protobuf import Messages, message_class
 from hicp_lib.detectors.published import check_use
+from hicp_lib.environment import with_variables
 from hicp_lib.errors import InputError
 from hicp_lib.files import sha256_bytes
+
+# ONNX Runtime would tell its vendor of every model that is opened, and keep an identifier for that in the
+# user's cache folder. It reads the variable once, when it is loaded.
+with with_variables(ORT_DISABLE_TELEMETRY="1"):
+    import onnxruntime
 
 _DTYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
 _FATAL_ONLY = 4

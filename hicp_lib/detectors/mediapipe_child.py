@@ -1,0 +1,148 @@
+"""The program of MediaPipe's own process: one task, then an answer to every image.
+
+It is run by its path and imports nothing of this package, so that it starts in any environment, and soon.
+Messages go through standard input and output: the lengths of head and body, a head in JSON, a body of plain
+bytes. The first one's head tells the task's options and its body is the bundle; every other one tells the
+`shape` of the RGB image that lies in memory both sides see, a file whose descriptor is the argument: through
+a pipe a call would take a tenth longer. Answers are arrays of float64 (`shape`) or an `error` in one line.
+"""
+
+from __future__ import annotations
+
+import json
+import mmap
+import os
+import signal
+import struct
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Any, BinaryIO
+
+import numpy as np
+
+N_POSE, N_HAND = 33, 21
+_LENGTHS = struct.Struct("<QQ")
+_SIDES = {"Left": 0.0, "Right": 1.0}
+_VISION = "mediapipe.tasks.python.vision"
+
+
+def send(file: BinaryIO, head: dict, body: bytes = b"") -> None:
+    """Write one message."""
+    text = json.dumps(head).encode()
+    file.write(_LENGTHS.pack(len(text), len(body)) + text)
+    file.write(body)
+    file.flush()
+
+
+def receive(file: BinaryIO) -> tuple[dict, bytearray]:
+    """Read one message.
+
+    Raises
+    ------
+    EOFError
+        If the other side is gone.
+    """
+    lengths = file.read(_LENGTHS.size)
+    if len(lengths) < _LENGTHS.size:
+        raise EOFError
+    n_head, n_body = _LENGTHS.unpack(lengths)
+    head, body = file.read(n_head), bytearray(n_body)
+    if len(head) < n_head or file.readinto(body) < n_body:
+        raise EOFError
+    return json.loads(head), body
+
+
+def _serve(questions: BinaryIO, answers: BinaryIO, shared: int) -> None:
+    head, bundle = receive(questions)
+    # Whatever hangs in the library is ended by the system, also when nobody waits for it any more.
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGALRM])
+    limit_s = head.pop("limit_s")
+    signal.setitimer(signal.ITIMER_REAL, limit_s)
+    _leave_out("mediapipe", "mediapipe.tasks.python", _VISION)
+    detect = detection(bytes(bundle), **head)
+    signal.setitimer(signal.ITIMER_REAL, 0)
+    send(answers, {})
+    pixels = b""
+    while True:
+        shape = receive(questions)[0]["shape"]
+        signal.setitimer(signal.ITIMER_REAL, limit_s)
+        try:
+            if np.prod(shape) > len(pixels):
+                pixels = mmap.mmap(shared, 0, access=mmap.ACCESS_READ)
+            found = detect(np.ndarray(shape, np.uint8, pixels))
+            head, body = {"shape": found.shape}, found.tobytes()
+        except (ValueError, RuntimeError) as error:
+            head, body = {"error": _one_line(error)}, b""
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        send(answers, head, body)
+
+
+def detection(bundle: bytes, task: str, **options: Any) -> Callable[[np.ndarray], np.ndarray]:
+    """A function from an image (height, width, 3) to what `_poses` or `_hands` say."""
+    task_is_ready = landmarker(bundle, task, **options)
+    pixels = import_module(f"{_VISION}.core.image")
+    rows = {"pose": _poses, "hand": _hands}[task]
+    return lambda image: rows(task_is_ready.detect(pixels.Image(pixels.ImageFormat.SRGB, image)))
+
+
+def landmarker(bundle: bytes, task: str, n: int, min_score: float) -> Any:
+    """MediaPipe's task ("pose" or "hand") for still images, ready."""
+    base_options = import_module("mediapipe.tasks.python.core.base_options")
+    module = import_module(f"{_VISION}.{task}_landmarker")
+    kind = task.capitalize()
+    options = getattr(module, f"{kind}LandmarkerOptions")(
+        base_options=base_options.BaseOptions(model_asset_buffer=bundle),
+        **{f"num_{task}s": n},
+        **{f"min_{task}_{step}_confidence": min_score for step in ("detection", "presence")},
+    )
+    return getattr(module, f"{kind}Landmarker").create_from_options(options)
+
+
+def _leave_out(*packages: str) -> None:
+    """Put empty packages in the place of MediaPipe's own, which load Matplotlib, audio and what not."""
+    (root,) = find_spec("mediapipe").submodule_search_locations
+    for name in packages:
+        package = ModuleType(name)
+        package.__path__ = [os.path.join(root, *name.split(".")[1:])]
+        sys.modules[name] = package
+
+
+def _poses(result: Any) -> np.ndarray:
+    """Array, shape (n, 33, 3): x and y as fractions of the image, visibility."""
+    people = [[(p.x, p.y, p.visibility) for p in person] for person in result.pose_landmarks]
+    return np.array(people, float).reshape(-1, N_POSE, 3)
+
+
+def _hands(result: Any) -> np.ndarray:
+    """Array, shape (n, 1 + 21, 2): side (0 left, 1 right) and score, then x and y as fractions."""
+    hands = [
+        [(_SIDES[sides[0].category_name], sides[0].score), *((p.x, p.y) for p in hand)]
+        for hand, sides in zip(result.hand_landmarks, result.handedness, strict=True)
+    ]
+    return np.array(hands, float).reshape(-1, 1 + N_HAND, 2)
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _main() -> None:
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what the library prints is no answer
+    sys.path.append(sys.argv[1])  # where MediaPipe is
+    try:
+        _serve(sys.stdin.buffer, answers, int(sys.argv[2]))
+    except EOFError:
+        pass
+    except Exception as error:  # a broken library may raise anything
+        send(answers, {"error": _one_line(error)})
+    # Without closing the task: that would send usage metrics, and takes its time.
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    _main()
