@@ -60,7 +60,7 @@ $(INSTALLED): environment.lock pyproject.toml
 	@$(BIN)/python -m pip install -qq --no-deps --no-build-isolation --no-index --editable .
 	@rm $(INSTALLING) && touch $(INSTALLED)
 
-# Libraries that Open3D loads and a bare Debian lacks: installed where that is allowed.
+# Libraries that the wheels load and do not bring: installed where that is allowed.
 system: $(INSTALLED)
 	@packages="$$($(BIN)/python -m hicp_lib.system_libraries)"; \
 	if [ -z "$$packages" ]; then exit 0; fi; \
