@@ -31,7 +31,7 @@ OPTIONAL = {
     "libc10": "of Open3D's operations for PyTorch, which the study does not use",
     "libGL.so": "of Open3D's window: another name of libGL.so.1",
     "libGLES": "of Open3D's window, for OpenGL ES 1, under two names",
-    "libOpenGL": "of Open3D's window; comes with libegl1",
+    "libOpenGL": "of Open3D's window: another name for what libGL.so.1 has",
     "libGLX": "of Open3D's window; comes with libgl1",
     "libOSMesa": "of Open3D's window, drawn in software",
     "libX": "of Open3D's window: X11's extensions; nothing opens a window",
