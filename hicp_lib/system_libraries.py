@@ -1,7 +1,8 @@
 """Shared libraries that the environment's wheels load and do not bring.
 
-The list is held against the wheels' own word by `tests/test_system_libraries.py`. `python -m hicp_lib.system_libraries` prints the Debian packages that are missing. It
-imports nothing but the standard library: it runs before anything else can.
+The list is held against the wheels' own word by `tests/test_system_libraries.py`.
+`python -m hicp_lib.system_libraries` prints the Debian packages that are missing. It imports
+nothing but the standard library: it runs before anything else can.
 """
 
 from __future__ import annotations

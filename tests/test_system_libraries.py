@@ -20,9 +20,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 # Debian's apt and Python stand on these: no system with Python is without them.
-ALWAYS_THERE = re.compile(
-    r"ld-linux-x86-64\.so\.2|lib(c|m|dl|pthread|rt|util|gcc_s|stdc\+\+)\.so\.\d+"
-)
+ALWAYS_THERE = re.compile(r"ld-linux-x86-64\.so\.2|lib(c|m|dl|pthread|rt|util|gcc_s|stdc\+\+)\.so\.\d+")
 # What is asked for and not needed, by the start of its name.
 OPTIONAL = {
     "libquadmath.so.0": "of Boost's charconv and locale, which Pinocchio does not load",

@@ -47,11 +47,10 @@ install_base() {
 # What this machine needs to reach its package indexes: name server, certificates, apt's and pip's settings.
 join_network() {
   cp -L /etc/resolv.conf "$root/etc/"
-  cp -aL /etc/ssl/certs/. "$root/etc/ssl/certs/"
+  rm -r "$root/etc/ssl/certs"
+  cp -aL /etc/ssl/certs "$root/etc/ssl/"
   cp /etc/apt/apt.conf.d/* "$root/etc/apt/apt.conf.d/" 2>/dev/null || true
-  local index
-  index=$(python3 -m pip config get global.index-url 2>/dev/null || true)
-  [ -z "$index" ] || export PIP_INDEX_URL=${PIP_INDEX_URL:-$index}
+  local name PIP_INDEX_URL=${PIP_INDEX_URL:-$(python3 -m pip config get global.index-url 2>/dev/null)}
   for name in {http,https,no}_proxy {HTTP,HTTPS,NO}_PROXY SSL_CERT_FILE REQUESTS_CA_BUNDLE \
     PIP_CERT PIP_INDEX_URL PIP_TRUSTED_HOST PIP_DEFAULT_TIMEOUT; do
     [ -z "${!name:-}" ] || environment+=("$name=${!name}")
