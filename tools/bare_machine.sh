@@ -4,10 +4,9 @@
 #
 #   tools/bare_machine.sh [SUITE] [COMMAND ...]
 #
-# SUITE: bookworm (Debian 12, the default), trixie (Debian 13) or noble (Ubuntu 24.04).
+# SUITE: bookworm (Debian 12, the default), trixie (Debian 13), forky (Debian testing) or noble (Ubuntu 24.04).
 # COMMANDs: "make report" and "make test" if none is given.
-# BARE_DIR (/var/tmp/hicp-bare): where the systems and logs are kept. BARE_PIP_CACHE: a pip cache to share, so that
-# nothing is downloaded again.
+# BARE_DIR (/var/tmp/hicp-bare): where systems and logs are kept; a system is installed once and copied for each run.
 #
 # Exit codes: 0 all commands succeeded, 1 one of them failed, 2 it cannot be tried here.
 set -euo pipefail
@@ -29,15 +28,17 @@ base=$folder/$suite.base root=$folder/$suite
 mkdir -p "$folder"
 
 install_base() {
+  # debootstrap may be older than the suite: all suites of Debian, and all of Ubuntu, share one script.
+  local scripts=/usr/share/debootstrap/scripts
   case $suite in
-    # Debian's debootstrap may know no script for Ubuntu's newest; they have all been the same since gutsy.
-    noble) set -- --components=main,universe "$suite" "$base.partial" "" /usr/share/debootstrap/scripts/gutsy ;;
-    bookworm | trixie) set -- "$suite" "$base.partial" ;;
-    *) cannot "suite is $suite; expected bookworm, trixie or noble" ;;
+    bookworm | trixie | forky) set -- "$suite" "$base.partial" "" $scripts/sid ;;
+    noble) set -- --components=main,universe "$suite" "$base.partial" "" $scripts/gutsy ;;
+    *) cannot "suite is $suite; expected bookworm, trixie, forky or noble" ;;
   esac
   command -v debootstrap >/dev/null || { apt-get update -qq && apt-get install -qq -y debootstrap; } >/dev/null 2>&1 ||
     cannot "debootstrap is missing; run: apt-get install debootstrap"
   rm -rf --one-file-system "$base.partial"
+  echo "bare_machine: installing $suite into $base ..."
   debootstrap --variant=minbase --include=python3,python3-venv,python3-pip,git,make,ca-certificates "$@" \
     >"$folder/$suite.base.log" 2>&1 ||
     cannot "debootstrap could not install $suite: $(tail -n 1 "$folder/$suite.base.log")"
@@ -65,10 +66,6 @@ join_network
 mount -t proc proc "$root/proc"
 mount --bind /sys "$root/sys"  # MediaPipe's memory allocator reads it
 mount --rbind /dev "$root/dev"
-if [ -n "${BARE_PIP_CACHE:-}" ]; then
-  mkdir -p "$BARE_PIP_CACHE" "$root/root/.cache/pip"
-  mount --bind "$BARE_PIP_CACHE" "$root/root/.cache/pip"
-fi
 git clone -q "$checkout" "$root/root/project"
 
 status=0 number=0
