@@ -28,7 +28,7 @@ report: setup
 	@$(BIN)/hicp report --profile $(PROFILE)
 
 test: setup
-	@$(BIN)/python -m pytest $(PYTEST_ARGS)
+	@$(BIN)/python -m pytest -n logical --dist loadfile $(PYTEST_ARGS)
 
 lab: setup
 	@$(BIN)/jupyter lab --notebook-dir=. --port=$(PORT) $(AS_ROOT) notebooks/00_quickstart.ipynb

@@ -6,6 +6,7 @@
 #
 # SUITE: bookworm (Debian 12, the default), trixie (Debian 13), forky (Debian testing) or noble (Ubuntu 24.04).
 # COMMANDs: "make report" and "make test" if none is given.
+# BARE_MIRROR (Debian's, as debootstrap knows it): the archive to install from; Ubuntu's has to be given.
 # BARE_DIR (/var/tmp/hicp-bare): where systems and logs are kept; a system is installed once and copied for each run.
 #
 # Exit codes: 0 all commands succeeded, 1 one of them failed, 2 it cannot be tried here.
@@ -31,8 +32,11 @@ install_base() {
   # debootstrap may be older than the suite: all suites of Debian, and all of Ubuntu, share one script.
   local scripts=/usr/share/debootstrap/scripts
   case $suite in
-    bookworm | trixie | forky) set -- "$suite" "$base.partial" "" $scripts/sid ;;
-    noble) set -- --components=main,universe "$suite" "$base.partial" "" $scripts/gutsy ;;
+    bookworm | trixie | forky) set -- "$suite" "$base.partial" "${BARE_MIRROR:-}" $scripts/sid ;;
+    noble)
+      [ -n "${BARE_MIRROR:-}" ] || cannot "noble needs the address of an archive of Ubuntu's in BARE_MIRROR"
+      set -- --components=main,universe "$suite" "$base.partial" "$BARE_MIRROR" $scripts/gutsy
+      ;;
     *) cannot "suite is $suite; expected bookworm, trixie, forky or noble" ;;
   esac
   command -v debootstrap >/dev/null || { apt-get update -qq && apt-get install -qq -y debootstrap; } >/dev/null 2>&1 ||
