@@ -28,7 +28,7 @@ report: setup
 	@$(BIN)/hicp report --profile $(PROFILE)
 
 test: setup
-	@$(BIN)/python -m pytest $(PYTEST_ARGS)
+	@$(BIN)/python -m pytest -n logical --dist loadfile $(PYTEST_ARGS)
 
 lab: setup
 	@$(BIN)/jupyter lab --notebook-dir=. --port=$(PORT) $(AS_ROOT) notebooks/00_quickstart.ipynb
@@ -62,7 +62,7 @@ $(INSTALLED): environment.lock pyproject.toml
 	  --config-settings editable_mode=compat
 	@rm $(INSTALLING) && touch $(INSTALLED)
 
-# Libraries that Open3D loads and a bare Debian lacks: installed where that is allowed.
+# Libraries that the wheels load and do not bring: installed where that is allowed.
 system: $(INSTALLED)
 	@packages="$$($(BIN)/python -m hicp_lib.system_libraries)"; \
 	if [ -z "$$packages" ]; then exit 0; fi; \

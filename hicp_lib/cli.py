@@ -259,10 +259,9 @@ def report(profile: str, pairs: tuple[tuple[str, str], ...], root: Path | None) 
 @hicp.command()
 def doctor() -> int:
     """Check the installation: one line each, with the remedy."""
-    from hicp_lib.doctor import run_checks
+    from hicp_lib.doctor import FAIL, run_checks
 
     checks = run_checks()
     for check in checks:
-        remedy = "" if check.is_ok else f"; remedy: {check.remedy}"
-        say(f"{'ok  ' if check.is_ok else 'FAIL'} {check.name}: {check.finding}{remedy}")
-    return 0 if all(check.is_ok for check in checks) else 2
+        say(str(check))
+    return 2 if any(check.status == FAIL for check in checks) else 0

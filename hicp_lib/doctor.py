@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 import os
 import platform
 import re
 import shutil
+import signal
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,11 +22,16 @@ from hicp_lib.checkout import working_folder
 from hicp_lib.errors import InputError
 from hicp_lib.files import cache_dir
 from hicp_lib.opencv_files import WANTED, overwritten
+from hicp_lib.probes import EXIT_ABSENT, EXIT_FAILED, probes
 from hicp_lib.system_libraries import DEBIAN_PACKAGES, missing_packages
 
 PYTHONS = ((3, 11), (3, 14))
 MIN_FREE_GB = 3.0
-_IMPORTS = ("cv2", "mediapipe", "onnxruntime", "open3d", "pandas", "papermill", "pycocotools", "sphinx")
+PROBE_LIMIT_S = 120.0
+OK, ABSENT, FAIL = "ok", "--", "FAIL"
+"""What a check came to; absent is a part that was not installed, which is no fault."""
+PROBE = (sys.executable, "-P", "-m", "hicp_lib.probes")
+_REINSTALL = "rm .venv/.installed; make report"
 
 
 @dataclass(frozen=True)
@@ -30,9 +39,18 @@ class Check:
     """One line of the doctor: what was looked at, what was found, and what to do if it is not well."""
 
     name: str
-    is_ok: bool
+    status: str
     finding: str
     remedy: str = ""
+
+    @classmethod
+    def of(cls, name: str, is_ok: bool, finding: str, remedy: str) -> Check:
+        """A check that is well or not."""
+        return cls(name, OK if is_ok else FAIL, finding, remedy)
+
+    def __str__(self) -> str:
+        remedy = f"; remedy: {self.remedy}" if self.status == FAIL else ""
+        return f"{self.status:<4} {self.name}: {self.finding}{remedy}"
 
 
 def run_checks() -> list[Check]:
@@ -42,8 +60,8 @@ def run_checks() -> list[Check]:
         check_system_libraries(),
         check_locked_versions(provenance.LOCK_PATH),
         check_opencv(),
-        check_imports(_IMPORTS),
         check_weights(),
+        *check_probes(),
         *check_folder("cache", cache_dir(), "set HICP_CACHE to a folder you may write to"),
         *check_folder("results", working_folder() / "results", "give yourself the right to write there"),
     ]
@@ -54,31 +72,30 @@ def check_python() -> Check:
     oldest, newest = PYTHONS
     is_ok = oldest <= sys.version_info[:2] <= newest
     remedy = "make it anew with a Python from 3.11 to 3.14: rm -r .venv; make report PYTHON=python3.12"
-    return Check("Python", is_ok, platform.python_version(), remedy)
+    return Check.of("Python", is_ok, platform.python_version(), remedy)
 
 
 def check_system_libraries() -> Check:
-    """What Open3D loads and a bare Debian lacks."""
+    """What the wheels load and do not bring."""
     missing = missing_packages()
     finding = f"missing: {' '.join(missing)}" if missing else f"{len(DEBIAN_PACKAGES)} found"
-    return Check("system libraries", not missing, finding, f"sudo apt-get install {' '.join(missing)}")
+    return Check.of("system libraries", not missing, finding, f"sudo apt-get install {' '.join(missing)}")
 
 
 def check_locked_versions(lock_path: Path) -> Check:
     """That what is installed is what the lock says."""
-    remedy = "rm .venv/.installed; make report"
     if provenance.CHECKOUT is None:
-        return Check("locked environment", True, "none: hicp was installed without a checkout")
+        return Check("locked environment", OK, "none: hicp was installed without a checkout")
     try:
         locked = dict(locked_versions(lock_path.read_text()))
     except OSError as error:
-        return Check(
+        return Check.of(
             "locked environment", False, f"{lock_path}: {error.strerror}", "git restore environment.lock"
         )
     wrong = [f"{name} {_installed(name)} instead of {version}" for name, version in locked.items()
              if _installed(name) != version]  # fmt: skip
     finding = f"{len(wrong)} differ: {', '.join(wrong[:3])}" if wrong else f"{len(locked)} packages as locked"
-    return Check("locked environment", not wrong, finding, remedy)
+    return Check.of("locked environment", not wrong, finding, _REINSTALL)
 
 
 def locked_versions(lock: str) -> Iterator[tuple[str, str]]:
@@ -98,25 +115,70 @@ def _installed(name: str) -> str:
         return "none"
 
 
-def check_imports(names: tuple[str, ...]) -> Check:
-    """That the libraries load: a version alone does not show a missing system library."""
-    failed = [f"{name} ({reason})" for name in names if (reason := _import_error(name))]
-    remedy = "install what is named; if it is a Python package: rm .venv/.installed; make report"
-    return Check("libraries", not failed, "; ".join(failed) or f"{len(names)} load", remedy)
+def check_probes() -> list[Check]:
+    """That detectors, renderer and controller run: as many trials at a time as there are processors."""
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        return list(threads.map(check_probe, probes()))
 
 
-def _import_error(name: str) -> str:
+def check_probe(name: str, command: tuple[str, ...] = PROBE, limit_s: float = PROBE_LIMIT_S) -> Check:
+    """Run one trial (see `hicp_lib.probes`) in a process of its own, which may die or hang.
+
+    Parameters
+    ----------
+    command : what runs the trial; its name is appended
+    limit_s : after this the trial and all its processes are ended
+    """
+    process = subprocess.Popen(
+        [*command, name], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, errors="replace", start_new_session=True,
+    )  # fmt: skip
     try:
-        __import__(name)
-    except Exception as error:  # a broken library may raise anything
-        return " ".join(str(error).split()) or type(error).__name__
-    return ""
+        said, murmured = process.communicate(timeout=limit_s)
+    except subprocess.TimeoutExpired:
+        return Check(name, FAIL, f"no answer within {limit_s:g} s, ended", _remedy(""))
+    finally:
+        _end(process)
+    return _judge(name, process.returncode, _last_line(said), _last_line(murmured))
+
+
+def _end(process: subprocess.Popen) -> None:
+    """End what may be left of a trial: itself, and processes that it started."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _judge(name: str, code: int, said: str, murmured: str) -> Check:
+    """What the end of a trial means; `said` and `murmured` are its last words on the two outputs."""
+    if code == 0:
+        return Check(name, OK, said)
+    if code == EXIT_ABSENT:
+        return Check(name, ABSENT, said)
+    if code == EXIT_FAILED and said:
+        return Check(name, FAIL, said, _remedy(said))
+    ending = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+    words = f" ({murmured})" if murmured else ""
+    return Check(name, FAIL, f"its process died of {ending}{words}", _remedy(murmured))
+
+
+def _remedy(words: str) -> str:
+    """What to do about a failure, by what it says: a shared library's package, or to install anew."""
+    library = re.search(r"lib[\w+.-]+\.so[.\d]*(?=: cannot open shared object)", words)
+    if library is None:
+        return f"in a container or chroot, give it /proc, /sys and /dev; else: {_REINSTALL}"
+    package = DEBIAN_PACKAGES.get(library[0])
+    return f"sudo apt-get install {package}" if package else f"install the system's package with {library[0]}"
+
+
+def _last_line(text: str) -> str:
+    return next((" ".join(line.split()) for line in reversed(text.splitlines()) if line.strip()), "")
 
 
 def check_opencv() -> Check:
     """That OpenCV's files are those of the build without a display, and no other distribution's."""
     fault = overwritten()
-    return Check("OpenCV", fault is None, *(fault or (f"{WANTED} {_installed(WANTED)}",)))
+    return Check("OpenCV", FAIL, *fault) if fault else Check("OpenCV", OK, f"{WANTED} {_installed(WANTED)}")
 
 
 def check_weights() -> Check:
@@ -126,9 +188,9 @@ def check_weights() -> Check:
     try:
         weights = list_weights()
     except InputError as error:
-        return Check("weights", False, str(error), "git restore data/detectors.json")
+        return Check.of("weights", False, str(error), "git restore data/detectors.json")
     wrong = [f"{row['name']} {row['status']}" for row in weights if row["status"] != "present"]
-    return Check(
+    return Check.of(
         "weights", not wrong, ", ".join(wrong) or f"{len(weights)} present and sound", "hicp models fetch"
     )
 
@@ -140,10 +202,10 @@ def check_folder(name: str, folder: Path, remedy: str) -> list[Check]:
     free_gb = shutil.disk_usage(there).free / 1e9
     room = f"{free_gb:.1f} GB free (at least {MIN_FREE_GB:.0f} wanted)"
     return [
-        Check(
+        Check.of(
             f"{name} folder", is_writable, f"{folder} {'is' if is_writable else 'is not'} writable", remedy
         ),
-        Check(f"{name} disk", free_gb >= MIN_FREE_GB, room, f"free space on the disk of {there}"),
+        Check.of(f"{name} disk", free_gb >= MIN_FREE_GB, room, f"free space on the disk of {there}"),
     ]
 
 

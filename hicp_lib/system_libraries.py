@@ -1,7 +1,8 @@
-"""Shared libraries that Open3D loads and a bare Linux lacks.
+"""Shared libraries that the environment's wheels load and do not bring.
 
-`python -m hicp_lib.system_libraries` prints the Debian packages that are missing. It
-imports nothing but the standard library: it runs before anything else can.
+The list is held against the wheels' own word by `tests/test_system_libraries.py`.
+`python -m hicp_lib.system_libraries` prints the Debian packages that are missing. It imports
+nothing but the standard library: it runs before anything else can.
 """
 
 from __future__ import annotations
@@ -10,11 +11,14 @@ import ctypes
 import sys
 
 DEBIAN_PACKAGES = {
-    "libEGL.so.1": "libegl1",
-    "libGL.so.1": "libgl1",
-    "libgomp.so.1": "libgomp1",
-    "libusb-1.0.so.0": "libusb-1.0-0",
-    "libX11.so.6": "libx11-6",
+    "libEGL.so.1": "libegl1",  # Open3D, MediaPipe
+    "libGL.so.1": "libgl1",  # Open3D
+    "libGLESv2.so.2": "libgles2",  # MediaPipe
+    "libX11.so.6": "libx11-6",  # Open3D
+    "libgomp.so.1": "libgomp1",  # Pinocchio
+    "libidn2.so.0": "libidn2-0",  # Open3D
+    "libudev.so.1": "libudev1",  # Open3D
+    "libusb-1.0.so.0": "libusb-1.0-0",  # Open3D
 }
 
 
