@@ -64,7 +64,6 @@ refused() { # EXTRA COMMAND...: one line that names the extra
 }
 refused analysis hicp lift --recording rec --detector mmpose --model net.onnx --out lifted.parquet
 refused render hicp scenes render scenes
-refused robot python -c 'import hicp_lib.robot.loop'
 refused mediapipe hicp models show --detector mediapipe
 refused openpose-mobilenet hicp models show --detector openpose-mobilenet
 refused report hicp report
