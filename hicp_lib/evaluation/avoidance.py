@@ -91,6 +91,23 @@ def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> d
     }
 
 
+def measured_times(runs: Iterable[Run]) -> pd.DataFrame:
+    """What detector and lifting took per image when a run was first simulated, beside the stated delay.
+
+    Columns: `script`, `detector`, `t_s`, `delay_s`, `time_ms`. The first image of a run is left out: the
+    detector is made ready with it.
+    """
+    runs = [run for run in runs if len(run.frames)]
+    parts = [
+        run.frames[["t_s", "time_ms"]]
+        .iloc[1:]
+        .assign(script=run.job.trial.script, detector=run.job.condition, delay_s=run.job.delay_s)
+        for run in runs
+    ]
+    columns = ["script", "detector", "t_s", "delay_s", "time_ms"]
+    return pd.concat(parts, ignore_index=True)[columns] if parts else pd.DataFrame(columns=columns)
+
+
 def _metrics(run: Run) -> dict:
     cycles, job = run.cycles, run.job
     t, distance, away = (cycles[name].to_numpy() for name in ("t_s", "distance_m", "hand_error_m"))

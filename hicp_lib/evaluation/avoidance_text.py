@@ -62,6 +62,20 @@ def error_table(errors: pd.DataFrame) -> pd.DataFrame:
     return table.assign(**{"95th percentile [cm]": by.quantile(0.95).map(in_cm)}).reset_index()
 
 
+def times_text(times: pd.DataFrame) -> pd.DataFrame:
+    """Per detector, the delay that is simulated and what it took here; of `avoidance.measured_times`."""
+    within = times.assign(within=times["time_ms"] <= 1e3 * times["delay_s"])
+    by = within.groupby("detector", sort=False)
+    table = pd.DataFrame(
+        {
+            "simulated [ms]": (1e3 * by["delay_s"].first()).map("{:.0f}".format),
+            "here, median [ms]": by["time_ms"].median().map("{:.0f}".format),
+            "here, no longer than simulated [%]": (100 * by["within"].mean()).map("{:.0f}".format),
+        }
+    )
+    return table.reset_index()
+
+
 def _or_dash(pattern: str) -> Callable[[float], str]:
     return lambda value: "–" if value != value else pattern.format(value)
 

@@ -7,6 +7,7 @@ import pytest
 from hicp_lib.evaluation.avoidance import (
     against_no_avoidance,
     keypoint_errors,
+    measured_times,
     metrics,
     separations,
 )
@@ -16,6 +17,7 @@ from hicp_lib.evaluation.avoidance_text import (
     losses,
     of_animation,
     runs_text,
+    times_text,
     values,
 )
 from hicp_lib.keypoints import INDEX
@@ -57,7 +59,8 @@ def made_up(condition: str, least_m: float, retreats: bool, seen_until_s: float 
                 "keypoints_px": points[..., :2],
             }
             flat = {key: array.ravel().tolist() for key, array in arrays.items()}
-            rows.append({"t_s": t, "jpeg": b""} | flat)
+            time_ms = 5000.0 if t == 0 else 90.0 + 20 * (t > 5.65)
+            rows.append({"t_s": t, "time_ms": time_ms, "jpeg": b""} | flat)
     return Run(Job(Trial(NAME), condition, 0.1 if rows else 0.0), cycles, pd.DataFrame(rows))
 
 
@@ -119,6 +122,14 @@ def test_errors_do_not_mind_the_side_and_feed_the_separation(runs):
     shown = error_table(errors)
     assert shown["detector"].tolist() == ["sees", "loses"]
     assert shown["median [cm]"].tolist() == shown["95th percentile [cm]"].tolist() == ["3.0", "3.0"]
+
+
+def test_times_are_told_beside_the_stated_delay(runs):
+    shown = times_text(measured_times(runs)).set_index("detector")
+    assert shown.index.tolist() == ["sees", "loses", "blind"]
+    # 75 images, of which the 19 from 5.7 s on took 110 ms; the first one is left out.
+    assert shown.loc["sees"].tolist() == ["100", "90", "75"]
+    assert times_text(measured_times(runs[:1])).empty
 
 
 def test_numbers_for_the_prose(runs):

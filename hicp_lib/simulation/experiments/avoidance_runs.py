@@ -6,9 +6,9 @@ weights, and the code and data of simulation, lifting, robot and detectors.
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
-import time
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -23,12 +23,12 @@ from hicp_lib.detectors.base import Detections, Detector
 from hicp_lib.detectors.cache import identity
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.errors import InputError
-from hicp_lib.files import atomic_path, cache_dir, read_json, write_json
+from hicp_lib.files import atomic_path, cache_dir
 from hicp_lib.keypoints import N_KEYPOINTS
-from hicp_lib.provenance import DATA_DIR, LIBRARY_DIR, digest, files_sha256, machine
+from hicp_lib.provenance import DATA_DIR, LIBRARY_DIR, digest, files_sha256
 from hicp_lib.robot.controller import PUBLISHED
-from hicp_lib.simulation.experiments.closed_loop import Trial, TrueKeypoints, simulate, start_posture
-from hicp_lib.simulation.experiments.head_camera import Album, DetectorEyes, Sight, perceived, photograph
+from hicp_lib.simulation.experiments.closed_loop import Trial, TrueKeypoints, simulate
+from hicp_lib.simulation.experiments.head_camera import Album, DetectorEyes, Sight
 from hicp_lib.simulation.experiments.reaching import in_root, script
 from hicp_lib.simulation.scenes import worker_pool
 
@@ -40,17 +40,28 @@ IDEAL = (NO_AVOIDANCE, TRUE_KEYPOINTS, PUBLISHED_GAINS)
 _LIBRARY_PATTERNS = ("simulation/**/*.py", "robot/*.py", "rgbd/*lifting.py", "rgbd/camera.py", "keypoints.py")
 _DATA_PATTERNS = ("body*", "icub*.json")
 _SHOWN_PX = (320, 240)  # kept images are for looking at
-_TIMED_AT_S = (0.3, 1.7, 3.0)
-_ROUNDS = 3
 
 
 @dataclass(frozen=True)
 class Job:
-    """One run: `condition` is one of `IDEAL` or a detector's name."""
+    """One run: `condition` is one of `IDEAL` or a detector's name.
+
+    `delay_s` is stated, from the image to when the loop knows: one that is measured would differ by machine
+    and by run, and all that is simulated with it.
+
+    Raises
+    ------
+    InputError
+        If the delay is no number of seconds.
+    """
 
     trial: Trial
     condition: str
     delay_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.delay_s, (int, float)) and 0 <= self.delay_s < math.inf):
+            raise InputError(f"delay of {self.condition!r} is {self.delay_s!r}; expected seconds, 0 or more")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +72,9 @@ class Run:
     ----------
     job : what was run
     cycles : a row per control period, see `closed_loop.simulate`
-    frames : a row per image: `t_s`, `jpeg` (bytes), and as flat lists `keypoints_px`, `scores` and
-        `keypoints_m` (root frame) of all people, and `truth_m` of the one there is
+    frames : a row per image: `t_s`, `time_ms` (what detector and lifting took, measured), `jpeg` (bytes),
+        and as flat lists `keypoints_px`, `scores` and `keypoints_m` (root frame) of all people, and
+        `truth_m` of the one there is
     """
 
     job: Job
@@ -105,23 +117,6 @@ def choose(runs: Iterable[Run], name: str, condition: str) -> Run:
     return found[0]
 
 
-def measured_delay_s(name: str, seed: int = 0) -> float:
-    """From image to keypoints in space on this machine: detector and lifting, in seconds.
-
-    The least of a few rounds' medians over some of the scripts' images, measured once and kept. Of wall time
-    and processor time the lesser counts: on a machine that is busy otherwise the second one is nearer to
-    what the detector would take alone.
-    """
-    key = digest([_identity(name), machine(), _code()])
-    path = cache_dir() / "avoidance" / "delays" / f"{key[:24]}.json"
-    if not path.is_file():
-        images = _timed_images(seed)
-        _timed_s(name, *images[0])  # the first call of a detector prepares it
-        rounds = [[_timed_s(name, *image) for image in images] for _ in range(_ROUNDS)]
-        write_json(path, {"delay_s": float(np.median(rounds, axis=1).min())})
-    return float(read_json(path)["delay_s"])
-
-
 def image(frame: pd.Series) -> tuple[np.ndarray, Detections]:
     """The picture of a row of `Run.frames`, RGB uint8, and what was detected, in the picture's pixels."""
     bgr = cv2.imdecode(np.frombuffer(frame["jpeg"], np.uint8), cv2.IMREAD_COLOR)
@@ -137,18 +132,6 @@ def keypoints_m(frame: pd.Series) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         _array(frame["scores"], 1)[..., 0],
         _array(frame["truth_m"], 3)[0],
     )
-
-
-@cache
-def _timed_images(seed: int) -> list[tuple[float, np.ndarray, np.ndarray]]:
-    scene = script("sitting, hand", seed)
-    return [(t, *photograph(scene, t, start_posture(), seed)) for t in _TIMED_AT_S]
-
-
-def _timed_s(name: str, time_s: float, rgb: np.ndarray, depth_m: np.ndarray) -> float:
-    start_s = time.perf_counter(), time.process_time()
-    perceived(_detector(name).detect(rgb), depth_m, time_s, start_posture())
-    return min(time.perf_counter() - start_s[0], time.process_time() - start_s[1])
 
 
 def _manager() -> SyncManager:
@@ -181,7 +164,7 @@ def _frame(sight: Sight, truth_m: np.ndarray) -> dict:
         "truth_m": truth_m,
     }
     flat = {name: np.asarray(array, np.float32).ravel().tolist() for name, array in arrays.items()}
-    return {"t_s": seen.time_s, "jpeg": jpeg.tobytes()} | flat
+    return {"t_s": seen.time_s, "time_ms": sight.time_ms, "jpeg": jpeg.tobytes()} | flat
 
 
 def _array(flat: np.ndarray, width: int) -> np.ndarray:

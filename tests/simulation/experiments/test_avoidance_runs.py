@@ -1,5 +1,7 @@
 """Runs are kept with what was seen in them, and read back instead of simulated again."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,23 @@ def test_what_was_seen_is_kept_as_it_was(detector, monkeypatch):
     monkeypatch.setattr(avoidance_runs, "simulate", lambda *_: pytest.fail("simulated again"))
     (again,) = run_all([Job(TRIAL, "two people", 0.02)])
     assert again.cycles.equals(run.cycles) and again.frames["jpeg"].equals(run.frames["jpeg"])
+
+
+def test_how_long_a_detector_takes_moves_nothing_but_its_time(detector, monkeypatch, tmp_path):
+    (quick,) = run_all([Job(TRIAL, "two people", 0.02)])
+    monkeypatch.setenv("HICP_CACHE", str(tmp_path / "other"))
+    monkeypatch.setattr(detector, "detect", lambda rgb: time.sleep(0.05) or detector.found)
+    (slow,) = run_all([Job(TRIAL, "two people", 0.02)])
+    assert slow.frames["time_ms"].min() >= 50 > quick.frames["time_ms"].median()
+    assert slow.cycles.equals(quick.cycles)
+    columns = [column for column in quick.frames if column != "time_ms"]
+    assert slow.frames[columns].map(str).equals(quick.frames[columns].map(str))
+
+
+@pytest.mark.parametrize("delay_s", [-0.1, float("nan"), float("inf"), "0.1", None])
+def test_a_delay_that_is_none_is_refused(delay_s):
+    with pytest.raises(InputError, match="delay of 'two people' is .*; expected seconds, 0 or more"):
+        Job(TRIAL, "two people", delay_s)
 
 
 def test_the_run_to_show_is_that_of_the_script_or_the_first_of_the_condition(detector):
