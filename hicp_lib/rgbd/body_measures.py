@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import zipfile
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import FACE, HAND_LIMBS, INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
+from hicp_lib.memo import memoised
 
 MEASURES_FILE = Path(__file__).parents[2] / "data" / "body_measures.npz"
 
@@ -71,7 +71,7 @@ class BodyMeasures:
     farthest_m: np.ndarray
 
 
-@cache
+@memoised()
 def load_measures(path: Path = MEASURES_FILE) -> BodyMeasures:
     """The measures of the project's body model.
 
