@@ -28,6 +28,7 @@ def memoised(maxsize: int | None = None) -> Callable[[_Function], _Function]:
 
     def decorate(function: _Function) -> _Function:
         @lru_cache(maxsize, typed=True)
+        @wraps(function)
         def kept(*arguments, **named):
             result = function(*arguments, **named)
             _freeze(result)
