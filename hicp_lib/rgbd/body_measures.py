@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import zipfile
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy as np
 from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import FACE, HAND_LIMBS, INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
+from hicp_lib.memo import memoised
 
 MEASURES_FILE = DATA_DIR / "body_measures.npz"
 
@@ -72,7 +72,7 @@ class BodyMeasures:
     farthest_m: np.ndarray
 
 
-@cache
+@memoised()
 def load_measures(path: Path = MEASURES_FILE) -> BodyMeasures:
     """The measures of the project's body model.
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import zipfile
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +21,7 @@ import numpy as np
 from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import HAND_LIMBS, LEFT_HAND, RIGHT_HAND
+from hicp_lib.memo import memoised
 from hicp_lib.quaternions import matrices_from_quaternions
 
 SHAPES_FILE = DATA_DIR / "hand_shapes.npz"
@@ -45,7 +45,7 @@ _DEPTH_SIGMA_M, _MOST_DEPTH = 0.010, 20.0  # cost of depths other than the fit's
 _BESIDE_M, _BEHIND_M = 0.015, 0.010  # a keypoint so near a limb in the image, so far behind it, is hidden
 
 
-@cache
+@memoised()
 def load_hand_shapes(path: Path = SHAPES_FILE) -> np.ndarray:
     """Right hands, shape (n, 21, 3), metres, about the middle of the palm, palms turned alike.
 
@@ -189,7 +189,7 @@ class _Palms:
     cost: np.ndarray
 
 
-@cache
+@memoised()
 def _turns(is_right: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Turns of the palm times its size, what the size costs, and where its keypoints are then.
 

@@ -20,11 +20,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
 from hicp_lib.keypoints import BODY, N_KEYPOINTS
+from hicp_lib.memo import memoised
 from hicp_lib.rgbd.camera import Intrinsics
 
 RADIUS_M = np.full(N_KEYPOINTS, 0.003)
@@ -184,7 +184,7 @@ def _nearest_that_reaches(depth_m, rows, columns, radius_px, reach: int) -> np.n
     return np.where(sizes >= away[nearest], sizes, -1)
 
 
-@cache
+@memoised()
 def _disk(reach: int) -> tuple[np.ndarray, np.ndarray]:
     """Pixels of a square window at most `reach` from its middle, nearest first, and how wide each must be."""
     steps = np.arange(-reach, reach + 1)

@@ -8,7 +8,6 @@ front of the torso only their number is documented: they are placed on simple cy
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json
+from hicp_lib.memo import memoised
 from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
 
@@ -56,7 +56,7 @@ class Skin:
         return positions, normals
 
 
-@lru_cache(maxsize=4)
+@memoised(4)
 def read_skin(path: Path = SKIN_FILE) -> Skin:
     """The taxels of the project's robot.
 

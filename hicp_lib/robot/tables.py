@@ -7,7 +7,6 @@ z, moves `d` along z and `a` along x, and turns by `alpha` about x. data/README.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ import numpy as np
 from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.files import read_json
+from hicp_lib.memo import memoised
 
 ICUB_FILE = DATA_DIR / "icub.json"
 COLUMNS = ["joint", "link", "a_m", "d_m", "alpha_deg", "offset_deg"]
@@ -69,7 +69,7 @@ class Tables:
     parts: dict[str, tuple[str, str]]
 
 
-@lru_cache(maxsize=4)
+@memoised(4)
 def read_tables(path: Path = ICUB_FILE) -> Tables:
     """The robot's tables.
 

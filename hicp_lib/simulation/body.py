@@ -17,7 +17,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +26,7 @@ from scipy import sparse
 from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
 from hicp_lib.keypoints import N_KEYPOINTS
+from hicp_lib.memo import memoised
 from hicp_lib.simulation.mesh import vertex_normals
 from hicp_lib.simulation.rotations import rotations_from_vectors
 
@@ -125,7 +126,7 @@ Pose = Mapping[str, np.ndarray]
 the reference stance."""
 
 
-@lru_cache(maxsize=4)
+@memoised(4)
 def load_body(path: Path = BODY_FILE) -> Body:
     """The body model of the project.
 
@@ -243,7 +244,7 @@ def rotation_matrices(body: Body, pose: Pose | np.ndarray) -> np.ndarray:
     return result
 
 
-@lru_cache(maxsize=16)
+@memoised(16)
 def _skeleton(body: Body, weights: bytes) -> tuple[np.ndarray, np.ndarray]:
     """Bone heads at rest and rotations to the reference stance of a blend of shapes."""
     blend = np.frombuffer(weights, np.float32)
@@ -258,16 +259,15 @@ def rest_shape(body: Body, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return _rest_vertices(body, weights.tobytes()), _skeleton(body, weights.tobytes())[0]
 
 
-@lru_cache(maxsize=16)
+@memoised(16)
 def _rest_vertices(body: Body, weights: bytes) -> np.ndarray:
     blend = np.frombuffer(weights, np.float32)
     mixed = np.flatnonzero(blend)  # mostly one or two shapes
     vertices = np.tensordot(blend[mixed], body.vertices_m[mixed], 1)
-    vertices.flags.writeable = False
     return vertices
 
 
-@lru_cache(maxsize=4)
+@memoised(4)
 def _levels(parents: tuple[int, ...]) -> list[np.ndarray]:
     """Bones by depth below the root, without it."""
     depth = np.zeros(len(parents), int)
@@ -276,7 +276,7 @@ def _levels(parents: tuple[int, ...]) -> list[np.ndarray]:
     return [np.flatnonzero(depth == d) for d in range(1, depth.max() + 1)]
 
 
-@lru_cache(maxsize=4)
+@memoised(4)
 def _chains(parents: tuple[int, ...]) -> np.ndarray:
     """Which bones lead from the root to each bone, itself included, the root not: (n, n), 0 or 1."""
     chains = np.zeros((len(parents), len(parents)))
@@ -313,8 +313,6 @@ def _unpack(stored) -> Body:
         regions=stored["regions"].astype(int),
         fields=stored["fields"].astype(np.float32),
     )
-    for array in arrays.values():
-        array.flags.writeable = False
     names = {key: tuple(str(n) for n in stored[key]) for key in ("shape_names", "bone_names")}
     return Body(**arrays, **names)
 

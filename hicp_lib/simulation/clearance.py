@@ -7,11 +7,11 @@ trunk is a stack of elliptic slices, the head an ellipsoid, limbs are rows of ba
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from scipy import sparse
 
+from hicp_lib.memo import memoised
 from hicp_lib.simulation.body import REGIONS, Body, Pose, pose_bones, rest_shape, shape_weights
 
 _N_SLICES = 12
@@ -129,7 +129,7 @@ def _moved_by(body: Body, parts: list[np.ndarray]) -> np.ndarray:
     return (members @ body.sparse_skin_weights).toarray().argmax(axis=1)
 
 
-@lru_cache(maxsize=32)
+@memoised(32)
 def _vertices_of(body: Body, *regions: str) -> np.ndarray:
     """Numbers of the vertices of some regions."""
     return np.flatnonzero(np.isin(body.regions, [REGIONS.index(region) for region in regions]))

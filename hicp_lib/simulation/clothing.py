@@ -8,11 +8,11 @@ thickness away from the skin, and folded.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from scipy import sparse
 
+from hicp_lib.memo import memoised, plain_fields
 from hicp_lib.simulation import mesh as g
 from hicp_lib.simulation.body import REGIONS, Body, PosedBody, load_body
 
@@ -42,6 +42,8 @@ class Garment:
     ease_m: float = 0.012
     smoothing: int = 10
 
+    __post_init__ = plain_fields
+
 
 @dataclass(frozen=True)
 class Pattern:
@@ -65,7 +67,7 @@ def cut_pattern(garment: Garment) -> Pattern:
     return _cut_pattern(Garment(garment.kind, garment.start, garment.end, garment.sleeve, garment.opening))
 
 
-@cache
+@memoised()
 def _cut_pattern(garment: Garment) -> Pattern:
     body = load_body()
     field = _FIELDS[garment.kind](body, garment)
@@ -83,10 +85,10 @@ def _cut_pattern(garment: Garment) -> Pattern:
 
 
 def _top_field(body: Body, garment: Garment) -> np.ndarray:
-    arm, torso = body.field("arm"), body.field("torso")
+    arm, torso = (body.field(name).astype(float) for name in ("arm", "torso"))
     rest = body.vertices_m[0]
     front = np.clip(rest[:, 0] / 0.08, 0, 1) * np.clip(1 - np.abs(rest[:, 1]) / 0.10, 0, 1)
-    trunk = np.minimum(torso - garment.start, garment.end - garment.opening * front - torso)
+    trunk = np.minimum(torso - garment.start, garment.end - garment.opening * front.astype(float) - torso)
     on_arm = arm > 0
     trunk = np.where(on_arm, np.maximum(trunk, np.minimum(8 * arm, 0.5)), trunk)
     field = np.minimum(trunk, np.where(on_arm, garment.sleeve - arm, 9))
@@ -94,8 +96,9 @@ def _top_field(body: Body, garment: Garment) -> np.ndarray:
 
 
 def _bottom_field(body: Body, garment: Garment) -> np.ndarray:
-    field = np.minimum(garment.end - body.field("torso"), garment.start - body.field("leg"))
-    allowed = _is(body, "hips", "torso", "thigh", "shin", "foot") & (body.field("arm") == 0)
+    arm, leg, torso = (body.field(name).astype(float) for name in ("arm", "leg", "torso"))
+    field = np.minimum(garment.end - torso, garment.start - leg)
+    allowed = _is(body, "hips", "torso", "thigh", "shin", "foot") & (arm == 0)
     return np.where(allowed, field, -1)
 
 
@@ -145,8 +148,9 @@ def put_on(
 
 def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, folds, below) -> np.ndarray:
     body = load_body()
-    ends = pattern.distance if garment.kind == "top" else garment.start - pattern.cut.apply(body.field("leg"))
-    away = garment.thickness_m + garment.ease_m * np.exp(-ends / 0.25)
+    leg = pattern.cut.apply(body.field("leg")).astype(float)
+    ends = pattern.distance if garment.kind == "top" else garment.start - leg
+    away = garment.thickness_m + garment.ease_m * np.exp(-ends / 0.25).astype(float)
     torso = pattern.cut.apply(body.field("torso"))
     if garment.kind == "bottom":  # a waistband is tight
         away = np.where(torso > 0, np.minimum(away, garment.thickness_m), away)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
+from hicp_lib.memo import memoised
 from hicp_lib.simulation import mesh as g
 from hicp_lib.simulation import textures
 from hicp_lib.simulation.body import REGIONS, PosedBody, load_body
@@ -52,7 +52,7 @@ def put_on_shoe(shoes: Shoes, posed: PosedBody, side: str) -> g.Mesh:
     return g.Mesh(vertices, triangles, normals.reshape(-1, 3), coords.reshape(-1, 3).astype(np.float32))
 
 
-@cache
+@memoised()
 def _foot(side: str) -> np.ndarray:
     """Numbers of the vertices that a shoe goes around."""
     body = load_body()

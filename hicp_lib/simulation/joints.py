@@ -10,10 +10,10 @@ palm turns forward), deviation towards the thumb, a turn or bend to the person's
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 
 import numpy as np
 
+from hicp_lib.memo import memoised
 from hicp_lib.simulation.body import Pose
 from hicp_lib.simulation.rotations import about, rotation
 
@@ -86,7 +86,7 @@ def pose_from_joints(angles: JointAngles) -> Pose:
     return pose
 
 
-@lru_cache(maxsize=256)  # while a pose is sought, most limbs stay as they are
+@memoised(256)  # while a pose is sought, most limbs stay as they are
 def _limb(name: str, side: str, angles: tuple[float, ...]) -> dict[str, np.ndarray]:
     """Rotations of a limb's bones by the angles of its joints, in the order of `_LIMBS`."""
     turns = _BONES[name](dict(zip(_LIMBS[name], angles, strict=True)))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
 
 import numpy as np
 
+from hicp_lib.memo import memoised
 from hicp_lib.simulation import clothing, fabrics, footwear, hair, skin
 from hicp_lib.simulation import mesh as g
 from hicp_lib.simulation.body import BODY_FILE, REGIONS, Body, PosedBody, load_body, rest_shape, shape_weights
@@ -72,7 +72,7 @@ def random_appearance(rng: Rng) -> Appearance:
     return Appearance(weights, complexion, style, beard, worn, skirt, shoes, int(rng.integers(2**31)))
 
 
-@cache
+@memoised()
 def _traits() -> dict:
     return json.loads(BODY_FILE.with_suffix(".json").read_text())["shapes"]
 
@@ -159,7 +159,7 @@ def landmarks_at_rest(body: Body, weights: np.ndarray) -> tuple[np.ndarray, np.n
     return rest, heads, body.sparse_keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
 
 
-@lru_cache(maxsize=4)
+@memoised(4)
 def part_of_vertices(body: Body) -> np.ndarray:
     """Part number of each vertex: its region, plus `RIGHT` on the person's right side."""
     return (body.regions + RIGHT * (body.vertices_m[0, :, 1] < 0)).astype(np.int16)
@@ -177,7 +177,7 @@ class _Fitted:
     hair: g.Mesh | None
 
 
-@lru_cache(maxsize=4)  # those who are seen in many frames
+@memoised(4)  # those who are seen in many frames
 def _fit(appearance: Appearance) -> _Fitted:
     body = load_body()
     rest, heads, landmarks = landmarks_at_rest(body, shape_weights(body, appearance.shape))
@@ -188,7 +188,7 @@ def _fit(appearance: Appearance) -> _Fitted:
     return _Fitted(rest, heads, landmarks, fabrics.make_cuts(landmarks), paint, grown)
 
 
-@cache
+@memoised()
 def _always_hidden() -> tuple[np.ndarray, np.ndarray]:
     """Triangles of the body that are never seen: inside the mouth, as lips are closed; inside shoes."""
     body = load_body()

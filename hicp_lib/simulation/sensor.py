@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import cv2
 import numpy as np
+
+from hicp_lib.memo import memoised
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of linear sRGB
 
@@ -58,7 +59,7 @@ def expose(
     return _tone(cv2.transform(light, saturate.astype(np.float32)), sensor.contrast)
 
 
-@cache
+@memoised()
 def _noise_tile() -> np.ndarray:
     """Noise of brightness and, blurred by demosaicking, of colour; (1536, 1536, 3)."""
     rng = np.random.default_rng(1536)

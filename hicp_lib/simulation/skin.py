@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from scipy.spatial import KDTree
 
+from hicp_lib.memo import memoised
 from hicp_lib.simulation import textures
 from hicp_lib.simulation.body import REGIONS, Body
 from hicp_lib.simulation.materials import hsv, linear
@@ -105,7 +105,7 @@ def paint_coords(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.
     return np.column_stack([rest_m, painted, flush]).astype(np.float32)
 
 
-@lru_cache(maxsize=4)
+@memoised(4)
 def _painted(body: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What is the same for all shapes: columns of coords (n_v, k); numbers of vertices of head and hands."""
     columns = [body.field(name) for name in _PAINTED]

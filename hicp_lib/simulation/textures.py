@@ -7,11 +7,12 @@ tile serves every paint, wood and cloth. Tiles are made once per process from fi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import cv2
 import numpy as np
 from scipy import fft
+
+from hicp_lib.memo import memoised
 
 _REMAP_COLUMNS = 8192  # OpenCV's remap takes no array longer than 32767
 
@@ -99,13 +100,13 @@ def _rng(number: int) -> np.random.Generator:
     return np.random.default_rng([20220, number])
 
 
-@cache
+@memoised()
 def cloud() -> Texture:
     """Smooth noise of all sizes, two independent channels; 1 m."""
     return make_texture(np.dstack([noise(512, _rng(k), 1.6, 2) for k in (1, 2)]), 1.0)
 
 
-@cache
+@memoised()
 def planks() -> Texture:
     """Wooden boards: (light to dark, gap between boards); 1.2 m, boards along v."""
     size, boards = 512, 8
@@ -122,7 +123,7 @@ def planks() -> Texture:
     return make_texture(np.dstack([np.clip(0.5 * tone + 0.25 + 0.12 * fibre, 0, 1), gap < 0.0025]), 1.2)
 
 
-@cache
+@memoised()
 def wood() -> Texture:
     """Sawn wood, light to dark, grain along v; 0.8 m."""
     rings = noise(512, _rng(7), 1.7, 1, (10, 1))
@@ -130,7 +131,7 @@ def wood() -> Texture:
     return make_texture(np.clip(0.5 + 0.28 * np.sin(4 * rings) + 0.12 * fibre, 0, 1), 0.8)
 
 
-@cache
+@memoised()
 def tiles() -> Texture:
     """Square tiles: (tone, grout); four tiles across, 1.2 m."""
     size, count = 512, 4
@@ -142,19 +143,19 @@ def tiles() -> Texture:
     )
 
 
-@cache
+@memoised()
 def carpet() -> Texture:
     """Short pile, light to dark; 0.6 m."""
     return make_texture(0.5 + 0.13 * noise(512, _rng(11), 0.4, 40) + 0.05 * noise(512, _rng(12), 1.2, 2), 0.6)
 
 
-@cache
+@memoised()
 def plaster() -> Texture:
     """Painted wall: slight unevenness, light to dark; 1.6 m."""
     return make_texture(0.5 + 0.12 * noise(512, _rng(13), 1.4, 2) + 0.12 * noise(512, _rng(14), 0.7, 40), 1.6)
 
 
-@cache
+@memoised()
 def bricks() -> Texture:
     """Brick wall: (tone, mortar); 1 m, 4 bricks by 12 courses."""
     size, across, courses = 512, 4, 12
@@ -176,7 +177,7 @@ def bricks() -> Texture:
     )
 
 
-@cache
+@memoised()
 def weave() -> Texture:
     """Woven or knitted cloth seen close, around 0; 0.06 m at a tenth of a millimetre."""
     size, threads = 512, 60
@@ -185,7 +186,7 @@ def weave() -> Texture:
     return make_texture(0.6 * cross + 0.5 * noise(size, _rng(17), 0.8, 10), 0.06)
 
 
-@cache
+@memoised()
 def wrinkles() -> Texture:
     """Height of small folds in cloth, around 0, two channels (soft, creased); 0.5 m, folds run along v."""
     soft = noise(512, _rng(18), 2.6, 3, (2.0, 1))
@@ -194,7 +195,7 @@ def wrinkles() -> Texture:
     return make_texture(np.dstack([soft, creased]), 0.5)
 
 
-@cache
+@memoised()
 def strands() -> Texture:
     """Hair: brightness of single strands and locks, around 0; 0.1 m, strands along v."""
     fine = noise(512, _rng(21), 0.2, 30, (60, 1))
@@ -202,7 +203,7 @@ def strands() -> Texture:
     return make_texture(0.6 * fine + 0.6 * locks, 0.1)
 
 
-@cache
+@memoised()
 def skin() -> Texture:
     """Skin: (blotches of redness, pores and lines, freckles 0..1), the first two around 0; 0.12 m."""
     blotches = noise(512, _rng(23), 1.8, 4)
@@ -211,14 +212,14 @@ def skin() -> Texture:
     return make_texture(np.dstack([blotches, pores, freckles]), 0.12)
 
 
-@cache
+@memoised()
 def stripes(duty: float = 0.5) -> Texture:
     """Stripes along u, 0 and 1; one period per metre (scale the coordinates)."""
     profile = ((np.arange(256) + 0.5) / 256 < duty).astype(np.float32)
     return make_texture(np.repeat(profile[:, None], 256, axis=1), 1.0)
 
 
-@cache
+@memoised()
 def checks(kind: int) -> Texture:
     """Gingham, tartan or window pane: weights of (second, third) colour; one period per metre."""
     t = (np.arange(256) + 0.5) / 256
@@ -233,7 +234,7 @@ def checks(kind: int) -> Texture:
     return make_texture(np.dstack([np.maximum(line[:, None], line[None, :]), np.zeros((256, 256))]), 1.0)
 
 
-@cache
+@memoised()
 def dots() -> Texture:
     """Dots on a staggered grid, 0 and 1; one period per metre."""
     v, u = (np.mgrid[:256, :256] + 0.5) / 256
@@ -241,7 +242,7 @@ def dots() -> Texture:
     return make_texture(np.minimum(*distance) < 0.16, 1.0)
 
 
-@cache
+@memoised()
 def blobs(number: int) -> Texture:
     """Flower-, leaf- or camouflage-like blobs: weights of (second, third) colour; one period per metre."""
     a, b = (
@@ -251,7 +252,7 @@ def blobs(number: int) -> Texture:
     return make_texture(np.dstack([a > 0.6, (b > 0.8) & (a <= 0.6)]), 1.0)
 
 
-@cache
+@memoised()
 def prints(number: int) -> Texture:
     """What is printed on a shirt's chest: weights of (second, third) colour; one print per 0.3 m."""
     rng, size = _rng(60 + number), 256
@@ -277,7 +278,7 @@ def prints(number: int) -> Texture:
     return make_texture(weights, 0.3)
 
 
-@cache
+@memoised()
 def picture(number: int) -> Texture:
     """A picture to hang on a wall, three channels in [0, 1]; one per metre."""
     rng = _rng(100 + number)

@@ -8,12 +8,12 @@ their delay.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
 from typing import Protocol
 
 import numpy as np
 import pandas as pd
 
+from hicp_lib.memo import memoised
 from hicp_lib.robot.controller import Controller, Settings
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import ARM_JOINTS, ICub, load_icub
@@ -68,7 +68,7 @@ class TrueKeypoints:
         return Perception(time_s, points_m, np.ones(points_m.shape[:2]))
 
 
-@cache
+@memoised()
 def start_posture() -> Posture:
     """How the robot stands before anybody comes: the left hand at its post, the head looking at it."""
     return replace(home_posture(load_icub()), neck_rad=NECK_RAD)
@@ -143,6 +143,6 @@ def person_skin_m(trial: Trial, time_s: float) -> np.ndarray:
     return first + np.float32(share) * (then - first)
 
 
-@lru_cache(maxsize=256)
+@memoised(256)
 def _posed_skin_m(name: str, seed: int, k: int) -> np.ndarray:
     return in_root(script(name, seed).person_at(k * _POSED_S).vertices_m).astype(np.float32)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
+from hicp_lib.memo import memoised
 from hicp_lib.rgbd.camera import transform
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.simulation.camera import Camera
@@ -39,7 +38,7 @@ def record_frame(name: str, seed: int, k: int) -> tuple[np.ndarray, np.ndarray, 
     return rgb, depth_m, frame.depth_m, truth
 
 
-@lru_cache(maxsize=1)
+@memoised(1)
 def stage(name: str, seed: int) -> Stage:
     """What a scenario shows when; made once in every process."""
     return scenario(name).stage(seed)

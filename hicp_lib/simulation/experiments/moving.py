@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
+from hicp_lib.memo import memoised
 from hicp_lib.simulation.body import PosedBody, load_body
 from hicp_lib.simulation.experiments.gestures import DISTANCE_M, TABLE_HEIGHT_M, TABLE_M, Mover, posed
 from hicp_lib.simulation.experiments.laboratory import adult, furnished, table
@@ -40,19 +40,19 @@ class Moving:
 
 
 # Whoever keeps still is posed and dressed once.
-@lru_cache(maxsize=4)
+@memoised(4)
 def _person(scene: Moving, motion_s: float) -> PosedBody:
     return posed(load_body(), scene.appearance.shape, scene.motion.at(motion_s))
 
 
-@lru_cache(maxsize=4)
+@memoised(4)
 def _staged(scene: Moving, motion_s: float) -> tuple[World, PosedBody]:
     person, vertices = _person(scene, motion_s), marker_vertices(scene.appearance.shape)
     worn = [*dress(scene.appearance, person, 0), *marker_balls(person, vertices, 0)]
     return replace(scene.room, surfaces=[*scene.room.surfaces, *worn]), person
 
 
-@lru_cache(maxsize=1)
+@memoised(1)
 def moving(seed: int) -> Moving:
     """The scene of a seed: who moves how, in what room. The same in every process."""
     rng = np.random.default_rng(np.random.SeedSequence([seed, 3]))

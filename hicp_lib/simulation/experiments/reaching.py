@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
 
 import numpy as np
 
+from hicp_lib.memo import memoised
 from hicp_lib.rgbd.camera import transform
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
@@ -99,17 +99,17 @@ class Script:
 
 
 # Whoever keeps still is posed and dressed once.
-@lru_cache(maxsize=4)
+@memoised(4)
 def _person(scene: Script, motion_s: float) -> PosedBody:
     return posed(scene.appearance.shape, scene.motion.at(motion_s))
 
 
-@lru_cache(maxsize=4)
+@memoised(4)
 def _worn(scene: Script, motion_s: float) -> list[Surface]:
     return dress(scene.appearance, _person(scene, motion_s), 0)
 
 
-@cache
+@memoised()
 def script(name: str, seed: int = 0) -> Script:
     """A script of `SCRIPTS`; the seed draws the person and the room. The same in every process."""
     staging = SCRIPTS[name]
@@ -184,7 +184,7 @@ def _distance_m(shape: np.ndarray, posture: Posture) -> float:
     return skin_distance_m(_robot_at_post(), in_root(posed(shape, posture).vertices_m))
 
 
-@cache
+@memoised()
 def _robot_at_post() -> tuple[np.ndarray, np.ndarray]:
     icub = load_icub()
     return robot_balls(icub, read_skin(), home_posture(icub))

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
+from hicp_lib.memo import memoised
 from hicp_lib.rgbd.camera import transform
 from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
@@ -44,7 +43,7 @@ def _capsule(segment: Segment) -> g.Mesh:
     return g.Mesh(vertices.astype(np.float32), upright.triangles, normals.astype(np.float32), upright.coords)
 
 
-@lru_cache(maxsize=32)
+@memoised(32)
 def _upright_capsule(length_m: float, radius_m: float) -> g.Mesh:
     """Along z from the origin; the robot's limbs keep their lengths."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, 2 * _N_RINGS)

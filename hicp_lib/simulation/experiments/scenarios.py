@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 import pandas as pd
 
 from hicp_lib.datafiles import DATA_DIR
 from hicp_lib.errors import InputError
+from hicp_lib.memo import memoised
 from hicp_lib.robot.kinematics import HEAD_JOINTS
 from hicp_lib.simulation.body import PosedBody
 from hicp_lib.simulation.experiments.mocap import Capture, capture
@@ -67,7 +67,7 @@ def scenario(name: str) -> Scenario:
     return SCENARIOS[name]
 
 
-@cache
+@memoised()
 def relative_poses_rad(view: str) -> np.ndarray:
     """The robot's poses of a view, (n, 6) in the order of `HEAD_JOINTS`, from data/relative_poses.csv."""
     table = pd.read_csv(POSES_FILE)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from statistics import NormalDist
 
 import cv2
 import numpy as np
+
+from hicp_lib.memo import memoised
 
 Rng = np.random.Generator
 _TILE_PX = 1536
@@ -20,7 +21,7 @@ def correlated_noise(shape: tuple[int, int], window_px: int, rng: Rng) -> np.nda
     return tile.take(rows, axis=0, mode="wrap").take(columns, axis=1, mode="wrap")
 
 
-@lru_cache(maxsize=4)
+@memoised(4)
 def _noise_tile(window_px: int) -> np.ndarray:
     """Square noise that goes on at its other side: drawing it anew would cost more than matching."""
     white = np.random.default_rng(window_px).standard_normal((_TILE_PX, _TILE_PX), np.float32)

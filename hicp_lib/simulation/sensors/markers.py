@@ -6,11 +6,10 @@ Two on each shoulder, elbow and wrist, on opposite sides, so that their mean is 
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from hicp_lib.keypoints import INDEX
+from hicp_lib.memo import memoised
 from hicp_lib.simulation.body import Body, PosedBody, load_body, pose_body
 from hicp_lib.simulation.mesh import Mesh
 from hicp_lib.simulation.raycast import RayScene
@@ -68,16 +67,14 @@ def marker_vertices(shape: int | str | np.ndarray) -> np.ndarray:
     return _marker_vertices(body, key)
 
 
-@lru_cache(maxsize=64)
+@memoised(64)
 def _marker_vertices(body: Body, key: int | str | bytes) -> np.ndarray:
     person = pose_body(body, np.frombuffer(key, np.float32) if isinstance(key, bytes) else key, {})
     arm = (body.field("arm") > _BELOW_SHOULDER)[body.triangles].all(axis=1)
     parts = [_place(body, person, "shoulder", np.ones_like(arm))]
     # A heavy person's trunk may touch the hanging arm: the trunk is no place for the elbow's marker.
     parts += [_place(body, person, joint, arm) for joint in ("elbow", "wrist")]
-    vertices = np.concatenate(parts)
-    vertices.flags.writeable = False
-    return vertices
+    return np.concatenate(parts)
 
 
 def _place(body: Body, person: PosedBody, joint: str, chosen: np.ndarray) -> np.ndarray:
@@ -102,7 +99,7 @@ def body_scene(person: PosedBody, obstacles: tuple[Mesh, ...] = ()) -> RayScene:
     return RayScene([skin, *(Surface(mesh, _unseen) for mesh in obstacles)])
 
 
-@lru_cache(maxsize=1)
+@memoised(1)
 def _coarse_triangles() -> np.ndarray:
     """The body's triangles between one vertex of each cell of space, (n, 3): the nearest to its middle."""
     body = load_body()

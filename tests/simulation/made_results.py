@@ -1,0 +1,62 @@
+"""Simulated results by name, as their SHA-256: ``python made_results.py NAME ...`` prints a line for each."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from itertools import islice
+
+import numpy as np
+from contents import content
+
+from hicp_lib.simulation.experiments.closed_loop import Trial, TrueKeypoints, simulate, start_posture
+from hicp_lib.simulation.experiments.doses import doses
+from hicp_lib.simulation.experiments.frames import record_frame
+from hicp_lib.simulation.experiments.head_camera import photograph
+from hicp_lib.simulation.experiments.reaching import SCRIPTS, script
+from hicp_lib.simulation.experiments.scenarios import scenario
+from hicp_lib.simulation.scenes import render_scene
+from hicp_lib.simulation.staging import random_stage
+
+
+def dressed(number: int) -> str:
+    """The meshes of a scene's people and room."""
+    stage = random_stage(np.random.default_rng(np.random.SeedSequence([0, number])))
+    return content([surface.mesh for surface in stage.world.surfaces])
+
+
+def closed_loop(number: int) -> str:
+    """The first steps of a run of avoidance, and what the robot's camera sees then."""
+    name = list(SCRIPTS)[number % len(SCRIPTS)]
+    cycles = simulate(Trial(name, 0.2, number), TrueKeypoints())
+    seen = photograph(script(name, number), 2.0, start_posture(), number)
+    return content(cycles.to_dict("list"), seen)
+
+
+def captured(number: int) -> str:
+    """Two seconds of motion capture."""
+    capture = scenario("mocap").capture(number, 2.0, np.eye(4))
+    return content(*vars(capture).values())
+
+
+KINDS: dict[str, Callable[[int], str]] = {
+    "dressed": dressed,
+    "scene": lambda number: content(*render_scene(0, number)),
+    "mocap": lambda number: content(*record_frame("mocap", 0, number)),
+    "upper": lambda number: content(*record_frame("relative-upper", 0, number)),
+    "lower": lambda number: content(*record_frame("relative-lower", 0, number)),
+    "dose": lambda number: content(*islice(doses(0, number), 3)),
+    "capture": captured,
+    "avoidance": closed_loop,
+}
+
+
+def made(name: str) -> str:
+    """SHA-256 of a result, such as "scene 3"."""
+    kind, number = name.split()
+    return KINDS[kind](int(number))
+
+
+if __name__ == "__main__":
+    for asked in sys.argv[1:]:
+        print(asked, made(asked))
