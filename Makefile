@@ -58,6 +58,7 @@ $(INSTALLED): environment.lock pyproject.toml
 	  -r environment.lock || { echo "make: the environment could not be installed; it needs the package" \
 	  "index, 4 GB of disk and, on Linux, glibc 2.35 (Debian 12, Ubuntu 22.04) or newer" >&2; exit 1; }
 	@$(BIN)/python -m pip install -qq --no-deps --no-build-isolation --no-index --editable .
+	@ln -sfn $(CURDIR)/tools/jupyter/* .venv/etc/jupyter/
 	@rm $(INSTALLING) && touch $(INSTALLED)
 
 # Libraries that Open3D loads and a bare Debian lacks: installed where that is allowed.
