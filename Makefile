@@ -60,6 +60,7 @@ $(INSTALLED): environment.lock pyproject.toml
 	  "index, 4 GB of disk and, on Linux, glibc 2.35 (Debian 12, Ubuntu 22.04) or newer" >&2; exit 1; }
 	@$(BIN)/python -m pip install -qq --no-deps --no-build-isolation --no-index --editable . \
 	  --config-settings editable_mode=compat
+	@ln -sfn $(CURDIR)/tools/jupyter/* .venv/etc/jupyter/
 	@rm $(INSTALLING) && touch $(INSTALLED)
 
 # Libraries that the wheels load and do not bring: installed where that is allowed.

@@ -196,8 +196,8 @@ def main() -> None:
             rows.append(row)
             print(
                 f"{name:20} {size_px}: {row['here_ms']:.2f} ms in this process, in its own "
-                f"{row['own_process_ms']:.2f} ms, ratio {row['ratio']:.3f}; started in {row['start_s']:.2f} s "
-                f"(processor time {row['start_cpu_s']:.2f} s)"
+                f"{row['own_process_ms']:.2f} ms, ratio {row['ratio']:.3f}; started in "
+                f"{row['start_s']:.2f} s (processor time {row['start_cpu_s']:.2f} s)"
             )
         row = measure_network(paths, arguments.repeats)
         rows.append(row)

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from hicp_lib.plots import Figure
 
 SCHEMA_VERSION = 1
+PLOTLY_MIME = "application/vnd.plotly.v1+json"
 _SVG_STYLE = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
 _SAVE_OPTIONS: dict[str, dict[str, Any]] = {
     "png": {},
@@ -108,12 +109,17 @@ class Study:
         self._show_figure(name, f'<img src="{source}" alt="{html.escape(alt)}">', caption, ["webp"])
 
     def scene(self, name: str, scene: go.Figure, caption: str, alt: str) -> None:
-        """Save an interactive 3D scene (its data as JSON) and show it; the page loads plotly.js once."""
-        write_bytes(self.folder / f"{name}.json", scene.to_json().encode())
+        """Save an interactive 3D scene (its data as JSON) and show it.
+
+        JupyterLab and VS Code draw the data with the plotly.js they bring; the book's page loads it once.
+        """
+        data = scene.to_json()
+        write_bytes(self.folder / f"{name}.json", data.encode())
         body = scene.to_html(full_html=False, include_plotlyjs=False, div_id=f"scene-{name}")
         body = f'<div class="hicp-scene" role="img" aria-label="{html.escape(alt)}">{body}</div>'
         self._captions[name] = {"caption": caption, "alt": alt}
-        self._show_figure(name, body, caption, ["json"])
+        display({PLOTLY_MIME: json.loads(data), "text/html": body}, raw=True)
+        self._show_figure(name, "", caption, ["json"])
 
     def table(self, name: str, table: pd.DataFrame, caption: str, digits: int = 3) -> None:
         """Save a table (Parquet, CSV) and show it; NaN is shown as a dash, floats with `digits` decimals."""

@@ -7,6 +7,7 @@ import matplotlib
 import pytest
 from hypothesis import settings
 
+from hicp_lib.checkout import CHECKOUT
 from hicp_lib.detectors import zoo
 from hicp_lib.images import read_image
 
@@ -41,3 +42,11 @@ def own_cache(tmp_path, monkeypatch, weights) -> Path:
 def photograph():
     """The photograph of a person that ships with matplotlib: (600, 512, 3), RGB."""
     return read_image(Path(matplotlib.get_data_path()) / "sample_data" / "grace_hopper.jpg")
+
+
+@pytest.fixture(scope="session")
+def book() -> Path:
+    """The book of the quick profile: made now, or what an earlier run left if nothing has changed."""
+    from hicp_lib.report.build import make_report  # not in every installation
+
+    return make_report("quick", [], print, sources=CHECKOUT, root=CHECKOUT).parent

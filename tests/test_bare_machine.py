@@ -8,14 +8,14 @@ import sys
 
 import pytest
 
-from hicp_lib.provenance import ROOT
+from hicp_lib.checkout import CHECKOUT
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="chroot and mounts of Linux")
 
 
 def test_what_cannot_be_tried_is_told_in_one_line(tmp_path):
     done = subprocess.run(
-        [ROOT / "tools" / "bare_machine.sh", "nowhere", "false"], capture_output=True, text=True,
+        [CHECKOUT / "tools" / "bare_machine.sh", "nowhere", "false"], capture_output=True, text=True,
         env=os.environ | {"BARE_DIR": str(tmp_path / "bare")},
     )  # fmt: skip
     assert (done.returncode, done.stdout) == (2, "")

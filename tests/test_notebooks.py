@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import ast
 import json
-from pathlib import Path
 
 import nbformat
 import pytest
 
 from hicp_lib.checkout import CHECKOUT
-from hicp_lib.report.build import make_report
 from hicp_lib.report.checks import book_problems
 from hicp_lib.report.notebooks import PARAMETERS_TAG, read_notebooks
 from hicp_lib.report.runs import first_problem
@@ -51,12 +49,6 @@ def test_notebooks_tell_and_the_library_does(notebook):
     assert notebook.cells[0].cell_type == "markdown"
     assert notebook.cells[0].source.startswith("# ")
     assert code[-1].rstrip().endswith("study.finish()")
-
-
-@pytest.fixture(scope="session")
-def book() -> Path:
-    """The book of the quick profile: made now, or what an earlier run left if nothing has changed."""
-    return make_report("quick", [], print, sources=CHECKOUT, root=CHECKOUT).parent
 
 
 def test_every_cell_of_the_quick_report_ran(book):

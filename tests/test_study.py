@@ -20,7 +20,11 @@ from hicp_lib.study import Study
 def shown(monkeypatch) -> list[str]:
     """The HTML that a notebook would show."""
     pieces: list[str] = []
-    monkeypatch.setattr("hicp_lib.study.display", lambda piece: pieces.append(piece.data))
+
+    def show(piece, raw=False):
+        pieces.append(piece["text/html"] if raw else piece.data)
+
+    monkeypatch.setattr("hicp_lib.study.display", show)
     return pieces
 
 

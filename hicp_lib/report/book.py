@@ -20,6 +20,8 @@ from hicp_lib.report.runs import Folders, RunError
 from hicp_lib.report.sphinx_extension import PLOTLY_PATH, SCRIPTS_DIR
 
 BUILD_LIMIT_S = 900
+# Links lead to files of the checkout. In the book, `book/` is the top and `notebooks/` lies in it.
+_LINK_TO_PAGE, _LINK_TO_NOTEBOOK = ("](../book/", "](../"), ("](../notebooks/", "](notebooks/")
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -92,11 +94,12 @@ def _assemble(source: Path, folders: Folders) -> None:
     results = Results(folders.results, folders.profile)
     footer = provenance.provenance_html(_book_stamp(folders))
     for page in source.rglob("*.md"):
-        page.write_text(f"{render_page(page, results, folders.profile)}\n\n{footer}\n")
+        text = render_page(page, results, folders.profile).replace(*_LINK_TO_NOTEBOOK)
+        page.write_text(f"{text}\n\n{footer}\n")
     notebooks = source / "notebooks"
     notebooks.mkdir(exist_ok=True)
     for executed in folders.executed.glob("*.ipynb"):
-        shutil.copy(executed, notebooks)
+        (notebooks / executed.name).write_text(executed.read_text().replace(*_LINK_TO_PAGE))
     scripts = source / SCRIPTS_DIR
     scripts.mkdir()
     # One file with its fonts inside: browsers refuse font files to pages that are read from disk.

@@ -1,6 +1,6 @@
 """Separation by ISO/TS 15066: how far a person and a moving robot must be for the robot to stop in time.
 
-`S = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z_d + Z_r` {cite}`iso15066`: what the person covers until
+`S = v_h (T_r + T_s) + v_r T_r + v_r T_s / 2 + C + Z_d + Z_r`: what the person covers until
 the robot stands, what the robot covers while it reacts and while it brakes evenly, how far the person's
 body gets before it is noticed, and how uncertain the places of both are. A yardstick for drawing only:
 nothing in this project is a safety function.

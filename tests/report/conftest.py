@@ -33,7 +33,6 @@ def study(tmp_path: Path) -> Path:
     book.mkdir()
     shutil.copytree(CHECKOUT / "book" / "_static", book / "_static")
     shutil.copy(CHECKOUT / "book" / "_config.yml", book)
-    shutil.copy(CHECKOUT / "book" / "references.bib", book)
     (book / "_toc.yml").write_text(
         "format: jb-book\nroot: index\nchapters:\n- file: notebooks/00_first\n- file: notebooks/01_second\n"
     )

@@ -43,8 +43,8 @@ def test_report_of_two_notebooks(study):
     make_report("quick", [("scale", "2")], lines.append, sources=study, root=study)
     assert lines[-2] == "book: built", "a page that was changed is built anew"
 
-    home.write_text(home.read_text() + "\n{doc}`nowhere`\n")
-    with pytest.raises(RunError, match=r"book: book/index.md:\d+: WARNING: unknown document: 'nowhere'"):
+    home.write_text(home.read_text() + "\n[Second](../notebooks/01_second.ipynb), [nowhere](nowhere.md)\n")
+    with pytest.raises(RunError, match=r"book: book/index.md:\d+: WARNING: .*'nowhere.md'.*1 in all"):
         make_report("quick", [("scale", "2")], lines.append, sources=study, root=study)
     home.write_text("# Home\n\n![](_static/x.png)\n")
     shutil.copy(matplotlib.get_data_path() + "/images/home.png", study / "book" / "_static" / "x.png")
