@@ -71,7 +71,7 @@ def read_points(path: Path) -> Points:
         raise InputError(f"{path}: is not a C3D file (its second byte is not 80); export it again")
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "points.npz"
-        command = [sys.executable, "-c", _CONVERT, str(path), str(out), str(_MAX_MEMORY_BYTES)]
+        command = [sys.executable, "-P", "-c", _CONVERT, str(path), str(out), str(_MAX_MEMORY_BYTES)]
         try:
             done = subprocess.run(command, capture_output=True, timeout=_TIMEOUT_S).returncode == 0
         except subprocess.TimeoutExpired:
