@@ -90,8 +90,14 @@ class NativeProcess:
     def _started(self) -> _Child:
         # After a fork the pipes belong to the process that made them.
         if self._child is None or self._child.owner != os.getpid():
-            self._child = _Child(self._program)
-            self._answer(self._child, self._first, self._remedy)
+            try:
+                child = _Child(self._program)
+            except OSError as error:
+                raise NativeError(
+                    f"{self._name}: no process can be started ({error.strerror}); use fewer workers"
+                ) from None
+            self._answer(child, self._first, self._remedy)
+            self._child = child
         return self._child
 
     def _answer(self, child: _Child, question: tuple, remedy: str) -> tuple[dict, bytearray]:
@@ -102,7 +108,7 @@ class NativeProcess:
             raise NativeError(f"{self._name}: {child.end()}; {remedy}") from None
         except BaseException:  # an interrupted wait: the answer would be taken for that to the next image
             self._child = None
-            child.end()
+            child.close()
             raise
         if "error" in head:
             raise NativeError(f"{self._name}: {head['error']}; {remedy}")
@@ -126,7 +132,7 @@ class _Child:
             start_new_session=True,  # an interrupt from the keyboard is for the caller
         )
         files = self._process.stdin, self._process.stdout, self._stderr, self._shared
-        self._close = weakref.finalize(self, _close, self._process, files, self.owner)
+        self.close = weakref.finalize(self, _close, self._process, files, self.owner)
 
     def show(self, image: np.ndarray) -> None:
         """Put an image where the program sees it."""
@@ -141,12 +147,12 @@ class _Child:
         return receive(self._process.stdout)
 
     def end(self) -> str:
-        """End it, if it has not ended itself; how it ended, in words."""
+        """How it ended, in words; it is about to, since it does not speak any more."""
         with suppress(subprocess.TimeoutExpired):
-            self._process.wait(1.0)
+            self._process.wait(10.0)
         status = self._process.poll()
         last = _last_line(self._stderr)
-        self._close()
+        self.close()
         return _in_words(status) + (f" ({last})" if last else "")
 
 
@@ -176,7 +182,7 @@ def _close(process: subprocess.Popen, files: tuple[BinaryIO, ...], owner: int) -
 
 def _in_words(status: int | None) -> str:
     if status is None:
-        return "its process was interrupted"
+        return "its process does not answer"
     if status >= 0:
         return f"its process ended with code {status}"
     if -status == signal.SIGALRM:

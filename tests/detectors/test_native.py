@@ -89,6 +89,8 @@ def test_one_that_cannot_start_says_why(program):
     assert "code 3" in told(program("sys.exit(3)", is_ready=False))
     line = told(program("import nothing_of_that_name", is_ready=False))
     assert line.endswith("No module named 'nothing_of_that_name'); give another file")
+    refuses = program("receive(files[0]); send(files[1], {'error': 'no such model'})", is_ready=False)
+    assert told(refuses) == told(refuses) == "a.task: no such model; give another file"
 
 
 def test_one_that_hangs_is_ended(weights, monkeypatch):
