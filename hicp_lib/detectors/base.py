@@ -29,6 +29,10 @@ class Detections:
     scores: np.ndarray
     person_scores: np.ndarray
 
+    def __post_init__(self) -> None:
+        for name in ("keypoints_px", "scores", "person_scores"):  # as files keep them, found anew or not
+            object.__setattr__(self, name, np.asarray(getattr(self, name), float))
+
     @classmethod
     def none(cls) -> Detections:
         """Nobody found."""

@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
+from hicp_lib import memo
 from hicp_lib.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.environment import with_variables
 from hicp_lib.errors import InputError
@@ -92,9 +93,9 @@ def _check(out: Path, n: int, seed: int, workers: int | None) -> None:
 
 @cache
 def renderer_version() -> str:
-    """SHA-256 over everything that decides what an image looks like: this package and the body model."""
+    """SHA-256 over everything that decides what an image looks like: code and the body model."""
     sources = sorted(Path(__file__).parent.glob("*.py"))
-    parts = [f"{path.name} {sha256_file(path)}" for path in [*sources, BODY_FILE]]
+    parts = [f"{path.name} {sha256_file(path)}" for path in [*sources, Path(memo.__file__), BODY_FILE]]
     return sha256_bytes("\n".join(parts).encode())
 
 

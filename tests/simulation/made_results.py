@@ -45,7 +45,7 @@ KINDS: dict[str, Callable[[int], str]] = {
     "mocap": lambda number: content(*record_frame("mocap", 0, number)),
     "upper": lambda number: content(*record_frame("relative-upper", 0, number)),
     "lower": lambda number: content(*record_frame("relative-lower", 0, number)),
-    "dose": lambda number: content(*islice(doses(0, number), 3)),
+    "dose": lambda number: content(*islice(doses(0, number), 1)),
     "capture": captured,
     "avoidance": closed_loop,
 }

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from contents import content
 from made_results import dressed
+from scipy import sparse
 
 from hicp_lib.memo import memoised
 from hicp_lib.simulation import clothing
@@ -82,10 +83,12 @@ def test_a_key_is_a_plain_number_within_tuples_too(given, key):
 def test_what_is_kept_cannot_be_changed():
     @memoised(2)
     def cut(n: int) -> tuple[clothing.g.Mesh, dict]:
-        return clothing.g.box(np.zeros(3), np.ones(3)), {"a": [np.arange(n)]}
+        return clothing.g.box(np.zeros(3), np.ones(3)), {
+            "a": [np.arange(n), sparse.eye_array(n, format="csr")]
+        }
 
     mesh, others = cut(3)
-    for array in (mesh.vertices_m, mesh.triangles, others["a"][0]):
+    for array in (mesh.vertices_m, mesh.triangles, others["a"][0], others["a"][1].data):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1
     assert cut(3)[0] is mesh and cut.cache_info().maxsize == 2

@@ -38,7 +38,14 @@ PUBLISHED_GAINS = "ground truth, published gains"
 IDEAL = (NO_AVOIDANCE, TRUE_KEYPOINTS, PUBLISHED_GAINS)
 """Conditions without a detector; every other condition is a detector's name."""
 
-_LIBRARY_PATTERNS = ("simulation/**/*.py", "robot/*.py", "rgbd/*lifting.py", "rgbd/camera.py", "keypoints.py")
+_LIBRARY_PATTERNS = (
+    "simulation/**/*.py",
+    "robot/*.py",
+    "rgbd/*lifting.py",
+    "rgbd/camera.py",
+    "keypoints.py",
+    "memo.py",
+)
 _DATA_PATTERNS = ("body*", "icub*.json")
 _SHOWN_PX = (320, 240)  # kept images are for looking at
 

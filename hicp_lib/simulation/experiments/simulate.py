@@ -44,7 +44,7 @@ _EXPERIMENTS = (
 _LIBRARY_PATTERNS = (
     "simulation/*.py", *(f"simulation/experiments/{name}.py" for name in _EXPERIMENTS),
     "simulation/sensors/depth_*.py", "simulation/sensors/markers.py", "simulation/sensors/motion_capture.py",
-    "robot/kinematics.py", "robot/tables.py", "keypoints.py", "images.py",
+    "robot/kinematics.py", "robot/tables.py", "keypoints.py", "images.py", "memo.py",
     "rgbd/camera.py", "rgbd/tum.py", "rgbd/recording_writer.py", "rgbd/qualisys.py", "rgbd/c3d.py",
 )  # fmt: skip
 _DATA_PATTERNS = ("body*", "icub.json", "relative_poses.csv")
