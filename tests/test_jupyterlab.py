@@ -23,6 +23,7 @@ import nbformat
 import numpy as np
 import pandas as pd
 import pytest
+from papermill.iorw import load_notebook_node
 from papermill.parameterize import parameterize_notebook
 from PIL import Image
 
@@ -44,12 +45,17 @@ RAW_MARKUP = re.compile(r"\{[a-z:-]+\}|```|:::")
 ASKS = ".jp-Dialog, .Toastify__toast"
 
 CALL = """
-  const [argument, done] = arguments, app = window.jupyterapp;
-  const call = async () => { %s };
+  const [argument, done] = arguments;
+  const pause = time_ms => new Promise(resolve => setTimeout(resolve, time_ms));
+  const call = async () => {
+    while (!window.jupyterapp) await pause(50);
+    const app = window.jupyterapp;
+    await app.restored;
+    %s
+  };
   call().then(value => done({value}), error => done({error: `${error}`}));
 """
 OPEN = """
-  await app.restored;
   const panel = await app.commands.execute("docmanager:open", {path: argument, factory: "Notebook"});
   await panel.context.ready;
   await panel.sessionContext.ready;
@@ -66,10 +72,10 @@ LOOK = """
   const seen = {text: "", images: []};
   for (const cell of app.shell.currentWidget.content.widgets) {
     cell.node.scrollIntoView();
-    await new Promise(resolve => setTimeout(resolve, 50));
+    await pause(50);
     for (const shown of cell.node.querySelectorAll(".jp-MarkdownOutput, .jp-OutputArea-output"))
       seen.text += shown.innerText + "\\n";
-    for (const image of cell.node.querySelectorAll("img")) {
+    for (const image of cell.node.querySelectorAll("figure.hicp img")) {
       await image.decode().catch(() => null);
       seen.images.push([image.alt, Math.min(image.naturalWidth, image.offsetWidth) * image.offsetHeight]);
     }
@@ -141,7 +147,7 @@ def stage_notebooks(folder: Path) -> None:
     shutil.copy(CHECKOUT / "notebooks" / "profiles.toml", folder)
     for notebook in notebooks:
         parameters = profile.parameters.get(notebook.name, {})
-        staged = parameterize_notebook(nbformat.read(notebook.path, as_version=4), parameters)
+        staged = parameterize_notebook(load_notebook_node(str(notebook.path)), parameters)
         del staged.metadata["papermill"]
         nbformat.write(staged, folder / notebook.path.name)
 
