@@ -23,7 +23,7 @@ from hicp_lib.errors import InputError
 from hicp_lib.files import cache_dir
 from hicp_lib.opencv_files import WANTED, overwritten
 from hicp_lib.probes import EXIT_ABSENT, EXIT_FAILED, probes
-from hicp_lib.system_libraries import DEBIAN_PACKAGES, missing_packages
+from hicp_lib.system_libraries import LIBRARIES, missing_packages
 
 PYTHONS = ((3, 11), (3, 14))
 MIN_FREE_GB = 3.0
@@ -78,7 +78,7 @@ def check_python() -> Check:
 def check_system_libraries() -> Check:
     """What the wheels load and do not bring."""
     missing = missing_packages()
-    finding = f"missing: {' '.join(missing)}" if missing else f"{len(DEBIAN_PACKAGES)} found"
+    finding = f"missing: {' '.join(missing)}" if missing else "all that is needed"
     return Check.of("system libraries", not missing, finding, f"sudo apt-get install {' '.join(missing)}")
 
 
@@ -167,8 +167,9 @@ def _remedy(words: str) -> str:
     library = re.search(r"lib[\w+.-]+\.so[.\d]*(?=: cannot open shared object)", words)
     if library is None:
         return f"in a container or chroot, give it /proc, /sys and /dev; else: {_REINSTALL}"
-    package = DEBIAN_PACKAGES.get(library[0])
-    return f"sudo apt-get install {package}" if package else f"install the system's package with {library[0]}"
+    if library[0] in LIBRARIES:
+        return f"sudo apt-get install {LIBRARIES[library[0]][0]}"
+    return f"install the system's package with {library[0]}"
 
 
 def _last_line(text: str) -> str:

@@ -9,24 +9,30 @@ from __future__ import annotations
 
 import ctypes
 import sys
+from importlib.util import find_spec
 
-DEBIAN_PACKAGES = {
-    "libEGL.so.1": "libegl1",  # Open3D, MediaPipe
-    "libGL.so.1": "libgl1",  # Open3D
-    "libGLESv2.so.2": "libgles2",  # MediaPipe
-    "libX11.so.6": "libx11-6",  # Open3D
-    "libgomp.so.1": "libgomp1",  # Pinocchio
-    "libidn2.so.0": "libidn2-0",  # Open3D
-    "libudev.so.1": "libudev1",  # Open3D
-    "libusb-1.0.so.0": "libusb-1.0-0",  # Open3D
+LIBRARIES = {
+    "libEGL.so.1": ("libegl1", {"mediapipe", "open3d"}),
+    "libGL.so.1": ("libgl1", {"open3d"}),
+    "libGLESv2.so.2": ("libgles2", {"mediapipe"}),
+    "libX11.so.6": ("libx11-6", {"open3d"}),
+    "libgomp.so.1": ("libgomp1", {"pinocchio"}),
+    "libidn2.so.0": ("libidn2-0", {"open3d"}),
+    "libudev.so.1": ("libudev1", {"open3d"}),
+    "libusb-1.0.so.0": ("libusb-1.0-0", {"open3d"}),
 }
+"""Each library's package in Debian, and the Python packages that cannot be imported without it."""
 
 
 def missing_packages() -> list[str]:
-    """Debian packages of the libraries that cannot be loaded; empty on other systems than Linux."""
+    """Debian packages of libraries that what is installed needs and that cannot be loaded; on Linux only."""
     if sys.platform != "linux":
         return []
-    return [package for library, package in DEBIAN_PACKAGES.items() if not _loads(library)]
+    return [
+        package
+        for library, (package, needed_by) in LIBRARIES.items()
+        if any(map(find_spec, needed_by)) and not _loads(library)
+    ]
 
 
 def _loads(library: str) -> bool:

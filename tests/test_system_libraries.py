@@ -7,12 +7,13 @@ import site
 import sys
 import sysconfig
 from collections import defaultdict
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from elftools.elf.elffile import ELFFile
 
-from hicp_lib.system_libraries import DEBIAN_PACKAGES
+from hicp_lib.system_libraries import LIBRARIES
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or sysconfig.get_platform() != "linux-x86_64",
@@ -58,22 +59,31 @@ OPTIONAL = {
 _OPENED = re.compile(rb"\0(lib[\w+.-]+\.so(?:\.\d+)*)(?=\0)")
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """Libraries that the environment does not bring: what links to each, and what may open it, by package."""
+
+    needed: dict[str, set[str]]
+    opened: dict[str, set[str]]
+
+
 @pytest.fixture(scope="module")
-def wanted() -> dict[str, set[str]]:
-    """Libraries that the environment asks for and does not bring, and the shared objects that ask."""
-    asking, brought = defaultdict(set), set()
-    for folder in site.getsitepackages():
-        for path in Path(folder).rglob("*.so*"):
-            brought.add(path.name)
-            if path.is_symlink() or not path.is_file():
-                continue
-            with path.open("rb") as file:
-                if file.read(4) == b"\x7fELF":
-                    elf = ELFFile(file)
-                    brought.update(_dynamic(elf, "DT_SONAME", "soname"))
-                    for name in _dynamic(elf, "DT_NEEDED", "needed") | _opened(elf):
-                        asking[name].add(path.name)
-    return {name: by for name, by in asking.items() if name not in brought}
+def wanted() -> Wanted:
+    needed, opened, brought = defaultdict(set), defaultdict(set), set()
+    for path in (path for folder in site.getsitepackages() for path in Path(folder).rglob("*.so*")):
+        brought.add(path.name)
+        if path.is_symlink() or not path.is_file():
+            continue
+        with path.open("rb") as file:
+            if file.read(4) == b"\x7fELF":
+                elf, package = ELFFile(file), str(path).rpartition("/site-packages/")[2].split("/")[0]
+                brought.update(_dynamic(elf, "DT_SONAME", "soname"))
+                for names, into in ((_dynamic(elf, "DT_NEEDED", "needed"), needed), (_opened(elf), opened)):
+                    for name in names:
+                        into[name].add(package)
+    return Wanted(
+        *({name: by for name, by in all_.items() if name not in brought} for all_ in (needed, opened))
+    )
 
 
 def _dynamic(elf: ELFFile, tag: str, attribute: str) -> set[str]:
@@ -88,15 +98,16 @@ def _opened(elf: ELFFile) -> set[str]:
 
 def test_every_library_is_listed_or_optional_for_a_reason(wanted):
     unknown = {
-        name: sorted(by)
-        for name, by in wanted.items()
-        if name not in DEBIAN_PACKAGES
-        and not ALWAYS_THERE.fullmatch(name)
-        and not name.startswith(tuple(OPTIONAL))
+        name: by
+        for name, by in (wanted.needed | wanted.opened).items()
+        if name not in LIBRARIES and not ALWAYS_THERE.fullmatch(name) and not name.startswith(tuple(OPTIONAL))
     }
-    assert not unknown, "add them to system_libraries.DEBIAN_PACKAGES, or to OPTIONAL with the reason"
+    assert not unknown, "add them to system_libraries.LIBRARIES, or to OPTIONAL with the reason"
 
 
-def test_nothing_is_listed_that_nobody_asks_for(wanted):
-    assert set(DEBIAN_PACKAGES) <= wanted.keys()
-    assert not [start for start in OPTIONAL if not any(name.startswith(start) for name in wanted)]
+def test_the_list_names_who_needs_each_and_nothing_that_nobody_asks_for(wanted):
+    assert {name: by for name, (_, by) in LIBRARIES.items()} == {
+        name: wanted.needed[name] for name in LIBRARIES
+    }
+    names = [*wanted.needed, *wanted.opened]
+    assert not [start for start in OPTIONAL if not any(name.startswith(start) for name in names)]

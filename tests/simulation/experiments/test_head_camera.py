@@ -78,7 +78,7 @@ def taken(monkeypatch):
 
 
 def test_detectors_share_pictures_until_the_robot_gives_way(taken):
-    album, pixels = {}, np.zeros((N_KEYPOINTS, 2))
+    album, pixels = {}, np.full((N_KEYPOINTS, 2), np.nan)  # nothing to lift
     first, second = (DetectorEyes(Pointing(pixels), 0.1, album=album) for _ in range(2))
     post = start_posture()
     away = post.moved("left", post.angles("left") + 0.01)
