@@ -65,7 +65,7 @@ def test_how_long_a_detector_takes_moves_nothing_but_its_time(detector, monkeypa
     monkeypatch.setenv("HICP_CACHE", str(tmp_path / "other"))
     monkeypatch.setattr(detector, "detect", lambda rgb: time.sleep(0.05) or detector.found)
     (slow,) = run_all([Job(TRIAL, "two people", 0.02)])
-    assert slow.frames["time_ms"].min() >= 50 > quick.frames["time_ms"].median()
+    assert slow.frames["time_ms"].min() >= 50
     assert slow.cycles.equals(quick.cycles)
     columns = [column for column in quick.frames if column != "time_ms"]
     assert slow.frames[columns].map(str).equals(quick.frames[columns].map(str))
