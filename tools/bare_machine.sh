@@ -27,6 +27,8 @@ checkout=$(git -C "$(dirname "$0")" rev-parse --show-toplevel)
 folder=${BARE_DIR:-/var/tmp/hicp-bare}
 base=$folder/$suite.base root=$folder/$suite
 mkdir -p "$folder"
+exec 9>"$folder/$suite.lock"
+flock -n 9 || cannot "another run of $suite is under way in $folder; wait for it to end"
 
 install_base() {
   # debootstrap may be older than the suite: all suites of Debian, and all of Ubuntu, share one script.
