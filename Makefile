@@ -13,11 +13,13 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_NO_INPUT := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup system report test lab doctor lint lock clean
+.PHONY: help setup system report test wheel-check test-lowest lab doctor lint lock clean
 
 help:
 	@echo "make report [PROFILE=full|quick]  run the study and build the report"
 	@echo "make test                         run the tests, notebooks included"
+	@echo "make wheel-check                  build the wheel, install and use it elsewhere"
+	@echo "make test-lowest                  test on the lowest versions allowed"
 	@echo "make lab                          open the notebooks in JupyterLab"
 	@echo "make doctor                       check the installation, line by line"
 	@echo "make lint                         check the style of the code"
@@ -29,6 +31,12 @@ report: setup
 
 test: setup
 	@$(BIN)/python -m pytest -n logical --dist loadfile $(PYTEST_ARGS)
+
+wheel-check:
+	@PYTHON=$(PYTHON) tools/wheel_check.sh
+
+test-lowest:
+	@UV=$(UV) tools/test_lowest.sh
 
 lab: setup
 	@$(BIN)/jupyter lab --notebook-dir=. --port=$(PORT) $(AS_ROOT) notebooks/00_quickstart.ipynb

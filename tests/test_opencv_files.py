@@ -38,7 +38,7 @@ def test_what_was_laid_over_it_is_named_with_a_remedy_that_holds(site):
     assert doctor.check_opencv().finding == "opencv-python-headless 5.0"
     install(site, "opencv-contrib-python", b"with a display")
     check = doctor.check_opencv()
-    assert not check.is_ok
+    assert check.status == doctor.FAIL
     assert check.finding == f"opencv-python-headless is overwritten by opencv-contrib-python ({BINARY})"
     reinstall = "pip install --force-reinstall --no-deps opencv-python-headless==5.0"
     assert check.remedy == f"pip uninstall -y opencv-contrib-python; {reinstall}"
