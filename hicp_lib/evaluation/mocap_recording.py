@@ -20,6 +20,7 @@ from hicp_lib.evaluation.lifting_ablation import N_STEPS, lifting_ablation
 from hicp_lib.evaluation.mocap_error import MIN_SCORES, POSITION, TABLE_JOINTS, marker_means, mocap_errors
 from hicp_lib.evaluation.sight import lines_of_sight
 from hicp_lib.evaluation.stability import position_array
+from hicp_lib.kept_tables import kept
 from hicp_lib.rgbd.clicking import CLICKS_FILE, read_clicks
 from hicp_lib.rgbd.keypoints3d import lift_found
 from hicp_lib.rgbd.qualisys import MotionCapture, read_mocap
@@ -84,7 +85,7 @@ def detect_frames(recording: Recording, detectors: Sequence[str]) -> dict[str, l
 def lift_frames(
     recording: Recording, found: Mapping[str, Sequence[Detections]]
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Everyone's keypoints in space, columns as of `hicp_lib.rgbd.keypoints3d.lift_found`.
+    """Everyone's keypoints in space, columns as of `hicp_lib.rgbd.keypoints3d.lift_found`; kept on disk.
 
     Returns
     -------
@@ -92,7 +93,7 @@ def lift_frames(
     positions are known (for `ablation`)
     """
     n_steps = METHODS if read_truth(recording) is None else METHODS | N_STEPS
-    table = lift_found(recording, found, n_steps)
+    table = kept(lift_found, recording, found, n_steps)
     return table[table["method"].isin(METHODS)], table[table["detector"] == next(iter(found))]
 
 
