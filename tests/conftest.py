@@ -1,5 +1,6 @@
 """Fixtures shared by the tests."""
 
+import fcntl
 import os
 from pathlib import Path
 
@@ -46,7 +47,14 @@ def photograph():
 
 @pytest.fixture(scope="session")
 def book() -> Path:
-    """The book of the quick profile: made now, or what an earlier run left if nothing has changed."""
+    """The book of the quick profile: made now, or what an earlier run left if nothing has changed.
+
+    One worker makes it, the others wait.
+    """
     from hicp_lib.report.build import make_report  # not in every installation
 
-    return make_report("quick", [], print, sources=CHECKOUT, root=CHECKOUT).parent
+    lock = CHECKOUT / "_build" / ".tests.lock"
+    lock.parent.mkdir(exist_ok=True)
+    with open(lock, "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        return make_report("quick", [], print, sources=CHECKOUT, root=CHECKOUT).parent
