@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import base64
+import csv
 import hashlib
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
+from pathlib import Path
 
 WANTED = "opencv-python-headless"
 _OTHERS = ("opencv-contrib-python", "opencv-contrib-python-headless", "opencv-python")
@@ -17,7 +19,7 @@ def overwritten() -> tuple[str, str] | None:
     if wanted is None:
         names = " ".join(others)
         return f"{names or 'OpenCV'} in the place of {WANTED}", _remedy(names, WANTED)
-    changed = [str(file) for file in _files(wanted) if not _is_as_recorded(file)]
+    changed = [name for name, sha256 in _recorded(wanted) if _sha256(wanted.locate_file(name)) != sha256]
     if not changed:
         return None
     names = " ".join(others)
@@ -37,13 +39,20 @@ def _installed(name: str) -> Distribution | None:
         return None
 
 
-def _files(installed: Distribution) -> list:
-    return [file for file in installed.files or () if file.parts[0] == "cv2" and file.hash is not None]
+def _recorded(installed: Distribution) -> list[tuple[str, str]]:
+    """Files of `cv2` and their hashes, those that are gone too: `Distribution.files` may leave these out."""
+    rows = csv.reader((installed.read_text("RECORD") or "").splitlines())
+    return [
+        (name, stated.removeprefix("sha256="))
+        for name, stated, _ in rows
+        if name.startswith("cv2/") and stated
+    ]
 
 
-def _is_as_recorded(file) -> bool:
+def _sha256(path: Path) -> str | None:
+    """As a distribution's record writes it; None of a file that is not there."""
     try:
-        found = hashlib.new(file.hash.mode, file.locate().read_bytes()).digest()
+        digest = hashlib.sha256(path.read_bytes()).digest()
     except OSError:
-        return False
-    return base64.urlsafe_b64encode(found).decode().rstrip("=") == file.hash.value
+        return None
+    return base64.urlsafe_b64encode(digest).decode().rstrip("=")

@@ -49,5 +49,5 @@ def test_what_is_cited_is_in_the_references_and_nothing_else():
 
 def test_every_link_of_the_book_leads_to_a_file_in_it(book):
     for page in book.rglob("*.html"):
-        for target in re.findall(r'<a [^>]*href="([^"#?:]+)', page.read_text()):
+        for target in re.findall(r'<a [^>]*href="([^"#?:]+)["#?]', page.read_text()):
             assert (page.parent / target).exists(), f"{page.relative_to(book)}: {target}"
