@@ -81,7 +81,7 @@ def test_a_package_that_is_not_installed_is_no_fault():
     check = trial(code)
     assert check.status == doctor.ABSENT
     assert check.finding.startswith("no_such_package is not installed")
-    assert str(check).endswith("pip install 'hicp[render]'")
+    assert str(check).endswith("pip install '.[render]'")
 
 
 def test_a_trial_that_hangs_is_ended_with_what_it_started(tmp_path):

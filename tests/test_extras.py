@@ -50,9 +50,8 @@ def test_a_command_answers_in_one_line(tmp_path, package, arguments, extra):
     words = [str(tmp_path / word) if word.startswith("OUT") else word for word in arguments]
     done = subprocess.run([sys.executable, "-c", WITHOUT, package, *words], capture_output=True, text=True)
     assert done.returncode == 2
-    assert (
-        done.stderr == f"hicp: {package} is not installed, and this needs it: pip install 'hicp[{extra}]'\n"
-    )
+    remedy = f"in hicp's checkout run: pip install '.[{extra}]'"
+    assert done.stderr == f"hicp: {package} is not installed, and this needs it; {remedy}\n"
 
 
 def test_every_extra_that_is_named_exists_and_every_dependency_has_a_lower_bound():

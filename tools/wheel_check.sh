@@ -60,7 +60,7 @@ head -1 lifted.csv | grep -q x_m || fail "lifted.csv is no table"
 refused() { # EXTRA COMMAND...: one line that names the extra
   local extra=$1; shift
   "$@" > "$work/said" 2>&1 && fail "$* did not fail"
-  [ "$(wc -l < "$work/said")" = 1 ] && grep -qF "pip install 'hicp[$extra]'" "$work/said" || fail "$*: $(cat "$work/said")"
+  [ "$(wc -l < "$work/said")" = 1 ] && grep -qF "pip install '.[$extra]'" "$work/said" || fail "$*: $(cat "$work/said")"
 }
 refused analysis hicp lift --recording rec --detector mmpose --model net.onnx --out lifted.parquet
 refused render hicp scenes render scenes

@@ -60,7 +60,7 @@ def test_another_wheel_is_refused_and_nothing_is_left(not_installed, tmp_path):
 
 def test_without_the_extra_that_is_what_is_told(not_installed, monkeypatch):
     monkeypatch.setattr("hicp_lib.extras.find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"absl is not installed, .*: pip install 'hicp\[mediapipe\]'"):
+    with pytest.raises(InputError, match=r"absl is not installed, .*: pip install '\.\[mediapipe\]'"):
         mediapipe_program.program_folder()
 
 
