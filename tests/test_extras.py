@@ -19,7 +19,7 @@ sys.exit(cli.run(sys.argv[2:]))"""
 
 
 def test_both_doors_name_the_package_and_its_extra():
-    said = r"^nowhere is not installed, and this needs it: pip install 'hicp\[robot\]'$"
+    said = r"^nowhere is not installed, and this needs it; .* pip install '\.\[robot\]'$"
     with pytest.raises(MissingPartError, match=said), needs("robot"):
         import nowhere  # noqa: F401
     with pytest.raises(MissingPartError, match=said):
