@@ -53,6 +53,7 @@ setup: $(INSTALLED) system
 # The locked environment. mediapipe's wheel declares two packages that the study leaves out
 # (see pyproject.toml), hence --no-deps: the lock is complete by itself.
 # Editable the plain way: else every start of Python imports a finder for the package data.
+# Where Python may not write bytecode (PYTHONDONTWRITEBYTECODE), every process would compile all it imports anew.
 # A marker tells an installation that was cut off: it is made anew.
 $(INSTALLED): environment.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 14))' || \
@@ -68,6 +69,8 @@ $(INSTALLED): environment.lock pyproject.toml
 	  "index, 4 GB of disk and, on Linux, glibc 2.35 (Debian 12, Ubuntu 22.04) or newer" >&2; exit 1; }
 	@$(BIN)/python -m pip install -qq --no-deps --no-build-isolation --no-index --editable . \
 	  --config-settings editable_mode=compat
+	@$(BIN)/python -c 'import sys; sys.exit(sys.dont_write_bytecode)' || $(BIN)/python -m compileall -q -j 0 \
+	  -x '/tests?/' "$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null || true
 	@ln -sfn $(CURDIR)/tools/jupyter/* .venv/etc/jupyter/
 	@rm $(INSTALLING) && touch $(INSTALLED)
 
