@@ -76,7 +76,7 @@ $(INSTALLED): environment.lock pyproject.toml
 
 # Libraries that the wheels load and do not bring: installed where that is allowed.
 system: $(INSTALLED)
-	@packages="$$($(BIN)/python -m hicp_lib.system_libraries)"; \
+	@packages="$$($(BIN)/python -m hicp_lib.cli.system_libraries)"; \
 	if [ -z "$$packages" ]; then exit 0; fi; \
 	if [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
 	  echo "Installing system libraries: $$packages"; \

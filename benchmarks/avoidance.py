@@ -21,21 +21,21 @@ from pathlib import Path
 
 import numpy as np
 
-from hicp_lib.detectors.base import Detections
+from hicp_lib.core.camera import Intrinsics, transform
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.registry import make_detector
-from hicp_lib.errors import InputError
-from hicp_lib.rgbd.camera import Intrinsics, transform
-from hicp_lib.rgbd.lifting import lift
+from hicp_lib.lifting.paper import lift
 from hicp_lib.robot.controller import Controller
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.loop import AvoidanceLoop, Perception
 from hicp_lib.robot.peripersonal_space import ReceptiveField, gains, response
-from hicp_lib.simulation.camera import project
-from hicp_lib.simulation.render import render
-from hicp_lib.simulation.sensor import expose
+from hicp_lib.simulation.rendering.camera import project
+from hicp_lib.simulation.rendering.colour_sensor import expose
+from hicp_lib.simulation.rendering.render import render
 from hicp_lib.simulation.sensors.depth_camera import D435, simulate_depth
-from hicp_lib.simulation.staging import random_stage
+from hicp_lib.simulation.world.staging import random_stage
 
 SEED = 20220
 PERIOD_S = 0.02

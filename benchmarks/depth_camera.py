@@ -19,8 +19,8 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
-from hicp_lib.simulation.camera import pixel_rays
-from hicp_lib.simulation.render import render
+from hicp_lib.simulation.rendering.camera import pixel_rays
+from hicp_lib.simulation.rendering.render import render
 from hicp_lib.simulation.sensors.depth_camera import (
     D435,
     left_imager,
@@ -28,7 +28,7 @@ from hicp_lib.simulation.sensors.depth_camera import (
     simulate_raw_depth,
     without_errors,
 )
-from hicp_lib.simulation.staging import random_stage
+from hicp_lib.simulation.world.staging import random_stage
 
 SEED = 20220
 REPEATS = 3

@@ -32,8 +32,14 @@ import matplotlib
 import numpy as np
 import psutil
 
-from hicp_lib.detectors import mediapipe_bundle, mediapipe_child, native, openpose_net, registry, run, zoo
-from hicp_lib.images import read_image, write_png
+from hicp_lib.core.images import read_image, write_png
+from hicp_lib.detectors import registry
+from hicp_lib.detectors.mediapipe import bundle as mediapipe_bundle
+from hicp_lib.detectors.mediapipe import child as mediapipe_child
+from hicp_lib.detectors.openpose import mobilenet as openpose_net
+from hicp_lib.detectors.runtime import isolation as native
+from hicp_lib.detectors.runtime import run
+from hicp_lib.detectors.weights import default as zoo
 
 NAMES = ("mediapipe-pose", "mediapipe-hands", "openpose-mobilenet")
 PROCESS_CASES = [

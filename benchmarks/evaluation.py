@@ -23,13 +23,13 @@ from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 from timing import best_seconds
 
-from hicp_lib.annotations import Annotations, ImageInfo, read_annotations, write_annotations
-from hicp_lib.detectors.base import Detections
-from hicp_lib.evaluation import engine
-from hicp_lib.evaluation.bootstrap import N_RESAMPLES, bootstrap_intervals
-from hicp_lib.evaluation.coco import evaluate
-from hicp_lib.evaluation.oks import oks
-from hicp_lib.keypoints import COCO_17, SIGMAS
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import COCO_17, SIGMAS
+from hicp_lib.core.oks import oks
+from hicp_lib.evaluation.ap import cocoeval as engine
+from hicp_lib.evaluation.ap.bootstrap import N_RESAMPLES, bootstrap_intervals
+from hicp_lib.evaluation.ap.evaluate import evaluate
+from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
 
 N_FOUND = 3  # detections per image
 

@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 from timing import best_seconds
 
-from hicp_lib.annotations import Annotations, ImageInfo
-from hicp_lib.importers.importing import import_predictions, write_imported
+from hicp_lib.formats.annotations import Annotations, ImageInfo
+from hicp_lib.formats.importers.importing import import_predictions, write_imported
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
 

@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 from timing import best_seconds
 
-from hicp_lib.keypoints import INDEX
-from hicp_lib.rgbd.camera import Intrinsics, deproject
-from hicp_lib.rgbd.lifting import RADIUS_M, lift
-from hicp_lib.rgbd.robust_lifting import lift_robust
-from hicp_lib.simulation.body import load_body, pose_body
-from hicp_lib.simulation.camera import Camera, look_at, pixel_rays, project
+from hicp_lib.core.camera import Intrinsics, deproject
+from hicp_lib.core.keypoints import INDEX
+from hicp_lib.lifting.paper import RADIUS_M, lift
+from hicp_lib.lifting.robust import lift_robust
+from hicp_lib.simulation.body.model import load_body, pose_body
+from hicp_lib.simulation.rendering.camera import Camera, look_at, pixel_rays, project
 from hicp_lib.simulation.sensors.markers import body_scene
 
 INTRINSICS = Intrinsics(640, 480, 615.0, 615.0, 319.5, 239.5)

@@ -19,11 +19,11 @@ import time
 import numpy as np
 import open3d as o3d
 
-from hicp_lib.simulation.camera import pixel_rays
-from hicp_lib.simulation.render import render
-from hicp_lib.simulation.scenes import annotate, render_scene, worker_pool
-from hicp_lib.simulation.sensor import expose
-from hicp_lib.simulation.staging import random_stage
+from hicp_lib.simulation.rendering.camera import pixel_rays
+from hicp_lib.simulation.rendering.colour_sensor import expose
+from hicp_lib.simulation.rendering.render import render
+from hicp_lib.simulation.world.scenes import annotate, render_scene, worker_pool
+from hicp_lib.simulation.world.staging import random_stage
 
 SEED = 20220
 

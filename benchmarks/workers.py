@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 from detectors import NAMES, make_images
 
-from hicp_lib.detectors import zoo
-from hicp_lib.detectors.run import n_cores
+from hicp_lib.detectors.runtime.run import n_cores
+from hicp_lib.detectors.weights import default as zoo
 
 _PROGRAM = """
 import sys, time

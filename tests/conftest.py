@@ -8,9 +8,9 @@ import matplotlib
 import pytest
 from hypothesis import settings
 
-from hicp_lib.checkout import CHECKOUT
-from hicp_lib.detectors import zoo
-from hicp_lib.images import read_image
+from hicp_lib.core.checkout import CHECKOUT
+from hicp_lib.core.images import read_image
+from hicp_lib.detectors.weights import default as zoo
 
 # The same examples on every machine and every day; a slow machine is no failure.
 settings.register_profile("hicp", derandomize=True, deadline=None)

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from hicp_lib.checkout import CHECKOUT
+from hicp_lib.core.checkout import CHECKOUT
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="chroot and mounts of Linux")
 

@@ -27,7 +27,7 @@ from papermill.iorw import load_notebook_node
 from papermill.parameterize import parameterize_notebook
 from PIL import Image
 
-from hicp_lib.checkout import CHECKOUT
+from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.report.notebooks import read_notebooks, read_profile
 
 pytestmark = pytest.mark.browser

@@ -8,7 +8,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from hicp_lib.checkout import CHECKOUT
+from hicp_lib.core.checkout import CHECKOUT
 
 # Roles, directives, targets and block breaks of MyST, which only Sphinx reads.
 RAW_MARKUP = re.compile(r"\{[a-z][a-z:-]*\}`|^ *(?:`{3,}|:{3,})\{|^\+\+\+|^\([\w-]+\)=$", re.MULTILINE)

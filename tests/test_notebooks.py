@@ -8,7 +8,7 @@ import json
 import nbformat
 import pytest
 
-from hicp_lib.checkout import CHECKOUT
+from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.report.checks import book_problems
 from hicp_lib.report.notebooks import PARAMETERS_TAG, read_notebooks
 from hicp_lib.report.runs import first_problem

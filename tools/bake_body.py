@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from bake import frames, landmarks, mesh, regions, source
 
-from hicp_lib import files
-from hicp_lib.simulation import body as runtime
+from hicp_lib.core import files
+from hicp_lib.simulation.body import model as runtime
 
 N_CHECKED_POSES = 40
 MAX_DISAGREEMENT_M = 1e-3

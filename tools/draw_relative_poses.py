@@ -12,13 +12,13 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from hicp_lib.datafiles import DATA_DIR
-from hicp_lib.files import write_bytes
-from hicp_lib.keypoints import HANDS, INDEX
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import write_bytes
+from hicp_lib.core.keypoints import HANDS, INDEX
+from hicp_lib.experiments.laboratory import COLOUR, robot_camera
+from hicp_lib.experiments.recordings.seated_person import VIEWS, seated
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
-from hicp_lib.simulation.camera import inside_image, project
-from hicp_lib.simulation.experiments.laboratory import COLOUR, robot_camera
-from hicp_lib.simulation.experiments.seated import VIEWS, seated
+from hicp_lib.simulation.rendering.camera import inside_image, project
 
 N_POSES = 100
 SEED = 2022

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hicp_lib.files import atomic_path
-from hicp_lib.keypoints import N_KEYPOINTS
-from hicp_lib.simulation.body import Body, load_body, pose_body
-from hicp_lib.simulation.poses import KINDS, sample_pose
+from hicp_lib.core.files import atomic_path
+from hicp_lib.core.keypoints import N_KEYPOINTS
+from hicp_lib.simulation.body.model import Body, load_body, pose_body
+from hicp_lib.simulation.body.poses import KINDS, sample_pose
 from hicp_lib.simulation.sensors.markers import body_scene
 
 N_DIRECTIONS = 400

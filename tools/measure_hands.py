@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from hicp_lib.files import atomic_path
-from hicp_lib.keypoints import RIGHT_HAND
-from hicp_lib.rgbd.hand_shapes import PALM
-from hicp_lib.simulation.body import Body, load_body, pose_body
-from hicp_lib.simulation.joints import FINGERS, LIMITS_DEG, pose_from_joints
+from hicp_lib.core.files import atomic_path
+from hicp_lib.core.keypoints import RIGHT_HAND
+from hicp_lib.lifting.hand_shapes import PALM
+from hicp_lib.simulation.body.joints import FINGERS, LIMITS_DEG, pose_from_joints
+from hicp_lib.simulation.body.model import Body, load_body, pose_body
 
 N_SHAPES = 60
 BODY_SHAPE = "woman_35_average"  # the middle of the grown-up shapes in the size of the palm

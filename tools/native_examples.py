@@ -23,7 +23,7 @@ from native_files import (
     write_openpose,
 )
 
-from hicp_lib.annotations import Annotations, ImageInfo, write_annotations
+from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 
 OUT = Path(__file__).parents[1] / "data" / "examples" / "native"
 IMAGES = {1: "one_000001.jpg", 2: "two_000002.jpg", 3: "three_000003.jpg"}

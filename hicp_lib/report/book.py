@@ -12,12 +12,12 @@ import sys
 import tempfile
 from pathlib import Path
 
-from hicp_lib import provenance
-from hicp_lib.files import sha256_file, write_json
+from hicp_lib.core.files import sha256_file, write_json
 from hicp_lib.report.checks import book_problems
 from hicp_lib.report.prose import Results, render_page
 from hicp_lib.report.runs import Folders, RunError
 from hicp_lib.report.sphinx_extension import PLOTLY_PATH, SCRIPTS_DIR
+from hicp_lib.study import provenance
 
 BUILD_LIMIT_S = 900
 # Links lead to files of the checkout. In the book, `book/` is the top and `notebooks/` lies in it.

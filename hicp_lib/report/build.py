@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from hicp_lib.errors import InputError
+from hicp_lib.core.errors import InputError
 from hicp_lib.report.book import build_book
 from hicp_lib.report.notebooks import parse_overrides, read_notebooks, read_profile
 from hicp_lib.report.runs import Folders, Run, run_all

@@ -12,8 +12,8 @@ from typing import Any
 
 import nbformat
 
-from hicp_lib.errors import InputError
-from hicp_lib.provenance import digest
+from hicp_lib.core.errors import InputError
+from hicp_lib.study.provenance import digest
 
 PARAMETERS_TAG = "parameters"
 

@@ -23,9 +23,9 @@ from typing import Any
 import jinja2
 import pandas as pd
 
-from hicp_lib.datafiles import DATA_DIR
-from hicp_lib.errors import InputError
-from hicp_lib.files import read_json
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json
 
 NOT_RUN = "not run"
 

@@ -24,12 +24,12 @@ from typing import Any
 
 import nbformat
 
-from hicp_lib import provenance
-from hicp_lib.errors import InputError
-from hicp_lib.files import sha256_file, write_json
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import sha256_file, write_json
 from hicp_lib.report import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
 from hicp_lib.report.notebooks import Notebook, is_path
 from hicp_lib.report.schedule import run_when_ready
+from hicp_lib.study import provenance
 
 WALL_LIMIT_S = 2 * 3600
 N_PARALLEL = 2

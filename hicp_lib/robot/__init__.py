@@ -1,5 +1,5 @@
 """The robot: its kinematics, the space around its skin, and a controller that gives way."""
 
-from hicp_lib.extras import require
+from hicp_lib.core.extras import require
 
 require("robot", "pinocchio", "qpsolvers", "daqp", "scipy")

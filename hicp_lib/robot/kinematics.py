@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from hicp_lib.errors import InputError
+from hicp_lib.core.errors import InputError
 from hicp_lib.robot.tables import Cable, Row, Tables, read_tables
 
 TORSO_JOINTS = ("torso_pitch", "torso_roll", "torso_yaw")

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hicp_lib.keypoints import N_KEYPOINTS
+from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.robot.controller import Controller, NoSolution
 from hicp_lib.robot.peripersonal_space import (
     ACTIVATION_THRESHOLD,

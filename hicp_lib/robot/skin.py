@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from hicp_lib.datafiles import DATA_DIR
-from hicp_lib.errors import InputError
-from hicp_lib.files import read_json
-from hicp_lib.memo import memoised
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json
+from hicp_lib.core.memo import memoised
 from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
 

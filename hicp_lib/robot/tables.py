@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from hicp_lib.datafiles import DATA_DIR
-from hicp_lib.errors import InputError
-from hicp_lib.files import read_json
-from hicp_lib.memo import memoised
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json
+from hicp_lib.core.memo import memoised
 
 ICUB_FILE = DATA_DIR / "icub.json"
 COLUMNS = ["joint", "link", "a_m", "d_m", "alpha_deg", "offset_deg"]

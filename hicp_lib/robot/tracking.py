@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from hicp_lib.keypoints import N_KEYPOINTS
+from hicp_lib.core.keypoints import N_KEYPOINTS
 
 FARTHEST_M = 20.0  # what is farther from the robot along any axis is no sighting: depth ends at 10 m
 

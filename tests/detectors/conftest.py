@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hicp_lib
-from hicp_lib.images import write_png
+from hicp_lib.core.images import write_png
 
 from .plain_people import render_person
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import open3d
 
-from hicp_lib.simulation.body import REGIONS, load_body, pose_body
-from hicp_lib.simulation.camera import Camera, look_at, pixel_rays, project
+from hicp_lib.simulation.body.model import REGIONS, load_body, pose_body
+from hicp_lib.simulation.rendering.camera import Camera, look_at, pixel_rays, project
 
 _WALL = (190.0, 190.0, 180.0)
 _SKIN = (206.0, 160.0, 134.0)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hicp_lib.detectors.base import Detections
+from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.registry import DETECTORS, Entry
 
 

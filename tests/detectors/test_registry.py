@@ -2,6 +2,7 @@
 
 import pytest
 
+from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.registry import (
     DETECTORS,
     command_to_run,
@@ -10,7 +11,6 @@ from hicp_lib.detectors.registry import (
     detector_names,
     make_detector,
 )
-from hicp_lib.errors import InputError
 
 
 def test_detectors_that_need_a_model_are_not_run_by_default():

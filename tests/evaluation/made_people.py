@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from hicp_lib.annotations import Annotations, ImageInfo
-from hicp_lib.detectors.base import Detections
-from hicp_lib.keypoints import HEAD, INDEX, N_KEYPOINTS
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import HEAD, INDEX, N_KEYPOINTS
+from hicp_lib.formats.annotations import Annotations, ImageInfo
 
 # A person in a source image; the crop starts at (100, 200) and shows what is below the head.
 POINTS = np.random.default_rng(3).uniform([120, 220], [700, 600], (N_KEYPOINTS, 2))

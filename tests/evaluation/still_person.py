@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from hicp_lib.evaluation.stability import PARTS
+from hicp_lib.evaluation.space.stability import PARTS
 
 KEYPOINTS = [name for names in PARTS.values() for name in names]
 TRUE_M = dict(zip(KEYPOINTS, np.random.default_rng(7).uniform(-0.5, 0.5, (len(KEYPOINTS), 3)), strict=True))

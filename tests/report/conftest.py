@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from tiny_study import FINISH, MEASURE, START, write_notebook
 
-from hicp_lib import provenance
-from hicp_lib.checkout import CHECKOUT
+from hicp_lib.core.checkout import CHECKOUT
+from hicp_lib.study import provenance
 
 
 @pytest.fixture(autouse=True)

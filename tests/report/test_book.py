@@ -7,7 +7,7 @@ import shutil
 import matplotlib
 import pytest
 
-from hicp_lib.errors import InputError
+from hicp_lib.core.errors import InputError
 from hicp_lib.report.build import make_report
 from hicp_lib.report.runs import Folders, RunError
 

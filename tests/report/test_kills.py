@@ -16,7 +16,7 @@ import psutil
 import pytest
 from tiny_study import FINISH, MEASURE, START, pretend_to_execute, tiny_run
 
-from hicp_lib.files import sha256_file
+from hicp_lib.core.files import sha256_file
 from hicp_lib.report import runs
 from hicp_lib.report.runs import Folders, Run, run_all, run_key, why_stale
 

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tiny_study import write_notebook
 
-from hicp_lib.errors import InputError
+from hicp_lib.core.errors import InputError
 from hicp_lib.report.notebooks import (
     check_parameters,
     parse_overrides,

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.errors import InputError
+from hicp_lib.core.errors import InputError
 from hicp_lib.report.prose import Results, markdown_table, render_page
 
 

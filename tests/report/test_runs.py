@@ -8,11 +8,11 @@ import os
 import pytest
 from tiny_study import FINISH, MEASURE, START, pretend_to_execute, tiny_run, write_notebook
 
-from hicp_lib import provenance
-from hicp_lib.errors import InputError
-from hicp_lib.files import sha256_file
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import sha256_file
 from hicp_lib.report.notebooks import read_notebook
 from hicp_lib.report.runs import Run, RunError, _Children, run_all, run_key, why_stale
+from hicp_lib.study import provenance
 
 
 def test_a_run_leaves_its_results_and_is_not_repeated(tmp_path):
@@ -45,7 +45,7 @@ def test_a_run_leaves_its_results_and_is_not_repeated(tmp_path):
         ),
         ((START, MEASURE), r"05_tiny: ended without results; its last line must be"),
         (
-            ("from hicp_lib.study import Study\nstudy = Study({name!r}, seed=9)", FINISH),
+            ("from hicp_lib.study.page import Study\nstudy = Study({name!r}, seed=9)", FINISH),
             "05_tiny: its results state other parameters",
         ),
         (("import os; os._exit(1)",), "05_tiny: did not run: .*Kernel died"),

@@ -9,7 +9,7 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
-from hicp_lib.checkout import CHECKOUT
+from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.report.saving import strip_study_notebook
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 from nbformat import read, write
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from hicp_lib.files import write_json
+from hicp_lib.core.files import write_json
 from hicp_lib.report.notebooks import read_notebook
 from hicp_lib.report.runs import Folders, Run
 
 PARAMETERS = 'seed = 0\nscale = 1.5\ndetectors = ["a", "b"]\nimages = ""'
-START = """from hicp_lib.study import Study
+START = """from hicp_lib.study.page import Study
 study = Study({name!r}, seed=seed, scale=scale, detectors=detectors, images=images)"""
 MEASURE = """import pandas as pd
 study.save("t", pd.DataFrame({"x_px": [seed, 2.5]}))

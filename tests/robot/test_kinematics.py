@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hicp_lib.errors import InputError
-from hicp_lib.files import read_json, write_json
-from hicp_lib.robot.boards import arm_from_boards, head_from_boards
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json, write_json
 from hicp_lib.robot.kinematics import ARM_JOINTS, HEAD_JOINTS, load_icub
+from hicp_lib.robot.motor_order import arm_from_boards, head_from_boards
 from hicp_lib.robot.segments import body_segments
 from hicp_lib.robot.tables import ICUB_FILE, read_tables
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from keypoint_streams import first_violation
 
-from hicp_lib.keypoints import INDEX
+from hicp_lib.core.keypoints import INDEX
 from hicp_lib.robot.controller import PUBLISHED, Controller, Settings
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.loop import AVOIDING, FREE, STOPPED, AvoidanceLoop, Perception

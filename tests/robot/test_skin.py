@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hicp_lib.errors import InputError
-from hicp_lib.files import read_json, write_json
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json, write_json
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.skin import SKIN_FILE, read_skin
 

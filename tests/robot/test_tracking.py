@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hicp_lib.keypoints import INDEX
+from hicp_lib.core.keypoints import INDEX
 from hicp_lib.robot.tracking import KeypointTracker, Trust
 
 WRIST, ELBOW = INDEX["left_wrist"], INDEX["left_elbow"]

@@ -9,14 +9,14 @@ from itertools import islice
 import numpy as np
 from contents import content
 
-from hicp_lib.simulation.experiments.closed_loop import Trial, TrueKeypoints, simulate, start_posture
-from hicp_lib.simulation.experiments.doses import doses
-from hicp_lib.simulation.experiments.frames import record_frame
-from hicp_lib.simulation.experiments.head_camera import photograph
-from hicp_lib.simulation.experiments.reaching import SCRIPTS, script
-from hicp_lib.simulation.experiments.scenarios import scenario
-from hicp_lib.simulation.scenes import render_scene
-from hicp_lib.simulation.staging import random_stage
+from hicp_lib.experiments.avoidance.closed_loop import Trial, TrueKeypoints, simulate, start_posture
+from hicp_lib.experiments.avoidance.head_camera import photograph
+from hicp_lib.experiments.avoidance.reaching import SCRIPTS, script
+from hicp_lib.experiments.doses import doses
+from hicp_lib.experiments.recordings.frames import record_frame
+from hicp_lib.experiments.recordings.scenarios import scenario
+from hicp_lib.simulation.world.scenes import render_scene
+from hicp_lib.simulation.world.staging import random_stage
 
 
 def dressed(number: int) -> str:

@@ -11,10 +11,10 @@ from contents import content
 from made_results import dressed
 from scipy import sparse
 
-from hicp_lib.memo import memoised
-from hicp_lib.simulation import clothing
-from hicp_lib.simulation.clothing import Garment
-from hicp_lib.simulation.experiments.motion import Posture, between
+from hicp_lib.core.memo import memoised
+from hicp_lib.experiments.minimum_jerk import Posture, between
+from hicp_lib.simulation.appearance import clothing
+from hicp_lib.simulation.appearance.clothing import Garment
 
 HERE = Path(__file__).parent
 

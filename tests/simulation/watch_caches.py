@@ -6,13 +6,13 @@ kept = watch_caches()
 
 import numpy as np  # noqa: E402
 
-from hicp_lib.rgbd.lifting import lift  # noqa: E402
-from hicp_lib.rgbd.robust_lifting import lift_robust  # noqa: E402
-from hicp_lib.simulation.experiments.closed_loop import Trial, TrueKeypoints, simulate  # noqa: E402
-from hicp_lib.simulation.experiments.frames import record_frame  # noqa: E402
-from hicp_lib.simulation.experiments.laboratory import COLOUR  # noqa: E402
-from hicp_lib.simulation.scenes import render_scene  # noqa: E402
-from hicp_lib.simulation.staging import random_stage  # noqa: E402
+from hicp_lib.experiments.avoidance.closed_loop import Trial, TrueKeypoints, simulate  # noqa: E402
+from hicp_lib.experiments.laboratory import COLOUR  # noqa: E402
+from hicp_lib.experiments.recordings.frames import record_frame  # noqa: E402
+from hicp_lib.lifting.paper import lift  # noqa: E402
+from hicp_lib.lifting.robust import lift_robust  # noqa: E402
+from hicp_lib.simulation.world.scenes import render_scene  # noqa: E402
+from hicp_lib.simulation.world.staging import random_stage  # noqa: E402
 
 for number in (39, 71, 100):
     random_stage(np.random.default_rng(np.random.SeedSequence([0, number])))

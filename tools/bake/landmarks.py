@@ -10,7 +10,7 @@ from __future__ import annotations
 import anny
 import numpy as np
 
-from hicp_lib.keypoints import COCO_NAMES, INDEX, N_KEYPOINTS
+from hicp_lib.core.keypoints import COCO_NAMES, INDEX, N_KEYPOINTS
 
 from .source import Source
 

@@ -6,8 +6,8 @@ import numpy as np
 from anny.paths import get_anny_root_dir
 from PIL import Image
 
-from hicp_lib.keypoints import FACE, INDEX
-from hicp_lib.simulation.body import FIELDS, REGIONS
+from hicp_lib.core.keypoints import FACE, INDEX
+from hicp_lib.simulation.body.model import FIELDS, REGIONS
 
 from .landmarks import LASHES_RIGHT
 from .mesh import BodyMesh

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hicp_lib.detectors.base import Detections
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx import pose_nms
 from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.box_source import BoxSource
@@ -16,7 +17,6 @@ from hicp_lib.detectors.onnx.decode import Decoded, decode_combined, decode_inte
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.pose_net import PoseNet, Recipe, as_detections
 from hicp_lib.detectors.onnx.session import open_model
-from hicp_lib.errors import InputError
 
 _N_FACE_AND_HANDS = 110
 _DECODERS: dict[str, Callable[[np.ndarray], Decoded]] = {

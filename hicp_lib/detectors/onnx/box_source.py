@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.person_boxes import PersonBoxes
-from hicp_lib.errors import InputError
 
 BOX_SOURCES = ("gt", "image", "detected")
 

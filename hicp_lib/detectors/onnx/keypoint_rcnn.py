@@ -17,13 +17,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hicp_lib.detectors.base import Detections
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.decode import decode_roi_maps
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import Letterbox, letterbox, planes
 from hicp_lib.detectors.onnx.pose_net import as_detections
 from hicp_lib.detectors.onnx.session import Port, open_model
-from hicp_lib.errors import InputError
 
 _N_KEYPOINTS = 17
 _LOGIT_MIDDLE = 2.0

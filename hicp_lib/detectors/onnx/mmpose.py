@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from hicp_lib.detectors.base import Detections
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import SIGMAS, TO_HALPE
 from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.box_source import BoxSource
 from hicp_lib.detectors.onnx.decode import decode_dark, decode_quarter
@@ -14,8 +16,6 @@ from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.pose_net import PoseNet, Recipe, as_detections
 from hicp_lib.detectors.onnx.pose_nms import oks_nms
 from hicp_lib.detectors.onnx.session import open_model
-from hicp_lib.errors import InputError
-from hicp_lib.keypoints import SIGMAS, TO_HALPE
 
 # RTMW's head enlarges features by shuffling pixels; the other SimCC heads do not. Its scores go up to ten.
 _RTMW_OPERATOR, _RTMW_SCALE = "DepthToSpace", 10.0

@@ -13,10 +13,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import letterbox, planes
 from hicp_lib.detectors.onnx.session import open_model
-from hicp_lib.errors import InputError
 
 _FILL = (114, 114, 114)
 _NORMALISATIONS = {

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hicp_lib.detectors.base import Detections
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import mirror, to_halpe
 from hicp_lib.detectors.onnx.affine import PADDING, Regions
 from hicp_lib.detectors.onnx.decode import Decoded, decode_simcc
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import planes
 from hicp_lib.detectors.onnx.session import OnnxModel
-from hicp_lib.errors import InputError
-from hicp_lib.keypoints import mirror, to_halpe
 
 CONVENTIONS = {
     17: "coco17",
@@ -54,7 +54,7 @@ class PoseNet:
     Attributes
     ----------
     input_size_px : (width, height) of the crops
-    convention : what its keypoints are, a key of `hicp_lib.keypoints.TO_HALPE`
+    convention : what its keypoints are, a key of `hicp_lib.core.keypoints.TO_HALPE`
     is_simcc : a vector per axis in place of a heat map
     batch : crops per run; None if the file leaves it open
 

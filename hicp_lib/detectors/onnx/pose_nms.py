@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hicp_lib.evaluation.oks import oks_terms
+from hicp_lib.core.oks import oks_terms
 
 _N_FACE, _N_HANDS = 68, 42
 _FACE_FACTOR, _HAND_FACTOR = 1.9, 0.55

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from google.protobuf.message import DecodeError, Message
 
-from hicp_lib.detectors.protobuf import Messages, message_class
-from hicp_lib.detectors.published import check_use
-from hicp_lib.environment import with_variables
-from hicp_lib.errors import InputError
-from hicp_lib.files import sha256_bytes
+from hicp_lib.core.environment import with_variables
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import sha256_bytes
+from hicp_lib.detectors.onnx.protobuf import Messages, message_class
+from hicp_lib.detectors.weights.published import check_use
 
 # ONNX Runtime would tell its vendor of every model that is opened, and keep an identifier for that in the
 # user's cache folder. It reads the variable once, when it is loaded.

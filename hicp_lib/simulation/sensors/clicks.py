@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from hicp_lib.rgbd.camera import project, transform
-from hicp_lib.rgbd.qualisys import MotionCapture
-from hicp_lib.rgbd.recording import Recording, read_exact_depth_m
-from hicp_lib.rgbd.synchronisation import interpolate_mocap
+from hicp_lib.core.camera import project, transform
+from hicp_lib.mocap.synchronisation import interpolate_mocap
+from hicp_lib.recordings.qualisys import MotionCapture
+from hicp_lib.recordings.recording import Recording, read_exact_depth_m
 
 # A marker is clicked if nothing is this much nearer at its place: it sits on the skin, so its own
 # limb is not.
@@ -34,7 +34,7 @@ def simulate_clicks(
 
     Returns
     -------
-    DataFrame, columns as `hicp_lib.rgbd.clicking.read_clicks`
+    DataFrame, columns as `hicp_lib.mocap.clicking.read_clicks`
     """
     rng = np.random.default_rng(seed)
     tables = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hicp_lib.simulation.camera import Camera
+from hicp_lib.simulation.rendering.camera import Camera
 
 
 def align_to_colour(depth_m: np.ndarray, left: Camera, colour: Camera) -> np.ndarray:

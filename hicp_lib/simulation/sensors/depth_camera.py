@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from hicp_lib.simulation.body import REGIONS
-from hicp_lib.simulation.camera import Camera, pixel_rays
-from hicp_lib.simulation.people import RIGHT
-from hicp_lib.simulation.raycast import RayScene, doubled
+from hicp_lib.simulation.appearance.people import RIGHT
+from hicp_lib.simulation.body.model import REGIONS
+from hicp_lib.simulation.rendering.camera import Camera, pixel_rays
+from hicp_lib.simulation.rendering.raycast import RayScene, doubled
 from hicp_lib.simulation.sensors.depth_alignment import align_to_colour
 from hicp_lib.simulation.sensors.depth_noise import correlated_noise, patches
 

@@ -7,7 +7,7 @@ from statistics import NormalDist
 import cv2
 import numpy as np
 
-from hicp_lib.memo import memoised
+from hicp_lib.core.memo import memoised
 
 Rng = np.random.Generator
 _TILE_PX = 1536

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hicp_lib.keypoints import INDEX
-from hicp_lib.memo import memoised
-from hicp_lib.simulation.body import Body, PosedBody, load_body, pose_body
-from hicp_lib.simulation.mesh import Mesh
-from hicp_lib.simulation.raycast import RayScene
-from hicp_lib.simulation.surfaces import Hits, Look, Surface
+from hicp_lib.core.keypoints import INDEX
+from hicp_lib.core.memo import memoised
+from hicp_lib.simulation.body.model import Body, PosedBody, load_body, pose_body
+from hicp_lib.simulation.rendering.mesh import Mesh
+from hicp_lib.simulation.rendering.raycast import RayScene
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Surface
 
 SIDES = {
     "shoulder": ((1, 0, 0), (-1, 0, 0)),  # front and back, through the head of the upper arm

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from hicp_lib.rgbd.camera import transform
-from hicp_lib.rgbd.qualisys import MotionCapture
-from hicp_lib.simulation.body import PosedBody
-from hicp_lib.simulation.camera import join_rays
-from hicp_lib.simulation.mesh import Mesh
-from hicp_lib.simulation.raycast import RayScene
-from hicp_lib.simulation.rotations import rotation
+from hicp_lib.core.camera import transform
+from hicp_lib.core.rotations import rotation
+from hicp_lib.recordings.qualisys import MotionCapture
+from hicp_lib.simulation.body.model import PosedBody
+from hicp_lib.simulation.rendering.camera import join_rays
+from hicp_lib.simulation.rendering.mesh import Mesh
+from hicp_lib.simulation.rendering.raycast import RayScene
 from hicp_lib.simulation.sensors.markers import body_scene, markers_m
 
 Rng = np.random.Generator

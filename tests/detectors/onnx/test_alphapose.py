@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import COCO_17
 from hicp_lib.detectors.onnx.alphapose import AlphaPose
-from hicp_lib.errors import InputError
-from hicp_lib.keypoints import COCO_17
 
 from .onnx_models import ALPHAPOSE_PIXELS, colour_maps_model, colour_simcc_model, constant_model
 from .test_mmpose import back_to_image, dots, heat_maps

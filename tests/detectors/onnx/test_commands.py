@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hicp_lib import cli
-from hicp_lib.detectors.own import keep_own, own_options, own_path
+from hicp_lib.cli import main as cli
+from hicp_lib.core.images import write_png
 from hicp_lib.detectors.registry import make_detector
-from hicp_lib.images import write_png
-from hicp_lib.provenance import weights_sha256
+from hicp_lib.detectors.weights.user import keep_own, own_options, own_path
+from hicp_lib.study.provenance import weights_sha256
 
 from .onnx_models import colour_maps_model, constant_model
 from .test_mmpose import dots

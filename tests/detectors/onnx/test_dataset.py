@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from hicp_lib.annotations import Annotations, ImageInfo, write_annotations
-from hicp_lib.detectors.run import detect_dataset, detect_images
-from hicp_lib.errors import InputError
-from hicp_lib.images import write_png
-from hicp_lib.keypoints import COCO_17, N_KEYPOINTS
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.images import write_png
+from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS
+from hicp_lib.detectors.runtime.run import detect_dataset, detect_images
+from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 
 from .onnx_models import colour_maps_model
 from .test_mmpose import dots

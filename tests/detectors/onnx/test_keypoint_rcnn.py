@@ -6,9 +6,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from onnx import TensorProto, helper
 
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import COCO_17
 from hicp_lib.detectors.onnx.keypoint_rcnn import KeypointRcnn, logistic_score
-from hicp_lib.errors import InputError
-from hicp_lib.keypoints import COCO_17
 
 from .onnx_models import constant_model, save
 

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import COCO_17, LEFT_HAND, RIGHT_HAND, TO_HALPE
 from hicp_lib.detectors.onnx.mmpose import MMPose
-from hicp_lib.errors import InputError
-from hicp_lib.keypoints import COCO_17, LEFT_HAND, RIGHT_HAND, TO_HALPE
 
 from .onnx_models import colour_maps_model, colour_simcc_model, constant_model
 

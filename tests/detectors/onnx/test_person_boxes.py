@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from onnx import helper
 
+from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.person_boxes import PersonBoxes
-from hicp_lib.errors import InputError
 
 from .onnx_models import constant_model, save
 

@@ -8,9 +8,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from onnx import TensorProto, helper
 
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import sha256_file
 from hicp_lib.detectors.onnx.session import available_providers, open_model
-from hicp_lib.errors import InputError
-from hicp_lib.files import sha256_file
 
 from .onnx_models import colour_maps_model, constant_model, save
 

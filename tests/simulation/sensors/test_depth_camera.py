@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hicp_lib.simulation import materials
-from hicp_lib.simulation import mesh as g
-from hicp_lib.simulation.body import REGIONS
-from hicp_lib.simulation.camera import Camera, look_at, pixel_rays
-from hicp_lib.simulation.raycast import RayScene
+from hicp_lib.simulation.appearance import materials
+from hicp_lib.simulation.body.model import REGIONS
+from hicp_lib.simulation.rendering import mesh as g
+from hicp_lib.simulation.rendering.camera import Camera, look_at, pixel_rays
+from hicp_lib.simulation.rendering.raycast import RayScene
+from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.sensors.depth_alignment import align_to_colour
 from hicp_lib.simulation.sensors.depth_camera import (
     D435,
@@ -19,7 +20,6 @@ from hicp_lib.simulation.sensors.depth_camera import (
     simulate_raw_depth,
     without_errors,
 )
-from hicp_lib.simulation.surfaces import Surface
 
 GREY = materials.plain(np.full(3, 0.5))
 # In the world as in the camera: x right, y down, z forward.

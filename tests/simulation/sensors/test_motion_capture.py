@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from hicp_lib.keypoints import INDEX
-from hicp_lib.simulation import mesh as g
-from hicp_lib.simulation.body import load_body, pose_body
-from hicp_lib.simulation.raycast import RayScene
-from hicp_lib.simulation.rotations import rotation
+from hicp_lib.core.keypoints import INDEX
+from hicp_lib.core.rotations import rotation
+from hicp_lib.simulation.body.model import load_body, pose_body
+from hicp_lib.simulation.rendering import mesh as g
+from hicp_lib.simulation.rendering.raycast import RayScene
+from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.sensors.markers import (
     CAMERA_MARKER,
     CAMERA_MARKER_M,
@@ -27,7 +28,6 @@ from hicp_lib.simulation.sensors.motion_capture import (
     room_cameras_m,
     watch,
 )
-from hicp_lib.simulation.surfaces import Surface
 
 BODY = load_body()
 SHAPE = "man_35_average"

@@ -1,0 +1,43 @@
+"""`hicp calibration`: keypoint scores that mean the same whoever gave them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from hicp_lib.cli.options import PATH, say
+
+
+@click.group()
+def calibration() -> None:
+    """Keypoint scores that say how often they are right."""
+
+
+@calibration.command("fit")
+@click.option("--annotations", type=PATH, required=True, help="Annotations in Halpe's layout.")
+@click.option("--detections", type=PATH, required=True, help="COCO keypoint results on these images.")
+@click.option("--detector", default="detector", show_default=True, help="Name kept in the file.")
+@click.option("--out", type=PATH, required=True, help="CSV file to write.")
+def calibration_fit(annotations: Path, detections: Path, detector: str, out: Path) -> None:
+    """Fit hit rates to scores, on images that nothing is evaluated on later."""
+    from hicp_lib.evaluation.calibration.files import fit_calibrations, write_calibrations
+    from hicp_lib.formats.annotations import read_annotations, read_detections
+
+    people = read_annotations(annotations)
+    table, counts = fit_calibrations(people, read_detections(detections, people), detector)
+    write_calibrations(out, table)
+    say(f"{out}: " + ", ".join(f"{group} fitted to {n} keypoints" for group, n in counts.items()))
+
+
+@calibration.command("apply")
+@click.option("--calibrations", type=PATH, required=True, help="Of `fit`, or the report's Parquet file.")
+@click.option("--detector", default="", help="Whose; needed where the file has several detectors'.")
+@click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
+@click.option("--out", type=PATH, required=True, help="Results to write, scores as they were beside.")
+def calibration_apply(calibrations: Path, detector: str, detections: Path, out: Path) -> None:
+    """Write results with calibrated keypoint scores; the scores as they were stay beside them."""
+    from hicp_lib.evaluation.calibration.files import apply_calibrations, read_calibrations
+
+    n = apply_calibrations(detections, read_calibrations(calibrations, detector), out)
+    say(f"{out}: {n} people")

@@ -1,0 +1,227 @@
+"""`hicp doctor`: what the study needs from this machine, found or missing, and how to mend it."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.metadata
+import os
+import platform
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from hicp_lib.cli.opencv_files import WANTED, overwritten
+from hicp_lib.cli.probes import EXIT_ABSENT, EXIT_FAILED, probes
+from hicp_lib.cli.system_libraries import LIBRARIES, missing_packages
+from hicp_lib.core.checkout import working_folder
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import cache_dir
+from hicp_lib.study import provenance
+
+PYTHONS = ((3, 11), (3, 14))
+MIN_FREE_GB = 3.0
+PROBE_LIMIT_S = 120.0
+OK, ABSENT, FAIL = "ok", "--", "FAIL"
+"""What a check came to; absent is a part that was not installed, which is no fault."""
+PROBE = (sys.executable, "-P", "-m", "hicp_lib.cli.probes")
+_REINSTALL = "rm .venv/.installed; make report"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One line of the doctor: what was looked at, what was found, and what to do if it is not well."""
+
+    name: str
+    status: str
+    finding: str
+    remedy: str = ""
+
+    @classmethod
+    def of(cls, name: str, is_ok: bool, finding: str, remedy: str) -> Check:
+        """A check that is well or not."""
+        return cls(name, OK if is_ok else FAIL, finding, remedy)
+
+    def __str__(self) -> str:
+        remedy = f"; remedy: {self.remedy}" if self.status == FAIL else ""
+        return f"{self.status:<4} {self.name}: {self.finding}{remedy}"
+
+
+def run_checks() -> list[Check]:
+    """Every check; none of them raises, and none contacts a network."""
+    return [
+        check_python(),
+        check_system_libraries(),
+        check_locked_versions(provenance.LOCK_PATH),
+        check_opencv(),
+        check_weights(),
+        *check_probes(),
+        *check_folder("cache", cache_dir(), "set HICP_CACHE to a folder you may write to"),
+        *check_folder("results", working_folder() / "results", "give yourself the right to write there"),
+    ]
+
+
+def check_python() -> Check:
+    """The version, and that it runs in an environment of its own."""
+    oldest, newest = PYTHONS
+    is_ok = oldest <= sys.version_info[:2] <= newest
+    remedy = "make it anew with a Python from 3.11 to 3.14: rm -r .venv; make report PYTHON=python3.12"
+    return Check.of("Python", is_ok, platform.python_version(), remedy)
+
+
+def check_system_libraries() -> Check:
+    """What the wheels load and do not bring."""
+    missing = missing_packages()
+    finding = f"missing: {' '.join(missing)}" if missing else "all that is needed"
+    return Check.of("system libraries", not missing, finding, f"sudo apt-get install {' '.join(missing)}")
+
+
+def check_locked_versions(lock_path: Path) -> Check:
+    """That what is installed is what the lock says."""
+    if provenance.CHECKOUT is None:
+        return Check("locked environment", OK, "none: hicp was installed without a checkout")
+    try:
+        locked = dict(locked_versions(lock_path.read_text()))
+    except OSError as error:
+        return Check.of(
+            "locked environment", False, f"{lock_path}: {error.strerror}", "git restore environment.lock"
+        )
+    wrong = [f"{name} {_installed(name)} instead of {version}" for name, version in locked.items()
+             if _installed(name) != version]  # fmt: skip
+    finding = f"{len(wrong)} differ: {', '.join(wrong[:3])}" if wrong else f"{len(locked)} packages as locked"
+    return Check.of("locked environment", not wrong, finding, _REINSTALL)
+
+
+def locked_versions(lock: str) -> Iterator[tuple[str, str]]:
+    """(name, version) of each locked package that is meant for this Python and system."""
+    from packaging.requirements import Requirement
+
+    for line in re.findall(r"^[A-Za-z0-9][^\\\n]*==[^\\\n]+", lock, re.MULTILINE):
+        requirement = Requirement(line.strip())
+        if requirement.marker is None or requirement.marker.evaluate():
+            yield requirement.name, next(iter(requirement.specifier)).version
+
+
+def _installed(name: str) -> str:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return "none"
+
+
+def check_probes() -> list[Check]:
+    """That detectors, renderer and controller run: as many trials at a time as there are processors."""
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        return list(threads.map(check_probe, probes()))
+
+
+def check_probe(name: str, command: tuple[str, ...] = PROBE, limit_s: float = PROBE_LIMIT_S) -> Check:
+    """Run one trial (see `hicp_lib.cli.probes`) in a process of its own, which may die or hang.
+
+    Parameters
+    ----------
+    command : what runs the trial; its name is appended
+    limit_s : after this the trial and all its processes are ended
+    """
+    process = subprocess.Popen(
+        [*command, name], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, errors="replace", start_new_session=True,
+    )  # fmt: skip
+    try:
+        said, murmured = process.communicate(timeout=limit_s)
+    except subprocess.TimeoutExpired:
+        return Check(name, FAIL, f"no answer within {limit_s:g} s, ended", _remedy(""))
+    finally:
+        _end(process)
+    return _judge(name, process.returncode, _last_line(said), _last_line(murmured))
+
+
+def _end(process: subprocess.Popen) -> None:
+    """End what may be left of a trial: itself, and processes that it started."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def _judge(name: str, code: int, said: str, murmured: str) -> Check:
+    """What the end of a trial means; `said` and `murmured` are its last words on the two outputs."""
+    if code == 0:
+        return Check(name, OK, said)
+    if code == EXIT_ABSENT:
+        return Check(name, ABSENT, said)
+    if code == EXIT_FAILED and said:
+        return Check(name, FAIL, said, _remedy(said))
+    ending = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+    words = f" ({murmured})" if murmured else ""
+    return Check(name, FAIL, f"its process died of {ending}{words}", _remedy(murmured))
+
+
+def _remedy(words: str) -> str:
+    """What to do about a failure, by what it says: a shared library's package, or to install anew."""
+    library = re.search(r"lib[\w+.-]+\.so[.\d]*(?=: cannot open shared object)", words)
+    if library is None:
+        return f"in a container or chroot, give it /proc, /sys and /dev; else: {_REINSTALL}"
+    if library[0] in LIBRARIES:
+        return f"sudo apt-get install {LIBRARIES[library[0]][0]}"
+    return f"install the system's package with {library[0]}"
+
+
+def _last_line(text: str) -> str:
+    return next((" ".join(line.split()) for line in reversed(text.splitlines()) if line.strip()), "")
+
+
+def check_opencv() -> Check:
+    """That OpenCV's files are those of the build without a display, and no other distribution's."""
+    fault = overwritten()
+    return Check("OpenCV", FAIL, *fault) if fault else Check("OpenCV", OK, f"{WANTED} {_installed(WANTED)}")
+
+
+def check_weights() -> Check:
+    """That every weight file is here and is the one the registry names."""
+    from hicp_lib.detectors.weights.default import list_weights
+
+    try:
+        weights = list_weights()
+    except InputError as error:
+        return Check.of("weights", False, str(error), "git restore data/detectors.json")
+    wrong = [f"{row['name']} {row['status']}" for row in weights if row["status"] != "present"]
+    return Check.of(
+        "weights", not wrong, ", ".join(wrong) or f"{len(weights)} present and sound", "hicp models fetch"
+    )
+
+
+def check_folder(name: str, folder: Path, remedy: str) -> list[Check]:
+    """That files can be written there, and that the disk has room."""
+    there = _nearest_existing(folder)
+    is_writable = _attempt(lambda: _write_there(there))
+    free_gb = shutil.disk_usage(there).free / 1e9
+    room = f"{free_gb:.1f} GB free (at least {MIN_FREE_GB:.0f} wanted)"
+    return [
+        Check.of(
+            f"{name} folder", is_writable, f"{folder} {'is' if is_writable else 'is not'} writable", remedy
+        ),
+        Check.of(f"{name} disk", free_gb >= MIN_FREE_GB, room, f"free space on the disk of {there}"),
+    ]
+
+
+def _nearest_existing(folder: Path) -> Path:
+    return next(path for path in (folder, *folder.parents) if path.exists())
+
+
+def _write_there(folder: Path) -> None:
+    with tempfile.NamedTemporaryFile(dir=folder) as file:
+        file.write(os.urandom(16))
+
+
+def _attempt(action: Callable[[], None]) -> bool:
+    try:
+        action()
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,267 @@
+"""The `hicp` command. Every subcommand only reads its arguments, calls the library and prints.
+
+Libraries are imported inside the commands, so that `hicp --help` answers at once.
+Exit codes: 0 done, 1 a notebook or the book failed, 2 bad input or usage; always with one line on
+standard error, never a traceback for a user's mistake.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from pathlib import Path
+from typing import Any, NoReturn
+
+import click
+
+from hicp_lib import __version__
+from hicp_lib.cli.calibration import calibration
+from hicp_lib.cli.models import models
+from hicp_lib.cli.options import PATH, WORKERS, detector_options, given, say
+from hicp_lib.cli.recordings import lift, record
+from hicp_lib.core.errors import InputError
+
+
+def main() -> NoReturn:
+    """Run the command line and exit."""
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # an image cut off is told in one line, by us
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command; its exit code. A user's mistake is told in one line on standard error."""
+    try:
+        return hicp(arguments, prog_name="hicp", standalone_mode=False) or 0
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        return 2
+    except click.ClickException as error:
+        context = getattr(error, "ctx", None)
+        where = context.command_path if context else "hicp"
+        return _fail(f"{' '.join(error.format_message().split())} See: {where} --help", 2)
+    except (click.Abort, KeyboardInterrupt):
+        return _fail("stopped; run the same command again to go on", 130)
+    except InputError as error:
+        return _fail(error, 2)
+    except OSError as error:
+        if error.filename is None:
+            raise
+        name = error.filename2 or error.filename  # of two, the one to be written
+        return _fail(f"{name}: {error.strerror}; check the path, the rights and the disk space", 2)
+
+
+def _fail(message: object, code: int) -> int:
+    click.echo(f"hicp: {message}", err=True)
+    return code
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__)
+def hicp() -> None:
+    """Human keypoint detection at close range: data, detectors, evaluation, report."""
+
+
+hicp.add_command(record)
+hicp.add_command(lift)
+hicp.add_command(calibration)
+hicp.add_command(models)
+
+
+@hicp.group()
+def scenes() -> None:
+    """Rendered people."""
+
+
+@scenes.command("render")
+@click.argument("out", type=PATH)
+@click.option("--n", default=100, show_default=True, type=click.IntRange(min=1), help="Number of images.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0))
+@click.option("--workers", type=WORKERS, help="Processes; all cores if not given.")
+def scenes_render(out: Path, n: int, seed: int, workers: int | None) -> None:
+    """Render people at 1-5 m into the folder OUT, with annotations in Halpe's layout."""
+    from hicp_lib.simulation.world.scenes import render_dataset
+
+    render_dataset(out, n=n, seed=seed, workers=workers)
+    say(f"{out}: {n} images")
+
+
+@hicp.group()
+def dataset() -> None:
+    """HiCP data sets: Basic and Headless crops."""
+
+
+@dataset.command("create")
+@click.option("--annotations", type=PATH, required=True, help="Annotations in Halpe's layout.")
+@click.option("--images", type=PATH, required=True, help="Folder of the images.")
+@click.option("--out", type=PATH, required=True, help="Where basic/ and headless/ are written.")
+@click.option("--min-pixels", default=20_000, show_default=True, type=click.IntRange(min=1))
+def dataset_create(annotations: Path, images: Path, out: Path, min_pixels: int) -> None:
+    """Cut people out of annotated images: Basic, and Headless without their heads."""
+    from hicp_lib.datasets.subsets import create_hicp
+
+    counts = create_hicp(annotations, images, out, min_pixels=min_pixels, progress=sys.stderr.isatty())
+    say(json.dumps(counts, indent=2))
+
+
+@hicp.command()
+@detector_options
+@click.option("--dataset", "dataset_dir", type=PATH, help="Folder with images/ and annotations.json.")
+@click.option("--images", "images_dir", type=PATH, help="Folder of images without annotations.")
+@click.option("--out", type=PATH, required=True, help="COCO keypoint results to write.")
+@click.option("--workers", type=WORKERS, help="Threads; all cores if not given.")
+@click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster, which then does the work.")
+def detect(
+    detector: str, dataset_dir: Path | None, images_dir: Path | None, out: Path, workers, dask, **chosen
+) -> None:
+    """Find people and their keypoints in images.
+
+    What was found in an image is kept: after an interruption, the same command does only the rest.
+    """
+    from hicp_lib.detectors.runtime.run import detect_dataset, detect_images
+    from hicp_lib.formats.annotations import write_detections
+
+    if (dataset_dir is None) == (images_dir is None):
+        raise click.UsageError("Give either --dataset DIR or --images DIR.", click.get_current_context())
+    if workers and dask:
+        raise click.UsageError("Give either --workers N or --dask ADDRESS.", click.get_current_context())
+    if dataset_dir is not None:
+        found = detect_dataset(detector, dataset_dir, workers, dask=dask, **given(**chosen))
+    else:
+        paths = _numbered_images(images_dir)
+        results = detect_images(detector, paths, workers, dask=dask, **given(**chosen))
+        found = {key: result.detections for key, result in results.items()}
+        _write_names(out, paths)
+    write_detections(out, found)
+    say(f"{out}: {sum(len(people) for people in found.values())} people in {len(found)} images")
+
+
+def _numbered_images(folder: Path) -> dict[int, Path]:
+    """Image ids as COCO numbers its files (000000012345.jpg is 12345), else by the order of names."""
+    if not folder.is_dir():
+        raise InputError(f"{folder}: is not a folder; give the folder that holds the images")
+    kinds = {".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff"}
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in kinds)
+    if not paths:
+        raise InputError(f"{folder}: holds no images; expected files such as 000001.jpg or photo.png")
+    numbers = [int(path.stem) for path in paths if path.stem.isascii() and path.stem.isdigit()]
+    is_numbered = len(set(numbers)) == len(paths)
+    return dict(zip(numbers if is_numbered else range(1, len(paths) + 1), paths, strict=True))
+
+
+def _write_names(out: Path, paths: dict[int, Path]) -> None:
+    """Beside the results, the image of each id: COCO's result layout has no place for names."""
+    from hicp_lib.core.files import write_json
+
+    names = [{"id": number, "file_name": path.name} for number, path in paths.items()]
+    write_json(out.with_suffix(".images.json"), names, indent=1)
+
+
+@hicp.command("import")
+@click.option("--format", "kind", required=True, help="openpose, alphapose, mmpose, detectron2 or coco.")
+@click.option("--predictions", type=PATH, required=True, help="The folder or file the tool wrote.")
+@click.option("--annotations", type=PATH, required=True, help="Annotations of the images the tool saw.")
+@click.option("--out", type=PATH, required=True, help="COCO keypoint results to write.")
+@click.option("--score-scale", type=float, help="Divides keypoint scores; the format's own if not given.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+def import_(kind: str, predictions: Path, annotations: Path, out: Path, score_scale, as_json: bool) -> None:
+    """Read the predictions another tool wrote."""
+    from hicp_lib.formats.annotations import read_annotations
+    from hicp_lib.formats.importers.importing import import_predictions, write_imported
+
+    imported = import_predictions(kind, predictions, read_annotations(annotations), score_scale)
+    write_imported(out, imported)
+    summary = imported.summary
+    for line in [json.dumps(summary.as_dict(), indent=2)] if as_json else summary.lines():
+        say(line)
+
+
+@hicp.command("export")
+@click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
+@click.option("--format", "kind", required=True, help="coco (results) or fiftyone (a COCO data set).")
+@click.option("--layout", default="halpe136", show_default=True, help="Or halpe26, coco17, wholebody133.")
+@click.option("--annotations", type=PATH, help="Annotations of the images; fiftyone needs them.")
+@click.option("--out", type=PATH, required=True)
+def export(detections: Path, kind: str, layout: str, annotations: Path | None, out: Path) -> None:
+    """Write detections for other tools."""
+    from hicp_lib.formats.annotations import read_annotations, read_detections
+    from hicp_lib.formats.exporters import export_detections
+
+    people = None if annotations is None else read_annotations(annotations)
+    n = export_detections(kind, read_detections(detections, people), out, people, layout)
+    say(f"{out}: {n} people")
+
+
+@hicp.command()
+@click.option("--annotations", type=PATH, required=True, help="Annotations in Halpe's layout.")
+@click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
+@click.option("--group", default="body", show_default=True, help="body (17 points) or hand (42).")
+@click.option("--sigmas", default="halpe", show_default=True, help="halpe or wholebody.")
+@click.option("--area", default="segment", show_default=True, help="segment, box, box53 or source.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the bootstrap.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def evaluate(
+    annotations: Path, detections: Path, group: str, sigmas: str, area: str, seed: int, as_json
+) -> None:
+    """Average precision and recall by OKS, with 95 % bootstrap intervals over images."""
+    from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals
+    from hicp_lib.evaluation.ap.evaluate import evaluate as evaluate_detections
+    from hicp_lib.evaluation.ap.metric_table import source_images
+    from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN
+    from hicp_lib.formats.annotations import read_annotations, read_detections
+
+    people = read_annotations(annotations)
+    found = read_detections(detections, people)
+    evaluation = evaluate_detections(people, found, group, sigmas=sigmas, area=area)
+    clusters = source_images(people)  # crops of one image are drawn together
+    rows = bootstrap_intervals(evaluation, seed=seed, clusters=clusters).to_dict("records")
+    if as_json:
+        figures = {row["metric"]: _finite({k: row[k] for k in ("value", "low", "high")}) for row in rows}
+        say(json.dumps(_finite(evaluation.row()) | {"metrics": figures, "seed": seed}, indent=2))
+        return
+    say(
+        f"{group}: {evaluation.n_people} people in {evaluation.n_images} images; {sigmas} sigmas, {area} area"
+    )
+    if not any(map(len, found.values())):
+        say(f"{detections}: an empty list: nobody was found in any image")
+    if not any(row["low"] == row["low"] for row in rows):
+        say(f"no intervals: they ask for {MIN_DRAWN} source images at least")
+    for row in rows:
+        interval = f"  [{row['low']:.3f}, {row['high']:.3f}]" if row["low"] == row["low"] else ""
+        say(f"{row['metric']:<5} {row['value']:.3f}{interval}")
+
+
+def _finite(row: dict[str, Any]) -> dict[str, Any]:
+    """NaN, where nobody counts, is null in JSON."""
+    return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
+
+
+@hicp.command()
+@click.option("--profile", default="full", show_default=True, help="A profile of notebooks/profiles.toml.")
+@click.option("-p", "--parameter", "pairs", nargs=2, multiple=True, metavar="NAME VALUE",
+              help="A notebook parameter; may be repeated.")  # fmt: skip
+@click.option("--results", "root", type=PATH,
+              help="Where results/ and _build/ are written; the working folder if not given.")  # fmt: skip
+def report(profile: str, pairs: tuple[tuple[str, str], ...], root: Path | None) -> int:
+    """Run the notebooks and build the book; what has not changed is not done again."""
+    from hicp_lib.core.checkout import sources, working_folder
+    from hicp_lib.report.build import make_report
+    from hicp_lib.report.runs import RunError
+
+    try:
+        make_report(profile, list(pairs), say, sources(), root or working_folder())
+    except RunError as error:
+        return _fail(error, 1)
+    return 0
+
+
+@hicp.command()
+def doctor() -> int:
+    """Check the installation: one line each, with the remedy."""
+    from hicp_lib.cli.doctor import FAIL, run_checks
+
+    checks = run_checks()
+    for check in checks:
+        say(str(check))
+    return 2 if any(check.status == FAIL for check in checks) else 0

@@ -1,0 +1,84 @@
+"""`hicp models`: the detectors' weights, the study's and the user's own."""
+
+from __future__ import annotations
+
+import click
+
+from hicp_lib.cli.options import detector_options, given, say
+from hicp_lib.core.errors import InputError
+
+
+@click.group()
+def models() -> None:
+    """The detectors' weights."""
+
+
+@models.command("list")
+def models_list() -> None:
+    """List the weight files, their licences, and whether they are here."""
+    from hicp_lib.detectors.weights.default import list_weights
+    from hicp_lib.detectors.weights.published import published, status
+    from hicp_lib.detectors.weights.user import all_own_options
+
+    for row in list_weights():
+        size = f"{row['size_bytes'] / 1e6:5.1f} MB"
+        say(f"{row['name']:<32} {row['status']:<8} {size}  {row['licence']:<12} {', '.join(row['used_by'])}")
+    say("\npublished, fetched by name:")
+    for model in published().values():
+        size = "     ? MB" if model.size_bytes is None else f"{model.size_bytes / 1e6:6.1f} MB"
+        row = f"{model.name:<32} {status(model):<10} {size}  {model.licence or 'licence ?':<12}"
+        say(f"{row} {model.use or 'not run here'}: {model.note}")
+    for name, options in all_own_options().items():
+        say(f"yours: {name} with {', '.join(f'{key} {value}' for key, value in options.items())}")
+
+
+@models.command("fetch")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+def models_fetch(names: tuple[str, ...]) -> None:
+    """Get the weight files that are not here, and check each against its hash.
+
+    NAME is a weight file, a detector, or a published model; without any, all weight files are fetched,
+    and no published model. MediaPipe itself comes with its detectors' weights.
+    """
+    from hicp_lib.detectors.mediapipe.program import fetch_program, is_wanted
+    from hicp_lib.detectors.weights.default import fetch
+    from hicp_lib.detectors.weights.published import fetch_published, published
+
+    by_name = [name for name in names if name in published()]
+    others = [name for name in names if name not in by_name]
+    if others or not names:
+        for name in fetch(others or None):
+            say(f"fetched {name}")
+        if is_wanted(others) and fetch_program():
+            say("fetched MediaPipe")
+    for name in by_name:
+        model = fetch_published(name)
+        how = f"hicp detect --detector {model.use} {model.path} ..." if model.use else model.note
+        say(f"fetched {name}: {model.path} ({how})")
+
+
+@models.command("show")
+@detector_options
+def models_show(detector: str, **chosen) -> None:
+    """Tell everything that is taken for granted about a detector and its model file."""
+    from hicp_lib.detectors.registry import describe, make_detector
+
+    for what, value, why in describe(make_detector(detector, **given(**chosen))):
+        say(f"{what:<16} {value}" + (f"  ({why})" if why else ""))
+
+
+@models.command("use")
+@detector_options
+def models_use(detector: str, **chosen) -> None:
+    """Say once which model file a detector runs on; notebooks and commands then take it by its name."""
+    from hicp_lib.detectors.registry import DETECTORS, make_detector
+    from hicp_lib.detectors.weights.user import keep_own
+
+    options = given(**chosen)
+    if detector in DETECTORS and not DETECTORS[detector].needs_model:
+        raise InputError(f"detector {detector!r} has weights of its own; it takes none of yours")
+    make_detector(detector, **options)
+    if "model" not in options:
+        raise InputError(f"detector {detector!r}: no model is named; give it with --model FILE.onnx")
+    keep_own(detector, options)
+    say(f"{detector}: {options['model']}; run it in the report with: hicp report -p detectors {detector}")

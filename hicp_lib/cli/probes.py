@@ -1,0 +1,82 @@
+"""Small trials of what runs on native libraries: each detector, the renderer, the controller.
+
+`python -m hicp_lib.cli.probes NAME` makes one trial and prints what came of it. The doctor runs each in a process
+of its own: a native library may abort, or hang, and must not take anything along.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.core.extras import MissingPartError
+from hicp_lib.core.images import read_image
+from hicp_lib.detectors.registry import DETECTORS, default_detector_names, make_detector
+
+EXIT_FAILED, EXIT_ABSENT = 1, 3
+"""What a trial's process ends with where the trial failed, and where what it needs was not chosen."""
+
+
+def probes() -> dict[str, Callable[[], str]]:
+    """Trials by name; each returns what it found, or raises. Detectors of one module share a process."""
+    by_module: dict[str, list[str]] = {}
+    for name in default_detector_names():
+        by_module.setdefault(DETECTORS[name].module, []).append(name)
+    detectors = {", ".join(names): partial(_detect, names) for names in by_module.values()}
+    return {**detectors, "renderer": _render, "controller": _control}
+
+
+def _detect(names: list[str]) -> str:
+    picture, shown = _picture()
+    found = [len(make_detector(name).detect(picture)) for name in names]
+    return f"in {shown}: {', '.join(map(str, found))}"
+
+
+def _picture() -> tuple[np.ndarray, str]:
+    """A photograph of a person that Matplotlib ships, or where it is not installed a plain picture."""
+    if find_spec("matplotlib") is None:
+        return np.full((480, 640, 3), 128, np.uint8), "a plain picture"
+    import matplotlib
+
+    path = Path(matplotlib.get_data_path()) / "sample_data" / "grace_hopper.jpg"
+    return read_image(path), "a photograph of one person"
+
+
+def _render() -> str:
+    from hicp_lib.simulation.world.scenes import render_scene
+
+    image, people = render_scene(seed=0, index=0)
+    return f"{image.shape[1]} x {image.shape[0]} pixels with {len(people)} people"
+
+
+def _control() -> str:
+    from hicp_lib.robot.controller import Controller
+    from hicp_lib.robot.home import HOME_M, home_posture
+    from hicp_lib.robot.kinematics import load_icub
+
+    icub = load_icub()
+    home = home_posture(icub)
+    controller = Controller(icub, np.array(HOME_M["left"]), home.angles("left"))
+    return f"{len(controller.velocities(home, []))} joint velocities"
+
+
+def main(name: str) -> int:
+    """Make one trial; one line on standard output says what came of it."""
+    try:
+        print(probes()[name]())
+    except MissingPartError as error:
+        print(error)
+        return EXIT_ABSENT
+    except Exception as error:  # a broken library may raise anything
+        print(" ".join(str(error).split()) or type(error).__name__)
+        return EXIT_FAILED
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

@@ -1,0 +1,105 @@
+"""Commands for recordings of an RGB-D camera on a robot: `hicp record ...` and `hicp lift`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from hicp_lib.cli.options import PATH, WORKERS, detector_options, given, say
+
+
+@click.group()
+def record() -> None:
+    """Recordings of colour, depth and camera poses."""
+
+
+@record.command("simulate")
+@click.argument("scenario", metavar="relative-upper|relative-lower|mocap")
+@click.argument("out", type=PATH)
+@click.option("--n-frames", type=click.IntRange(min=1), help="The scenario's own number if not given.")
+@click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0))
+@click.option("--workers", type=WORKERS, help="Processes; all cores if not given.")
+def simulate(scenario: str, out: Path, n_frames: int | None, seed: int, workers: int | None) -> None:
+    """Simulate a recording into the folder OUT.
+
+    The relative scenarios show a seated person from many poses of the robot, mocap one who moves, with
+    motion capture. Finished frames are kept: after an interruption, the same command does only the rest.
+    """
+    from hicp_lib.experiments.recordings.simulate import simulate_recording
+
+    recording = simulate_recording(out, scenario, n_frames, seed, workers, progress=sys.stderr.isatty())
+    say(f"{out}: {len(recording)} frames")
+
+
+@record.command("check")
+@click.argument("folder", type=PATH, metavar="DIR")
+def check(folder: Path) -> int:
+    """Say what is missing or inconsistent in the recording in DIR, one line each.
+
+    Exit code 2 if it cannot be used as it is.
+    """
+    from hicp_lib.recordings.check import check_recording
+    from hicp_lib.recordings.recording import open_recording
+
+    findings = check_recording(folder)
+    for finding in findings:
+        say(f"{'FAIL' if finding.is_fatal else 'note'} {finding}")
+    if any(finding.is_fatal for finding in findings):
+        return 2
+    recording = open_recording(folder)
+    duration_s = recording.times_s[-1] - recording.times_s[0]
+    say(f"ok   {folder}: {len(recording)} frames in {duration_s:.1f} s")
+    return 0
+
+
+@record.command("import")
+@click.argument("out", type=PATH)
+@click.option("--bag", type=PATH, help="A .bag of the RealSense viewer.")
+@click.option("--open3d", "folder", type=PATH, help="A folder with color/, depth/ and intrinsic.json.")
+@click.option(
+    "--poses", type=PATH, help="Camera poses (TUM text; one line: it stands still), or joints (CSV)."
+)
+@click.option(
+    "--mount", default="level", show_default=True, type=click.Choice(["level", "tilted"]), help="For joints."
+)
+@click.option("--rate", type=click.FloatRange(min=0, min_open=True), help="Frames per second of a folder.")
+def import_(out: Path, bag: Path | None, folder: Path | None, poses: Path | None, mount: str, rate) -> None:
+    """Make a recording in the folder OUT of what RealSense's or Open3D's tools saved.
+
+    Without --poses the camera's own frame is the base frame.
+    """
+    from hicp_lib.recordings.importing import import_bag, import_open3d, read_pose_source
+
+    if (bag is None) == (folder is None):
+        raise click.UsageError("Give either --bag FILE or --open3d DIR.", click.get_current_context())
+    source = read_pose_source(poses, mount)
+    n = import_bag(bag, out, source) if folder is None else import_open3d(folder, out, source, rate)
+    say(f"{out}: {n} frames; check them with: hicp record check {out}")
+
+
+@click.command()
+@click.option("--recording", "folder", type=PATH, required=True, help="Folder of the recording.")
+@detector_options
+@click.option("--method", default="robust", show_default=True, help="Or paper: the paper's method.")
+@click.option("--out", type=PATH, required=True, help="Table to write: FILE.parquet, or FILE.csv.")
+@click.option("--workers", type=WORKERS, help="Threads; all cores if not given.")
+def lift(folder: Path, detector: str, method: str, out: Path, workers: int | None, **chosen) -> None:
+    """Find people in a recording and where their keypoints are in the robot's base frame."""
+    from hicp_lib.core.extras import require
+    from hicp_lib.core.files import atomic_path
+    from hicp_lib.detectors.runtime.run import detect_images
+    from hicp_lib.lifting.table import lift_recording, steps_of
+    from hicp_lib.recordings.recording import open_recording
+
+    is_csv = out.suffix == ".csv"
+    if not is_csv:
+        require("analysis", "pyarrow")
+    recording = open_recording(folder)
+    steps_of(method)  # a wrong name is told before anybody is looked for
+    found = detect_images(detector, dict(enumerate(recording.rgb_paths)), workers, **given(**chosen))
+    table = lift_recording(recording, [found[k].detections for k in range(len(recording))], method)
+    with atomic_path(out) as temporary:
+        table.to_csv(temporary, index=False) if is_csv else table.to_parquet(temporary, index=False)
+    say(f"{out}: {table['x_m'].notna().sum()} of {len(table)} keypoints in {len(recording)} frames lifted")

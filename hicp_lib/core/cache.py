@@ -1,0 +1,274 @@
+"""Keys of cached results: the code that makes a result, the data it reads, the libraries it calls, its inputs.
+
+The code is found, not listed: every module of the library that the entry points import, from whatever place
+(the *import closure*). So a module that moves, or is imported anew, is part of the key by itself.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib.metadata
+import json
+import re
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import sha256_bytes, sha256_file
+
+LIBRARY_DIR = Path(__file__).resolve().parents[1]
+
+# Distributions whose name is not that of what is imported; of several, the one that is installed.
+_DISTRIBUTIONS = {
+    "PIL": ("pillow",),
+    "cv2": ("opencv-python-headless", "opencv-python", "opencv-contrib-python"),
+    "google": ("protobuf",),
+    "jupyter_book": ("jupyter-book",),
+    "open3d": ("open3d-cpu", "open3d"),
+    "pinocchio": ("pin",),
+}
+_DATA = re.compile(r'\bDATA_DIR\b(?:\s*/\s*"([^"]+)")?')
+ALL_DATA = "**/*"
+
+
+@dataclass(frozen=True)
+class Code:
+    """What results of some entry points follow from, besides their inputs.
+
+    Attributes
+    ----------
+    modules, data : dict of str to str
+        SHA-256 by module name, and by path below `data/`.
+    libraries : dict of str to str
+        Version by name, of every other library that one of the modules imports; "absent" where it is not
+        installed.
+    """
+
+    modules: dict[str, str]
+    data: dict[str, str]
+    libraries: dict[str, str]
+
+
+@dataclass(frozen=True)
+class _Module:
+    sha256: str
+    imports: frozenset[str]
+    data: frozenset[str]
+
+
+def key(entry_points: Sequence[Any], *, without: Sequence[str] = (), **inputs: Any) -> str:
+    """SHA-256 of everything a result depends on.
+
+    Parameters
+    ----------
+    entry_points : sequence of callables, modules or module names
+        What makes the result. All code is counted that they import, and all that imports in turn.
+    without : sequence of str
+        Names of modules where that stops: what they do to the result is said by `inputs`.
+    **inputs
+        What the code is given, by any names: plain values, arrays, tables, dataclasses of these; a path counts
+        by the names, sizes and times of its files.
+
+    Raises
+    ------
+    TypeError
+        For an input whose content is not known.
+
+    Examples
+    --------
+    >>> one = key([sha256_bytes], n_frames=3)
+    >>> one == key([sha256_bytes], n_frames=3), one == key([sha256_bytes], n_frames=4)
+    (True, False)
+    """
+    names = tuple(sorted({_module_name(entry) for entry in entry_points}))
+    return digest([_code_digest(names, tuple(without)), content(inputs)])
+
+
+@cache
+def _code_digest(names: tuple[str, ...], without: tuple[str, ...]) -> str:
+    found = code(names, without=without)
+    return digest([found.modules, found.data, found.libraries])
+
+
+def code(
+    names: Iterable[str], *, without: Sequence[str] = (), library: Path = LIBRARY_DIR, data: Path = DATA_DIR
+) -> Code:
+    """The import closure of modules of the library, with the data and the libraries it uses.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Modules; what is not of the library counts as a library that is called.
+    without : sequence of str
+        Modules that are left out, with what only they import.
+    library, data : Path
+        Folders of the library's code and of its data.
+
+    Examples
+    --------
+    >>> sorted(code(["hicp_lib.core.errors"]).modules)
+    ['hicp_lib', 'hicp_lib.core', 'hicp_lib.core.errors']
+    """
+    waiting, modules, others = list(names), {}, set()
+    while waiting:
+        name = waiting.pop()
+        if name in modules or name in without:
+            continue
+        path = _path(name, library)
+        if path is not None:
+            modules[name] = _read(path)
+            waiting += [name.rpartition(".")[0], *modules[name].imports]
+        elif name.startswith("hicp_lib."):
+            waiting.append(name.rpartition(".")[0])  # something within a module
+        elif name:
+            others.add(name.partition(".")[0])
+    patterns = frozenset().union(*(module.data for module in modules.values()))
+    return Code(
+        {name: module.sha256 for name, module in modules.items()},
+        _data_sha256(patterns, data),
+        {name: _version(name) for name in others - sys.stdlib_module_names},
+    )
+
+
+def imports_of(source: str) -> frozenset[str]:
+    """Names of what Python code imports, wherever in it; not what it imports for type checks alone."""
+    return frozenset(name for statement in _imports(ast.parse(source)) for name in _imported(statement))
+
+
+def content(value: Any) -> Any:
+    """What JSON can hold and differs where `value` differs.
+
+    Raises
+    ------
+    TypeError
+        For a value whose content is not known.
+    """
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        if value.dtype.hasobject:
+            return content(value.tolist())
+        return [str(value.dtype), value.shape, sha256_bytes(np.ascontiguousarray(value).tobytes())]
+    if isinstance(value, Path):
+        state = value.stat()
+        return input_sha256(value) if value.is_dir() else [value.name, state.st_size, state.st_mtime_ns]
+    if isinstance(value, Mapping):
+        return [[content(name), content(item)] for name, item in value.items()]
+    if isinstance(value, Sequence):
+        return [content(item) for item in value]
+    if is_dataclass(value):
+        return [type(value).__name__, {f.name: content(getattr(value, f.name)) for f in fields(value)}]
+    if type(value).__name__ == "DataFrame":
+        return _table_content(value)
+    raise TypeError(f"the content of {type(value).__name__} is not known; no result of it can be cached")
+
+
+def digest(value: Any) -> str:
+    """SHA-256 of a JSON-able value, independent of the order of its keys."""
+    return sha256_bytes(json.dumps(value, sort_keys=True, ensure_ascii=False).encode())
+
+
+def files_sha256(paths: Iterable[Path], base: Path) -> str:
+    """One SHA-256 over the names (relative to `base`) and contents of files, independent of their order.
+
+    Raises
+    ------
+    InputError
+        If there is none of them: the hash of nothing would call two results alike that are not.
+    """
+    hashes = {path.relative_to(base).as_posix(): sha256_file(path) for path in paths}
+    if not hashes:
+        raise InputError(f"{base}: the files that a result follows from are not there; install hicp anew")
+    return digest(hashes)
+
+
+def input_sha256(path: Path) -> str:
+    """Identity of an input: a file's content, or a folder's file names, sizes and modification times.
+
+    A folder of images is not read: hashing gigabytes on every call would cost more than it protects.
+    """
+    if path.is_file():
+        return sha256_file(path)
+    files = sorted(p for p in path.rglob("*") if p.is_file())
+    return digest([[p.relative_to(path).as_posix(), p.stat().st_size, p.stat().st_mtime_ns] for p in files])
+
+
+def _module_name(entry: Any) -> str:
+    if isinstance(entry, str):
+        return entry
+    return entry.__name__ if isinstance(entry, ModuleType) else entry.__module__
+
+
+def _path(name: str, library: Path) -> Path | None:
+    """The file of a module of the library; None if there is no such module."""
+    parts = name.split(".")
+    if parts[0] != "hicp_lib":
+        return None
+    path = library.joinpath(*parts[1:])
+    file = path / "__init__.py" if path.is_dir() else path.with_name(f"{path.name}.py")
+    return file if file.is_file() else None
+
+
+@cache
+def _read(path: Path) -> _Module:
+    """A module as it was when it was first asked for: later changes are not in the code this process runs."""
+    source = path.read_bytes()
+    statements = list(_imports(ast.parse(source)))
+    names = frozenset(name for statement in statements for name in _imported(statement))
+    lines = source.decode().splitlines()
+    for statement in statements:
+        lines[statement.lineno - 1 : statement.end_lineno] = [""] * (
+            statement.end_lineno - statement.lineno + 1
+        )
+    data = frozenset(name or ALL_DATA for name in _DATA.findall("\n".join(lines)))
+    return _Module(sha256_bytes(source), names, frozenset() if path.name == "datafiles.py" else data)
+
+
+def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, (ast.Import, ast.ImportFrom)):
+            yield node
+        elif isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
+            yield from (found for other in node.orelse for found in _imports(ast.Module([other], [])))
+        elif not isinstance(node, ast.expr):
+            yield from _imports(node)
+
+
+def _imported(statement: ast.Import | ast.ImportFrom) -> Iterator[str]:
+    if isinstance(statement, ast.ImportFrom):
+        yield statement.module
+        yield from (f"{statement.module}.{alias.name}" for alias in statement.names)
+    else:
+        yield from (alias.name for alias in statement.names)
+
+
+def _data_sha256(patterns: Iterable[str], data: Path) -> dict[str, str]:
+    paths = {path for pattern in patterns for path in data.glob(pattern) if path.is_file()}
+    return {path.relative_to(data).as_posix(): sha256_file(path) for path in paths}
+
+
+@cache
+def _version(name: str) -> str:
+    for distribution in _DISTRIBUTIONS.get(name, (name,)):
+        try:
+            return importlib.metadata.version(distribution)
+        except importlib.metadata.PackageNotFoundError:
+            pass
+    return "absent"
+
+
+def _table_content(table: Any) -> list:
+    from pandas.util import hash_pandas_object  # takes long to load, and is there already if it is a table
+
+    hashes = hash_pandas_object(table).to_numpy()
+    return [[str(name), str(kind)] for name, kind in table.dtypes.items()] + [sha256_bytes(hashes.tobytes())]

@@ -1,0 +1,60 @@
+"""Tables kept on disk: what was made once of the same inputs with the same code is read, not made again.
+
+A notebook that is opened after a report so shows the report's numbers, and soon, whatever threads its
+process has.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from hicp_lib.core.cache import key
+from hicp_lib.core.files import cache_dir, sha256_bytes, write_bytes
+
+
+def kept(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> pd.DataFrame:
+    """The table ``make(*arguments, **named)``, made only if it is not in the cache.
+
+    The key is all it depends on (`hicp_lib.core.cache.key`): the function and what it imports, and its inputs. A damaged file is never an
+    answer: the table is made again. What is returned was read from the file, the first time too.
+
+    Parameters
+    ----------
+    make : a function of `hicp_lib` whose result follows from its inputs
+
+    Raises
+    ------
+    TypeError
+        For an input whose content is not known.
+    """
+    given = inspect.signature(make).bind(*arguments, **named)
+    given.apply_defaults()
+    result_key = key([make], function=make.__qualname__, **given.arguments)
+    path = cache_dir() / "tables" / make.__name__ / f"{result_key[:32]}.bin"
+    table = _read(path)
+    if table is None:
+        made = pa.BufferOutputStream()
+        pq.write_table(pa.Table.from_pandas(make(*arguments, **named)), made)
+        payload = made.getvalue().to_pybytes()
+        write_bytes(path, sha256_bytes(payload).encode() + payload)
+        table = _read(path)
+    return table
+
+
+def _read(path: Path) -> pd.DataFrame | None:
+    """The table of a file that is a SHA-256 and the Parquet it is of; None if it is absent or damaged."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    stated, payload = content[:64], content[64:]
+    if sha256_bytes(payload).encode() != stated:
+        return None
+    return pq.read_table(pa.BufferReader(payload)).to_pandas()

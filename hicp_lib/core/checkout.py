@@ -1,0 +1,39 @@
+"""Where the study's notebooks and book are, and where results go: never beside installed code."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hicp_lib.core.errors import InputError
+
+_MARK = Path("notebooks", "profiles.toml")
+_BESIDE_LIBRARY = Path(__file__).resolve().parents[2]
+
+CHECKOUT: Path | None = _BESIDE_LIBRARY if (_BESIDE_LIBRARY / _MARK).is_file() else None
+"""The checkout that the library itself runs from; None where it was installed."""
+
+
+def working_folder() -> Path:
+    """Where results go: the working folder, or the study around it, since Jupyter works in `notebooks`."""
+    here = Path.cwd()
+    return _study_around(here) or here
+
+
+def sources() -> Path:
+    """The study to run: the one the working folder lies in, or the library's own checkout.
+
+    Raises
+    ------
+    InputError
+        If there is neither: an installed package brings the library, not the notebooks.
+    """
+    found = _study_around(Path.cwd()) or CHECKOUT
+    if found is None:
+        raise InputError(
+            f"{Path.cwd()}: has no {_MARK}; the report is made of the study's notebooks, run it in a checkout"
+        )
+    return found
+
+
+def _study_around(folder: Path) -> Path | None:
+    return next((path for path in (folder, *folder.parents) if (path / _MARK).is_file()), None)

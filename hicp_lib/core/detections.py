@@ -1,0 +1,69 @@
+"""What every detector is: an image in, people in the Halpe-136 layout out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from hicp_lib.core.keypoints import N_KEYPOINTS
+
+
+@dataclass(frozen=True)
+class Detections:
+    """The people found in one image.
+
+    Attributes
+    ----------
+    keypoints_px : array, shape (n_persons, 136, 2)
+        (u, v) in pixels, pixel centres at integers, origin top-left; NaN where the
+        detector gives no such keypoint. Points may lie outside the image.
+    scores : array, shape (n_persons, 136)
+        Keypoint confidence in [0, 1]; 0 where the keypoint is NaN.
+    person_scores : array, shape (n_persons,)
+        What people are ranked by in AP.
+    """
+
+    keypoints_px: np.ndarray
+    scores: np.ndarray
+    person_scores: np.ndarray
+
+    def __post_init__(self) -> None:
+        for name in ("keypoints_px", "scores", "person_scores"):  # as files keep them, found anew or not
+            object.__setattr__(self, name, np.asarray(getattr(self, name), float))
+
+    @classmethod
+    def none(cls) -> Detections:
+        """Nobody found."""
+        return cls(np.full((0, N_KEYPOINTS, 2), np.nan), np.zeros((0, N_KEYPOINTS)), np.zeros(0))
+
+    def and_also(self, more: Detections) -> Detections:
+        """These people, then others in the same image."""
+        return Detections(
+            np.concatenate([self.keypoints_px, more.keypoints_px]),
+            np.concatenate([self.scores, more.scores]),
+            np.concatenate([self.person_scores, more.person_scores]),
+        )
+
+    def __len__(self) -> int:
+        return len(self.person_scores)
+
+
+class Detector(Protocol):
+    """A keypoint detector, ready to run.
+
+    `settings` (JSON-able: weights' SHA-256, thresholds, versions that matter) identifies
+    its results: two detectors with equal name and settings give equal detections. A detector
+    with a true attribute `takes_boxes` is given the people's boxes, `detect(image, boxes_px)`.
+    One that is made of others has them in a dictionary `parts` and asks them there, so that
+    their answers can be kept (see `hicp_lib.detectors.runtime.cached_parts`). One whose first call would take longer than the
+    others, since something is started for it, starts that in a method `start()` too, if it is called before.
+    """
+
+    name: str
+    settings: dict
+
+    def detect(self, image: np.ndarray) -> Detections:
+        """Find people in an RGB image, shape (height, width, 3), uint8."""
+        ...

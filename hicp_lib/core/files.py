@@ -1,0 +1,88 @@
+"""Files: the cache folder, hashes, writes that are whole or absent, JSON read at the door."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import platformdirs
+
+from hicp_lib.core.errors import InputError
+
+
+def cache_dir() -> Path:
+    """Folder of downloads, renders and detections: ``$HICP_CACHE``, or the user's cache folder."""
+    return Path(os.environ.get("HICP_CACHE") or platformdirs.user_cache_dir("hicp"))
+
+
+@contextmanager
+def atomic_path(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary name beside `path`; rename it to `path` when the block succeeds.
+
+    A reader sees the old file, the new one, or none: never a half-written one. The
+    temporary file keeps the suffix, since image writers choose the format by it.
+    """
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.parent / f".partial-{secrets.token_hex(8)}{path.suffix}"
+    os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # less the caller's mask
+    try:
+        yield temporary
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_bytes(path: str | Path, content: bytes) -> None:
+    """Write `content` to `path`, whole or not at all."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def write_json(path: str | Path, value: Any, *, indent: int | None = None) -> None:
+    """Write `value` as strict JSON (NaN and infinity are refused), whole or not at all."""
+    text = json.dumps(value, indent=indent, allow_nan=False)
+    write_bytes(path, (text + "\n").encode())
+
+
+def read_json(path: str | Path) -> Any:
+    """Read JSON from outside.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, unreadable or not JSON; the line and column are named.
+    """
+    path = Path(path)
+    try:
+        return json.loads(path.read_bytes())
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a JSON file") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is not text in UTF-8; expected a JSON file") from None
+    except json.JSONDecodeError as error:
+        raise InputError(
+            f"{path}: line {error.lineno}, column {error.colno}: not JSON ({error.msg}); "
+            "the file may be cut off, write it again"
+        ) from None
+    except (RecursionError, ValueError):
+        raise InputError(
+            f"{path}: nested too deeply or with numbers too long to be an annotation file"
+        ) from None
+
+
+def sha256_bytes(content: bytes) -> str:
+    """SHA-256 of `content` in hexadecimal."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def sha256_file(path: str | Path) -> str:
+    """SHA-256 of a file's content in hexadecimal."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,46 @@
+"""Images in and out: RGB, 8 bit, as arrays."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import write_bytes
+
+
+def read_image(path: str | Path) -> np.ndarray:
+    """Read an image as RGB, shape (height, width, 3), uint8; EXIF rotation is not applied.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or not an image OpenCV can decode.
+    """
+    try:
+        content = np.fromfile(path, dtype=np.uint8)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); expected an image file") from None
+    return decode_image(content, path)
+
+
+def decode_image(content: bytes | np.ndarray, path: str | Path) -> np.ndarray:
+    """An image out of a file's content, as `read_image` does; `path` is for the error's message."""
+    content = np.frombuffer(content, dtype=np.uint8)
+    flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+    bgr = cv2.imdecode(content, flags) if content.size else None
+    if bgr is None:
+        raise InputError(f"{path}: is not an image (PNG, JPEG, ...) or is cut off; replace the file")
+    return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+
+
+def write_png(path: str | Path, image: np.ndarray) -> None:
+    """Write an image losslessly: RGB uint8 (height, width, 3), or one channel uint8/uint16."""
+    pixels = cv2.cvtColor(image, cv2.COLOR_RGB2BGR) if image.ndim == 3 else image
+    # Level 1: a third larger than the default, four times as fast. One filter for all rows instead of the
+    # best for each: as small, and in half the time, for reading too.
+    options = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP]
+    _, encoded = cv2.imencode(".png", pixels, options)
+    write_bytes(path, encoded.tobytes())

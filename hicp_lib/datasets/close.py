@@ -1,0 +1,134 @@
+"""Close: a third subset beside HiCP's Basic and Headless, of single parts of people.
+
+A robot within reach of a person sees a head, an arm or two legs alone, which hardly any crop of a whole
+person shows. This subset is not the paper's. It is cut from the crops of Basic by rule: around the labelled
+keypoints of one part, grown by a margin. A crop is taken when it has at least `min_pixels` pixels and its
+annotations say that it is of the class aimed at (`evaluation.visibility_classes`); of every class, the first
+`n_per_class` people. No detector has a say in it.
+
+Arms and legs of rendered people or of COCO's are small: with Basic's least size hardly any would be left.
+So the crops are smaller than Basic's, and resolution differs along with the class.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.core.cache import key
+from hicp_lib.core.files import cache_dir, sha256_file
+from hicp_lib.core.images import read_image, write_png
+from hicp_lib.core.keypoints import HEAD, INDEX, LEFT_HAND, RIGHT_HAND
+from hicp_lib.datasets.crops import Box, crop_people, n_pixels, whole_pixel_boxes
+from hicp_lib.datasets.visibility import visibility_class
+from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
+
+MARGIN = 0.1  # of the larger side of the keypoints' extent, added on every side
+
+
+def _named(*names: str) -> np.ndarray:
+    return np.array([INDEX[name] for name in names])
+
+
+_LEFT = np.r_[_named("left_elbow", "left_wrist"), LEFT_HAND]
+_RIGHT = np.r_[_named("right_elbow", "right_wrist"), RIGHT_HAND]
+# Class aimed at: keypoints that the crop is cut around.
+AIMS: dict[str, np.ndarray] = {
+    "only head": HEAD,
+    "only left arm": _LEFT,
+    "only right arm": _RIGHT,
+    "both arms": np.r_[_LEFT, _RIGHT, _named("left_shoulder", "right_shoulder")],
+    "both arms without shoulders": np.r_[_LEFT, _RIGHT],
+    "only legs": _named("left_knee", "right_knee", "left_ankle", "right_ankle"),
+}
+
+
+def open_close(basic: Path, n_per_class: int = 30, min_pixels: int = 5_000) -> Path:
+    """The dataset folder of Close for a folder of Basic; made in the cache if it is not there.
+
+    Parameters
+    ----------
+    basic : dataset folder (`images/`, `annotations.json`) that `create_hicp` wrote
+    n_per_class : most crops per class
+    min_pixels : least size of a crop
+    """
+    of_basic = {"annotations": sha256_file(basic / "annotations.json"), "basic": str(basic.resolve())}
+    result_key = key([open_close], **of_basic, n_per_class=n_per_class, min_pixels=min_pixels)
+    folder = cache_dir() / "close" / result_key[:16]
+    if (folder / "annotations.json").is_file():
+        return folder
+    source = read_annotations(basic / "annotations.json")
+    parts = []
+    for aim in AIMS:
+        parts += _crops_of(source, aim, n_per_class, min_pixels)
+    for number, (image_id, box, _) in enumerate(parts, start=1):
+        left, top, right, bottom = box
+        pixels = read_image(basic / "images" / source.images[image_id].file_name)
+        write_png(folder / "images" / _file_name(number), pixels[top:bottom, left:right])
+    write_annotations(folder / "annotations.json", _joined(source, parts))
+    return folder
+
+
+def _crops_of(
+    source: Annotations, aim: str, most: int, min_pixels: int
+) -> list[tuple[int, Box, Annotations]]:
+    """The first crops that show what is aimed at: image id in Basic, box, people."""
+    kept: list[tuple[int, Box, Annotations]] = []
+    for rows in _people_by_image(source):
+        people = source.take(rows)
+        box = _box_around(people, AIMS[aim], source.images[int(people.image_ids[0])])
+        if box is None or n_pixels(box) < min_pixels:
+            continue
+        shown = crop_people(people, np.arange(len(people)), box)
+        if not shown.is_crowd[0] and visibility_class(shown.visibility[:1])[0] == aim:
+            kept.append((int(people.image_ids[0]), box, shown))
+        if len(kept) == most:
+            break
+    return kept
+
+
+def _people_by_image(source: Annotations) -> Iterator[np.ndarray]:
+    """Rows of each crop's people, whoever counts first."""
+    for image_id in source.images:
+        rows = np.flatnonzero(source.image_ids == image_id)
+        yield rows[np.argsort(source.is_crowd[rows], kind="stable")]
+
+
+def _box_around(people: Annotations, keypoints: np.ndarray, image: ImageInfo) -> Box | None:
+    """The grown extent of the first person's labelled keypoints, in whole pixels of the image."""
+    points = people.keypoints_px[0, keypoints[people.visibility[0, keypoints] > 0]]
+    if len(points) < 2:
+        return None
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = MARGIN * (high - low).max()
+    box = np.r_[low - margin, high - low + 2 * margin][None]
+    crop = whole_pixel_boxes(box, np.array([image.width_px]), np.array([image.height_px]))[0]
+    return tuple(int(edge) for edge in crop)
+
+
+def _file_name(number: int) -> str:
+    return f"{number:012d}.png"
+
+
+def _joined(source: Annotations, parts: list[tuple[int, Box, Annotations]]) -> Annotations:
+    """The crops as one data set; image ids count from 1, and people say where they come from."""
+    origins = {
+        int(image_id): extra
+        for image_id, extra in zip(source.image_ids, source.extras, strict=True)
+        if not extra.get("other")
+    }
+    images, extras = {}, []
+    pieces = [source.take(np.zeros(0, dtype=int))]  # so that no crop at all is a data set, too
+    for number, (image_id, box, people) in enumerate(parts, start=1):
+        images[number] = ImageInfo(number, _file_name(number), box[2] - box[0], box[3] - box[1])
+        left, top = origins[image_id]["crop_px"][:2]
+        in_source = [box[0] + left, box[1] + top, box[2] + left, box[3] + top]
+        extras.append(origins[image_id] | {"subset": "close", "crop_px": in_source})
+        extras += [{"other": True} for _ in people.ids[1:]]
+        pieces.append(replace(people, image_ids=np.full(len(people), number)))
+    arrays = ("image_ids", "boxes_px", "areas_px2", "is_crowd", "keypoints_px", "visibility")
+    joined = {name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in arrays}
+    return Annotations(images=images, ids=np.arange(1, len(extras) + 1), extras=extras, **joined)

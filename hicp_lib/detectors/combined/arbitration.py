@@ -1,0 +1,204 @@
+"""Whose hand is it: from many sightings of hands to at most one left and one right hand per body.
+
+Several looks at an image show the same hand more than once, show other people's hands, and show hands
+where there are none. Three rules, in this order:
+
+1. *Duplicates.* Sightings whose roots lie closer together than a share of the hand's size are one hand;
+   its points are the medians of theirs.
+2. *Refusal.* A hand whose root is farther from a wrist than a share of the forearm is not that wrist's.
+   An arm without a wrist takes hands within reach of its elbow, and failing that of its shoulder.
+3. *Assignment.* Hands go to arms so that the sum of distances, in forearms, is smallest. Left and right
+   are the arm's, whatever the hand model says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.extras import needs
+from hicp_lib.core.keypoints import LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
+from hicp_lib.detectors.combined.hand_squares import Arms
+
+with needs("mediapipe"):
+    from scipy.optimize import linear_sum_assignment
+
+SIDES = np.stack([LEFT_HAND, RIGHT_HAND])
+_REFUSED = 1e6  # a distance no hand is assigned at; finite, as the solver wants it
+
+
+@dataclass(frozen=True)
+class ArbitrationRule:
+    """Thresholds of the rules above.
+
+    Attributes
+    ----------
+    same_hand : roots closer than this share of the smaller hand's size are one hand's (size: from the
+        root to the farthest point)
+    wrist_reach, elbow_reach, shoulder_reach : farthest root from the arm's last given joint, in forearms
+    """
+
+    same_hand: float = 0.5
+    wrist_reach: float = 1.0
+    elbow_reach: float = 1.5
+    shoulder_reach: float = 2.5
+
+
+@dataclass(frozen=True)
+class Hands:
+    """Sightings of hands.
+
+    Attributes
+    ----------
+    keypoints_px : array, shape (n, 21, 2); the root is given, others may be NaN
+    scores : array, shape (n, 21)
+    sides : array, shape (n,), what the hand model calls them: 0 left, 1 right
+    """
+
+    keypoints_px: np.ndarray
+    scores: np.ndarray
+    sides: np.ndarray
+
+    @classmethod
+    def of(cls, found: Detections) -> Hands:
+        """The hands in detections; one without its root is none."""
+        rows, sides = np.nonzero(np.isfinite(found.keypoints_px[:, SIDES[:, 0]]).all(axis=-1))
+        points = SIDES[sides]
+        return cls(found.keypoints_px[rows[:, None], points], found.scores[rows[:, None], points], sides)
+
+    @classmethod
+    def together(cls, parts: list[Hands]) -> Hands:
+        """All sightings of several looks."""
+        none = cls(np.zeros((0, 21, 2)), np.zeros((0, 21)), np.zeros(0, dtype=int))
+        return cls(
+            np.concatenate([part.keypoints_px for part in [none, *parts]]),
+            np.concatenate([part.scores for part in [none, *parts]]),
+            np.concatenate([part.sides for part in [none, *parts]]),
+        )
+
+    def take(self, rows: np.ndarray) -> Hands:
+        """Some of the sightings."""
+        return Hands(self.keypoints_px[rows], self.scores[rows], self.sides[rows])
+
+    def __len__(self) -> int:
+        return len(self.sides)
+
+
+def merge_duplicates(hands: Hands, same_hand: float) -> Hands:
+    """One hand for all sightings of it: medians of points and scores, the side most of them say."""
+    roots = hands.keypoints_px[:, 0]
+    sizes = np.nanmax(np.linalg.norm(hands.keypoints_px - roots[:, None], axis=-1), axis=1, initial=0)
+    apart = np.linalg.norm(roots[:, None] - roots[None], axis=-1)
+    near = (apart < same_hand * np.minimum.outer(sizes, sizes)) | np.eye(len(hands), dtype=bool)
+    left = np.ones(len(hands), dtype=bool)
+    merged = []
+    while left.any():
+        # First the hand with the most sightings around it; among equals the first seen.
+        centre = np.where(left, (near & left).sum(axis=1), 0).argmax()
+        merged.append(_median(hands.take(near[centre] & left)))
+        left &= ~near[centre]
+    return Hands.together(merged)
+
+
+def _median(same: Hands) -> Hands:
+    given = np.isfinite(same.keypoints_px).all(axis=(0, 2))  # points that every sighting gives
+    points = np.where(given[:, None], np.median(same.keypoints_px, axis=0), same.keypoints_px[0])
+    scores = np.where(given, np.median(same.scores, axis=0), same.scores[0])
+    return Hands(points[None], scores[None], np.array([round(same.sides.mean() + 1e-9)]))
+
+
+def distances(arms: Arms, hands: Hands, rule: ArbitrationRule) -> np.ndarray:
+    """How far hands are from where arms end, in forearms.
+
+    Returns
+    -------
+    array, shape (n_bodies, 2, n_hands), inf where the arm refuses the hand
+    """
+    result = np.full((*arms.scales_px.shape, len(hands)), np.inf)
+    joints = (
+        (arms.shoulders_px, rule.shoulder_reach), (arms.elbows_px, rule.elbow_reach),
+        (arms.wrists_px, rule.wrist_reach),
+    )  # fmt: skip
+    for positions_px, reach in joints:
+        away = np.linalg.norm(positions_px[:, :, None] - hands.keypoints_px[:, 0], axis=-1)
+        away = away / arms.scales_px[..., None]
+        given = np.isfinite(positions_px).all(axis=-1) & np.isfinite(arms.scales_px)
+        result = np.where(given[..., None], np.where(away < reach, away, np.inf), result)
+    return result
+
+
+def assign(away: np.ndarray) -> np.ndarray:
+    """Which hand each arm gets, from distances (n_bodies, 2, n_hands): (n_bodies, 2), -1 for none."""
+    chosen = np.full(away.shape[:2], -1)
+    costs = np.where(np.isfinite(away), away, _REFUSED).reshape(chosen.size, away.shape[2])
+    rows, columns = linear_sum_assignment(costs)
+    taken = costs[rows, columns] < _REFUSED
+    chosen.flat[rows[taken]] = columns[taken]
+    return chosen
+
+
+def nearest_first(wrists_px: np.ndarray, hands: Hands, chosen: np.ndarray) -> np.ndarray:
+    """Assignment without arbitration: each hand, surest first, to the nearest wrist that is still free.
+
+    Of wrists (n_bodies, 2, 2), NaN where not given, those are free whose arm has no hand yet, -1 in `chosen`
+    (n_bodies, 2); the hands are indexed as in `assign`.
+    """
+    chosen = chosen.copy()
+    away = np.linalg.norm(wrists_px[:, :, None] - hands.keypoints_px[:, 0], axis=-1)
+    away = np.where(np.isnan(away), np.inf, away)
+    for hand in np.argsort(-hands.scores.mean(axis=1), kind="stable"):
+        open_px = np.where(chosen < 0, away[:, :, hand], np.inf)
+        if hand not in chosen and np.isfinite(open_px).any():
+            chosen.flat[open_px.argmin()] = hand
+    return chosen
+
+
+def give_hands(bodies: Detections, hands: Hands, chosen: np.ndarray) -> Detections:
+    """Bodies (n) with their chosen hands (n, 2), -1 for none: such an arm keeps what its body came with."""
+    keypoints_px, scores = bodies.keypoints_px.copy(), bodies.scores.copy()
+    for body, side in np.argwhere(chosen >= 0):
+        hand = chosen[body, side]
+        keypoints_px[body, SIDES[side]] = hands.keypoints_px[hand]
+        scores[body, SIDES[side]] = hands.scores[hand]
+    return Detections(keypoints_px, scores, bodies.person_scores)
+
+
+def in_pairs(hands: Hands) -> Detections:
+    """Instances of the k-th surest left with the k-th surest right hand, as the model calls them."""
+    return _instances(hands, *_by_side(hands))
+
+
+def without_body(hands: Hands) -> Detections:
+    """Instances of hands that belong to no body found: the k-th surest left with the k-th surest right.
+
+    Sides are the model's, there is nothing better; but of two hands with the same side, the less sure
+    takes the other: nobody has two left hands.
+    """
+    lefts, rights = _by_side(hands)
+    more, fewer = (lefts, rights) if len(lefts) > len(rights) else (rights, lefts)
+    while len(more) > len(fewer) + 1:
+        fewer.append(more.pop())
+    return _instances(hands, lefts, rights)
+
+
+def _by_side(hands: Hands) -> tuple[list[int], list[int]]:
+    """Rows of the left and of the right hands, surest first."""
+    order = np.argsort(-hands.scores.mean(axis=1), kind="stable").tolist()
+    return [row for row in order if hands.sides[row] == 0], [row for row in order if hands.sides[row] == 1]
+
+
+def _instances(hands: Hands, lefts: list[int], rights: list[int]) -> Detections:
+    """People without a body: the k-th left with the k-th right hand, as far as there are both."""
+    chosen = np.full((max(len(lefts), len(rights)), 2), -1)
+    chosen[: len(lefts), 0], chosen[: len(rights), 1] = lefts, rights
+    nobody = Detections(
+        np.full((len(chosen), N_KEYPOINTS, 2), np.nan),
+        np.zeros((len(chosen), N_KEYPOINTS)),
+        np.zeros(len(chosen)),
+    )
+    found = give_hands(nobody, hands, chosen)
+    given = found.scores[:, SIDES.ravel()] > 0
+    person_scores = found.scores.sum(axis=1) / np.maximum(given.sum(axis=1), 1)
+    return Detections(found.keypoints_px, found.scores, person_scores)

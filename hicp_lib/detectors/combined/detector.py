@@ -1,0 +1,131 @@
+"""The paper's proposal: one detector for the body and another for the hands.
+
+`combined:BODY+HANDS` looks for hands where the body says they are, and everywhere else:
+
+1. the body detector runs once;
+2. the hand model looks at squares around the forearms' ends (`hand_squares`), enlarged when small;
+3. it looks at the whole image and, when that is oblong, at overlapping squares along it: a hand model
+   is shown a square, and a long image makes small hands in it. These looks find the hands of bodies
+   that were not found or whose arms are wrong, and every further sighting steadies a hand's points;
+4. all it saw is arbitrated (`arbitration`): one hand per arm, left and right by the body's anatomy.
+
+Hands that no arm takes are instances of their own if they lie out of every body's reach; otherwise
+the body says that they are elsewhere, and they are refused. Where no hand is found, an arm keeps the
+hand that the body detector itself gave, if it did.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import numpy as np
+
+from hicp_lib.core.detections import Detections, Detector
+from hicp_lib.core.errors import InputError
+from hicp_lib.detectors.combined.arbitration import (
+    ArbitrationRule,
+    Hands,
+    assign,
+    distances,
+    give_hands,
+    merge_duplicates,
+    nearest_first,
+    without_body,
+)
+from hicp_lib.detectors.combined.hand_squares import Arms, Square, SquareRule, hand_squares, squares_along
+
+LOOKS = ("wrists", "image", "along")
+
+
+class Combined:
+    """A body detector and a hand detector as one.
+
+    Parameters
+    ----------
+    body, hands : ready detectors; `hands` gives hand points in the Halpe layout
+    looks : where hands are looked for, joined by +: "wrists" (squares at the forearms' ends), "image" (the
+        whole of it), "along" (squares along an oblong image)
+    arbitrate : apply the rules of `arbitration`; if not, a wrist takes the surest hand of its own
+        squares, and further hands go to the nearest free wrist
+    min_side_px : smaller squares are enlarged to this
+    squares, rule : thresholds
+    """
+
+    def __init__(
+        self,
+        body: Detector,
+        hands: Detector,
+        looks: str = "wrists+image+along",
+        arbitrate: bool = True,
+        min_side_px: int = 320,
+        squares: SquareRule | None = None,
+        rule: ArbitrationRule | None = None,
+    ) -> None:
+        self._looks = looks.split("+")
+        if not set(self._looks) <= set(LOOKS):
+            raise InputError(f"looks {looks!r}: expected some of {', '.join(LOOKS)}, joined by +")
+        self.name = f"combined:{body.name}+{hands.name}"
+        self.parts = {"body": body, "hands": hands}
+        self._arbitrate = arbitrate
+        self._min_side_px = min_side_px
+        self._squares, self._rule = squares or SquareRule(), rule or ArbitrationRule()
+        self.takes_boxes = getattr(body, "takes_boxes", False)
+        self.settings = {
+            "body": {"name": body.name, **body.settings},
+            "hands": {"name": hands.name, **hands.settings},
+            "looks": sorted(self._looks),
+            "arbitrate": arbitrate,
+            "min_side_px": min_side_px,
+            "squares": asdict(self._squares),
+            "rule": asdict(self._rule),
+        }
+
+    def detect(self, image: np.ndarray, boxes_px: np.ndarray | None = None) -> Detections:
+        """Find people in an RGB image, shape (height, width, 3), uint8."""
+        body = self.parts["body"]
+        bodies = body.detect(image, boxes_px) if self.takes_boxes else body.detect(image)
+        arms = Arms.of(bodies, self._squares)
+        return (self._arbitrated if self._arbitrate else self._as_seen)(image, bodies, arms)
+
+    def _arbitrated(self, image: np.ndarray, bodies: Detections, arms: Arms) -> Detections:
+        seen = [hands for _, _, hands in self._at_wrists(image, arms)] + self._elsewhere(image)
+        hands = merge_duplicates(Hands.together(seen), self._rule.same_hand)
+        chosen = assign(distances(arms, hands, self._rule))
+        strangers = hands.take(~self._within_reach(arms, hands))
+        return give_hands(bodies, hands, chosen).and_also(without_body(strangers))
+
+    def _within_reach(self, arms: Arms, hands: Hands) -> np.ndarray:
+        """Which hands (n,) some body could have, were the rest of its arms unknown."""
+        unknown = np.full_like(arms.wrists_px, np.nan)
+        loose = Arms(unknown, unknown, arms.shoulders_px, arms.scales_px)
+        reached = np.isfinite(distances(loose, hands, self._rule))
+        taken = np.isfinite(distances(arms, hands, self._rule))
+        return (reached | taken).any(axis=(0, 1))
+
+    def _as_seen(self, image: np.ndarray, bodies: Detections, arms: Arms) -> Detections:
+        chosen = np.full((len(bodies), 2), -1)
+        seen: list[Hands] = []
+        for person, side, hands in self._at_wrists(image, arms):
+            if len(hands) and chosen[person, side] < 0:
+                chosen[person, side] = len(seen)
+                seen.append(hands.take([hands.scores.mean(axis=1).argmax()]))
+        hands = Hands.together(seen + self._elsewhere(image))
+        chosen = nearest_first(arms.wrists_px, hands, chosen)
+        rest = np.setdiff1d(np.arange(len(hands)), chosen)
+        return give_hands(bodies, hands, chosen).and_also(without_body(hands.take(rest)))
+
+    def _at_wrists(self, image: np.ndarray, arms: Arms) -> list[tuple[int, int, Hands]]:
+        if "wrists" not in self._looks:
+            return []
+        squares = hand_squares(arms, self._squares, image)
+        return [(person, side, self._look(image, square)) for person, side, square in squares]
+
+    def _elsewhere(self, image: np.ndarray) -> list[Hands]:
+        whole = [Hands.of(self.parts["hands"].detect(image))] if "image" in self._looks else []
+        squares = squares_along(image) if "along" in self._looks else []
+        return whole + [self._look(image, square) for square in squares]
+
+    def _look(self, image: np.ndarray, square: Square) -> Hands:
+        hands = Hands.of(self.parts["hands"].detect(square.cut(image, self._min_side_px)))
+        positions_px = square.to_image_px(hands.keypoints_px, self._min_side_px)
+        return Hands(positions_px, hands.scores, hands.sides)

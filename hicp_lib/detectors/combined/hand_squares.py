@@ -1,0 +1,147 @@
+"""Where a body's hands should be: squares around the forearms' ends, cut out for a hand model.
+
+The rule is OpenPose's (Simon et al., "Hand keypoint detection in single images using multiview
+bootstrapping", CVPR 2017, and its program): the hand lies a third of the forearm beyond the wrist, and
+the square's side is a multiple of the arm's scale. That scale is the forearm's length in the
+image, or a share of the upper arm's or the shoulders' where these say more: a forearm that points at
+the camera, as at close range, looks short.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from hicp_lib.core.detections import Detections
+
+# Left, right.
+_SHOULDERS, _ELBOWS, _WRISTS = [5, 6], [7, 8], [9, 10]
+
+
+# Length over width from which an image is looked at in squares.
+MIN_OBLONG = 1.15
+
+
+@dataclass(frozen=True)
+class SquareRule:
+    """How squares are laid.
+
+    Attributes
+    ----------
+    beyond_wrist : where the centre is, in forearms from the wrist, away from the elbow
+    side : side in units of the arm's scale; one square per value
+    forearms_per_upper_arm, forearms_per_shoulders : what the forearm's length is taken to be at least,
+        as a share of the upper arm's and the shoulders' in the image
+    min_score : wrists of a lower score have no square
+    """
+
+    beyond_wrist: float = 0.33
+    sides: tuple[float, ...] = (1.8, 2.7)
+    forearms_per_upper_arm: float = 0.9
+    forearms_per_shoulders: float = 0.6
+    min_score: float = 0.03
+
+
+@dataclass(frozen=True)
+class Arms:
+    """The arms of n bodies, left and right.
+
+    Attributes
+    ----------
+    wrists_px, elbows_px, shoulders_px : arrays, shape (n, 2, 2), NaN where not given
+    scales_px : array, shape (n, 2): length of the forearm, see `SquareRule`; NaN where nothing tells
+    """
+
+    wrists_px: np.ndarray
+    elbows_px: np.ndarray
+    shoulders_px: np.ndarray
+    scales_px: np.ndarray
+
+    @classmethod
+    def of(cls, bodies: Detections, rule: SquareRule) -> Arms:
+        """The arms of bodies; wrists below the rule's score count as not given."""
+        points = bodies.keypoints_px
+        sure = bodies.scores[:, _WRISTS] >= rule.min_score
+        wrists = np.where(sure[..., None], points[:, _WRISTS], np.nan)
+        elbows, shoulders = points[:, _ELBOWS], points[:, _SHOULDERS]
+        lengths = [
+            np.linalg.norm(wrists - elbows, axis=-1),
+            rule.forearms_per_upper_arm * np.linalg.norm(elbows - shoulders, axis=-1),
+            rule.forearms_per_shoulders * np.linalg.norm(shoulders - shoulders[:, ::-1], axis=-1),
+        ]
+        longest = np.nan_to_num(np.stack(lengths), nan=0.0).max(axis=0)
+        return cls(wrists, elbows, shoulders, np.where(longest > 0, longest, np.nan))
+
+
+@dataclass(frozen=True)
+class Square:
+    """A square part of an image, whole pixels: columns left_px to left_px + side_px - 1, rows likewise."""
+
+    left_px: int
+    top_px: int
+    side_px: int
+
+    @classmethod
+    def around(cls, centre_px: np.ndarray, side_px: float) -> Square:
+        """The square of about this side whose middle lies nearest to a centre, pixel centres at integers."""
+        side = max(2, round(side_px))
+        left, top = np.round(np.asarray(centre_px) - (side - 1) / 2).astype(int).tolist()
+        return cls(left, top, side)
+
+    def overlaps(self, image: np.ndarray) -> bool:
+        """Whether any of it lies in the image."""
+        height, width = image.shape[:2]
+        end_x, end_y = self.left_px + self.side_px, self.top_px + self.side_px
+        return self.left_px < width and self.top_px < height and end_x > 0 and end_y > 0
+
+    def cut(self, image: np.ndarray, min_side_px: int) -> np.ndarray:
+        """Its pixels, black outside the image, enlarged to `min_side_px` when smaller."""
+        height, width = image.shape[:2]
+        end_x, end_y = self.left_px + self.side_px, self.top_px + self.side_px
+        inside = image[max(self.top_px, 0) : max(end_y, 0), max(self.left_px, 0) : max(end_x, 0)]
+        pixels = cv2.copyMakeBorder(
+            inside,
+            max(-self.top_px, 0), max(end_y - height, 0), max(-self.left_px, 0), max(end_x - width, 0),
+            cv2.BORDER_CONSTANT, value=(0, 0, 0),
+        )  # fmt: skip
+        if self.side_px >= min_side_px:
+            return pixels
+        return cv2.resize(pixels, (min_side_px, min_side_px), interpolation=cv2.INTER_CUBIC)
+
+    def to_image_px(self, positions_px: np.ndarray, min_side_px: int) -> np.ndarray:
+        """Positions (..., 2) in the pixels of `cut` as positions in the image; pixel centres at integers."""
+        zoom = max(self.side_px, min_side_px) / self.side_px
+        return (positions_px + 0.5) / zoom - 0.5 + (self.left_px, self.top_px)
+
+
+def hand_squares(arms: Arms, rule: SquareRule, image: np.ndarray) -> list[tuple[int, int, Square]]:
+    """The squares of all hands that may lie in the image.
+
+    Returns
+    -------
+    (person, side (0 left, 1 right), square), largest square of a hand last
+    """
+    forearm = np.nan_to_num(arms.wrists_px - arms.elbows_px)  # without an elbow: around the wrist
+    centres = arms.wrists_px + rule.beyond_wrist * forearm
+    squares = []
+    for person, side in np.argwhere(np.isfinite(centres).all(axis=-1) & np.isfinite(arms.scales_px)):
+        for multiple in rule.sides:
+            # A square larger than the image would show it smaller than the image itself does.
+            side_px = min(multiple * arms.scales_px[person, side], max(image.shape[:2]))
+            square = Square.around(centres[person, side], side_px)
+            if square.overlaps(image):
+                squares.append((int(person), int(side), square))
+    return squares
+
+
+def squares_along(image: np.ndarray) -> list[Square]:
+    """Squares along an oblong image, as wide as its short side, each half over the next or more."""
+    height, width = image.shape[:2]
+    side, length = min(height, width), max(height, width)
+    if length < MIN_OBLONG * side:
+        return []
+    steps = int(np.ceil(2 * (length - side) / side)) + 1
+    starts = np.linspace(0, length - side, steps).round().astype(int).tolist()
+    return [Square(0, start, side) if height > width else Square(start, 0, side) for start in starts]

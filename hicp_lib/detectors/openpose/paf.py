@@ -1,0 +1,280 @@
+"""From heat maps and part affinity fields to people: peaks, limb scores, assembly.
+
+After OpenPose (Cao et al., "OpenPose: Realtime multi-person 2D pose estimation using part
+affinity fields", TPAMI 2021) and the defaults of its released program. Plain NumPy on any
+`PartModel`; positions are in pixels of the network's input, pixel centres at integers, where
+cell i of a map with stride s covers pixels s i ... s i + s - 1.
+
+Two deliberate differences, which `paf_released` does not have: OpenPose enlarges the maps to input size
+and takes a centroid around each maximum. Here the maximum is found in the map itself and refined with
+the parabola through the logarithms of its neighbours, exact for the Gaussians the maps are trained on and
+cheaper. And two people are merged when a limb joins them and they have no part in common.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class PartModel:
+    """The parts a network finds and the limbs it knows.
+
+    Attributes
+    ----------
+    convention : key of `hicp_lib.core.keypoints.TO_HALPE` for its parts
+    n_parts : number of heat maps used (the background map is not)
+    pairs : array (n_pairs, 2), parts (from, to) of each limb, in the order they are connected
+    fields : array (n_pairs, 2), channels of the limb's affinity field (x, y)
+    completing : limbs that may complete a person but never start one (ear to shoulder)
+    uncounted : parts that do not count towards the fewest parts of a person
+    """
+
+    convention: str
+    n_parts: int
+    pairs: np.ndarray
+    fields: np.ndarray
+    completing: frozenset[int] = frozenset()
+    uncounted: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True)
+class PafOptions:
+    """Thresholds, with the defaults of OpenPose's program.
+
+    Attributes
+    ----------
+    min_peak : least heat map value of a part
+    min_sample : least projection of the field onto the limb for a sample to agree
+    min_agreement : least fraction of samples that agree
+    min_parts : fewest parts of a person
+    min_score : least (sum of part and limb scores) / (number of parts) of a person
+    """
+
+    min_peak: float = 0.05
+    min_sample: float = 0.05
+    min_agreement: float = 0.95
+    min_parts: int = 3
+    min_score: float = 0.4
+
+
+@dataclass
+class _Person:
+    """Peaks of one person by part, and the sum of the limb scores."""
+
+    peaks: dict[int, int] = field(default_factory=dict)
+    limb_score: float = 0.0
+    n_limbs: int = 0
+
+
+# Peaks at its start and end, by their row, and how well the field supports it.
+Limb = tuple[int, int, float]
+# Values of maps (c, h, w) at input positions (..., 2), given the stride: (c, ...).
+Sampler = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
+
+MAX_PEAKS = 64
+_LEAST = 1e-4
+_LEAST_LENGTH_PX = _LEAST_SCORE = 1e-6
+
+
+def find_peaks(heat_maps: np.ndarray, stride: int, min_peak: float) -> list[np.ndarray]:
+    """Local maxima of each heat map, the highest `MAX_PEAKS` of them by falling value.
+
+    Parameters
+    ----------
+    heat_maps : array, shape (n_parts, h, w)
+    stride : input pixels per cell
+    min_peak : least value
+
+    Returns
+    -------
+    One array (n, 3) per part: x, y in input pixels, value.
+    """
+    cells = np.argwhere(_is_maximum(heat_maps) & (heat_maps > min_peak))
+    part, row, column = cells.T
+    logs = np.pad(np.log(np.maximum(heat_maps, _LEAST)), ((0, 0), (1, 1), (1, 1)), constant_values=np.nan)
+    x = column + _vertex(
+        logs[part, row + 1, column], logs[part, row + 1, column + 1], logs[part, row + 1, column + 2]
+    )
+    y = row + _vertex(
+        logs[part, row, column + 1], logs[part, row + 1, column + 1], logs[part, row + 2, column + 1]
+    )
+    value = heat_maps[part, row, column]
+    peaks = np.stack([(x + 0.5) * stride - 0.5, (y + 0.5) * stride - 0.5, value], axis=1)
+    order = np.argsort(-value, kind="stable")
+    return [peaks[order[part[order] == index]][:MAX_PEAKS] for index in range(len(heat_maps))]
+
+
+def _is_maximum(maps: np.ndarray) -> np.ndarray:
+    """Cells above their eight neighbours; of a plateau of equals, one remains."""
+    height, width = maps.shape[1:]
+    padded = np.pad(maps, ((0, 0), (1, 1), (1, 1)), constant_values=-np.inf)
+    result = np.ones(maps.shape, dtype=bool)
+    for dy in (-1, 0, 1):
+        for dx in (-1, 0, 1):
+            if dy == dx == 0:
+                continue
+            neighbour = padded[:, 1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width]
+            result &= (maps > neighbour) if (dy, dx) < (0, 0) else (maps >= neighbour)
+    return result
+
+
+def _vertex(before: np.ndarray, middle: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Vertex of the parabola through values at -1, 0, 1; 0 where a neighbour is missing (NaN)."""
+    curvature = before - 2 * middle + after
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shift = 0.5 * (before - after) / curvature
+    return np.clip(np.where(np.isfinite(shift), shift, 0.0), -0.5, 0.5)
+
+
+def limb_scores(
+    limb_field: np.ndarray,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    stride: int,
+    options: PafOptions,
+    sample: Sampler | None = None,
+) -> np.ndarray:
+    """How well an affinity field supports a limb between every start and every end.
+
+    The field is sampled along the straight line, 5 to 25 times by its length, and projected on
+    the line's direction; the score is the mean of the samples that agree, if enough do.
+
+    Parameters
+    ----------
+    limb_field : array, shape (2, h, w), x and y component
+    starts, ends : arrays (n, >= 2) and (m, >= 2), positions in input pixels
+    stride : input pixels per cell
+    sample : how the field is read between cells; bilinearly if None
+
+    Returns
+    -------
+    array, shape (n, m); 0 where there is no limb
+    """
+    start, end = starts[:, None, :2], ends[None, :, :2]
+    vector = end - start
+    length = np.linalg.norm(vector, axis=-1)
+    direction = vector / np.maximum(length, 1e-9)[..., None]
+    n_samples = np.clip(np.round(np.sqrt(5 * np.abs(vector).max(axis=-1))), 5, 25)
+    step = np.arange(25)
+    taken = step < n_samples[..., None]
+    along = start[..., None, :] + vector[..., None, :] * (step / n_samples[..., None])[..., None]
+    projected = np.einsum("cijk,ijc->ijk", (sample or _sample)(limb_field, along, stride), direction)
+    agree = taken & (projected > options.min_sample)
+    count = agree.sum(axis=-1)
+    mean = np.where(agree, projected, 0).sum(axis=-1) / np.maximum(count, 1)
+    # Points nearly on top of each other leave the field no room; OpenPose lets them just pass.
+    is_short = (length > _LEAST_LENGTH_PX) & (length < np.sqrt(limb_field[0].size) * stride / 150)
+    weak = np.where(is_short, options.min_peak + 1e-6, 0.0)
+    return np.where(count > options.min_agreement * n_samples, mean, weak)
+
+
+def _sample(maps: np.ndarray, positions_px: np.ndarray, stride: int) -> np.ndarray:
+    """Bilinear samples of maps (c, h, w) at input positions (..., 2): (c, ...); clamped at the border."""
+    limit = np.array([maps.shape[2], maps.shape[1]]) - 1
+    cell = np.clip((positions_px + 0.5) / stride - 0.5, 0, limit)
+    low = np.minimum(cell.astype(int), np.maximum(limit - 1, 0))
+    high = np.minimum(low + 1, limit)
+    (fx, fy), (x0, y0), (x1, y1) = (np.moveaxis(part, -1, 0) for part in (cell - low, low, high))
+    top = maps[:, y0, x0] * (1 - fx) + maps[:, y0, x1] * fx
+    bottom = maps[:, y1, x0] * (1 - fx) + maps[:, y1, x1] * fx
+    return top * (1 - fy) + bottom * fy
+
+
+def connect(scores: np.ndarray) -> list[Limb]:
+    """Limbs taken greedily by falling score, of equal ones the last first; each end used once."""
+    limbs, free_start, free_end = [], set(range(scores.shape[0])), set(range(scores.shape[1]))
+    for flat in np.argsort(scores, axis=None, kind="stable")[::-1]:
+        start, end = divmod(int(flat), scores.shape[1])
+        if scores[start, end] <= _LEAST_SCORE:
+            break
+        if start in free_start and end in free_end:
+            limbs.append((start, end, float(scores[start, end])))
+            free_start.remove(start)
+            free_end.remove(end)
+    return limbs
+
+
+def assemble(
+    heat_maps: np.ndarray, fields: np.ndarray, model: PartModel, stride: int, options: PafOptions
+) -> tuple[np.ndarray, np.ndarray]:
+    """People in the maps of one image.
+
+    Parameters
+    ----------
+    heat_maps : array, shape (n_parts, h, w), in [0, 1]
+    fields : array, shape (n_fields, h, w)
+    model, stride, options : what the maps mean, input pixels per cell, thresholds
+
+    Returns
+    -------
+    parts : array, shape (n_people, n_parts, 3): x, y in input pixels, score; NaN, NaN, 0 if missing
+    scores : array, shape (n_people,): (sum of part and limb scores) / (parts + limbs)
+    """
+    peaks = find_peaks(heat_maps, stride, options.min_peak)
+    people: list[_Person] = []
+    for index, limbs in enumerate(find_limbs(peaks, fields, model, stride, options)):
+        a, b = model.pairs[index].tolist()
+        for start, end, score in limbs:
+            _join(people, (a, start), (b, end), score, index in model.completing)
+    return _keep(people, peaks, model, options)
+
+
+def find_limbs(
+    peaks: list[np.ndarray],
+    fields: np.ndarray,
+    model: PartModel,
+    stride: int,
+    options: PafOptions,
+    sample: Sampler | None = None,
+) -> list[list[Limb]]:
+    """Limbs of each pair, from the peaks (n, 3: x, y in input pixels, value) of each part."""
+    return [
+        connect(limb_scores(fields[channels], peaks[a], peaks[b], stride, options, sample))
+        for (a, b), channels in zip(model.pairs, model.fields, strict=True)
+    ]
+
+
+def _join(
+    people: list[_Person], a: tuple[int, int], b: tuple[int, int], score: float, completing: bool
+) -> None:
+    """Add the limb between peak `a` and peak `b` (part, index) to the people found so far."""
+    with_a = next((person for person in people if person.peaks.get(a[0]) == a[1]), None)
+    with_b = next((person for person in people if person.peaks.get(b[0]) == b[1]), None)
+    if with_a is None and with_b is None:
+        if completing:
+            return
+        with_a = _Person()
+        people.append(with_a)
+    elif with_a is not None and with_b is not None and with_a is not with_b:
+        if with_a.peaks.keys() & with_b.peaks.keys():
+            return
+        with_a.peaks.update(with_b.peaks)
+        with_a.limb_score += with_b.limb_score
+        with_a.n_limbs += with_b.n_limbs
+        people[:] = [person for person in people if person is not with_b]
+    person = with_a or with_b
+    for part, peak in (a, b):
+        if person.peaks.setdefault(part, peak) != peak:
+            return
+    person.limb_score += score
+    person.n_limbs += 1
+
+
+def _keep(
+    people: list[_Person], peaks: list[np.ndarray], model: PartModel, options: PafOptions
+) -> tuple[np.ndarray, np.ndarray]:
+    parts, scores = [], []
+    for person in people:
+        rows = np.full((model.n_parts, 3), (np.nan, np.nan, 0.0))
+        for part, peak in person.peaks.items():
+            rows[part] = peaks[part][peak]
+        total = rows[:, 2].sum() + person.limb_score
+        n_counted = len(person.peaks.keys() - model.uncounted)
+        if n_counted >= options.min_parts and total / len(person.peaks) >= options.min_score:
+            parts.append(rows)
+            scores.append(total / (len(person.peaks) + person.n_limbs))
+    return np.array(parts).reshape(-1, model.n_parts, 3), np.array(scores)

@@ -1,0 +1,92 @@
+"""Peaks and affinity fields as OpenPose's released program reads them.
+
+The maps are enlarged to the size of the network's input; a peak is the centroid of the positive
+values within 3 pixels of a local maximum, and fields are read at the nearest pixel. `paf` finds
+peaks in the small maps, which is far cheaper and as good; this is for the original networks,
+whose results should be the program's (constants and rules: its `net` folder, version 1.7).
+
+The program counts image pixels from their corners: it adds half an image pixel to a peak before it
+reads the fields, and leaves it in its results. The fields are read there, too (`offset_px`); positions
+given have pixel centres at integers, as everywhere here.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import cv2
+import numpy as np
+
+from hicp_lib.detectors.openpose.joining import join_as_released
+from hicp_lib.detectors.openpose.paf import PafOptions, PartModel, find_limbs
+
+_MAX_PEAKS = 127
+_REACH_PX = 3
+
+
+def assemble_released(
+    heat_maps: np.ndarray,
+    fields: np.ndarray,
+    model: PartModel,
+    stride: int,
+    options: PafOptions,
+    offset_px: float = 0.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """People in the maps of one image; parameters and results as of `paf.assemble`.
+
+    Person scores are the program's, see `join_as_released`. `offset_px` is half an image pixel in pixels
+    of the network's input.
+    """
+    heat_maps, fields = enlarge(heat_maps, stride), enlarge(fields, stride)
+    peaks = [centroid_peaks(heat_map, options.min_peak) for heat_map in heat_maps]
+    sample = partial(_nearest, offset_px=offset_px)
+    return join_as_released(peaks, find_limbs(peaks, fields, model, 1, options, sample), model, options)
+
+
+def enlarge(maps: np.ndarray, factor: int) -> np.ndarray:
+    """Maps (n, h, w), n > 0, enlarged bicubically; pixel centres at integers in both."""
+    size = maps.shape[2] * factor, maps.shape[1] * factor
+    large = [cv2.resize(map_, size, interpolation=cv2.INTER_CUBIC) for map_ in maps.astype(np.float32)]
+    return np.stack(large)
+
+
+def centroid_peaks(heat_map: np.ndarray, min_peak: float) -> np.ndarray:
+    """Local maxima of an enlarged map (h, w) above `min_peak`: rows (n, 3) of x, y in pixels and value.
+
+    At the border itself there are none; one pixel inside, where enlarging leaves twins, equal
+    neighbours are allowed.
+    """
+    height, width = heat_map.shape
+    # Nothing below its neighbours can be a peak: few pixels are left to look at closely.
+    highest = cv2.dilate(heat_map, np.ones((3, 3), np.uint8))
+    rows, columns = np.nonzero((heat_map > min_peak) & (heat_map >= highest))
+    value = heat_map[rows, columns]
+    around = _windows(heat_map, rows, columns, 1, min_peak).reshape(-1, 9)
+    others = np.delete(around, 4, axis=1)
+    inner = (1 < columns) & (columns < width - 2) & (1 < rows) & (rows < height - 2)
+    ring = ~inner & (np.isin(columns, (1, width - 2)) | np.isin(rows, (1, height - 2)))
+    is_peak = inner & (value[:, None] > others).all(axis=1) | ring & (value[:, None] >= others).all(axis=1)
+    rows, columns, value = (part[is_peak][:_MAX_PEAKS] for part in (rows, columns, value))
+    weights = np.maximum(_windows(heat_map, rows, columns, _REACH_PX, 0.0), 0).astype(float)
+    step = np.arange(-_REACH_PX, _REACH_PX + 1)
+    total = weights.sum(axis=(1, 2))
+    x = columns + (weights.sum(axis=1) @ step) / total
+    y = rows + (weights.sum(axis=2) @ step) / total
+    return np.stack([x, y, value], axis=1)
+
+
+def _windows(
+    values: np.ndarray, rows: np.ndarray, columns: np.ndarray, reach: int, fill: float
+) -> np.ndarray:
+    """Squares of `values` (h, w) around some cells, `fill` beyond the border: (n, 2 reach + 1, same)."""
+    padded = np.pad(values, reach, constant_values=fill)
+    step = np.arange(2 * reach + 1)
+    return padded[rows[:, None, None] + step[:, None], columns[:, None, None] + step]
+
+
+def _nearest(maps: np.ndarray, positions_px: np.ndarray, stride: int, offset_px: float = 0.0) -> np.ndarray:
+    limit = np.array([maps.shape[2], maps.shape[1]]) - 1
+    x, y = np.moveaxis(
+        np.clip(np.floor((positions_px + offset_px) / stride + 0.5).astype(int), 0, limit), -1, 0
+    )
+    return maps[:, y, x]

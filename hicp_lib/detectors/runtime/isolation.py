@@ -1,0 +1,200 @@
+"""A native library in a process of its own: what it does there is not done to the caller's.
+
+MediaPipe 1.x writes to descriptor 2, reports usage metrics (no images) to its vendor every minute and
+whenever a task is closed, has no switch for either, and may abort. Its HTTP client obeys the usual proxy
+variables: in its process these are pointed at a closed port. The study contacts nobody; the tests watch that
+it stays so.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import weakref
+from contextlib import suppress
+from typing import BinaryIO
+
+import numpy as np
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.detectors.mediapipe.child import receive, send
+
+# Port 9 ("discard") of this machine: a connection is refused at once.
+_NOWHERE = {
+    **{name: "http://127.0.0.1:9" for name in ("http_proxy", "https_proxy", "all_proxy")},
+    "no_proxy": "localhost",
+}
+_FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1"}  # NumPy's, which have nothing to do there
+# A call takes milliseconds, and a start seconds on a busy machine.
+LIMIT_S = 120.0
+
+
+class NativeError(InputError):
+    """A native library gave up, or its process ended."""
+
+
+class NativeProcess:
+    """A program of this package that loads a native library, run when first asked and again after it ended.
+
+    Parameters
+    ----------
+    program : script that speaks as `mediapipe_child` says, and its first arguments
+    head, body : the first message to it
+    name : what messages to the user begin with
+    remedy : what they end with if the program cannot start
+    """
+
+    def __init__(self, program: list[str], head: dict, body: bytes, name: str, remedy: str) -> None:
+        self._program, self._first = program, (head | {"limit_s": LIMIT_S}, body)
+        self._name, self._remedy = name, remedy
+        self._lock = threading.Lock()
+        self._child: _Child | None = None
+
+    def start(self) -> None:
+        """Start it unless it runs.
+
+        Raises
+        ------
+        NativeError
+            If it does not start.
+        """
+        with self._lock:
+            self._started()
+
+    def ask(self, image: np.ndarray) -> np.ndarray:
+        """What the program answers to an RGB image, shape (height, width, 3), uint8.
+
+        Raises
+        ------
+        NativeError
+            If it cannot tell, or its process ends; the next call starts another.
+        InputError
+            If it is no such image.
+        """
+        if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or not image.size:
+            raise InputError(
+                f"{self._name}: an image of {image.dtype} {image.shape}; expected uint8 (height, width, 3)"
+            )
+        with self._lock:
+            child = self._started()
+            child.show(image)
+            remedy = "run it again, and without this image if it fails there again"
+            head, body = self._answer(child, ({"shape": image.shape},), remedy)
+        return np.frombuffer(body).reshape(head["shape"])
+
+    def _started(self) -> _Child:
+        # After a fork the pipes belong to the process that made them.
+        if self._child is None or self._child.owner != os.getpid():
+            try:
+                child = _Child(self._program)
+            except OSError as error:
+                raise NativeError(
+                    f"{self._name}: no process can be started ({error.strerror}); use fewer workers"
+                ) from None
+            self._answer(child, self._first, self._remedy)
+            self._child = child
+        return self._child
+
+    def _answer(self, child: _Child, question: tuple, remedy: str) -> tuple[dict, bytearray]:
+        try:
+            head, body = child.ask(*question)
+        except (EOFError, OSError):
+            self._child = None
+            raise NativeError(f"{self._name}: {child.end()}; {remedy}") from None
+        except BaseException:  # an interrupted wait: the answer would be taken for that to the next image
+            self._child = None
+            child.close()
+            raise
+        if "error" in head:
+            raise NativeError(f"{self._name}: {head['error']}; {remedy}")
+        return head, body
+
+
+class _Child:
+    """A running program: ended when nothing refers to it any more, or this process ends in whatever way."""
+
+    def __init__(self, program: list[str]) -> None:
+        self.owner = os.getpid()
+        self._stderr = tempfile.TemporaryFile()
+        self._shared, self._pixels = _unnamed_file(), b""
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", *program, str(self._shared.fileno())],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._stderr,
+            env=child_environment(),
+            pass_fds=[self._shared.fileno()],
+            start_new_session=True,  # an interrupt from the keyboard is for the caller
+        )
+        files = self._process.stdin, self._process.stdout, self._stderr, self._shared
+        self.close = weakref.finalize(self, _close, self._process, files, self.owner)
+
+    def show(self, image: np.ndarray) -> None:
+        """Put an image where the program sees it."""
+        if image.size > len(self._pixels):
+            self._shared.truncate(image.size)
+            self._pixels = mmap.mmap(self._shared.fileno(), image.size)
+        np.ndarray(image.shape, np.uint8, self._pixels)[...] = image
+
+    def ask(self, head: dict, body: bytes = b"") -> tuple[dict, bytearray]:
+        """Send a message and wait for the answer; EOFError or OSError if the program has ended."""
+        send(self._process.stdin, head, body)
+        return receive(self._process.stdout)
+
+    def end(self) -> str:
+        """How it ended, in words; it is about to, since it does not speak any more."""
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(10.0)
+        status = self._process.poll()
+        last = _last_line(self._stderr)
+        self.close()
+        return _in_words(status) + (f" ({last})" if last else "")
+
+
+def child_environment() -> dict[str, str]:
+    """This process's environment, but with every way out led to a closed port."""
+    nowhere = _NOWHERE | {name.upper(): value for name, value in _NOWHERE.items()}
+    return os.environ | _FEW_THREADS | nowhere
+
+
+def _unnamed_file() -> BinaryIO:
+    """A file in memory, where the system has such."""
+    if hasattr(os, "memfd_create"):
+        return open(os.memfd_create("pixels"), "r+b", buffering=0)
+    return tempfile.TemporaryFile(buffering=0)
+
+
+def _close(process: subprocess.Popen, files: tuple[BinaryIO, ...], owner: int) -> None:
+    for file in files:
+        with suppress(OSError):  # what was not sent any more
+            file.close()
+    if owner == os.getpid():
+        process.kill()
+        process.wait()
+    else:
+        process.returncode = 0  # a copy of its parent cannot wait for it, and need not
+
+
+def _in_words(status: int | None) -> str:
+    if status is None:
+        return "its process does not answer"
+    if status >= 0:
+        return f"its process ended with code {status}"
+    if -status == signal.SIGALRM:
+        return f"its process gave no answer within {LIMIT_S:g} s"
+    cause = ", which often means that memory ran out" if -status == signal.SIGKILL else ""
+    return f"its process was ended by {signal.Signals(-status).name}{cause}"
+
+
+def _last_line(stderr: BinaryIO) -> str:
+    """The last line a library wrote that is not part of a trace of the stack."""
+    stderr.seek(max(0, stderr.seek(0, os.SEEK_END) - 8192))
+    lines = stderr.read().decode(errors="replace").splitlines()
+    said = [line for line in lines if line.strip() and not line.startswith((" ", "@", "***", "\t"))]
+    fatal = [line for line in said if line.startswith("F0")]
+    return " ".join((fatal or said or [""])[-1].split())[:300]

@@ -1,0 +1,92 @@
+"""Detectors of one kind for the threads of a process."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hicp_lib.detectors.registry import make_detector
+from hicp_lib.detectors.runtime.cached_parts import Runner
+from hicp_lib.detectors.runtime.isolation import NativeError
+from hicp_lib.detectors.runtime.results import Timed
+
+
+class DetectorPool:
+    """Detectors of one kind, made when a thread needs one and none is idle.
+
+    Parameters
+    ----------
+    name, options : as `make_detector` takes them
+    workers : how many threads use them at a time
+
+    Attributes
+    ----------
+    first : one of them, made at once; it tells the settings of all
+    """
+
+    def __init__(self, name: str, options: dict, workers: int) -> None:
+        self._name, self._options, self._workers = name, options, workers
+        self._idle: queue.SimpleQueue[Runner] = queue.SimpleQueue()
+        runner = self._make()
+        self.first = runner.detector
+        self._idle.put(runner)
+
+    def detect(
+        self, image: np.ndarray, boxes_px: np.ndarray | None, image_sha256: str | None = None
+    ) -> Timed:
+        """As `Runner.detect`, by one that is idle."""
+        with self._borrow() as runner:
+            return runner.detect(image, boxes_px, image_sha256)
+
+    def _make(self) -> Runner:
+        return Runner(make_detector(self._name, **self._options), self._workers)
+
+    @contextmanager
+    def _borrow(self) -> Iterator[Runner]:
+        try:
+            runner = self._idle.get_nowait()
+        except queue.Empty:
+            runner = self._make()
+        yield runner
+        self._idle.put(runner)
+
+
+@contextmanager
+def naming(path: str | Path) -> Iterator[None]:
+    """Name the image in what is told of a library that failed on it."""
+    try:
+        yield
+    except NativeError as error:
+        raise NativeError(f"{path}: {error}") from None
+
+
+class _OneThread:
+    """Holds OpenCV to one thread: the images are what is spread.
+
+    The number is the whole process's: the first of several who want it sets it, the last one restores it.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._depth, self._before = threading.Lock(), 0, 0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._depth == 0:
+                self._before = cv2.getNumThreads()
+                cv2.setNumThreads(1)
+            self._depth += 1
+
+    def __exit__(self, *_) -> None:
+        with self._lock:
+            self._depth -= 1
+            if self._depth == 0:
+                cv2.setNumThreads(self._before)
+
+
+single_threaded_opencv = _OneThread()

@@ -1,0 +1,125 @@
+"""Detections kept on disk, one small file per image, found again only if nothing changed.
+
+The key is the SHA-256 of everything a result depends on: the image file's bytes, the
+detector's name and settings (with its weights' hashes), the versions of the libraries that
+decode and compute, and the source of this package's detectors. A stale or damaged file is
+never an answer: it is computed again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.core.cache import code, digest
+from hicp_lib.core.detections import Detections, Detector
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import cache_dir, sha256_bytes, sha256_file, write_bytes
+from hicp_lib.core.keypoints import N_KEYPOINTS
+
+_N_COLUMNS = 3 * N_KEYPOINTS + 1
+
+
+@dataclass(frozen=True)
+class Timed:
+    """Detections in one image, and what finding them took.
+
+    Attributes
+    ----------
+    detections : the people found
+    time_ms : time of the detector's call when it was made (what was kept, its parts' too, keeps its time)
+    workers : how many such calls ran side by side then; more of them make each slower
+    """
+
+    detections: Detections
+    time_ms: float
+    workers: int
+
+
+def identity(detector: Detector) -> dict:
+    """All that this detector's results depend on, besides the image."""
+    modules, data, libraries = _code(tuple(sorted({__name__, *_modules(detector)})))
+    return {"settings": detector.settings, "code": [modules, data], "libraries": libraries}
+
+
+def _modules(detector: Detector) -> Iterator[str]:
+    yield type(detector).__module__
+    for part in getattr(detector, "parts", {}).values():
+        yield from _modules(part)
+
+
+@cache
+def _code(names: tuple[str, ...]) -> tuple[str, str, dict[str, str]]:
+    found = code(names)
+    return digest(found.modules), digest(found.data), found.libraries
+
+
+def cache_folder(detector: Detector) -> Path:
+    """Folder of this detector's results under its present settings."""
+    return cache_dir() / "detections" / detector.name / digest(identity(detector))[:32]
+
+
+def image_sha256(path: str | Path) -> str:
+    """SHA-256 of an image file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    try:
+        return sha256_file(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); expected an image file") from None
+
+
+def pixels_sha256(image: np.ndarray) -> str:
+    """SHA-256 of an image that is no file."""
+    content = hashlib.sha256(f"{image.dtype} {image.shape}".encode())
+    content.update(np.ascontiguousarray(image))
+    return content.hexdigest()
+
+
+def result_path(folder: Path, image_sha256: str, boxes_px: np.ndarray | None) -> Path:
+    """Where the result of an image is kept; boxes (n, 4) count if they were given."""
+    boxes_key = "" if boxes_px is None else "-" + sha256_bytes(np.asarray(boxes_px, float).tobytes())[:16]
+    return folder / f"{image_sha256}{boxes_key}.bin"
+
+
+def read_result(path: Path) -> Timed | None:
+    """The result kept at `path`; None if there is none or it is damaged."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    digest, payload = content[:32], content[32:]
+    if hashlib.sha256(payload).digest() != digest:
+        return None
+    timing, *people = np.load(io.BytesIO(payload), allow_pickle=False)
+    rows = np.array(people).reshape(-1, _N_COLUMNS)
+    keypoints_px, scores, person_scores = np.split(rows, [2 * N_KEYPOINTS, 3 * N_KEYPOINTS], axis=1)
+    found = Detections(keypoints_px.reshape(-1, N_KEYPOINTS, 2), scores, person_scores[:, 0])
+    return Timed(found, float(timing[0]), int(timing[1]))
+
+
+def write_result(path: Path, result: Timed) -> None:
+    """Keep a result at `path`; another process may do the same at the same time.
+
+    The file is a SHA-256 digest and the `.npy` array it is of: a row with the timing, then one
+    row per person with positions, scores and person score.
+    """
+    found = result.detections
+    rows = np.zeros((len(found) + 1, _N_COLUMNS))
+    rows[0, :2] = result.time_ms, result.workers
+    rows[1:, : 2 * N_KEYPOINTS] = found.keypoints_px.reshape(len(found), 2 * N_KEYPOINTS)
+    rows[1:, 2 * N_KEYPOINTS : -1] = found.scores
+    rows[1:, -1] = found.person_scores
+    payload = io.BytesIO()
+    np.save(payload, rows)
+    write_bytes(path, hashlib.sha256(payload.getvalue()).digest() + payload.getvalue())

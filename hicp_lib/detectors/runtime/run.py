@@ -1,0 +1,139 @@
+"""Run a detector over many images: all cores or a cluster, a progress bar, results kept on disk.
+
+Each result is kept as soon as it is there, so a run that was cut off goes on where it was.
+
+The work is spread over threads, not processes: the networks run outside Python's global lock,
+and threads need no start-up. Every thread has its own detector, and OpenCV is held to one
+thread in each, so the results do not depend on how many there are.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Hashable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from tqdm import tqdm
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.images import read_image
+from hicp_lib.detectors.runtime.pool import DetectorPool, naming, single_threaded_opencv
+from hicp_lib.detectors.runtime.results import (
+    Timed,
+    cache_folder,
+    image_sha256,
+    read_result,
+    result_path,
+    write_result,
+)
+from hicp_lib.formats.annotations import read_annotations
+
+Key = TypeVar("Key", bound=Hashable)
+
+
+def detect_dataset(
+    name: str,
+    dataset_dir: str | Path,
+    workers: int | None = None,
+    progress: bool = True,
+    dask: str | None = None,
+    **options,
+) -> dict[int, Detections]:
+    """People in every image of a dataset folder (`images/`, `annotations.json`), by image id.
+
+    Parameters as in `detect_images`; the annotated boxes go to detectors that take them.
+    """
+    results = time_dataset(name, dataset_dir, workers, progress, dask, **options)
+    return {image_id: result.detections for image_id, result in results.items()}
+
+
+def time_dataset(
+    name: str,
+    dataset_dir: str | Path,
+    workers: int | None = None,
+    progress: bool = True,
+    dask: str | None = None,
+    **options,
+) -> dict[int, Timed]:
+    """As `detect_dataset`, each with the time it took."""
+    annotations = read_annotations(Path(dataset_dir) / "annotations.json")
+    paths = {
+        image_id: Path(dataset_dir) / "images" / image.file_name
+        for image_id, image in annotations.images.items()
+    }
+    people = annotations.take(~annotations.is_crowd)
+    boxes_px = {image_id: people.boxes_px[people.image_ids == image_id] for image_id in paths}
+    return detect_images(name, paths, workers, progress, boxes_px, dask, **options)
+
+
+def detect_images(
+    name: str,
+    paths: Mapping[Key, str | Path],
+    workers: int | None = None,
+    progress: bool = True,
+    boxes_px: Mapping[Key, np.ndarray] | None = None,
+    dask: str | None = None,
+    **options,
+) -> dict[Key, Timed]:
+    """People in every image file.
+
+    Parameters
+    ----------
+    name : detector, see `hicp_lib.detectors.registry`
+    paths : image files by any key
+    workers : threads (the cores this process may use, if None)
+    progress : show a bar; only ever on a terminal
+    boxes_px : annotated boxes (n, 4: x, y, width, height) of each image, for detectors that take them
+    dask : address of a Dask scheduler, whose workers do what threads do otherwise
+    options : options of the detector
+
+    Returns
+    -------
+    The result of each image, in the order of `paths`.
+
+    Raises
+    ------
+    InputError
+        If an image cannot be read, or the detector cannot be made.
+    """
+    workers = max(1, min(workers or n_cores(), len(paths) or 1))
+    pool = DetectorPool(name, options, workers)
+    takes_boxes = boxes_px is not None and getattr(pool.first, "takes_boxes", False)
+    jobs = {key: (Path(path), boxes_px[key] if takes_boxes else None) for key, path in paths.items()}
+    if dask is None:
+        results = _in_threads(pool, jobs, workers)
+    else:
+        from hicp_lib.detectors.runtime.cluster import detect_on_cluster  # the library is an extra
+
+        results = detect_on_cluster(dask, name, options, pool.first, jobs)
+    # disable=None: no bar unless standard error is a terminal.
+    done = dict(tqdm(results, desc=name, total=len(jobs), disable=None if progress else True))
+    return {key: done[key] for key in paths}
+
+
+def _in_threads(
+    pool: DetectorPool, jobs: dict[Key, tuple[Path, np.ndarray | None]], workers: int
+) -> Iterator[tuple[Key, Timed]]:
+    folder = cache_folder(pool.first)
+    with single_threaded_opencv, ThreadPoolExecutor(workers) as executor:
+        calls = executor.map(lambda job: _detect_one(pool, *job, folder), jobs.values())
+        yield from zip(jobs, calls, strict=True)
+
+
+def _detect_one(pool: DetectorPool, path: Path, boxes_px: np.ndarray | None, folder: Path) -> Timed:
+    sha256 = image_sha256(path)
+    kept = result_path(folder, sha256, boxes_px)
+    result = read_result(kept)
+    if result is None:
+        with naming(path):
+            result = pool.detect(read_image(path), boxes_px, sha256)
+        write_result(kept, result)
+    return result
+
+
+def n_cores() -> int:
+    """Cores this process may run on."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,242 @@
+"""Weights their authors publish for download: fetched one by one, by name, and never by default.
+
+`data/published_weights.json` names each download with its licence and, where known, its size and
+SHA-256. Where the hash is not known, the first fetch records it in the cache, in
+`published_weights.lock.json` (a committed one in `data/` comes first); a download that differs later is
+refused. Of an archive one member is read, in memory; nothing is unpacked and nothing fetched is executed.
+"""
+
+from __future__ import annotations
+
+import re
+import stat
+import tempfile
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from urllib.parse import urlsplit
+
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import cache_dir, read_json, sha256_bytes, sha256_file, write_bytes, write_json
+from hicp_lib.detectors.weights.default import weights_dir
+from hicp_lib.detectors.weights.url_download import download
+
+REGISTRY_PATH = DATA_DIR / "published_weights.json"
+# No published model comes near it; a server or an archive that gives more is not to be believed.
+MAX_BYTES = 1 << 30
+
+
+@dataclass(frozen=True)
+class Published:
+    """One download.
+
+    Attributes
+    ----------
+    name : what users type
+    url : where its authors publish it
+    member : file name within the zip archive; None if the download is the weight file itself
+    use : detector and option that take the file, None if nothing here runs it
+    licence, size_bytes, sha256 : of the download; None where not known
+    note : what it is
+    """
+
+    name: str
+    url: str
+    member: str | None
+    use: str | None
+    licence: str | None
+    size_bytes: int | None
+    sha256: str | None
+    note: str
+
+    @property
+    def file(self) -> str:
+        """File name of the download."""
+        return PurePosixPath(urlsplit(self.url).path).name
+
+    @property
+    def path(self) -> Path:
+        """Where the weight file is kept, fetched or not."""
+        return published_dir() / (self.name + PurePosixPath(self.member or self.file).suffix)
+
+    @property
+    def by_hand(self) -> Path:
+        """Where the download may be put by hand."""
+        return published_dir() / "by_hand" / self.file
+
+
+def published_dir() -> Path:
+    """Folder the published weight files are kept in."""
+    return weights_dir() / "published"
+
+
+def lock_path() -> Path:
+    """The user's file of the hashes recorded on first use."""
+    return cache_dir() / "published_weights.lock.json"
+
+
+def published() -> dict[str, Published]:
+    """Every published download by name.
+
+    Raises
+    ------
+    InputError
+        If the registry is unreadable, or a name in it is not a plain file name.
+    """
+    try:
+        models = {name: Published(name, **row) for name, row in read_json(REGISTRY_PATH).items()}
+        names = [name for model in models.values() for name in (model.name, model.file)]
+    except (AttributeError, TypeError, ValueError) as error:
+        raise InputError(f"{REGISTRY_PATH}: not a registry ({error}); restore the committed file") from None
+    for name in names:
+        if not re.fullmatch(r"\w[\w.-]*", name, re.ASCII):
+            raise InputError(
+                f"{REGISTRY_PATH}: {name!r} is not a plain file name; restore the committed file"
+            )
+    return models
+
+
+def status(model: Published) -> str:
+    """`present`, `absent`, `corrupt` (not the file that was recorded) or `unrecorded`."""
+    if not model.path.is_file():
+        return "absent"
+    record = _records().get(model.name)
+    if record is None:
+        return "unrecorded"
+    return "present" if sha256_file(model.path) == record["file_sha256"] else "corrupt"
+
+
+def fetch_published(name: str) -> Published:
+    """Get one published weight file, unless it is here and sound; it is then at the result's `path`.
+
+    Raises
+    ------
+    InputError
+        If the name is unknown, the download fails (the message names the place to put it by hand), or it
+        is not the file that is known or was recorded.
+    """
+    models = published()
+    if name not in models:
+        raise InputError(f"published model {name!r} is not known; expected one of: {', '.join(models)}")
+    model = models[name]
+    if status(model) == "present":
+        return model
+    with tempfile.TemporaryDirectory(prefix="hicp-") as folder:
+        source = _obtain(model, Path(folder))
+        sha256 = _verified(model, source)
+        content = source.read_bytes() if model.member is None else _read_member(source, model.member)
+    _record(model, sha256, sha256_bytes(content))
+    write_bytes(model.path, content)
+    return model
+
+
+def check_use(path: Path, content: bytes) -> None:
+    """Hold a weight file that is about to be used against the hash recorded when it was fetched.
+
+    Files that were not fetched by name are the user's own, and pass.
+
+    Raises
+    ------
+    InputError
+        If it is not the file that was recorded.
+    """
+    path = path.resolve()
+    if path.parent != published_dir().resolve():
+        return
+    record = next((row for name, row in _records().items() if name in (path.stem, path.name)), None)
+    if record is not None and sha256_bytes(content) != record["file_sha256"]:
+        raise InputError(
+            f"{path}: is not the file that {lock_path()} records; run: hicp models fetch {path.stem}"
+        )
+
+
+def _obtain(model: Published, folder: Path) -> Path:
+    """The download put in its place by hand, or else the one from its address."""
+    if model.by_hand.is_file():
+        return model.by_hand
+    problem = download(model.url, folder / model.file, MAX_BYTES)
+    if problem:
+        raise InputError(
+            f"{model.name}: {model.url} could not be downloaded ({problem}); check the network, or put "
+            f"{model.file} at {model.by_hand} and run this again"
+        )
+    return folder / model.file
+
+
+def _verified(model: Published, source: Path) -> str:
+    """SHA-256 of a download; refused if it is not the known or the recorded one."""
+    size_bytes, sha256 = source.stat().st_size, sha256_file(source)
+    recorded = _records().get(model.name, {}).get("sha256")
+    for expected, by in ((model.sha256, REGISTRY_PATH), (recorded, lock_path())):
+        if expected and sha256 != expected:
+            raise InputError(
+                f"{model.file}: SHA-256 is {sha256}, but {by} says {expected}; the file has changed and was "
+                f"not used, ask its authors at {model.url} or remove {model.by_hand} if it is there"
+            )
+    if not 0 < size_bytes <= MAX_BYTES or model.size_bytes not in (None, size_bytes):
+        raise InputError(
+            f"{model.file}: has {size_bytes} bytes, expected {model.size_bytes or f'up to {MAX_BYTES}'}; "
+            f"was not used, get it again from {model.url}"
+        )
+    return sha256
+
+
+def _read_member(archive: Path, member: str) -> bytes:
+    """Content of the one regular file called `member` in a zip archive, whatever folder it lies in."""
+    broken = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError, ValueError)
+    try:
+        with zipfile.ZipFile(archive) as file:
+            entry, problem = _find_member(file.infolist(), member)
+            if entry is not None:
+                return file.read(entry)
+    except broken:
+        problem = f"is not a sound zip archive with {member}"
+    raise InputError(f"{archive.name}: {problem}; it was not used, get it again or ask its authors")
+
+
+def _find_member(entries: list[zipfile.ZipInfo], member: str) -> tuple[zipfile.ZipInfo | None, str]:
+    """The entry that is `member`, or None and what is wrong with the archive."""
+    if any(_leads_out(entry.filename) for entry in entries):
+        return None, "holds names that lead out of a folder"
+    found = [entry for entry in entries if PurePosixPath(entry.filename).name == member]
+    if len(found) != 1 or found[0].is_dir() or stat.S_ISLNK(found[0].external_attr >> 16):
+        return None, f"expected one file {member} in it"
+    if found[0].compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        return None, f"{member} is compressed in an unusual way"
+    if found[0].file_size > MAX_BYTES:
+        return None, f"{member} is larger than {MAX_BYTES} bytes"
+    return found[0], ""
+
+
+def _leads_out(name: str) -> bool:
+    return name.startswith("/") or bool(set(name) & set("\\:")) or ".." in PurePosixPath(name).parts
+
+
+def _records() -> dict[str, dict[str, str]]:
+    """The user's records, and in their place those that came with the library."""
+    return _read_records(lock_path()) | _read_records(REGISTRY_PATH.with_suffix(".lock.json"))
+
+
+def _read_records(path: Path) -> dict[str, dict[str, str]]:
+    if not path.exists():
+        return {}
+    records = read_json(path)
+    keys = {"url", "sha256", "file_sha256"}
+    if not isinstance(records, dict) or any(
+        not isinstance(record, dict) or record.keys() != keys for record in records.values()
+    ):
+        raise InputError(f"{path}: not a record of hashes; restore it, or delete it to record them anew")
+    return records
+
+
+def _record(model: Published, sha256: str, file_sha256: str) -> None:
+    """Record the hashes of a first fetch; those of a later one must be the same."""
+    records = _records()
+    record = {"url": model.url, "sha256": sha256, "file_sha256": file_sha256}
+    if model.name not in records:
+        own = _read_records(lock_path()) | {model.name: record}
+        write_json(lock_path(), dict(sorted(own.items())), indent=1)
+    elif records[model.name]["file_sha256"] != file_sha256:
+        raise InputError(f"{lock_path()}: {model.name} is recorded with another hash; restore that file")

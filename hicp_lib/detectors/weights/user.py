@@ -1,0 +1,60 @@
+"""Weights of the user's own, named once: what a detector that needs a model runs on where none is given.
+
+Notebooks and the report name detectors, not files. `hicp models use` writes down which files, and which
+other options, such a detector takes (`own_detectors.json` in the cache); options given at a call come first.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import cache_dir, read_json, sha256_bytes, sha256_file, write_json
+
+
+def own_path() -> Path:
+    """The file of own options."""
+    return cache_dir() / "own_detectors.json"
+
+
+def all_own_options() -> dict[str, dict[str, Any]]:
+    """Options kept, by detector.
+
+    Raises
+    ------
+    InputError
+        If the file is not one of options.
+    """
+    path = own_path()
+    kept = read_json(path) if path.is_file() else {}
+    if not isinstance(kept, dict) or not all(isinstance(options, dict) for options in kept.values()):
+        raise InputError(
+            f"{path}: expected options by detector; delete it, and name your files again with hicp models use"
+        )
+    return kept
+
+
+def own_options(name: str) -> dict[str, Any]:
+    """Options kept for a detector; none where nothing was kept."""
+    return all_own_options().get(name, {})
+
+
+def keep_own(name: str, options: dict[str, Any]) -> None:
+    """Keep a detector's options, files by their absolute path, in the place of those kept before."""
+    kept = {key: str(Path(value).resolve()) if _is_file(value) else value for key, value in options.items()}
+    write_json(own_path(), all_own_options() | {name: kept}, indent=2)
+
+
+def own_sha256() -> dict[str, str]:
+    """By detector, one SHA-256 of its options with the content of their files."""
+    digests = {}
+    for name, kept in all_own_options().items():
+        content = {key: sha256_file(value) if _is_file(value) else value for key, value in kept.items()}
+        digests[name] = sha256_bytes(json.dumps(content).encode())
+    return digests
+
+
+def _is_file(value: Any) -> bool:
+    return isinstance(value, str | Path) and Path(value).is_file()

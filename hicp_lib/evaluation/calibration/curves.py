@@ -1,0 +1,210 @@
+"""Scores that mean the same: how often a keypoint of a given score is right, and scores made to say so.
+
+The reliability of a detector's scores is the hit rate of its keypoints (see `keypoint_hits`) against the
+score (Niculescu-Mizil and Caruana, "Predicting good probabilities with supervised learning", ICML 2005);
+the expected calibration error is the mean distance between the two over bins of the score, weighted with
+the keypoints in them (Guo et al., "On calibration of modern neural networks", ICML 2017). The calibration
+is isotonic regression, the best monotone curve in the least-squares sense, so it never turns round which
+of two keypoints of a detector is the surer one.
+
+It is fitted on one half of the source images and judged on the other. Raw scores stay as they are, for
+thresholds as the paper has them; `Calibration.apply` makes new detections.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.extras import needs
+from hicp_lib.core.keypoints import GROUPS
+from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
+
+with needs("analysis"):
+    from scipy.optimize import isotonic_regression
+
+N_BINS = 10
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What the scores of a detector are worth.
+
+    Attributes
+    ----------
+    scores : array, shape (n,), rising
+    rates : array, shape (n,), not falling: hit rate at each of `scores`; linear between, level beyond
+    """
+
+    scores: np.ndarray
+    rates: np.ndarray
+
+    @classmethod
+    def fit(cls, scores: np.ndarray, hits: np.ndarray) -> Calibration:
+        """Isotonic regression of hits (n,) on scores (n,).
+
+        Raises
+        ------
+        InputError
+            If there are no scores to fit to.
+        """
+        if not len(scores):
+            raise InputError("no scored keypoints of labelled people; give more images to calibrate on")
+        # Equal scores are one point of the curve, or the order of rows would matter.
+        levels, place, counts = np.unique(scores, return_inverse=True, return_counts=True)
+        rates = isotonic_regression(np.bincount(place, weights=hits) / counts, weights=counts).x
+        # Of each level stretch the curve needs only the ends.
+        inner = np.zeros(len(levels), dtype=bool)
+        inner[1:-1] = (rates[1:-1] == rates[:-2]) & (rates[1:-1] == rates[2:])
+        return cls(levels[~inner], np.clip(rates[~inner], 0, 1))
+
+    def __call__(self, scores: np.ndarray) -> np.ndarray:
+        """Hit rates to expect at scores of any shape."""
+        return np.interp(scores, self.scores, self.rates)
+
+    def apply(self, found: Detections, group: str) -> Detections:
+        """The detections with a group's keypoint scores calibrated; a keypoint not given keeps 0."""
+        keypoints = GROUPS[group]
+        given = np.isfinite(found.keypoints_px[:, keypoints]).all(axis=-1)
+        scores = found.scores.copy()
+        scores[:, keypoints] = np.where(given, self(scores[:, keypoints]), 0.0)
+        return replace(found, scores=scores)
+
+
+def split_half(groups: pd.Series, seed: int = 0) -> np.ndarray:
+    """A random half of the groups (source images): True for rows (n,) to fit on, False for the other half.
+
+    Rows of one group are never on both sides.
+    """
+    names = np.sort(groups.unique())
+    chosen = np.random.default_rng(seed).permutation(len(names)) < (len(names) + 1) // 2
+    return groups.isin(names[chosen]).to_numpy()
+
+
+def calibration_study(
+    hits: pd.DataFrame, n_resamples: int = 1000, seed: int = 0
+) -> tuple[pd.DataFrame, pd.DataFrame, dict[tuple[str, str], Calibration]]:
+    """Fit a calibration per detector and group on half of the source images, judge it on the other half.
+
+    Parameters
+    ----------
+    hits : `keypoint_hits.all_hits`, or rows of `keypoint_hits` with columns `detector, group, source_image`
+
+    Returns
+    -------
+    errors : DataFrame, columns `detector, group, n_keypoints, n_images, hit_rate, raw, raw_low, raw_high,
+        calibrated, calibrated_low, calibrated_high, change, change_low, change_high`: expected calibration
+        errors on the half held out with 95 % bootstrap intervals over source images
+    curves : DataFrame, columns `detector, group, scores` ("raw" or "calibrated") and those of `reliability`
+    calibrations : by (detector, group)
+    """
+    fits_on = split_half(hits["source_image"], seed)
+    errors, curves, calibrations = [], [], {}
+    for case, rows in hits.groupby(["detector", "group"], sort=False):
+        to_fit = fits_on[hits.index.get_indexer(rows.index)]
+        calibration = Calibration.fit(rows["score"].to_numpy()[to_fit], rows["hit"].to_numpy()[to_fit])
+        held_out = rows[~to_fit]
+        kinds = {"raw": held_out, "calibrated": held_out.assign(score=calibration(held_out["score"]))}
+        errors.append((*case, *_counts(held_out), *_errors(kinds, n_resamples, seed)))
+        for kind, table in kinds.items():
+            labels = {"detector": case[0], "group": case[1], "scores": kind}
+            curve = reliability(table["score"], table["hit"], table["source_image"], n_resamples, seed)
+            curves.append(curve.assign(**labels)[[*labels, *curve.columns]])
+        calibrations[case] = calibration
+    names = ["detector", "group", "n_keypoints", "n_images", "hit_rate"] + [
+        f"{kind}{end}" for kind in ("raw", "calibrated", "change") for end in ("", "_low", "_high")
+    ]
+    return pd.DataFrame(errors, columns=names), pd.concat(curves, ignore_index=True), calibrations
+
+
+def calibration_table(calibrations: Mapping[tuple[str, str], Calibration]) -> pd.DataFrame:
+    """Calibrations to be saved: columns `detector, group, score, rate`, a row per corner of a curve."""
+    rows = [
+        (*case, score, rate)
+        for case, calibration in calibrations.items()
+        for score, rate in zip(calibration.scores, calibration.rates, strict=True)
+    ]
+    return pd.DataFrame(rows, columns=["detector", "group", "score", "rate"])
+
+
+def calibrations_of(table: pd.DataFrame) -> dict[tuple[str, str], Calibration]:
+    """Calibrations by (detector, group) from a saved `calibration_table`."""
+    return {
+        case: Calibration(rows["score"].to_numpy(), rows["rate"].to_numpy())
+        for case, rows in table.groupby(["detector", "group"], sort=False)
+    }
+
+
+def _counts(rows: pd.DataFrame) -> tuple[int, int, float]:
+    return len(rows), rows["source_image"].nunique(), float(rows["hit"].mean())
+
+
+def _errors(kinds: Mapping[str, pd.DataFrame], n_resamples: int, seed: int) -> Iterator[float]:
+    """Value and interval of each kind's calibration error and, on the same draws, of their difference."""
+    samples = []
+    for rows in kinds.values():
+        sums = _sums(rows["score"], rows["hit"], rows["source_image"])
+        samples.append(_error(_resampled(sums, n_resamples, seed)))
+    samples.append(samples[1] - samples[0])
+    for drawn in samples:
+        yield from map(float, with_interval(drawn))
+
+
+def calibration_error(scores: np.ndarray, hits: np.ndarray) -> float:
+    """Expected calibration error of scores (n,) against hits (n,), over ten bins of equal width."""
+    return float(_error(_sums(scores, hits, np.zeros(len(scores))).sum(axis=0)))
+
+
+def reliability(
+    scores: np.ndarray,
+    hits: np.ndarray,
+    groups: np.ndarray,
+    n_resamples: int = 1000,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Hit rate per bin of the score, with 95 % bootstrap intervals over groups (source images).
+
+    Returns
+    -------
+    DataFrame, one row per bin that holds keypoints, columns `bin` (0-9), `score` (mean), `rate, low,
+    high, count`
+    """
+    sums = _sums(scores, hits, groups)
+    count, score_sum, _ = sums.sum(axis=0)
+    drawn = _resampled(sums, n_resamples, seed)
+    with np.errstate(invalid="ignore"):
+        rate, low, high = with_interval(drawn[:, 2] / drawn[:, 0])
+    rows = [
+        (int(i), score_sum[i] / count[i], rate[i], low[i], high[i], int(count[i]))
+        for i in np.flatnonzero(count)
+    ]
+    return pd.DataFrame(rows, columns=["bin", "score", "rate", "low", "high", "count"])
+
+
+def _sums(scores: np.ndarray, hits: np.ndarray, groups: np.ndarray) -> np.ndarray:
+    """Count, sum of scores and sum of hits per group and bin: shape (n_groups, 3, 10)."""
+    scores, hits = np.asarray(scores, float), np.asarray(hits, float)
+    group, names = pd.factorize(np.asarray(groups))
+    place = group * N_BINS + np.clip((scores * N_BINS).astype(int), 0, N_BINS - 1)
+    size = len(names) * N_BINS
+    sums = [
+        np.bincount(place, weights=weights, minlength=size)
+        for weights in (np.ones(len(scores)), scores, hits)
+    ]
+    return np.stack(sums).reshape(3, len(names), N_BINS).swapaxes(0, 1)
+
+
+def _resampled(sums: np.ndarray, n_resamples: int, seed: int) -> np.ndarray:
+    """Sums (1 + n_resamples, 3, 10) of all groups, then of groups drawn with replacement."""
+    return np.tensordot(draw_counts(len(sums), n_resamples, seed), sums, axes=1)
+
+
+def _error(sums: np.ndarray) -> np.ndarray:
+    """Expected calibration error of sums (..., 3, 10)."""
+    count, score_sum, hit_sum = np.moveaxis(sums, -2, 0)
+    return np.abs(hit_sum - score_sum).sum(axis=-1) / count.sum(axis=-1)

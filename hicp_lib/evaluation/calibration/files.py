@@ -1,0 +1,116 @@
+"""Calibrations as files: fitted to one result file, applied to others of the same detector.
+
+The table is the one the report saves: columns `detector, group, score, rate`, a row per corner of a curve
+(`calibration.calibration_table`), as Parquet there and as CSV here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json, write_bytes
+from hicp_lib.core.keypoints import GROUPS
+from hicp_lib.evaluation.calibration.curves import Calibration, calibration_table, calibrations_of
+from hicp_lib.evaluation.calibration.keypoint_hits import keypoint_hits
+from hicp_lib.formats.annotations import Annotations, read_detections, write_detections
+
+RAW_SCORES = "raw_keypoint_scores"
+_COLUMNS = ["detector", "group", "score", "rate"]
+_KNOWN_KEYS = {"image_id", "category_id", "keypoints", "score"}
+
+
+def fit_calibrations(
+    annotations: Annotations, detections: Mapping[int, Detections], detector: str
+) -> tuple[pd.DataFrame, dict[str, int]]:
+    """Calibration of every group of keypoints the detections give, and the keypoints each was fitted to.
+
+    Fitted to all annotated images: do not evaluate what comes of it on the same ones.
+
+    Raises
+    ------
+    InputError
+        If no keypoint of an annotated person was found.
+    """
+    calibrations, counts = {}, {}
+    for group in GROUPS:
+        hits = keypoint_hits(annotations, detections, group)
+        if len(hits):
+            fitted = Calibration.fit(hits["score"].to_numpy(), hits["hit"].to_numpy())
+            calibrations[detector, group], counts[group] = fitted, len(hits)
+    if not counts:
+        raise InputError("no scored keypoints of labelled people; give more images to calibrate on")
+    return calibration_table(calibrations), counts
+
+
+def write_calibrations(path: str | Path, table: pd.DataFrame) -> None:
+    """Write a calibration table as CSV, every digit of it."""
+    write_bytes(path, table.to_csv(index=False).encode())
+
+
+def read_calibrations(path: str | Path, detector: str = "") -> dict[str, Calibration]:
+    """Calibrations by group, of one detector; its name may be empty where the file has no other.
+
+    Raises
+    ------
+    InputError
+        If the file is unreadable, is no table of calibrations, or does not tell whose to take.
+    """
+    path = Path(path)
+    try:
+        table = pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
+    except (OSError, ValueError) as error:
+        problem = getattr(error, "strerror", None) or " ".join(str(error).split())[:150]
+        raise InputError(f"{path}: cannot be read as a table ({problem}); give calibrations") from None
+    if list(table.columns) != _COLUMNS:
+        raise InputError(f"{path}: has not the columns {', '.join(_COLUMNS)}; write it with calibration fit")
+    names = table["detector"].astype(str).unique().tolist()
+    if detector not in names and (detector or len(names) != 1):
+        raise InputError(f"{path}: detector {detector!r} is not in it; expected one of: {', '.join(names)}")
+    rows = table[table["detector"].astype(str) == (detector or names[0])]
+    _check(path, rows)
+    return {group: calibration for (_, group), calibration in calibrations_of(rows).items()}
+
+
+def _check(path: Path, table: pd.DataFrame) -> None:
+    unknown = set(table["group"]) - GROUPS.keys()
+    if unknown:
+        raise InputError(f"{path}: group {unknown.pop()!r} is not known; expected {', '.join(GROUPS)}")
+    for group, rows in table.groupby("group"):
+        values = rows[["score", "rate"]].apply(pd.to_numeric, errors="coerce").to_numpy(float)
+        steps = np.diff(values, axis=0)
+        inside = (values[:, 1] >= 0) & (values[:, 1] <= 1)
+        if not (np.isfinite(values).all() and inside.all() and (steps > (0, -1e-12)).all()):
+            raise InputError(f"{path}: group {group}: expected rising scores, rates that do not fall")
+
+
+def apply_calibrations(
+    detections_path: str | Path, calibrations: Mapping[str, Calibration], out: str | Path
+) -> int:
+    """Write a result file with calibrated keypoint scores, the scores as they were beside; the people in it.
+
+    A file that holds an importer's `raw_keypoint_scores` keeps those. Keypoints of groups without a
+    calibration keep their scores, and people theirs: AP ranks people and stays as it was.
+
+    Raises
+    ------
+    InputError
+        As `hicp_lib.formats.annotations.read_detections`.
+    """
+    found = read_detections(detections_path)
+    extras: dict[int, list[dict]] = {image_id: [] for image_id in found}
+    for row in read_json(detections_path):
+        people = extras[row["image_id"]]
+        raw = {RAW_SCORES: found[row["image_id"]].scores[len(people)].tolist()}
+        people.append(raw | {key: value for key, value in row.items() if key not in _KNOWN_KEYS})
+    for image_id, people in found.items():
+        for group, calibration in calibrations.items():
+            people = calibration.apply(people, group)
+        found[image_id] = people
+    write_detections(out, found, extras)
+    return sum(map(len, found.values()))

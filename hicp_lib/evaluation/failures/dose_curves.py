@@ -1,0 +1,151 @@
+"""How detection falls with the dose of what makes it hard: varied on purpose, or as found in a data set.
+
+Varied on purpose (`hicp_lib.experiments.doses`), everything but the dose is the same. In a data
+set doses come together: who is near is cropped as well. There a curve shows what goes with a dose, not what
+the dose does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.images import read_image
+from hicp_lib.evaluation.ap.metric_table import compare, only_images
+from hicp_lib.evaluation.failures.error_kinds import all_errors
+from hicp_lib.evaluation.statistics.proportions import shares
+from hicp_lib.formats.annotations import Annotations
+
+MEASURES = ("AP", "visible keypoints hit", "hidden keypoints hit")
+N_BINS = 5
+OBSERVED = {
+    "share of keypoints in the picture": "",
+    "distance": "m",
+    "picture": "px",
+    "share of keypoints hidden": "",
+    "distance to the border": "of the picture",
+    "brightness": "of 255",
+}
+
+
+def by_level(annotations: Annotations) -> dict[tuple[str, float], Annotations]:
+    """The pictures of each dose and level; people carry both."""
+    images: dict[tuple[str, float], set[int]] = {}
+    for image_id, extra in zip(annotations.image_ids.tolist(), annotations.extras, strict=True):
+        images.setdefault((extra["dose"], extra["level"]), set()).add(image_id)
+    return {level: only_images(annotations, chosen) for level, chosen in images.items()}
+
+
+def dose_curves(
+    annotations: Annotations,
+    found: Mapping[str, Mapping[int, Detections]],
+    n_resamples: int = 1000,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """AP, and the share of keypoints hit, at every level of every dose.
+
+    Parameters
+    ----------
+    annotations : as `doses.open_doses` writes them
+    found : detector -> detections by image id
+
+    Returns
+    -------
+    DataFrame, columns `dose, level, detector, group, measure` (one of `MEASURES`), `value, low, high, n`
+    (people, or keypoints): 95 % bootstrap intervals over people
+    """
+    truth = {str(key): people for key, people in by_level(annotations).items()}
+    cases = {
+        (name, detector): {i: run[i] for i in people.images}
+        for detector, run in found.items()
+        for name, people in truth.items()
+    }
+    ap = compare(truth, cases, n_resamples, seed).query("metric == 'AP'")
+    ap = ap.rename(columns={"n_people": "n"}).assign(measure="AP")
+    errors = all_errors(truth, cases)
+    state = np.where(errors["visibility"] >= 2, *MEASURES[1:])
+    keys = ["subset", "detector", "group", "measure"]
+    table = pd.concat([ap, shares(errors.assign(measure=state), keys, "hit", n_resamples, seed)])
+    levels = pd.DataFrame(by_level(annotations).keys(), index=list(truth), columns=["dose", "level"])
+    table = table.join(levels, on="subset")
+    columns = ["dose", "level", "detector", "group", "measure", "value", "low", "high", "n"]
+    return table[columns].reset_index(drop=True)
+
+
+def observed_doses(
+    truth: Mapping[str, Annotations], folders: Mapping[str, Path], source: Annotations
+) -> pd.DataFrame:
+    """The doses of everybody who counts, as the data set has them: one row per labelled body keypoint.
+
+    Parameters
+    ----------
+    truth, folders : subset -> annotations, and folder with their images
+    source : the annotations the crops were made from; distances are known if people carry `distance_m`
+
+    Returns
+    -------
+    DataFrame, columns `subset, image_id, keypoint` and those of `OBSERVED` (NaN where not known)
+    """
+    distances = {
+        int(i): extra.get("distance_m", np.nan) for i, extra in zip(source.ids, source.extras, strict=True)
+    }
+    tables = []
+    for subset, of_subset in truth.items():
+        people = of_subset.take(~of_subset.is_crowd)
+        for row, image_id in enumerate(people.image_ids.tolist()):
+            image = people.images[image_id]
+            pixels = read_image(Path(folders[subset]) / "images" / image.file_name)
+            table = _doses_of(people, row, np.array([image.width_px, image.height_px]))
+            about = people.extras[row]
+            tables.append(
+                table.assign(
+                    subset=subset, image_id=image_id, distance=distances.get(about.get("source_id"), np.nan),
+                    brightness=cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY).mean(),
+                )
+            )  # fmt: skip
+    return pd.concat(tables, ignore_index=True)[["subset", "image_id", "keypoint", *OBSERVED]]
+
+
+def _doses_of(people: Annotations, row: int, size_px: np.ndarray) -> pd.DataFrame:
+    flags = people.visibility[row, :17]
+    points = people.keypoints_px[row, :17][flags > 0]
+    gap = np.minimum(points + 0.5, size_px - points - 0.5).min(axis=1)
+    return pd.DataFrame(
+        {
+            "keypoint": np.flatnonzero(flags > 0),
+            "share of keypoints in the picture": (flags > 0).mean(),
+            "share of keypoints hidden": ((flags > 0) & (flags < 2)).sum() / max((flags > 0).sum(), 1),
+            "picture": np.sqrt(size_px.prod()),
+            "distance to the border": gap / size_px.min(),
+        }
+    )
+
+
+def observed_curves(
+    errors: pd.DataFrame, observed: pd.DataFrame, n_resamples: int = 1000, seed: int = 0
+) -> pd.DataFrame:
+    """Share of body keypoints hit, by five bins of each dose that hold equally many keypoints.
+
+    Parameters
+    ----------
+    errors : `error_kinds.all_errors`
+    observed : `observed_doses`
+
+    Returns
+    -------
+    DataFrame, columns `subset, dose, detector, level` (median of the bin), `value, low, high, n, n_images`
+    """
+    body = errors[errors["group"] == "body"].merge(observed, on=["subset", "image_id", "keypoint"])
+    tables = []
+    for dose in OBSERVED:
+        for _, rows in body[body[dose].notna()].groupby("subset", sort=False):
+            bins = pd.qcut(rows[dose], N_BINS, labels=False, duplicates="drop")
+            middle = rows.groupby(bins)[dose].median()
+            rows = rows.assign(dose=dose, level=bins.map(middle)).sort_values("level", kind="stable")
+            tables.append(shares(rows, ["subset", "dose", "detector", "level"], "hit", n_resamples, seed))
+    return pd.concat(tables, ignore_index=True)

@@ -1,0 +1,157 @@
+"""Scores of keypoints that are not there to be seen, and the paper's remarks on them as numbers.
+
+What the paper says of each system in a few words becomes a measure that every detector can be held to:
+
+- MMPose "adds keypoints at the edge with low confidence": of keypoints outside the picture, the share that
+  is given; of those given, the share put at the border or beyond; their mean score less visible ones'.
+- AlphaPose is "conservative": the share of labelled keypoints given with a score of at least .3, and the
+  share of those that are right.
+- Detectron2 has "low shoulder scores": mean score of visible shoulders less that of other visible keypoints
+  below the head.
+- OpenPose gives "fingers only with a wrist": of hands given, the share whose body wrist is not given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import INDEX, LEFT_HAND, RIGHT_HAND
+from hicp_lib.evaluation.ap.metric_table import groups_of, source_images
+from hicp_lib.evaluation.failures.placed_keypoints import landed
+from hicp_lib.evaluation.statistics.proportions import mean_with_interval, shares
+from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
+from hicp_lib.formats.annotations import Annotations
+
+SURE = 0.3  # the paper's threshold
+N_BINS = 5
+_SHOULDERS = (INDEX["left_shoulder"], INDEX["right_shoulder"])
+_FIRST_BELOW_HEAD = INDEX["left_shoulder"]
+
+# Measure: the system that the paper says it of.
+MEASURES = {
+    "outside the picture: given": "mmpose",
+    "outside the picture: of those given, put at the border or beyond": "mmpose",
+    "outside the picture: mean score, less that of visible keypoints": "mmpose",
+    f"labelled keypoints given with a score of at least {SURE}": "alphapose",
+    f"of keypoints with a score of at least {SURE}: right": "alphapose",
+    "mean score of shoulders, less that of the other joints": "detectron2",
+    "hands given without their wrist": "openpose",
+}
+
+
+def scores_by_state(placed: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+    """Hit rate against score, for keypoints that are visible, hidden and outside the picture.
+
+    Parameters
+    ----------
+    placed : `placed_keypoints.placed_keypoints`
+
+    Returns
+    -------
+    DataFrame, columns `detector, state, bin, score` (mean), `value, low, high, n, n_images`, by five equal
+    bins of the score
+    """
+    rows = placed[placed["hit"].notna()]
+    bins = np.clip((rows["score"] * N_BINS).astype(int), 0, N_BINS - 1)
+    rows = rows.assign(bin=bins).sort_values(["detector", "state", "bin"], kind="stable")
+    keys = ["detector", "state", "bin"]
+    means = rows.groupby(keys)["score"].mean().reset_index()
+    return means.merge(shares(rows, keys, "hit", n_resamples, seed), on=keys)
+
+
+def paper_remarks(
+    placed: pd.DataFrame,
+    errors: pd.DataFrame,
+    truth: Mapping[str, Annotations],
+    found: Mapping[tuple[str, str], Mapping[int, Detections]],
+    n_resamples: int = 1000,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Every measure for every detector that was run, and "not run" for the system the paper says it of.
+
+    Parameters
+    ----------
+    placed : `placed_keypoints.placed_keypoints`
+    errors : `error_kinds.all_errors`
+
+    Returns
+    -------
+    DataFrame, columns `measure, said_of, detector, value, low, high, n, status` ("run" or "not run")
+    """
+    rows = []
+    detectors = list(dict.fromkeys(detector for _, detector in found))
+    for detector in detectors:
+        of = [table[table["detector"] == detector] for table in (placed, errors[errors["group"] == "body"])]
+        hands = _hands(detector, truth, found) if "hand" in groups_of(found, detector) else None
+        values = _values(*of, hands, n_resamples, seed)
+        rows += [(m, MEASURES[m], detector, *value, "run") for m, value in zip(MEASURES, values, strict=True)]
+    absent = {
+        name for name in MEASURES.values() if name not in detectors and f"{name}-imported" not in detectors
+    }
+    rows += [(m, s, s, np.nan, np.nan, np.nan, 0, "not run") for m, s in MEASURES.items() if s in absent]
+    table = pd.DataFrame(
+        rows, columns=["measure", "said_of", "detector", "value", "low", "high", "n", "status"]
+    )
+    order = {measure: i for i, measure in enumerate(MEASURES)}
+    return table.sort_values("measure", key=lambda names: names.map(order), kind="stable", ignore_index=True)
+
+
+def _values(
+    placed: pd.DataFrame, errors: pd.DataFrame, hands: pd.DataFrame | None, n_resamples: int, seed: int
+) -> Iterator[tuple[float, float, float, int]]:
+    """Value, interval and number of rows of each of `MEASURES`, in their order."""
+    outside = placed[placed["state"] == "outside"]
+    given, visible = outside[outside["given"]], placed[(placed["state"] == "visible") & placed["given"]]
+    joints = visible[visible["keypoint"] >= _FIRST_BELOW_HEAD]
+    shoulder = joints["keypoint"].isin(_SHOULDERS)
+    sure = errors["score"] >= SURE
+    yield _mean(outside, outside["given"], n_resamples, seed)
+    yield _mean(given, landed(given) != "inside", n_resamples, seed)
+    yield _difference(given, visible, n_resamples, seed)
+    yield _mean(errors, sure, n_resamples, seed)
+    yield _mean(errors[sure], errors["hit"][sure], n_resamples, seed)
+    yield _difference(joints[shoulder], joints[~shoulder], n_resamples, seed)
+    yield (np.nan, np.nan, np.nan, 0) if hands is None else _mean(hands, ~hands["wrist"], n_resamples, seed)
+
+
+def _mean(
+    rows: pd.DataFrame, flags: pd.Series, n_resamples: int, seed: int
+) -> tuple[float, float, float, int]:
+    return *mean_with_interval(flags, rows["source_image"], n_resamples, seed), len(rows)
+
+
+def _difference(
+    a: pd.DataFrame, b: pd.DataFrame, n_resamples: int, seed: int
+) -> tuple[float, float, float, int]:
+    """Mean score of a less that of b, both on the same draws of source images."""
+    images = np.unique(np.concatenate([a["source_image"], b["source_image"]]))
+    if not len(a) or not len(b):
+        return np.nan, np.nan, np.nan, 0
+    times = draw_counts(len(images), n_resamples, seed)
+    means = []
+    for rows in (a, b):
+        place = np.searchsorted(images, rows["source_image"])
+        sums, counts = (np.bincount(place, weights=w, minlength=len(images)) for w in (rows["score"], None))
+        with np.errstate(invalid="ignore"):
+            means.append(times @ sums / (times @ counts))
+    value, low, high = with_interval(means[0] - means[1])
+    return float(value), float(low), float(high), len(a)
+
+
+def _hands(detector: str, truth: Mapping, found: Mapping) -> pd.DataFrame:
+    """Every hand with a finger given: columns `source_image, wrist` (whether the body's wrist is given)."""
+    rows = []
+    for (subset, name), run in found.items():
+        if name != detector:
+            continue
+        sources = source_images(truth[subset])
+        for image_id, people in run.items():
+            given = np.isfinite(people.keypoints_px).all(axis=-1)
+            for hand, wrist in ((LEFT_HAND, "left_wrist"), (RIGHT_HAND, "right_wrist")):
+                has_hand = given[:, hand[1:]].any(axis=1)
+                rows += [(sources[image_id], bool(flag)) for flag in given[has_hand, INDEX[wrist]]]
+    return pd.DataFrame(rows, columns=["source_image", "wrist"]).astype({"wrist": bool})

@@ -1,0 +1,126 @@
+"""Temporal stability: keypoints that come and go, and jump, from one frame of a recording to the next.
+
+- A keypoint is *given* in a frame when its score is at least `MIN_SCORE`.
+- The *flicker rate* is the share of keypoints that are given in one of two consecutive frames only, of those
+  given in either.
+- The *jitter* is the length of the second difference of a keypoint's places in three consecutive frames,
+  over the square root of 6: what an error of the single frame that is independent of the others' is long,
+  on average. Steady motion adds nothing.
+
+The causal filter looks back only: a keypoint is taken as given when it was in most of the last
+`MAJORITY_OF` frames, and its place runs through a One Euro filter (Casiez, Roussel and Vogel, CHI 2012; the
+authors' package), which smooths less the faster a keypoint moves. Its latency is the time by which filtered
+places lag behind unfiltered ones: the least-squares factor between that lag and the velocity.
+
+Consecutive frames show nearly the same view when the recording's rate is high against the motion. Detectors
+that find hands and faces are judged on the 17 body keypoints all detectors share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.extras import needs
+from hicp_lib.core.keypoints import COCO_17
+from hicp_lib.evaluation.statistics.proportions import mean_with_interval
+
+with needs("analysis"):
+    from OneEuroFilter import OneEuroFilter
+
+MIN_SCORE = 0.3
+MAJORITY_OF = 3
+MIN_CUTOFF_HZ, BETA = 1.5, 0.02  # of the One Euro filter; beta in Hz per px/s
+MAX_GAP_S = 0.5  # over which frames still count as consecutive
+_BLOCK_S = 1.0  # stretches of time that are drawn together in the bootstrap
+
+
+def best_person(found: Sequence[Detections]) -> np.ndarray:
+    """The given body keypoints of the best-scored person of every frame: (n, 17, 2), NaN where not given."""
+    tracks = np.full((len(found), len(COCO_17), 2), np.nan)
+    for frame, people in enumerate(found):
+        if len(people):
+            best = int(people.person_scores.argmax())
+            given = people.scores[best, COCO_17] >= MIN_SCORE
+            tracks[frame] = np.where(given[:, None], people.keypoints_px[best, COCO_17], np.nan)
+    return tracks
+
+
+def causal_filter(tracks_px: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+    """Tracks (n, k, 2) filtered as the module says, by what was seen up to each frame (times (n,))."""
+    filtered = np.full_like(tracks_px, np.nan)
+    for k in range(tracks_px.shape[1]):
+        filtered[:, k] = _filtered_keypoint(tracks_px[:, k], times_s)
+    return filtered
+
+
+def _filtered_keypoint(track_px: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+    given = np.isfinite(track_px).all(axis=-1)
+    result = np.full_like(track_px, np.nan)
+    place, seen_s, axes = np.full(2, np.nan), -np.inf, ()
+    for i, time_s in enumerate(times_s):
+        if given[i]:
+            if time_s - seen_s > MAX_GAP_S:
+                axes = tuple(OneEuroFilter(1.0, MIN_CUTOFF_HZ, BETA) for _ in range(2))
+            place = np.array([one(float(x), time_s) for one, x in zip(axes, track_px[i], strict=True)])
+            seen_s = time_s
+        recent = given[max(0, i + 1 - MAJORITY_OF) : i + 1]
+        if 2 * recent.sum() > len(recent):
+            result[i] = place
+    return result
+
+
+def latency_s(tracks_px: np.ndarray, filtered_px: np.ndarray, times_s: np.ndarray) -> float:
+    """By how much filtered tracks lag behind the unfiltered ones; NaN where nothing moves."""
+    steps = np.diff(times_s)[:, None, None]
+    velocity = np.diff(tracks_px, axis=0) / steps
+    behind = (tracks_px - filtered_px)[1:]
+    both = np.isfinite(velocity) & np.isfinite(behind)
+    power = (velocity[both] ** 2).sum()
+    return float((velocity[both] * behind[both]).sum() / power) if power > 0 else float("nan")
+
+
+def flicker(
+    found: Mapping[str, Sequence[Detections]], times_s: np.ndarray, n_resamples: int = 1000, seed: int = 0
+) -> pd.DataFrame:
+    """Flicker and jitter of every detector, as detected and through the causal filter.
+
+    Parameters
+    ----------
+    found : detector -> detections of each frame
+    times_s : array, shape (n,), rising
+
+    Returns
+    -------
+    DataFrame, columns `detector, tracks` ("as detected", "filtered"), `measure` ("flicker rate", "jitter
+    [px]", "latency [s]"), `value, low, high, n`: 95 % intervals from drawing stretches of a second; none
+    for the latency
+    """
+    rows = []
+    for detector, run in found.items():
+        raw = best_person(run)
+        filtered = causal_filter(raw, times_s)
+        for kind, tracks in (("as detected", raw), ("filtered", filtered)):
+            for measure, (values, at_s) in _measures(tracks, times_s).items():
+                interval = mean_with_interval(values, np.floor(at_s / _BLOCK_S), n_resamples, seed)
+                rows.append((detector, kind, measure, *interval, len(values)))
+            lag_s = 0.0 if kind == "as detected" else latency_s(raw, filtered, times_s)
+            rows.append((detector, kind, "latency [s]", lag_s, np.nan, np.nan, len(times_s)))
+    return pd.DataFrame(rows, columns=["detector", "tracks", "measure", "value", "low", "high", "n"])
+
+
+def _measures(tracks_px: np.ndarray, times_s: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Values and their times: whether keypoints flicker, and how far they jump."""
+    given = np.isfinite(tracks_px).all(axis=-1)
+    close = (np.diff(times_s) <= MAX_GAP_S)[:, None]
+    either = (given[1:] | given[:-1]) & close
+    jumps = np.linalg.norm(np.diff(tracks_px, n=2, axis=0), axis=-1) / np.sqrt(6)
+    jumped = np.isfinite(jumps) & close[1:] & close[:-1]
+    at_s = np.broadcast_to(times_s[:, None], given.shape)
+    return {
+        "flicker rate": ((given[1:] != given[:-1])[either], at_s[1:][either]),
+        "jitter [px]": (jumps[jumped], at_s[2:][jumped]),
+    }

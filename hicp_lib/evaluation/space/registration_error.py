@@ -1,0 +1,85 @@
+"""What a registration adds to the errors, where the exact transform is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.camera import project, transform
+from hicp_lib.core.extras import needs
+from hicp_lib.mocap.registration import Registration
+from hicp_lib.mocap.synchronisation import interpolate_mocap
+from hicp_lib.recordings.qualisys import MotionCapture
+from hicp_lib.recordings.recording import Recording
+
+with needs("analysis"):
+    from scipy.spatial.transform import Rotation
+
+
+def compare_registrations(
+    registrations: Sequence[Registration], mocap: MotionCapture, T_base_mocap: np.ndarray | None
+) -> pd.DataFrame:
+    """Registrations side by side, with how far from the truth they put the markers on the person.
+
+    Parameters
+    ----------
+    T_base_mocap : the exact transform, shape (4, 4); None where it is not known
+
+    Returns
+    -------
+    DataFrame, columns `method, n_points, rms_m, leave_one_out_m`, and against the exact transform
+    `turned_rad` (angle between the rotations), `added_m` and `worst_m` (median and largest displacement
+    of the markers on the person, all frames); NaN where it is not known
+    """
+    on_person = [k for k, name in enumerate(mocap.names) if name != "camera"]
+    markers_m = mocap.points_m[:, on_person].reshape(-1, 3)
+    markers_m = markers_m[np.isfinite(markers_m).all(axis=1)]
+    rows = []
+    for one in registrations:
+        row = {"method": one.method, "n_points": one.n_points, "rms_m": one.rms_m}
+        row |= {
+            "leave_one_out_m": one.leave_one_out_m,
+            "turned_rad": np.nan,
+            "added_m": np.nan,
+            "worst_m": np.nan,
+        }
+        if T_base_mocap is not None:
+            R = one.T_base_mocap[:3, :3].T @ T_base_mocap[:3, :3]
+            moved_m = transform(one.T_base_mocap, markers_m) - transform(T_base_mocap, markers_m)
+            distances_m = np.linalg.norm(moved_m, axis=1)
+            row["turned_rad"] = float(Rotation.from_matrix(R).magnitude())
+            row |= {"added_m": float(np.median(distances_m)), "worst_m": float(distances_m.max())}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def marker_pixels(
+    recording: Recording,
+    mocap: MotionCapture,
+    registrations: Sequence[Registration],
+    frames: Iterable[int],
+    offset_s: float = 0.0,
+) -> pd.DataFrame:
+    """Where each registration puts the measured markers in images.
+
+    Parameters
+    ----------
+    frames : of the images; a number may come more than once
+    offset_s : to add to the motion capture's stamps to have them on the camera's clock
+
+    Returns
+    -------
+    DataFrame, columns `method, frame, marker, u_px, v_px`; NaN where a marker was not measured
+    """
+    frames = sorted(set(frames))
+    measured_m = interpolate_mocap(mocap.times_s, mocap.points_m, recording.times_s[frames] - offset_s)
+    tables = []
+    for one in registrations:
+        for frame, points_m in zip(frames, measured_m, strict=True):
+            T_cam_mocap = np.linalg.inv(recording.T_base_cam[frame]) @ one.T_base_mocap
+            pixels_px = project(recording.intrinsics, transform(T_cam_mocap, points_m))
+            table = pd.DataFrame(pixels_px, columns=["u_px", "v_px"])
+            tables.append(table.assign(method=one.method, frame=frame, marker=mocap.names))
+    return pd.concat(tables, ignore_index=True)[["method", "frame", "marker", "u_px", "v_px"]]

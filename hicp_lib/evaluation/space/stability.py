@@ -1,0 +1,192 @@
+"""How steadily, and how truly, 3D keypoints of a still person are found from many views (paper section IV-B).
+
+The person sits still and the robot looks from many poses, so every view should give the same position in
+the robot's base frame. *Stability* is how close views come to the detector's own median position; it needs no
+truth, and a detector that is always wrong in the same way is stable. *Accuracy* is the same against the true
+position, which simulated recordings have.
+
+Throughout, `points` is the table of `hicp_lib.lifting.table.lift_recording` with the columns `view`,
+`detector` and `method` before its own, and `n_frames` maps every view to its number of images. The person
+with the best score of each image counts; a keypoint counts as found when its score is above `min_score`
+and it could be lifted.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.keypoints import LEFT_HAND, NAMES, RIGHT_HAND
+from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
+
+CASE = ["view", "detector", "method"]
+POSITION = ["x_m", "y_m", "z_m"]
+THRESHOLDS_M = (0.025, 0.05, 0.1)
+MIN_SCORE = 0.1
+
+# What the paper reports. All 21 keypoints of a hand count, each against its own median position.
+PARTS: dict[str, tuple[str, ...]] = {
+    f"{side} {part}": keypoints
+    for part in ("shoulder", "elbow", "wrist", "hand")
+    for side, hand in (("left", LEFT_HAND), ("right", RIGHT_HAND))
+    for keypoints in [tuple(NAMES[i] for i in hand) if part == "hand" else (f"{side}_{part}",)]
+}
+
+
+def counted(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
+    """The rows that count: the best person of an image, score above `min_score`, lifted."""
+    lifted = points[POSITION].notna().all(axis=1)
+    return points[(points["person"] == 0) & (points["score"] > min_score) & lifted]
+
+
+def median_positions(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
+    """Coordinate-wise median over the views of every keypoint, in the base frame.
+
+    Returns
+    -------
+    DataFrame, columns `view, detector, method, keypoint, n, x_m, y_m, z_m`; `n` is the number of images
+    """
+    groups = counted(points, min_score).groupby([*CASE, "keypoint"], sort=False)
+    return (
+        groups[POSITION].median().assign(n=groups.size()).reset_index()[[*CASE, "keypoint", "n", *POSITION]]
+    )
+
+
+def within_distance(
+    points: pd.DataFrame,
+    n_frames: Mapping[str, int],
+    truth: Mapping[str, pd.DataFrame] | None = None,
+    thresholds_m: Sequence[float] = THRESHOLDS_M,
+    min_score: float = MIN_SCORE,
+    n_resamples: int = 1000,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Fraction of images in which a keypoint was found within a distance of where it should be.
+
+    An image in which it was not found counts as not within. For a hand, each of its keypoints counts alike.
+    A detector that finds a part in no image and on neither side does not give it, and has no row.
+
+    Parameters
+    ----------
+    truth : view -> table with `frame, keypoint, x_m, y_m, z_m`. Given, distances are to the true
+        positions; None, to the median over the images, taken anew in every draw of the bootstrap
+
+    Returns
+    -------
+    DataFrame, columns `view, detector, method, part, reference` ("median" or "truth"), `threshold_m, value,
+    low, high` (95 % percentile bootstrap over images), `found` (fraction of images, at any distance)
+    """
+    rows = []
+    reference = "median" if truth is None else "truth"
+    weights_of = {n: draw_counts(n, n_resamples, seed) for n in set(n_frames.values())}
+    for case, part, found_m, true_m in _cases(points, n_frames, truth, min_score):
+        weights = weights_of[len(found_m)]
+        shares = np.zeros((len(weights), len(thresholds_m)))
+        for k in range(found_m.shape[1]):
+            distances = _distances(found_m[:, k], None if true_m is None else true_m[:, k], weights)
+            for j, threshold_m in enumerate(thresholds_m):
+                shares[:, j] += np.einsum("dn,dn->d", weights, distances <= threshold_m) / found_m.size * 3
+        found = float(np.isfinite(found_m[..., 0]).mean())
+        for threshold_m, *numbers in zip(thresholds_m, *with_interval(shares), strict=True):
+            rows.append((*case, part, reference, threshold_m, *numbers, found))
+    columns = [*CASE, "part", "reference", "threshold_m", "value", "low", "high", "found"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def spread_and_bias(
+    points: pd.DataFrame,
+    n_frames: Mapping[str, int],
+    truth: Mapping[str, pd.DataFrame] | None = None,
+    min_score: float = MIN_SCORE,
+    n_resamples: int = 1000,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Stability and accuracy as distances, over the images in which a keypoint was found.
+
+    Returns
+    -------
+    DataFrame, columns `view, detector, method, part, n_images` (in which it was found), then in metres, each
+    with `_low` and `_high` beside it: `spread_m`, the median distance to the median position; with `truth`
+    also `bias_m`, how far the median position is from the true one, and `error_m`, the median distance to
+    the truth. For a hand, the mean of each over its keypoints; NaN where nothing was found
+    """
+    rows = []
+    weights_of = {n: draw_counts(n, n_resamples, seed) for n in set(n_frames.values())}
+    for case, part, found_m, true_m in _cases(points, n_frames, truth, min_score):
+        weights = weights_of[len(found_m)]
+        row = dict(zip(CASE, case, strict=True)) | {
+            "part": part,
+            "n_images": float(np.isfinite(found_m[..., 0]).sum(axis=0).mean()),
+        }
+        for name, draws in _distances_drawn(found_m, true_m, weights).items():
+            value, low, high = with_interval(draws)
+            row |= {name: value, f"{name}_low": low, f"{name}_high": high}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def position_array(
+    rows: pd.DataFrame, keypoints: Sequence[str], n_frames: int, columns: Sequence[str] = POSITION
+) -> np.ndarray:
+    """Positions of one case as an array, shape (n_frames, len(keypoints), 3), metres; NaN where not found."""
+    result = np.full((n_frames, len(keypoints), 3), np.nan)
+    place = {name: k for k, name in enumerate(keypoints)}
+    rows = rows[rows["keypoint"].isin(place)]
+    result[rows["frame"], rows["keypoint"].map(place).astype(int)] = rows[list(columns)]
+    return result
+
+
+def _cases(
+    points: pd.DataFrame,
+    n_frames: Mapping[str, int],
+    truth: Mapping[str, pd.DataFrame] | None,
+    min_score: float,
+) -> Iterator[tuple[tuple[str, str, str], str, np.ndarray, np.ndarray | None]]:
+    """Case, part, positions found and true positions (None without truth) of every part a detector gives."""
+    given = {
+        detector: {name.split()[1] for name in PARTS if set(PARTS[name]) & set(rows["keypoint"].unique())}
+        for detector, rows in points.groupby("detector", sort=False)
+    }
+    found = dict(list(counted(points, min_score).groupby(CASE, sort=False)))
+    runs = points[["detector", "method"]].drop_duplicates().itertuples(index=False, name=None)
+    for (view, n), (detector, method) in itertools.product(n_frames.items(), runs):
+        # A detector that finds nobody in a view has no rows there, and is counted all the same.
+        rows = found.get((view, detector, method), points[:0])
+        for part, keypoints in PARTS.items():
+            if part.split()[1] in given[detector]:
+                true = None if truth is None else position_array(truth[view], keypoints, n)
+                yield (view, detector, method), part, position_array(rows, keypoints, n), true
+
+
+def _median_position(found_m: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Coordinate-wise median of one keypoint's positions (n, 3) in every draw, shape (draws, 3)."""
+    return np.stack([weighted_median(found_m[:, i], weights) for i in range(3)], axis=1)
+
+
+def _distances(found_m: np.ndarray, true_m: np.ndarray | None, weights: np.ndarray) -> np.ndarray:
+    """Distances of one keypoint's positions (n, 3): to the truth (1, n), or each draw's median (draws, n)."""
+    if true_m is not None:
+        return np.linalg.norm(found_m - true_m, axis=1)[None]
+    median_m = _median_position(found_m, weights)
+    return np.sqrt(sum((found_m[:, i] - median_m[:, i, None]) ** 2 for i in range(3)))
+
+
+def _distances_drawn(
+    found_m: np.ndarray, true_m: np.ndarray | None, weights: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Spread, bias and error in every draw, shape (draws,), mean over the keypoints found."""
+    names = ("spread_m",) if true_m is None else ("spread_m", "bias_m", "error_m")
+    draws: dict[str, list[np.ndarray]] = {name: [] for name in names}
+    for k in np.flatnonzero(np.isfinite(found_m[..., 0]).any(axis=0)):
+        found, spread = found_m[:, k], _distances(found_m[:, k], None, weights)
+        draws["spread_m"].append(weighted_median(spread, weights))
+        if true_m is not None:
+            bias = np.linalg.norm(_median_position(found - true_m[:, k], weights), axis=1)
+            draws["bias_m"].append(bias)
+            error = _distances(found, true_m[:, k], weights)
+            draws["error_m"].append(weighted_median(error, weights))
+    nothing = [np.full(len(weights), np.nan)]
+    return {name: np.mean(columns or nothing, axis=0) for name, columns in draws.items()}

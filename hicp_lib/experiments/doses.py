@@ -1,0 +1,236 @@
+"""Doses: the same person, pose and room, with one thing varied and all else fixed.
+
+A person stands in the laboratory before a camera that looks level from `EYE_M` above the floor. Every
+picture is of one dose at one level:
+
+- "distance": of the camera, in metres. The lens is fixed, so a near camera sees less of the person.
+- "light": a share of the laboratory's. The camera makes up for it by amplification: shot noise grows with
+  the root of the missing light, read noise in proportion.
+- "hidden": a board, out of reach before the person, hides this share of their height from below.
+- "resolution": height of the picture in pixels, of the same view, by down-sampling.
+- "upper part", "lower part": the share of the person's height that the picture shows, from the head down
+  and from the feet up; cut from the same picture.
+
+The area in the annotations, the s² of OKS, is that of the whole unhidden person at the picture's scale, so
+that the same error in body sizes counts the same at every level.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hicp_lib.core.cache import key
+from hicp_lib.core.files import cache_dir
+from hicp_lib.core.images import write_png
+from hicp_lib.datasets.crops import inside, whole_pixel_boxes
+from hicp_lib.experiments.laboratory import PHOTOGRAPHIC, adult, facing_robot, furnished
+from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
+from hicp_lib.simulation.appearance import materials as m
+from hicp_lib.simulation.appearance.people import dress
+from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
+from hicp_lib.simulation.body.poses import sample_pose
+from hicp_lib.simulation.rendering import mesh as g
+from hicp_lib.simulation.rendering.camera import Camera, look_at
+from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
+from hicp_lib.simulation.rendering.render import Frame, World, render
+from hicp_lib.simulation.rendering.surfaces import Surface
+from hicp_lib.simulation.world.scenes import worker_pool
+from hicp_lib.simulation.world.visibility import keypoint_visibility
+
+LEVELS: dict[str, tuple[float, ...]] = {
+    "distance": (0.5, 0.75, 1.0, 1.5, 2.5, 3.5),
+    "light": (1.0, 0.3, 0.1, 0.03, 0.01),
+    "hidden": (0.0, 0.2, 0.4, 0.6, 0.8),
+    "resolution": (640, 320, 160, 80, 48),
+    "upper part": (1.0, 0.8, 0.6, 0.4, 0.2),
+    "lower part": (1.0, 0.8, 0.6, 0.4, 0.2),
+}
+DISTANCE_M, EYE_M = 2.5, 1.3
+_WIDTH_PX, _HEIGHT_PX, _FOCAL_PX = 480, 640, 560.0
+_PERSON_Y_M, _BOARD_M, _BOARD_HALF_M = 1.2, 0.85, 0.6
+_SIDE_MARGIN = 0.1  # of the person's height, left and right of a cut-out part
+_POSES = ("standing", "reaching", "reaching_both", "pointing", "raised", "hips")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of one person and what is true of them there.
+
+    Attributes
+    ----------
+    image : RGB uint8, shape (height, width, 3)
+    mask : the person's pixels, shape (height, width), bool
+    keypoints_px : array, shape (136, 2)
+    visibility : array, shape (136,); 0 outside, 1 hidden, 2 visible
+    area_px2 : of the whole unhidden person at this scale
+    """
+
+    image: np.ndarray
+    mask: np.ndarray
+    keypoints_px: np.ndarray
+    visibility: np.ndarray
+    area_px2: float
+
+
+def open_doses(n_people: int = 10, seed: int = 0) -> Path:
+    """Dataset folder (`images/`, `annotations.json`) of all doses; rendered first if it is not in the cache.
+
+    People in the annotations carry `dose`, `level`, and `source_image_id`, the number of the person.
+    """
+    folder = cache_dir() / "doses" / key([open_doses], n_people=n_people, seed=seed)[:16]
+    if not (folder / "annotations.json").is_file():
+        jobs = [(str(folder), seed, k) for k in range(n_people)]
+        with worker_pool(min(n_people, multiprocessing.cpu_count())) as pool:
+            people = pool.starmap(_write_person, jobs, chunksize=1)
+        write_annotations(folder / "annotations.json", _joined([row for rows in people for row in rows]))
+    return folder
+
+
+def doses(seed: int, number: int) -> Iterator[tuple[str, float, Picture]]:
+    """All pictures of one person: dose, level and picture."""
+    person, world = _stage(np.random.default_rng(np.random.SeedSequence([seed, number])))
+    base_frame, base = _photograph(person, world, DISTANCE_M, (seed, number))
+    for level in LEVELS["distance"]:
+        yield "distance", level, _at_distance(person, world, level, base, (seed, number))
+    for level in LEVELS["light"]:
+        yield "light", level, replace(base, image=_developed(base_frame, _dim(level), (seed, number)))
+    for level in LEVELS["hidden"]:
+        yield "hidden", level, _hidden(person, world, level, base, (seed, number))
+    for level in LEVELS["resolution"]:
+        yield "resolution", level, _smaller(base, level / _HEIGHT_PX)
+    for level in LEVELS["upper part"]:
+        yield "upper part", level, _part(base, level, from_above=True)
+    for level in LEVELS["lower part"]:
+        yield "lower part", level, _part(base, level, from_above=False)
+
+
+def _stage(rng: np.random.Generator) -> tuple[PosedBody, World]:
+    body, appearance = load_body(), adult(rng)
+    pose = sample_pose(rng, body, str(rng.choice(_POSES)), appearance.shape)
+    person = pose_body(body, appearance.shape, pose, facing_robot(_PERSON_Y_M))
+    free = [(0.0, y, 0.7) for y in np.linspace(_PERSON_Y_M - LEVELS["distance"][-1], _PERSON_Y_M, 8)]
+    return person, furnished(rng, dress(appearance, person, 0), free)
+
+
+def _camera(distance_m: float) -> Camera:
+    eye = np.array([0.0, _PERSON_Y_M - distance_m, EYE_M])
+    pose = look_at(eye, eye + [0, 1, 0])
+    centre = (_WIDTH_PX - 1) / 2, (_HEIGHT_PX - 1) / 2
+    return Camera(_WIDTH_PX, _HEIGHT_PX, _FOCAL_PX, _FOCAL_PX, *centre, pose)
+
+
+def _photograph(
+    person: PosedBody, world: World, distance_m: float, seed: tuple[int, int]
+) -> tuple[Frame, Picture]:
+    camera = _camera(distance_m)
+    frame = render(world, camera, np.random.default_rng(seed))
+    pixels, seen = keypoint_visibility(frame.rays, camera, person.keypoints_m, 0)
+    mask = frame.person == 0
+    return frame, Picture(_developed(frame, PHOTOGRAPHIC, seed), mask, pixels, seen, float(mask.sum()))
+
+
+def _developed(frame: Frame, sensor: Sensor, seed: tuple[int, int]) -> np.ndarray:
+    return expose(frame.radiance, sensor, np.random.default_rng(seed), frame.person >= 0)
+
+
+def _dim(light: float) -> Sensor:
+    shot, read = PHOTOGRAPHIC.shot_noise / np.sqrt(light), PHOTOGRAPHIC.read_noise / light
+    return replace(PHOTOGRAPHIC, shot_noise=shot, read_noise=read)
+
+
+def _at_distance(person, world, distance_m: float, base: Picture, seed: tuple[int, int]) -> Picture:
+    if distance_m == DISTANCE_M:
+        return base
+    _, picture = _photograph(person, world, distance_m, seed)
+    return replace(picture, area_px2=base.area_px2 * (DISTANCE_M / distance_m) ** 2)
+
+
+def _hidden(person, world, share: float, base: Picture, seed: tuple[int, int]) -> Picture:
+    """A board whose upper edge is seen at the given share of the person's height above their feet."""
+    if share == 0:
+        return base
+    rows = np.flatnonzero(base.mask.any(axis=1))
+    edge_px = rows[-1] - share * (rows[-1] - rows[0])
+    depth_m = DISTANCE_M - _BOARD_M
+    top_m = EYE_M - (edge_px - (_HEIGHT_PX - 1) / 2) / _FOCAL_PX * depth_m
+    y = _PERSON_Y_M - _BOARD_M
+    board = Surface(
+        g.box([-_BOARD_HALF_M, y, 0], [_BOARD_HALF_M, y + 0.02, top_m]),
+        m.plain(m.any_colour(np.random.default_rng(seed))),
+    )
+    _, picture = _photograph(person, replace(world, surfaces=[*world.surfaces, board]), DISTANCE_M, seed)
+    return replace(picture, area_px2=base.area_px2)
+
+
+def _smaller(base: Picture, scale: float) -> Picture:
+    if scale == 1:
+        return base
+    size = round(_WIDTH_PX * scale), round(_HEIGHT_PX * scale)
+    factor = np.array(size) / [_WIDTH_PX, _HEIGHT_PX]
+    return Picture(
+        cv2.resize(base.image, size, interpolation=cv2.INTER_AREA),
+        cv2.resize(base.mask.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.5,
+        (base.keypoints_px + 0.5) * factor - 0.5,
+        base.visibility,
+        base.area_px2 * factor.prod(),
+    )
+
+
+def _part(base: Picture, share: float, from_above: bool) -> Picture:
+    box = _bounds(base.mask)
+    margin, kept = _SIDE_MARGIN * box[3], share * box[3]
+    top = box[1] if from_above else box[1] + box[3] - kept
+    cut = np.array([[box[0] - margin, top, box[2] + 2 * margin, kept]])
+    crop = whole_pixel_boxes(cut, np.array([_WIDTH_PX]), np.array([_HEIGHT_PX]))[0]
+    left, above, right, below = (int(edge) for edge in crop)
+    shown = inside(base.keypoints_px, (left, above, right, below))
+    window = slice(above, below), slice(left, right)
+    return replace(
+        base,
+        image=base.image[window],
+        mask=base.mask[window],
+        keypoints_px=base.keypoints_px - [left, above],
+        visibility=np.where(shown, base.visibility, 0),
+    )
+
+
+def _bounds(mask: np.ndarray) -> np.ndarray:
+    """x, y, width, height of a mask; zeros where it is empty."""
+    v, u = np.nonzero(mask)
+    return np.array([u.min(), v.min(), np.ptp(u) + 1, np.ptp(v) + 1], float) if len(u) else np.zeros(4)
+
+
+def _write_person(folder: str, seed: int, number: int) -> list[tuple]:
+    """Writes one person's pictures; a row for each: file name, person, dose, level, sizes, truth."""
+    rows = []
+    for dose, level, picture in doses(seed, number):
+        name = f"{number:03d}_{dose.replace(' ', '_')}_{level:g}.png"
+        write_png(Path(folder) / "images" / name, np.ascontiguousarray(picture.image))
+        about = {"source_image_id": number, "dose": dose, "level": float(level)}
+        shown = picture.visibility > 0
+        keypoints = np.where(shown[:, None], picture.keypoints_px, np.nan)
+        size = picture.image.shape[1::-1]
+        box = _bounds(picture.mask)
+        rows.append(
+            (name, size, about, box, picture.area_px2, keypoints, np.where(shown, picture.visibility, 0))
+        )
+    return rows
+
+
+def _joined(rows: list[tuple]) -> Annotations:
+    names, sizes, about, boxes, areas, keypoints, visibility = zip(*rows, strict=True)
+    ids = np.arange(1, len(rows) + 1)
+    images = {
+        int(i): ImageInfo(int(i), name, int(size[0]), int(size[1]))
+        for i, name, size in zip(ids, names, sizes, strict=True)
+    }
+    return Annotations(
+        images, ids, ids, np.array(boxes), np.array(areas), np.zeros(len(rows), bool),
+        np.array(keypoints), np.array(visibility, float), list(about),
+    )  # fmt: skip

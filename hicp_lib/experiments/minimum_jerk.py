@@ -1,0 +1,91 @@
+"""Movements of a person as joint angles over time: postures, and minimum-jerk paths between them.
+
+Between two postures every joint follows 10 s^3 - 15 s^4 + 6 s^5, s from 0 to 1: the smoothest way
+from rest to rest, and how people's arms move (Flash and Hogan, *The Coordination of Arm Movements*,
+J. Neuroscience 1985). Joints stay within the ranges of the postures, so within their limits.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hicp_lib.simulation.body.arms import Joints
+
+
+@dataclass(frozen=True)
+class Posture:
+    """Joint angles (radians), and where the person stands: x, y on the floor in metres."""
+
+    joints: Joints
+    place_m: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Move:
+    """A movement that takes `duration_s` and ends in a posture; a pause where it is the one before."""
+
+    duration_s: float
+    to: Posture
+
+
+def between(a: Posture, b: Posture, share: float) -> Posture:
+    """The posture a share (0 to 1) of the way from `a` to `b`; joints one of them lacks are at zero there."""
+    names = [*dict(a.joints) | b.joints]  # in the same order in every process, as those of a set are not
+    start, end = (np.array([p.joints.get(name, 0.0) for name in names]) for p in (a, b))
+    place = np.array(a.place_m) + share * (np.array(b.place_m) - a.place_m)
+    joints = dict(zip(names, (start + share * (end - start)).tolist(), strict=True))
+    return Posture(joints, (float(place[0]), float(place[1])))
+
+
+def minimum_jerk(s: float) -> float:
+    """Share of the way after a share `s` of the time, both 0 to 1."""
+    return s**3 * (10 - 15 * s + 6 * s * s)
+
+
+@dataclass
+class Motion:
+    """Movements one after another from a first posture, drawn only as far as they are asked for.
+
+    Attributes
+    ----------
+    first : the posture until time 0
+    moves : what comes then, without end
+    """
+
+    first: Posture
+    moves: Iterator[Move]
+    _ends_s: list[float] = field(default_factory=lambda: [0.0])
+    _postures: list[Posture] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._postures.append(self.first)
+
+    def at(self, time_s: float) -> Posture:
+        """The posture at a time, in seconds."""
+        k = self._move_at(time_s)
+        if k == 0:
+            return self.first
+        start_s, end_s = self._ends_s[k - 1 : k + 1]
+        share = minimum_jerk((time_s - start_s) / (end_s - start_s))
+        return between(self._postures[k - 1], self._postures[k], share)
+
+    def still_since_s(self, time_s: float) -> float:
+        """From when on the posture has been that of a time; the time itself where it is changing."""
+        k = start = self._move_at(time_s)
+        while start and self._postures[start - 1] == self._postures[start]:
+            start -= 1
+        return time_s if 0 < start == k else self._ends_s[start]
+
+    def _move_at(self, time_s: float) -> int:
+        """Which movement a time belongs to, from 1 on; 0 before all. Movements up to there are drawn."""
+        if time_s <= 0:
+            return 0
+        while self._ends_s[-1] <= time_s:
+            move = next(self.moves)
+            self._ends_s.append(self._ends_s[-1] + move.duration_s)
+            self._postures.append(move.to)
+        return bisect_right(self._ends_s, time_s)

@@ -1,0 +1,94 @@
+"""Motion capture of the person who moves: markers to be seen in the images, and what the system exports.
+
+The system has a clock and a world frame of its own: it starts before the camera does, and the camera's
+clock shows something else. What both truly are goes into `simulation.json`, for comparison only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hicp_lib.recordings.qualisys import MotionCapture
+from hicp_lib.simulation.appearance import materials as m
+from hicp_lib.simulation.appearance.people import part_of_vertices
+from hicp_lib.simulation.body.model import PosedBody, load_body
+from hicp_lib.simulation.rendering import mesh as g
+from hicp_lib.simulation.rendering.surfaces import Surface
+from hicp_lib.simulation.sensors.markers import CAMERA_MARKER, JOINT_MARKERS, camera_marker_m, markers_m
+from hicp_lib.simulation.sensors.motion_capture import (
+    QUALISYS,
+    measure,
+    mocap_frame,
+    room_cameras_m,
+    watch,
+)
+
+LEAD_S = 0.5  # motion capture starts this long before the first frame, and ends as long after the last
+_BALL_M = 0.006  # radius of a marker
+
+
+@dataclass(frozen=True)
+class Capture:
+    """What motion capture exports, its true frame, and the true offset of its clock.
+
+    Attributes
+    ----------
+    T_mocap_world : (4, 4)
+    start_s : when its clock shows zero, in seconds from the first frame
+    """
+
+    exported: MotionCapture
+    T_mocap_world: np.ndarray
+    start_s: float
+
+
+def capture(
+    person_at: Callable[[float], PosedBody],
+    vertices: np.ndarray,
+    T_world_camera: np.ndarray,
+    obstacles: tuple[g.Mesh, ...],
+    duration_s: float,
+    seed: int,
+) -> Capture:
+    """Motion capture of a person, from `LEAD_S` before the first frame on.
+
+    Parameters
+    ----------
+    person_at : seconds from the first frame -> the person in the world
+    vertices : (12,), see `sensors.markers.marker_vertices`
+    T_world_camera : (4, 4), the camera that carries a marker too; it stays where it is
+    obstacles : what hides markers besides the person
+    duration_s : from the first frame to the last
+    """
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 4]))
+    T_mocap_world = mocap_frame(rng)
+    n = int(round((duration_s + 2 * LEAD_S) * QUALISYS.rate_hz)) + 1
+    clock_s = np.arange(n) / QUALISYS.rate_hz
+    middle_m = person_at(0.0).keypoints_m[19, :2]
+    points_m, n_seeing = watch(
+        person_at,
+        vertices,
+        camera_marker_m(T_world_camera)[None],
+        clock_s - LEAD_S,
+        room_cameras_m(QUALISYS, middle_m),
+        obstacles=obstacles,
+    )
+    names = (*JOINT_MARKERS, CAMERA_MARKER)
+    exported = measure(clock_s, names, points_m, n_seeing, T_mocap_world, QUALISYS, rng)
+    return Capture(exported, T_mocap_world, -LEAD_S)
+
+
+def marker_balls(person: PosedBody, vertices: np.ndarray, number: int) -> list[Surface]:
+    """The markers on person `number` as grey balls; each counts as the part of the body it is taped to."""
+    parts = part_of_vertices(load_body())[vertices]
+    balls = [_ball(centre_m) for centre_m in markers_m(person, vertices)]
+    owner = np.repeat(parts, [len(ball.triangles) for ball in balls])
+    return [Surface(g.concatenate(balls), m.plain(np.full(3, 0.55), 0.35), number, owner)]
+
+
+def _ball(centre_m: np.ndarray) -> g.Mesh:
+    angle = np.linspace(-np.pi / 2, np.pi / 2, 7)
+    return g.lathe(_BALL_M * np.c_[np.cos(angle), np.sin(angle)], centre_m, 10)

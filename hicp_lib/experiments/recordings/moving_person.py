@@ -1,0 +1,63 @@
+"""A person who moves before the robot, watched by motion capture; the robot stands still."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hicp_lib.core.memo import memoised
+from hicp_lib.experiments.laboratory import adult, furnished, table
+from hicp_lib.experiments.minimum_jerk import Motion
+from hicp_lib.experiments.recordings.capture import marker_balls
+from hicp_lib.experiments.recordings.gestures import DISTANCE_M, TABLE_HEIGHT_M, TABLE_M, Mover, posed
+from hicp_lib.simulation.appearance.people import Appearance, dress
+from hicp_lib.simulation.body.model import PosedBody, load_body
+from hicp_lib.simulation.rendering.render import World
+from hicp_lib.simulation.rendering.surfaces import Surface
+from hicp_lib.simulation.sensors.markers import marker_vertices
+
+HEAD_RAD = np.radians([0.0, 0.0, 0.0, 9.0, 0.0, 0.0])
+"""Where the robot holds its head: a little up, so that the person is seen from the thighs to the hair."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """A person who moves in a room, with markers on; times in seconds from the first frame."""
+
+    room: World  # without the person
+    table: Surface
+    appearance: Appearance
+    motion: Motion
+
+    def person_at(self, time_s: float) -> PosedBody:
+        """The person, not dressed."""
+        return _person(self, self.motion.still_since_s(time_s))
+
+    def at(self, time_s: float) -> tuple[World, PosedBody]:
+        """All there is to see, and the person in it."""
+        return _staged(self, self.motion.still_since_s(time_s))
+
+
+# Whoever keeps still is posed and dressed once.
+@memoised(4)
+def _person(scene: Moving, motion_s: float) -> PosedBody:
+    return posed(load_body(), scene.appearance.shape, scene.motion.at(motion_s))
+
+
+@memoised(4)
+def _staged(scene: Moving, motion_s: float) -> tuple[World, PosedBody]:
+    person, vertices = _person(scene, motion_s), marker_vertices(scene.appearance.shape)
+    worn = [*dress(scene.appearance, person, 0), *marker_balls(person, vertices, 0)]
+    return replace(scene.room, surfaces=[*scene.room.surfaces, *worn]), person
+
+
+@memoised(1)
+def moving(seed: int) -> Moving:
+    """The scene of a seed: who moves how, in what room. The same in every process."""
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 3]))
+    appearance = adult(rng)
+    top = table(rng, *TABLE_M, TABLE_HEIGHT_M)
+    room = furnished(rng, [top], [(0.0, DISTANCE_M, 0.8), (0.0, 0.9, 0.8)])
+    mover = Mover(rng, load_body(), appearance.shape)
+    return Moving(room, top, appearance, Motion(mover.now, mover.moves()))

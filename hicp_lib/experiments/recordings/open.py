@@ -1,0 +1,53 @@
+"""The recordings the study's notebooks look at: a lab's own, or simulated once and kept in the cache."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from hicp_lib.core.cache import key
+from hicp_lib.core.files import cache_dir
+from hicp_lib.recordings.recording import RGB_LIST, Recording, first_frames, open_recording, read_simulation
+
+
+def open_experiment(
+    scenario: str, recording: str | Path = "", n_frames: int | None = None, seed: int = 0
+) -> Recording:
+    """Open the recording of an experiment.
+
+    Parameters
+    ----------
+    scenario : "relative-upper", "relative-lower" or "mocap"; simulated when no folder is given
+    recording : folder of a lab's own recording
+    n_frames : how many frames, from the first; all of them when left out
+    seed : of the simulation
+
+    Raises
+    ------
+    InputError
+        For an unknown scenario, or a folder that does not hold a recording.
+    """
+    if recording:
+        opened = open_recording(recording)
+        return opened if n_frames is None else first_frames(opened, n_frames)
+    # Open3D takes a second to load.
+    from hicp_lib.experiments.recordings.scenarios import scenario as known
+    from hicp_lib.experiments.recordings.simulate import simulate_recording
+
+    n = known(scenario).n_frames if n_frames is None else n_frames
+    result_key = key([simulate_recording], scenario=scenario, n_frames=n, seed=seed)
+    folder = cache_dir() / "recordings" / result_key[:16]
+    if (folder / RGB_LIST).is_file():
+        return open_recording(folder)
+    return simulate_recording(folder, scenario, n_frames=n, seed=seed, progress=sys.stderr.isatty())
+
+
+def data_note(recordings: Mapping[str, Recording]) -> str:
+    """What recordings are, by their names, in the words of captions."""
+    plural = "s" if len(recordings) > 1 else ""
+    if not all(read_simulation(recording) for recording in recordings.values()):
+        return f"recording{plural} {' and '.join(recordings)}"
+    has_mocap = any(recording.mocap_path for recording in recordings.values())
+    sensors = "D435 and motion capture" if has_mocap else "D435"
+    return f"simulated recording{plural} (rendered person, simulated {sensors})"

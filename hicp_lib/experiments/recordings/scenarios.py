@@ -1,0 +1,113 @@
+"""The recordings that can be simulated: who is before the robot, and how either of them moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.memo import memoised
+from hicp_lib.experiments.recordings.capture import Capture, capture
+from hicp_lib.experiments.recordings.moving_person import HEAD_RAD, moving
+from hicp_lib.experiments.recordings.seated_person import VIEWS, seated
+from hicp_lib.robot.kinematics import HEAD_JOINTS
+from hicp_lib.simulation.body.model import PosedBody
+from hicp_lib.simulation.rendering.render import World
+from hicp_lib.simulation.sensors.markers import marker_vertices
+
+POSES_FILE = DATA_DIR / "relative_poses.csv"
+
+Stage = Callable[[float], tuple[World, PosedBody]]
+"""What is to be seen at a time (seconds from the first frame), and the person in it."""
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A recording to be simulated.
+
+    Attributes
+    ----------
+    name : as the command line and the notebooks call it
+    n_frames, max_frames : by default, and at most
+    rate_hz : frames per second
+    mount : holder of the camera on the robot's head
+    head_rad : number of frames -> (n, 6) joint angles of the robot, `HEAD_JOINTS`
+    stage : seed -> `Stage`
+    capture : (seed, duration in seconds, T_world_camera) -> motion capture of it; None where there is none
+    """
+
+    name: str
+    n_frames: int
+    max_frames: int
+    rate_hz: float
+    mount: str
+    head_rad: Callable[[int], np.ndarray]
+    stage: Callable[[int], Stage]
+    capture: Callable[[int, float, np.ndarray], Capture] | None = None
+
+    def times_s(self, n: int) -> np.ndarray:
+        """Times (n,) of the frames, the first at 0."""
+        return np.arange(n) / self.rate_hz
+
+
+def scenario(name: str) -> Scenario:
+    """A scenario by its name.
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+    """
+    if name not in SCENARIOS:
+        raise InputError(f"no scenario {name!r}; choose one of {', '.join(SCENARIOS)}")
+    return SCENARIOS[name]
+
+
+@memoised()
+def relative_poses_rad(view: str) -> np.ndarray:
+    """The robot's poses of a view, (n, 6) in the order of `HEAD_JOINTS`, from data/relative_poses.csv."""
+    table = pd.read_csv(POSES_FILE)
+    columns = [f"{joint}_deg" for joint in HEAD_JOINTS]
+    return np.radians(table.loc[table["view"] == view, columns].to_numpy(float))
+
+
+def _relative(view: str) -> Scenario:
+    poses_rad = relative_poses_rad(view)
+    return Scenario(
+        name=f"relative-{view}",
+        n_frames=len(poses_rad),
+        max_frames=len(poses_rad),
+        rate_hz=0.5,  # the robot moves and settles between two frames
+        mount=VIEWS[view],
+        head_rad=lambda n: poses_rad[:n],
+        stage=_still,
+    )
+
+
+def _still(seed: int) -> Stage:
+    scene = seated(seed)
+    return lambda time_s: (scene.world, scene.person)
+
+
+def _capture_moving(seed: int, duration_s: float, T_world_camera: np.ndarray) -> Capture:
+    scene = moving(seed)
+    vertices = marker_vertices(scene.appearance.shape)
+    return capture(scene.person_at, vertices, T_world_camera, (scene.table.mesh,), duration_s, seed)
+
+
+SCENARIOS = {f"relative-{view}": _relative(view) for view in VIEWS} | {
+    "mocap": Scenario(
+        name="mocap",
+        n_frames=480,
+        max_frames=100_000,
+        rate_hz=12.0,
+        mount="level",
+        head_rad=lambda n: np.tile(HEAD_RAD, (n, 1)),
+        stage=lambda seed: moving(seed).at,
+        capture=_capture_moving,
+    )
+}

@@ -1,0 +1,99 @@
+"""A person who sits still at a table before the robot, hands on it: what the stability test looks at.
+
+The person sits at one place in one posture for the whole recording; only the robot moves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hicp_lib.experiments.laboratory import adult, chair, facing_robot, furnished, table
+from hicp_lib.simulation.appearance.people import dress
+from hicp_lib.simulation.body.arms import Joints
+from hicp_lib.simulation.body.hands import sample_hand
+from hicp_lib.simulation.body.joints import pose_from_joints
+from hicp_lib.simulation.body.model import REGIONS, Body, PosedBody, load_body, pose_body
+from hicp_lib.simulation.body.reach import reach
+from hicp_lib.simulation.rendering.render import World
+
+VIEWS = {"upper": "level", "lower": "tilted"}
+"""The paper's two views, and the camera holder each is seen with."""
+DISTANCE_M = 1.15  # of the person's pelvis from the robot's root, along the floor
+TABLE_HEIGHT_M = 0.72
+_TABLE_EDGE_M = 0.20  # the table's edge before the pelvis
+_TABLE_DEPTH_M = 0.55
+_WRISTS_M = {"left": (0.40, 0.12), "right": (0.36, -0.18)}  # before the pelvis, to the person's left
+_POSTURE_DEG = {
+    "spine_flexion": 9.0, "spine_turn": 2.0, "neck_flexion": -2.0, "neck_turn": 3.0,
+    "left_hip_flexion": 86.0, "right_hip_flexion": 87.0,
+    "left_knee_flexion": 88.0, "right_knee_flexion": 92.0,
+    "left_hip_abduction": 6.0, "right_hip_abduction": 8.0,
+    "left_ankle_flexion": -2.0, "right_ankle_flexion": -5.0,
+}  # fmt: skip
+_HAND_DEG = {"forearm_supination": -76.0, "wrist_flexion": 15.0, "wrist_deviation": -4.0}
+_CONTACT_M = 0.003  # between the lowest point of hand or forearm and the table
+_N_ROUNDS = 6
+
+
+@dataclass(frozen=True)
+class Seated:
+    """A person at a table in a furnished room, ready to be seen."""
+
+    world: World
+    person: PosedBody
+
+
+def seated(seed: int) -> Seated:
+    """The scene of a seed: who sits there, in what room. The same in every process."""
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
+    body, appearance = load_body(), adult(rng)
+    person = _sit_down(body, appearance.shape, rng)
+    edge_m = DISTANCE_M - _TABLE_EDGE_M
+    top = table(rng, (-0.65, edge_m - _TABLE_DEPTH_M), (0.65, edge_m), TABLE_HEIGHT_M)
+    seat = chair(rng, (0.0, DISTANCE_M), _seat_height_m(body, person))
+    surfaces = [top, *seat, *dress(appearance, person, 0)]
+    clear = [(0.0, DISTANCE_M - 0.2, 0.9), (0.0, DISTANCE_M + 0.4, 0.7)]
+    return Seated(furnished(rng, surfaces, clear), person)
+
+
+def _sit_down(body: Body, shape: np.ndarray, rng: np.random.Generator) -> PosedBody:
+    """The posture, with the arms brought down until the hands lie on the table."""
+    joints = {name: float(np.radians(angle)) for name, angle in _POSTURE_DEG.items()}
+    for side in _WRISTS_M:
+        hand = {name: float(np.radians(angle)) for name, angle in _HAND_DEG.items()}
+        joints |= {f"{side}_{name}": angle for name, angle in (sample_hand(rng, "open") | hand).items()}
+    T_world_body = facing_robot(DISTANCE_M)
+    wrist_heights_m = dict.fromkeys(_WRISTS_M, TABLE_HEIGHT_M + 0.05)
+    for _ in range(_N_ROUNDS):
+        pelvis_m = pose_body(body, shape, pose_from_joints(joints), T_world_body).heads_m[0, 2]
+        for side, (ahead_m, left_m) in _WRISTS_M.items():
+            target_m = np.array([ahead_m, left_m, wrist_heights_m[side] - pelvis_m])
+            joints = _with_arm(body, shape, joints, side, target_m)
+        person = pose_body(body, shape, pose_from_joints(joints), T_world_body)
+        for side in _WRISTS_M:
+            wrist_heights_m[side] += TABLE_HEIGHT_M + _CONTACT_M - _lowest_m(body, person, side)
+    return person
+
+
+def _with_arm(body: Body, shape: np.ndarray, joints: Joints, side: str, wrist_m: np.ndarray) -> Joints:
+    found = reach(body, shape, joints, side, wrist_m, elbow_toward=(-0.1, 0.8, -0.7))
+    if found is None:
+        raise ValueError(f"the {side} hand cannot come to the table")
+    return found
+
+
+def _lowest_m(body: Body, person: PosedBody, side: str) -> float:
+    """Height of the lowest point of a hand and forearm above the table's top."""
+    limbs = np.isin(body.regions, [REGIONS.index(name) for name in ("hand", "forearm")])
+    own = (body.vertices_m[0, :, 1] > 0) == (side == "left")
+    over_table = person.vertices_m[:, 1] < DISTANCE_M - _TABLE_EDGE_M
+    return float(person.vertices_m[limbs & own & over_table, 2].min())
+
+
+def _seat_height_m(body: Body, person: PosedBody) -> float:
+    """Right under hips and thighs."""
+    seat = np.isin(body.regions, [REGIONS.index(name) for name in ("hips", "thigh")])
+    near = np.abs(person.vertices_m[:, 1] - DISTANCE_M) < 0.2
+    return float(person.vertices_m[seat & near, 2].min()) - 0.008

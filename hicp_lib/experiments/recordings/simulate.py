@@ -1,0 +1,140 @@
+"""Simulating recordings: what the robot's camera, its joints and motion capture would have recorded.
+
+Frame k depends on scenario, seed and k only, so the number of processes changes nothing, and a
+longer recording begins with the shorter one.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from hicp_lib.core.cache import key
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json, write_json
+from hicp_lib.experiments.laboratory import T_WORLD_ROOT
+from hicp_lib.experiments.recordings.frames import camera_poses, record_frame
+from hicp_lib.experiments.recordings.ground_truth import (
+    DEPTH_UNITS_PER_M,
+    MOCAP_PART,
+    PARTS_DIR,
+    START_S,
+    finish_recording,
+    part_path,
+)
+from hicp_lib.experiments.recordings.scenarios import Scenario, scenario
+from hicp_lib.recordings.c3d import MAX_FRAMES as MAX_C3D_FRAMES
+from hicp_lib.recordings.qualisys import write_c3d, write_tsv
+from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, MOCAP_FILE, RGB_LIST, Recording, open_recording
+from hicp_lib.recordings.writer import depth_name, rgb_name, write_depth, write_rgb
+from hicp_lib.simulation.world.scenes import worker_pool
+
+
+def simulate_recording(
+    out: str | Path,
+    name: str,
+    n_frames: int | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: bool = True,
+) -> Recording:
+    """Simulate a recording into a folder; finished frames of an interrupted run are kept.
+
+    Parameters
+    ----------
+    name : "relative-upper", "relative-lower" or "mocap"
+    n_frames : the scenario's own number when left out
+    seed : non-negative; who is there, in what room, how they move, and all noise
+    workers : processes; as many as there are processors when left out
+
+    Raises
+    ------
+    InputError
+        For an unknown scenario, numbers out of range, or a folder that holds something else.
+    """
+    out, plan = Path(out), scenario(name)
+    n = plan.n_frames if n_frames is None else n_frames
+    _check(out, plan, n, seed, workers)
+    stamp = {"key": key([simulate_recording], scenario=name, seed=int(seed))}
+    _prepare(out, stamp)
+    todo = [partial(record_one, out, name, int(seed), k) for k in range(n) if not part_path(out, k).exists()]
+    if plan.capture is not None:
+        todo.insert(0, partial(_capture_all, out, name, int(seed), int(n)))  # the longest first
+    bar = tqdm(total=len(todo), desc=name, unit="frame", disable=None if progress else True)
+    for _ in _in_processes(todo, workers or os.cpu_count() or 1):
+        bar.update()
+    bar.close()
+    finish_recording(out, plan, int(n), stamp)
+    return open_recording(out)
+
+
+def _check(out: Path, plan: Scenario, n: int, seed: int, workers: int | None) -> None:
+    limits = {
+        "n_frames": (n, 1, plan.max_frames),
+        "seed": (seed, 0, 2**32),
+        "workers": (1 if workers is None else workers, 1, 1000),
+    }
+    for what, (value, low, high) in limits.items():
+        if not isinstance(value, int | np.integer) or not low <= value <= high:
+            raise InputError(f"{what} is {value!r}; {plan.name} takes a whole number from {low} to {high}")
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out}: is a file; give a folder for the recording")
+    if out.is_dir() and any(out.iterdir()) and not (out / PARTS_DIR).is_dir():
+        raise InputError(f"{out}: holds files that were not simulated; give an empty or new folder")
+
+
+def _prepare(out: Path, stamp: dict) -> None:
+    """No recording until it is finished; drop what another scenario, seed or version left."""
+    (out / RGB_LIST).unlink(missing_ok=True)
+    stamp_file = out / PARTS_DIR / "stamp.json"
+    if stamp_file.exists() and read_json(stamp_file) == stamp:
+        return
+    for folder in ("rgb", "depth", EXACT_DEPTH_DIR, PARTS_DIR):
+        shutil.rmtree(out / folder, ignore_errors=True)
+    for kind in (".tsv", ".c3d"):
+        (out / MOCAP_FILE).with_suffix(kind).unlink(missing_ok=True)
+    write_json(stamp_file, stamp)
+
+
+def _in_processes(todo: list[Callable[[], None]], workers: int) -> Iterator[None]:
+    if workers == 1 or len(todo) < 2:
+        yield from map(_call, todo)
+        return
+    with worker_pool(min(workers, len(todo))) as pool:
+        yield from pool.imap_unordered(_call, todo)
+
+
+def _call(job: Callable[[], None]) -> None:
+    job()
+
+
+def record_one(out: Path, name: str, seed: int, k: int) -> None:
+    """Write the images of a frame, then its truth: a frame counts as finished when that is there."""
+    rgb, depth_m, exact_m, truth = record_frame(name, seed, k)
+    write_rgb(out / rgb_name(k), rgb)
+    write_depth(out / depth_name(k), depth_m, DEPTH_UNITS_PER_M)
+    exact = out / EXACT_DEPTH_DIR / Path(depth_name(k)).name
+    write_depth(exact, exact_m, DEPTH_UNITS_PER_M)
+    write_json(part_path(out, k), truth)
+
+
+def _capture_all(out: Path, name: str, seed: int, n: int) -> None:
+    """Write motion capture of `n` frames, unless it is there."""
+    part = out / PARTS_DIR / MOCAP_PART
+    if part.exists() and read_json(part)["n_frames"] == n:
+        return
+    plan = scenario(name)
+    T_root_camera = camera_poses(plan, 1)[0]
+    found = plan.capture(seed, float(plan.times_s(n)[-1]), T_WORLD_ROOT @ T_root_camera)
+    write_tsv(out / MOCAP_FILE, found.exported)
+    if len(found.exported.times_s) < MAX_C3D_FRAMES:  # a longer one is in the TSV file alone
+        write_c3d((out / MOCAP_FILE).with_suffix(".c3d"), found.exported)
+    T_base_mocap = np.linalg.inv(found.T_mocap_world @ T_WORLD_ROOT)
+    offset_s = START_S + found.start_s
+    write_json(part, {"n_frames": n, "T_base_mocap": T_base_mocap.tolist(), "mocap_offset_s": offset_s})

@@ -1,0 +1,232 @@
+"""COCO files in and out: annotated people, and detections as COCO keypoint results.
+
+Both are checked where they enter. Conventions of this module, where formats in the wild differ:
+
+- People come in the Halpe-136 layout whatever the file has (17, 26, 133 or 136 keypoints).
+- A keypoint is labelled when its flag v > 0; flags are floats and kept as they are (Halpe and
+  COCO-WholeBody files hold values other than 0, 1 and 2), except that v <= 0 becomes 0.
+- `num_keypoints` is not read (in Halpe's files it counts the body, or nothing); it is written as in
+  Halpe's validation set, the number of labelled keypoints out of COCO's 17.
+- Detections keep the scores they come with, which need not lie in [0, 1]. A keypoint 0, 0, 0 is
+  one the detector does not give. Equal detections are allowed: the second is a false positive.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path, PureWindowsPath
+
+import numpy as np
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json, write_json
+from hicp_lib.core.keypoints import COCO_17, NAMES
+from hicp_lib.formats.json_validation import PART_KEYS, Rows, shown
+
+PERSON_CATEGORY = 1
+MAX_SIDE_PX = 100_000
+_UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")  # control characters, halves of characters
+_KNOWN_KEYS = {
+    "id", "image_id", "category_id", "bbox", "area", "iscrowd", "keypoints", "num_keypoints", *PART_KEYS,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ImageInfo:
+    """One image of a dataset; `file_name` is relative to the folder of images."""
+
+    id: int
+    file_name: str
+    width_px: int
+    height_px: int
+
+
+@dataclass(frozen=True)
+class Annotations:
+    """Annotated people, one row each.
+
+    Attributes
+    ----------
+    images : image id -> ImageInfo, in the order of the file
+    ids, image_ids : arrays, shape (n,), int64
+    boxes_px : array, shape (n, 4): x, y of the top-left corner, width, height
+    areas_px2 : array, shape (n,): area of the person's segment, the s² of OKS
+    is_crowd : array, shape (n,), bool: never counted; a detection there is neither right nor wrong
+    keypoints_px : array, shape (n, 136, 2); NaN where not labelled
+    visibility : array, shape (n, 136); 0 not labelled, above 0 labelled (1 occluded, 2 visible)
+    extras : per person, the further keys of its JSON object
+    """
+
+    images: dict[int, ImageInfo]
+    ids: np.ndarray
+    image_ids: np.ndarray
+    boxes_px: np.ndarray
+    areas_px2: np.ndarray
+    is_crowd: np.ndarray
+    keypoints_px: np.ndarray
+    visibility: np.ndarray
+    extras: list[dict]
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def take(self, rows: np.ndarray) -> Annotations:
+        """The people of some rows (indices or a mask); all images stay."""
+        rows = np.arange(len(self))[rows]
+        arrays = (self.ids, self.image_ids, self.boxes_px, self.areas_px2, self.is_crowd, self.keypoints_px)
+        chosen = (array[rows] for array in (*arrays, self.visibility))
+        return Annotations(self.images, *chosen, [self.extras[i] for i in rows])
+
+
+def read_annotations(path: str | Path) -> Annotations:
+    """Read COCO, COCO-WholeBody or Halpe keypoint annotations.
+
+    Raises
+    ------
+    InputError
+        For anything malformed; the message names the file, the row, the key and what was expected.
+    """
+    path = Path(path)
+    data = read_json(path)
+    if not isinstance(data, dict):
+        raise InputError(f"{path}: is not an object; expected a COCO annotation file")
+    for key in ("images", "annotations"):
+        if key not in data:
+            raise InputError(f"{path}: has no {key!r}; expected a COCO annotation file")
+    images = _read_images(Rows.of(path, "images", data["images"]))
+    return _read_people(Rows.of(path, "annotations", data["annotations"]), images)
+
+
+def _read_images(rows: Rows) -> dict[int, ImageInfo]:
+    ids = rows.unique_integers("id").tolist()
+    sides = {key: rows.integers(key) for key in ("width", "height")}
+    for key, values in sides.items():
+        for i in np.flatnonzero((values < 1) | (values > MAX_SIDE_PX))[:1]:
+            raise rows.error(i, f"{key} is {values[i]}; expected 1 to {MAX_SIDE_PX} pixels")
+    names = rows.column("file_name")
+    for i, name in enumerate(names):
+        if not _is_inside(name):
+            raise rows.error(i, f"file_name is {shown(name)}; expected a name inside the folder of images")
+    widths, heights = (values.tolist() for values in sides.values())
+    return {i: ImageInfo(i, *rest) for i, *rest in zip(ids, names, widths, heights, strict=True)}
+
+
+def _is_inside(name: object) -> bool:
+    """Whether a file name cannot lead out of its folder, on any system."""
+    if not isinstance(name, str) or _UNWRITABLE.search(name):
+        return False
+    path = PureWindowsPath(name)  # splits at both kinds of slash and knows drives
+    return bool(path.name) and not path.anchor and ".." not in path.parts
+
+
+def _read_people(rows: Rows, images: dict[int, ImageInfo]) -> Annotations:
+    ids, image_ids = rows.unique_integers("id"), rows.integers("image_id")
+    _check_references(rows, image_ids, images)
+    boxes = rows.vectors("bbox", ("x", "y", "width", "height"))
+    for i in np.flatnonzero((boxes[:, 2:] < 0).any(axis=1))[:1]:
+        raise rows.error(i, "bbox has a negative width or height; expected [x, y, width, height] in pixels")
+    areas = rows.numbers("area")
+    for i in np.flatnonzero(areas < 0)[:1]:
+        raise rows.error(i, f"area is {areas[i]:g}; expected the segment's area in square pixels")
+    triples = rows.keypoints()
+    visibility = np.maximum(triples[..., 2], 0.0)
+    return Annotations(
+        images, ids, image_ids, boxes, areas, _crowd_flags(rows),
+        np.where(visibility[..., None] > 0, triples[..., :2], np.nan), visibility, rows.extras(_KNOWN_KEYS),
+    )  # fmt: skip
+
+
+def _check_references(rows: Rows, image_ids: np.ndarray, images: dict[int, ImageInfo] | None) -> None:
+    for i, image_id in enumerate(image_ids.tolist()):
+        if images is not None and image_id not in images:
+            raise rows.error(i, f"image_id {image_id} is not among the annotated images")
+        category = rows.rows[i].get("category_id", PERSON_CATEGORY)
+        if type(category) is not int or category != PERSON_CATEGORY:
+            raise rows.error(i, f"category_id is not {PERSON_CATEGORY} (person); leave other categories out")
+
+
+def _crowd_flags(rows: Rows) -> np.ndarray:
+    flags = [row.get("iscrowd", 0) for row in rows.rows]
+    for i, flag in enumerate(flags):
+        if not isinstance(flag, int | float) or flag not in (0, 1):
+            raise rows.error(i, "iscrowd is neither 0 nor 1")
+    return np.array(flags, dtype=bool)
+
+
+def write_annotations(path: str | Path, annotations: Annotations) -> None:
+    """Write people as a COCO keypoint file with 136 keypoints in Halpe's order."""
+    a = annotations
+    people = [
+        {
+            **extra, "id": i, "image_id": image, "category_id": PERSON_CATEGORY, "bbox": box, "area": area,
+            "iscrowd": crowd, "num_keypoints": count, "keypoints": keypoints,
+        }
+        for extra, i, image, box, area, crowd, count, keypoints in zip(
+            a.extras, a.ids.tolist(), a.image_ids.tolist(), a.boxes_px.tolist(), a.areas_px2.tolist(),
+            a.is_crowd.astype(int).tolist(), (a.visibility[:, COCO_17] > 0).sum(axis=1).tolist(),
+            _triples(a.keypoints_px, a.visibility), strict=True,
+        )
+    ]  # fmt: skip
+    images = [
+        {"id": image.id, "file_name": image.file_name, "width": image.width_px, "height": image.height_px}
+        for image in a.images.values()
+    ]
+    category = {"id": PERSON_CATEGORY, "name": "person", "supercategory": "person", "keypoints": list(NAMES)}
+    write_json(path, {"images": images, "annotations": people, "categories": [category]})
+
+
+def _triples(keypoints_px: np.ndarray, values: np.ndarray) -> list[list[float]]:
+    """(n, 136, 2) and (n, 136) as n lists of 408 numbers, 0, 0, 0 for NaN."""
+    given = np.isfinite(keypoints_px).all(axis=-1)[..., None]
+    triples = np.where(given, np.concatenate([keypoints_px, values[..., None]], axis=-1), 0.0)
+    return triples.reshape(len(triples), triples.shape[1] * 3).tolist()
+
+
+def read_detections(path: str | Path, annotations: Annotations | None = None) -> dict[int, Detections]:
+    """Read COCO keypoint results (a list of `image_id, category_id, keypoints, score`).
+
+    With `annotations`, every image id must be among theirs, and images without a detection
+    come back with none. People keep the order of the file. An empty list is a result: nobody was found.
+
+    Raises
+    ------
+    InputError
+        For anything malformed: NaN, a wrong number of keypoints, an unknown image, ...
+    """
+    rows = Rows.of(Path(path), "results", read_json(path), name_key="image_id")
+    image_ids, person_scores = rows.integers("image_id"), rows.numbers("score")
+    _check_references(rows, image_ids, None if annotations is None else annotations.images)
+    triples = rows.keypoints()
+    keypoints = np.where((triples == 0).all(axis=-1, keepdims=True), np.nan, triples[..., :2])
+    found = {} if annotations is None else dict.fromkeys(annotations.images, Detections.none())
+    order = np.argsort(image_ids, kind="stable")
+    starts = np.flatnonzero(np.diff(image_ids[order])) + 1
+    for chosen in np.split(order, starts) if len(order) else ():
+        found[int(image_ids[chosen[0]])] = Detections(
+            keypoints[chosen], triples[chosen, :, 2], person_scores[chosen]
+        )
+    return found
+
+
+def write_detections(
+    path: str | Path, detections: dict[int, Detections], extras: Mapping[int, list[dict]] | None = None
+) -> None:
+    """Write detections as COCO keypoint results with 136 keypoints in Halpe's order.
+
+    `extras` are further keys of each person's JSON object, by image id; readers pass over them.
+    """
+    results = [
+        {
+            **extra, "image_id": int(image_id), "category_id": PERSON_CATEGORY,
+            "keypoints": keypoints, "score": score,
+        }
+        for image_id, found in detections.items()
+        for keypoints, score, extra in zip(
+            _triples(found.keypoints_px, found.scores), found.person_scores.tolist(),
+            extras[image_id] if extras is not None else [{}] * len(found), strict=True,
+        )
+    ]  # fmt: skip
+    write_json(path, results)

@@ -1,0 +1,123 @@
+"""Detections for other tools: COCO keypoint results, and a COCO data set that FiftyOne opens.
+
+- "coco": a list of `image_id, category_id, keypoints, score`, in any of COCO's and Halpe's layouts.
+- "fiftyone": a COCO data set of the images with the detections as its annotations, keypoint names and
+  skeleton in its category. FiftyOne shows it over the images with
+
+      fiftyone.Dataset.from_dir(dataset_type=fiftyone.types.COCODetectionDataset, label_types="keypoints",
+                                data_path=IMAGES, labels_path=OUT)
+
+  (limbs once the data set's `default_skeleton` is set to the category's), and any reader of COCO
+  annotations has names and sizes of the images in it. A keypoint's flag is 2 when it is given; per
+  person, `confidence` are the keypoints' scores and `score` is the person's.
+
+Keypoints that are not given are 0, 0, 0 in both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import write_json
+from hicp_lib.core.keypoints import LIMBS, NAMES, TO_HALPE
+from hicp_lib.formats.annotations import PERSON_CATEGORY, Annotations
+
+FORMATS = ("coco", "fiftyone")
+LAYOUTS = ("halpe136", "halpe26", "coco17", "wholebody133")
+
+
+def export_detections(
+    format: str,
+    detections: Mapping[int, Detections],
+    out: str | Path,
+    annotations: Annotations | None = None,
+    layout: str = "halpe136",
+) -> int:
+    """Write detections for another tool; the number of people written.
+
+    People without any keypoint in the layout are left out.
+
+    Parameters
+    ----------
+    format : one of `FORMATS`
+    out : the file to write
+    annotations : of the images; "fiftyone" needs it for their names and sizes
+    layout : one of `LAYOUTS`
+
+    Raises
+    ------
+    InputError
+        For an unknown format or layout, and images without name and size.
+    """
+    for name, value, allowed in (("format", format, FORMATS), ("layout", layout, LAYOUTS)):
+        if value not in allowed:
+            raise InputError(f"{name} {value!r} is not known; expected one of: {', '.join(allowed)}")
+    if format == "coco":
+        people = list(_people(detections, layout))
+        write_json(out, people)
+    else:
+        images = _images(detections, annotations)
+        people = [
+            row | {"id": i, "iscrowd": 0, **_as_labelled(row)}
+            for i, row in enumerate(_people(detections, layout), start=1)
+        ]
+        write_json(out, {"images": images, "annotations": people, "categories": [_category(layout)]})
+    return len(people)
+
+
+def _people(detections: Mapping[int, Detections], layout: str) -> Iterator[dict]:
+    """One COCO keypoint result after the other."""
+    indices = TO_HALPE[layout]
+    for image_id, found in detections.items():
+        points, scores = found.keypoints_px[:, indices], found.scores[:, indices]
+        given = np.isfinite(points).all(axis=-1)
+        triples = np.where(given[..., None], np.dstack([points, scores]), 0.0)
+        for i in np.flatnonzero(given.any(axis=1)):
+            yield {
+                "image_id": int(image_id),
+                "category_id": PERSON_CATEGORY,
+                "keypoints": triples[i].ravel().tolist(),
+                "score": float(found.person_scores[i]),
+            }
+
+
+def _as_labelled(row: dict) -> dict:
+    """What an annotation has beyond a result, and its keypoints with flags in place of scores."""
+    triples = np.reshape(row["keypoints"], (-1, 3))
+    given = (triples != 0).any(axis=1)
+    corner = triples[given, :2].min(axis=0)
+    size = triples[given, :2].max(axis=0) - corner
+    flagged = np.column_stack([triples[:, :2], 2 * given])
+    return {
+        "keypoints": flagged.ravel().tolist(),
+        "num_keypoints": int(given.sum()),
+        "confidence": triples[:, 2].tolist(),
+        "bbox": [*corner.tolist(), *size.tolist()],
+        "area": float(size.prod()),
+    }
+
+
+def _images(detections: Mapping[int, Detections], annotations: Annotations | None) -> list[dict]:
+    if annotations is None:
+        raise InputError("format 'fiftyone' needs the annotations, for the images' names and sizes")
+    unknown = detections.keys() - annotations.images.keys()
+    if unknown:
+        raise InputError(f"detections of image {min(unknown)}: not among the annotations; give its own")
+    return [
+        {"id": image.id, "file_name": image.file_name, "width": image.width_px, "height": image.height_px}
+        for image in annotations.images.values()
+    ]
+
+
+def _category(layout: str) -> dict:
+    """The person, with keypoint names and limbs; COCO counts keypoints from 1."""
+    place = {int(halpe): i for i, halpe in enumerate(TO_HALPE[layout], start=1)}
+    skeleton = [[place[a], place[b]] for a, b in LIMBS if a in place and b in place]
+    names = [NAMES[i] for i in TO_HALPE[layout]]
+    return {"id": PERSON_CATEGORY, "name": "person", "supercategory": "person", "keypoints": names,
+            "skeleton": skeleton}  # fmt: skip

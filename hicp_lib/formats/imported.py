@@ -1,0 +1,54 @@
+"""Detections made elsewhere, taken into the comparison beside the detectors that are run here."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
+from hicp_lib.formats.annotations import Annotations, read_detections
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,39}")
+
+
+def read_imported(
+    folder: str | Path, truth: Mapping[str, Annotations]
+) -> dict[tuple[str, str], dict[int, Detections]]:
+    """Detections by (subset, "NAME-imported"), as `hicp_lib.evaluation.ap.metric_table` takes them.
+
+    The suffix tells them from a detector of that name which is run here.
+
+    Parameters
+    ----------
+    folder : holds a folder for each detector, of the detector's name, with a file of detections for each
+        subset in it: `mmpose/basic.json`, `mmpose/headless.json`, ..., as `hicp import` and `hicp detect`
+        write them; empty text for none
+    truth : subset -> annotations
+
+    Raises
+    ------
+    InputError
+        For a folder without such folders, names that are no names, and files that are absent or do not fit.
+    """
+    if not folder:
+        return {}
+    try:
+        detectors = sorted(path for path in Path(folder).iterdir() if path.is_dir() and path.name[0] != ".")
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read ({error.strerror}); expected a folder") from None
+    if not detectors:
+        raise InputError(
+            f"{folder}: holds no folder; expected one for each detector, such as mmpose/basic.json"
+        )
+    for path in detectors:
+        if not _NAME.fullmatch(path.name):
+            raise InputError(
+                f"{path}: the folder's name is the detector's; use letters, digits, - and _ only"
+            )
+    return {
+        (subset, f"{path.name}-imported"): read_detections(path / f"{subset}.json", people)
+        for subset, people in truth.items()
+        for path in detectors
+    }

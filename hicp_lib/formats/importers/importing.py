@@ -1,0 +1,190 @@
+"""Predictions of other tools, from their own files to `Detections` by image id.
+
+`read_*` of each format gives people and the names of their images; here they meet the annotated images,
+scores come into [0, 1], and what belonged where is summed up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
+from hicp_lib.formats.annotations import Annotations, write_detections
+from hicp_lib.formats.importers.matching import match_images
+from hicp_lib.formats.importers.mmpose import read_mmpose
+from hicp_lib.formats.importers.openpose import read_openpose, refuse_other_size
+from hicp_lib.formats.importers.people import People
+from hicp_lib.formats.importers.results import ALPHAPOSE, COCO, DETECTRON2, read_results
+from hicp_lib.formats.importers.scores import score_scale, to_unit
+
+READERS: dict[str, Callable[[Path], People]] = {
+    "openpose": read_openpose,
+    "alphapose": lambda path: read_results(path, ALPHAPOSE),
+    "mmpose": read_mmpose,
+    "detectron2": lambda path: read_results(path, DETECTRON2),
+    "coco": lambda path: read_results(path, COCO),
+}
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What an import found, and what belonged to which image.
+
+    Attributes
+    ----------
+    n_images : annotated images
+    n_with_people, n_without_people : images the files speak of, with somebody and with nobody
+    n_not_mentioned : images the files say nothing of; nobody was found there, or the tool did not see them
+    unmatched : images of the files that are not annotated; their people are left out
+    n_people : people imported
+    conventions : people per keypoint convention, unmatched ones included
+    score_range : lowest, median and highest keypoint score as the tool wrote them
+    score_scale : what they were divided by; `n_cut` of them were then cut to 1
+    n_keypoints, n_outside : keypoints given, and those outside their image
+    """
+
+    format: str
+    n_images: int
+    n_with_people: int
+    n_without_people: int
+    n_not_mentioned: int
+    unmatched: tuple[str, ...]
+    n_people: int
+    conventions: dict[str, int]
+    score_range: tuple[float, float, float]
+    score_scale: float
+    n_cut: int
+    n_keypoints: int
+    n_outside: int
+
+    def as_dict(self) -> dict:
+        """For JSON."""
+        return asdict(self)
+
+    def lines(self) -> list[str]:
+        """For people."""
+        low, middle, high = self.score_range
+        scaled = f"divided by {self.score_scale:g}" if self.score_scale != 1 else "taken as they are"
+        unmatched = ", ".join(map(repr, self.unmatched[:3])) + (", ..." if len(self.unmatched) > 3 else "")
+        return [
+            f"{self.format}: {self.n_people} people in {self.n_with_people} of {self.n_images} images; "
+            f"{self.n_without_people} with nobody, {self.n_not_mentioned} not mentioned",
+            "people per convention: " + ", ".join(f"{name} {n}" for name, n in self.conventions.items()),
+            f"keypoint scores {low:.3g} to {high:.3g}, median {middle:.3g}: {scaled}, {self.n_cut} cut to 1",
+            f"keypoints outside their image: {self.n_outside} of {self.n_keypoints}",
+            f"not annotated and left out: {len(self.unmatched)} images"
+            + (f" ({unmatched})" if unmatched else ""),
+        ]
+
+
+@dataclass(frozen=True)
+class Imported:
+    """Detections of every annotated image, and what the tool wrote beyond them.
+
+    Attributes
+    ----------
+    detections : image id -> Detections, in the order of the annotations; keypoint scores in [0, 1],
+        person scores the tool's own
+    extras : image id -> per person `raw_keypoint_scores` (136 in Halpe's order, 0 where not given) and
+        the further keys of the tool's file, such as its box
+    """
+
+    detections: dict[int, Detections]
+    extras: dict[int, list[dict]]
+    summary: Summary
+
+
+def import_predictions(
+    format: str, path: str | Path, annotations: Annotations, scale: float | None = None
+) -> Imported:
+    """Read another tool's predictions for annotated images.
+
+    Parameters
+    ----------
+    format : a key of `READERS`
+    path : the folder or file the tool wrote
+    annotations : of the images the tool ran on
+    scale : what keypoint scores are divided by; None for the format's own, see `scores`
+
+    Raises
+    ------
+    InputError
+        For anything malformed, coordinates that are no pixels of these images, images that match none or
+        several; the message names the file, the entry, the key, what was expected and what to do.
+    """
+    if format not in READERS:
+        raise InputError(f"format {format!r} is not known; expected one of: {', '.join(READERS)}")
+    if scale is not None and not 0 < scale < np.inf:
+        raise InputError(f"--score-scale is {scale:g}; expected a positive number")
+    people = READERS[format](Path(path))
+    if not len(people):
+        raise InputError(f"{path}: holds no people; check the run, or leave this detector out")
+    matched = match_images(people, annotations.images)
+    scale = score_scale(format, people) if scale is None else scale
+    image_of = np.array([-1 if image is None else i for i, image in enumerate(matched)])[people.source_of]
+    rows = np.flatnonzero(image_of >= 0)
+    sizes = np.array([_size(annotations, matched[s]) for s in people.source_of[rows]]).reshape(-1, 2)
+    if format == "openpose":
+        refuse_other_size(people.path, people.keypoints_px[rows], sizes)
+    detections, extras = _by_image(people, matched, annotations, scale)
+    return Imported(detections, extras, _summary(format, people, matched, annotations, rows, sizes, scale))
+
+
+def _size(annotations: Annotations, image_id: int) -> tuple[int, int]:
+    image = annotations.images[image_id]
+    return image.width_px, image.height_px
+
+
+def _by_image(
+    people: People, matched: list[int | None], annotations: Annotations, scale: float
+) -> tuple[dict[int, Detections], dict[int, list[dict]]]:
+    scores = to_unit(people.raw_scores, scale)
+    raw = people.raw_scores.tolist()
+    detections = dict.fromkeys(annotations.images, Detections.none())
+    extras: dict[int, list[dict]] = {image: [] for image in annotations.images}
+    order = np.argsort(people.source_of, kind="stable")
+    starts = np.searchsorted(people.source_of[order], np.arange(1, len(matched)))
+    for image, rows in zip(matched, np.split(order, starts), strict=True):
+        if image is not None:
+            detections[image] = Detections(
+                people.keypoints_px[rows], scores[rows], people.person_scores[rows]
+            )
+            extras[image] = [people.extras[i] | {"raw_keypoint_scores": raw[i]} for i in rows.tolist()]
+    return detections, extras
+
+
+def _summary(
+    format: str, people: People, matched: list[int | None], annotations: Annotations, rows: np.ndarray,
+    sizes_px: np.ndarray, scale: float,
+) -> Summary:  # fmt: skip
+    points, raw = people.keypoints_px[rows], people.raw_scores[rows]
+    given = np.isfinite(points).all(axis=-1)
+    # Pixel centres are at integers: an image reaches from -0.5 to width - 0.5.
+    outside = given & ((points < -0.5) | (points > sizes_px[:, None] - 0.5)).any(axis=-1)
+    n_mentioned = sum(image is not None for image in matched)
+    n_with = len(set(people.source_of[rows].tolist()))
+    return Summary(
+        format=format,
+        n_images=len(annotations.images),
+        n_with_people=n_with,
+        n_without_people=n_mentioned - n_with,
+        n_not_mentioned=len(annotations.images) - n_mentioned,
+        unmatched=tuple(str(s) for s, image in zip(people.sources, matched, strict=True) if image is None),
+        n_people=len(rows),
+        conventions=dict(people.conventions),
+        score_range=tuple(np.quantile(raw[given], [0, 0.5, 1]).tolist()) if given.any() else (0.0, 0.0, 0.0),
+        score_scale=float(scale),
+        n_cut=int((raw > scale).sum()),
+        n_keypoints=int(given.sum()),
+        n_outside=int(outside.sum()),
+    )
+
+
+def write_imported(path: str | Path, imported: Imported) -> None:
+    """Write imported detections as COCO keypoint results, the tool's own scores and keys beside them."""
+    write_detections(path, imported.detections, imported.extras)

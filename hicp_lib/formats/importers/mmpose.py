@@ -1,0 +1,107 @@
+"""MMPoseInferencer's prediction folders (`pred_out_dir`): `<name>.json` for each image.
+
+- A file is a list of people: `keypoints` [[x, y], ...], `keypoint_scores`, and from top-down models `bbox`
+  [[x1, y1, x2, y2]] (a list of one) and `bbox_score`.
+- Keypoint scores are the decoder's maxima: about 0 to 1 for heat maps, RTMPose and DWPose, up to about
+  10 for RTMW. A keypoint whose score is not positive has no place, its coordinates mean nothing.
+- The person's score is the one MMPose's own COCO evaluation uses: box score x mean of the keypoint
+  scores above 0.2.
+
+Sources: MMPose's inferencer, `split_instances`, and `CocoMetric` ("bbox_keypoint").
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json
+from hicp_lib.core.keypoints import N_KEYPOINTS
+from hicp_lib.formats.importers.people import FileRows, People, json_files, split
+from hicp_lib.formats.json_validation import CONVENTIONS, Rows, shown
+
+_KNOWN_KEYS = {"keypoints", "keypoint_scores", "bbox"}
+_COUNTED_FROM = 0.2
+
+
+def read_mmpose(path: Path) -> People:
+    """Read the folder MMPoseInferencer wrote with `pred_out_dir`.
+
+    Raises
+    ------
+    InputError
+        For anything malformed, and for predictions of a video.
+    """
+    files = json_files(path, ".json", "the folder MMPoseInferencer wrote with pred_out_dir")
+    rows, source_of = FileRows.joined(path, "instances", {file: _instances(file) for file in files.values()})
+    triples, conventions = _triples(rows)
+    keypoints, scores = split(triples, triples[..., 2] > 0)
+    counted = scores > _COUNTED_FROM
+    means = np.where(counted, scores, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
+    return People(
+        path, "stem", list(files), source_of, keypoints, scores, _box_scores(rows) * means, conventions,
+        _extras(rows),
+    )  # fmt: skip
+
+
+def _instances(file: Path) -> list[dict]:
+    rows = Rows.of(file, "instances", read_json(file)).rows
+    if rows and "instances" in rows[0]:
+        raise InputError(f"{file}: holds the frames of a video; run MMPose on the images, one file each")
+    return rows
+
+
+def _triples(rows: FileRows) -> tuple[np.ndarray, Counter[str]]:
+    points, scores = rows.column("keypoints"), rows.column("keypoint_scores")
+    flat = {i: _flat(rows, i, *both) for i, both in enumerate(zip(points, scores, strict=True))}
+    triples, conventions = np.zeros((len(flat), N_KEYPOINTS, 3)), Counter()
+    for count, convention in CONVENTIONS.items():
+        chosen = {i: xy for i, xy in flat.items() if len(xy) == 2 * count}
+        if chosen:
+            conventions[convention] = len(chosen)
+            index = list(chosen)
+            triples[index, :, :2] = rows.points("keypoints", convention, chosen, width=2)
+            values = {i: scores[i] for i in index}
+            triples[index, :, 2:] = rows.points("keypoint_scores", convention, values, width=1)
+    return triples, conventions
+
+
+def _flat(rows: FileRows, i: int, points: Any, scores: Any) -> list:
+    """One person's [[x, y], ...] as a flat list, once the shapes of it and of the scores are right."""
+    if not isinstance(points, list) or set(map(type, points)) != {list} or set(map(len, points)) != {2}:
+        raise rows.error(i, f"keypoints is {shown(points)}; expected one [x, y] per keypoint")
+    if len(points) not in CONVENTIONS:
+        counts = ", ".join(map(str, CONVENTIONS))
+        raise rows.error(i, f"keypoints has {len(points)} points; expected a whole person's {counts}")
+    if not isinstance(scores, list) or len(scores) != len(points):
+        raise rows.error(i, f"keypoint_scores is {shown(scores)}; expected {len(points)} numbers")
+    return list(chain.from_iterable(points))
+
+
+def _box_scores(rows: FileRows) -> np.ndarray:
+    """Shape (n,); 1 where a bottom-up model gave no box."""
+    complete = [{"bbox_score": 1.0, **row} for row in rows.rows]
+    return FileRows(rows.path, rows.label, complete, places=rows.places).numbers("bbox_score")
+
+
+def _extras(rows: FileRows) -> list[dict]:
+    """What else is written, the box as COCO has it."""
+    extras = rows.extras(_KNOWN_KEYS)
+    for i, row in enumerate(rows.rows):
+        if "bbox" in row:
+            x1, y1, x2, y2 = _corners(rows, i, row["bbox"])
+            extras[i]["bbox"] = [x1, y1, x2 - x1, y2 - y1]
+    return extras
+
+
+def _corners(rows: FileRows, i: int, box: Any) -> list[float]:
+    if isinstance(box, list) and len(box) == 1:
+        box = box[0]
+    if not isinstance(box, list) or len(box) != 4:
+        raise rows.error(i, f"bbox is {shown(box)}; expected [[x1, y1, x2, y2]]")
+    return rows.finite([box], 4, lambda j: f"bbox[{j}]", [i])[0].tolist()

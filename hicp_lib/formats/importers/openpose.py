@@ -1,0 +1,124 @@
+"""OpenPose's `--write_json` folders: `<name>_keypoints.json` for each image.
+
+- The body has 25 parts (BODY_25) or 18 (COCO), told by the length of its list; face 70 and hands 21 each.
+  An empty list is a part of the model that was not run; a part with confidence 0 was not found.
+- Coordinates are read as source pixels (`--keypoint_scale 0`, OpenPose's default) and refused otherwise.
+- OpenPose adds half a pixel to the body's peaks, not to those of face and hands; it is taken off, which
+  puts pixel centres at integers.
+- No score of the person is written (OpenPose's own averages parts and limbs, and limbs are not in the
+  file). Here it is the sum of the body parts' confidences over the number of parts, absent ones 0;
+  where no body was run, the mean confidence of what was found.
+
+Source: OpenPose's output documentation.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json
+from hicp_lib.core.keypoints import BODY, N_KEYPOINTS
+from hicp_lib.formats.importers.people import FileRows, People, json_files, split
+from hicp_lib.formats.importers.results import OPENPOSE, read_results
+from hicp_lib.formats.json_validation import Rows, shown
+
+_ENDING = "_keypoints.json"
+# Key -> what its list may be, by length.
+_PARTS = {
+    "pose_keypoints_2d": {75: "openpose_body25", 54: "openpose_coco18"},
+    "face_keypoints_2d": {210: "openpose_face70"},
+    "hand_left_keypoints_2d": {63: "left_hand21"},
+    "hand_right_keypoints_2d": {63: "right_hand21"},
+}
+_RUN_AGAIN = "run OpenPose with --keypoint_scale 0 (source pixels)"
+
+
+def read_openpose(path: Path) -> People:
+    """Read a `--write_json` folder, or a `--write_coco_json` file.
+
+    Raises
+    ------
+    InputError
+        For anything malformed, and for coordinates that are not pixels.
+    """
+    if path.is_file():
+        return read_results(path, OPENPOSE)
+    files = json_files(path, _ENDING, "the folder OpenPose wrote with --write_json")
+    rows, source_of = FileRows.joined(path, "people", {file: _people(file) for file in files.values()})
+    triples, conventions, n_parts = _triples(rows)
+    keypoints, scores = split(triples, triples[..., 2] > 0)
+    _refuse_normalised(path, keypoints)
+    parts, n_counted = scores[:, BODY], n_parts
+    if not n_parts.any():  # only face or hands were run
+        parts, n_counted = scores, (scores > 0).sum(axis=1)
+    person_scores = parts.sum(axis=1) / np.maximum(n_counted, 1)
+    return People(
+        path, "stem", list(files), source_of, keypoints, scores, person_scores, conventions,
+        [{} for _ in rows.rows],
+    )  # fmt: skip
+
+
+def _people(file: Path) -> list[dict]:
+    data = read_json(file)
+    if not isinstance(data, dict) or "people" not in data:
+        raise InputError(f"{file}: has no 'people'; expected a file of OpenPose's --write_json")
+    return Rows.of(file, "people", data["people"]).rows
+
+
+def _triples(rows: FileRows) -> tuple[np.ndarray, Counter[str], np.ndarray]:
+    """All parts as (n, 136, 3), people per convention, and the number of the body's parts, shape (n,)."""
+    triples, n_parts = np.zeros((len(rows.rows), N_KEYPOINTS, 3)), np.zeros(len(rows.rows))
+    conventions: Counter[str] = Counter()
+    for key, by_length in _PARTS.items():
+        lists = _lists(rows, key, by_length)
+        for length, convention in by_length.items():
+            chosen = {i: values for i, values in lists.items() if len(values) == length}
+            if chosen:
+                conventions[convention] = len(chosen)
+                points = rows.points(key, convention, chosen)
+                if key == "pose_keypoints_2d":
+                    n_parts[list(chosen)] = length // 3
+                    points[..., :2] -= OPENPOSE.offset_px * (points[..., 2:] > 0)
+                triples[list(chosen)] += points
+    return triples, conventions, n_parts
+
+
+def _lists(rows: FileRows, key: str, by_length: dict[int, str]) -> dict[int, list]:
+    """The rows that have this part. Only the body's key must be there."""
+    values = rows.column(key) if key == "pose_keypoints_2d" else [row.get(key, []) for row in rows.rows]
+    for i, value in enumerate(values):
+        if not isinstance(value, list) or len(value) not in (0, *by_length):
+            found = f"a list of {len(value)}" if isinstance(value, list) else shown(value)
+            expected = ", ".join(f"{length} ({name})" for length, name in by_length.items())
+            raise rows.error(i, f"{key} is {found}; expected x, y, c per part: {expected}, or 0 numbers")
+    return {i: value for i, value in enumerate(values) if value}
+
+
+def _refuse_normalised(path: Path, keypoints_px: np.ndarray) -> None:
+    values = keypoints_px[np.isfinite(keypoints_px)]
+    if values.size and np.abs(values).max() <= 1:
+        span = "[0, 1]" if values.min() >= 0 else "[-1, 1]"
+        raise InputError(f"{path}: all coordinates lie in {span}; expected pixels, {_RUN_AGAIN}")
+
+
+def refuse_other_size(path: Path, keypoints_px: np.ndarray, sizes_px: np.ndarray) -> None:
+    """Refuse coordinates of the network's input or the output image; OpenPose finds nothing outside images.
+
+    Parameters
+    ----------
+    keypoints_px : array, shape (n, 136, 2)
+    sizes_px : array, shape (n, 2): width and height of each person's image
+    """
+    body = keypoints_px[:, BODY]
+    given = np.isfinite(body).all(axis=-1)
+    # Padding to the network's input may leave a few just beyond the edge.
+    outside = given & (body > 1.05 * sizes_px[:, None]).any(axis=-1)
+    if outside.sum() > 0.1 * given.sum():
+        raise InputError(
+            f"{path}: {outside.sum()} of {given.sum()} body parts lie outside their images; "
+            f"expected source pixels of the annotated images, {_RUN_AGAIN} on these images"
+        )

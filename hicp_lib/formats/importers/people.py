@@ -1,0 +1,108 @@
+"""People as another tool's files give them: in the Halpe-136 layout already, scores as written."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import N_KEYPOINTS, TO_HALPE
+from hicp_lib.formats.json_validation import Rows
+
+
+@dataclass(frozen=True)
+class People:
+    """Everybody in a tool's output, one row each, before anything is matched with images.
+
+    Attributes
+    ----------
+    path : the file or folder that was read
+    named_by : what `sources` are: "stem" (a file name without suffix), "id" (an image id, or a file
+        name where it is text), "number" (as "id", but a number is the one at the end of a file name)
+    sources : the images the files speak of, each once, also those without people
+    source_of : array, shape (n,): index into `sources`
+    keypoints_px : array, shape (n, 136, 2); NaN where not given
+    raw_scores : array, shape (n, 136): the tool's own keypoint scores; 0 where not given
+    person_scores : array, shape (n,): what people are ranked by
+    conventions : how many people come in each convention, keys of `hicp_lib.core.keypoints.TO_HALPE`
+    extras : per person, what else the file says
+    """
+
+    path: Path
+    named_by: Literal["stem", "id", "number"]
+    sources: list[str | int]
+    source_of: np.ndarray
+    keypoints_px: np.ndarray
+    raw_scores: np.ndarray
+    person_scores: np.ndarray
+    conventions: Counter[str]
+    extras: list[dict]
+
+    def __len__(self) -> int:
+        return len(self.person_scores)
+
+
+def split(triples: np.ndarray, given: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triples (x, y, score), shape (n, 136, 3), as coordinates and scores; NaN and 0 where not given."""
+    return np.where(given[..., None], triples[..., :2], np.nan), np.where(given, triples[..., 2], 0.0)
+
+
+@dataclass(frozen=True)
+class FileRows(Rows):
+    """Objects from many files checked as one list; `places` says which file and entry each came from."""
+
+    places: list[tuple[Path, int]] = field(default_factory=list)
+
+    @classmethod
+    def joined(cls, folder: Path, label: str, by_file: dict[Path, list[dict]]) -> tuple[FileRows, np.ndarray]:
+        """The objects of each file one after the other, and the index of each one's file, shape (n,)."""
+        objects = [row for rows in by_file.values() for row in rows]
+        places = [(file, i) for file, rows in by_file.items() for i in range(len(rows))]
+        counts = [len(rows) for rows in by_file.values()]
+        return cls(folder, label, objects, places=places), np.repeat(np.arange(len(counts)), counts)
+
+    def error(self, i: int, problem: str) -> InputError:
+        path, entry = self.places[i]
+        return InputError(f"{path}: {self.label}[{entry}]: {problem}")
+
+    def points(self, key: str, convention: str, lists: dict[int, list], width: int = 3) -> np.ndarray:
+        """Flat lists of numbers of some rows, one convention's keypoints times `width`, in Halpe-136.
+
+        Parameters
+        ----------
+        lists : row -> list, of the convention's length times `width`
+
+        Returns
+        -------
+        array, shape (len(lists), 136, width); 0 where the convention has no such keypoint
+        """
+        indices = TO_HALPE[convention]
+        values = self.finite(
+            list(lists.values()), width * len(indices), lambda j: f"{key}[{j}]", list(lists)
+        ).reshape(-1, len(indices), width)
+        result = np.zeros((len(lists), N_KEYPOINTS, width))
+        result[:, indices[indices >= 0]] = values[:, indices >= 0]
+        return result
+
+
+def json_files(folder: Path, ending: str, what: str) -> dict[str, Path]:
+    """Files of a folder by their name without `ending`, in the order of names.
+
+    Raises
+    ------
+    InputError
+        If it is no folder, or holds no such file; `what` says which folder to give.
+    """
+    try:
+        names = sorted(entry.name for entry in os.scandir(folder) if entry.name.endswith(ending))
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read ({error.strerror}); give {what}") from None
+    files = {name.removesuffix(ending): folder / name for name in names if name != ending}
+    if not files:
+        raise InputError(f"{folder}: holds no file *{ending}; give {what}")
+    return files

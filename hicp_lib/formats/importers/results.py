@@ -1,0 +1,105 @@
+"""Lists of COCO keypoint results, as COCO, Detectron2, AlphaPose and OpenPose write them.
+
+All have `image_id, category_id, keypoints, score`; what each tool does its own way is a `Dialect`:
+
+- COCO: the third number of a keypoint is anything; a keypoint 0, 0, 0 is not given.
+- Detectron2's `coco_instances_results.json`: it takes half a pixel off its continuous coordinates on
+  writing, which puts pixel centres at integers as everywhere here, so nothing is added on reading.
+  Keypoint scores are the softmax mass of the best cell of a 56 x 56 grid: small numbers, 0.05 is a lot.
+- AlphaPose's `alphapose-results.json`: `image_id` is a file name, or with `--eval` the number at its
+  end. All keypoints are always there. The person's score is mean + box + 1.25 max, about 0.5 to 3.
+  Keypoint scores of its regression models run far below those of its heat maps (0.05 against 0.4 is
+  where its own drawings begin).
+- OpenPose's `--write_coco_json`: the body's 17, found (1) or not (0), and the number in the file name.
+  They are half a pixel above pixel centres at integers, which is taken off.
+
+Sources: the COCO results format, and the writers of Detectron2 (`coco_evaluation.py`), AlphaPose
+(`pPose_nms.py`) and OpenPose (`cocoJsonSaver.cpp`).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json
+from hicp_lib.formats.importers.people import People, split
+from hicp_lib.formats.json_validation import PART_KEYS, Rows, shown
+
+_KNOWN_KEYS = {"image_id", "category_id", "keypoints", "score", *PART_KEYS}
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """What a tool does its own way.
+
+    Attributes
+    ----------
+    tool : for messages
+    file_name : looked for when a folder is given
+    named_by : what a number as `image_id` is, see `People`
+    absent : a keypoint is not given when all three numbers are 0, or when its score is not positive
+    categories : ids that mean a person
+    offset_px : what its coordinates exceed those with pixel centres at integers by
+    """
+
+    tool: str
+    file_name: str
+    named_by: Literal["id", "number"] = "id"
+    absent: Literal["zeros", "score"] = "score"
+    categories: tuple[int, ...] = (1,)
+    offset_px: float = 0.0
+
+
+COCO = Dialect("COCO", "results.json", absent="zeros")
+# Without a registered COCO data set, Detectron2 counts its only class, the person, as 0.
+DETECTRON2 = Dialect("Detectron2", "coco_instances_results.json", categories=(1, 0))
+ALPHAPOSE = Dialect("AlphaPose", "alphapose-results.json", named_by="number")
+OPENPOSE = Dialect("OpenPose", "coco.json", named_by="number", offset_px=0.5)
+
+
+def read_results(path: Path, dialect: Dialect) -> People:
+    """Read a list of COCO keypoint results, or the one of the tool's own name in a folder.
+
+    Raises
+    ------
+    InputError
+        For anything malformed; the message names the file, the row, the key and what was expected.
+    """
+    path = path / dialect.file_name if path.is_dir() else path
+    rows = Rows.of(path, "results", _checked_list(path, read_json(path), dialect), name_key="image_id")
+    sources, source_of = _sources(rows)
+    for i, row in enumerate(rows.rows):
+        category = row.get("category_id", 1)
+        if type(category) is not int or category not in dialect.categories:
+            raise rows.error(i, f"category_id is {shown(category)}; expected 1 (person), leave others out")
+    triples = rows.keypoints()
+    given = triples[..., 2] > 0 if dialect.absent == "score" else (triples != 0).any(axis=-1)
+    keypoints, scores = split(triples, given)
+    return People(
+        path, dialect.named_by, sources, source_of, keypoints - dialect.offset_px, scores,
+        rows.numbers("score"), Counter(rows.conventions()), rows.extras(_KNOWN_KEYS),
+    )  # fmt: skip
+
+
+def _checked_list(path: Path, value: Any, dialect: Dialect) -> list:
+    if isinstance(value, dict) and dialect is ALPHAPOSE:
+        raise InputError(f"{path}: was written with --format cmu or open; run AlphaPose without --format")
+    if isinstance(value, dict) and "annotations" in value:
+        raise InputError(f"{path}: holds annotations; expected {dialect.tool} results, a list of objects")
+    return value
+
+
+def _sources(rows: Rows) -> tuple[list[str | int], np.ndarray]:
+    """The images in the order of the file, and the index of each row's."""
+    keys = rows.column("image_id")
+    for i, key in enumerate(keys):
+        if not (type(key) is int and abs(key) < 2**63) and not (isinstance(key, str) and key):
+            raise rows.error(i, f"image_id is {shown(key)}; expected a whole number or a file name")
+    index = {key: i for i, key in enumerate(dict.fromkeys(keys))}
+    return list(index), np.array([index[key] for key in keys], dtype=int)

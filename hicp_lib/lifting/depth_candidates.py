@@ -1,0 +1,126 @@
+"""Surfaces seen around keypoints as candidates for their depth, and what each depth costs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hicp_lib.core.camera import Intrinsics
+from hicp_lib.core.keypoints import BODY, N_KEYPOINTS
+from hicp_lib.lifting.paper import has_depth
+
+_IS_BODY = np.isin(np.arange(N_KEYPOINTS), BODY)
+RADIUS_M = np.where(_IS_BODY, 0.030, 0.010)  # how far around a keypoint surfaces are looked at
+_SIGMA_M = np.where(_IS_BODY, 0.012, 0.010)  # depths that differ so much cost 1
+_SAMPLES = 7  # per side of the neighbourhood
+_STEEP_M = 0.03  # a larger difference between the pixels on both sides is a depth step
+_ON_STEP = 1.0  # cost of a surface there
+_HIDDEN, _IN_FRONT = 6.0, 20.0  # cost of lying behind the nearest surface, and in front of it
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Depths that m keypoints of a person may have by what is seen around them.
+
+    Attributes
+    ----------
+    rays : array, shape (m, 3), lines of sight in the camera frame, z = 1
+    depth_m : array, shape (m, k), the keypoint's below each surface sampled; NaN where none was
+    cost : array, shape (m, k): 0 at the keypoint, 1 at the neighbourhood's edge, more on depth steps
+    sigma_m : array, shape (m,), depths that differ so much cost 1
+    """
+
+    rays: np.ndarray
+    depth_m: np.ndarray
+    cost: np.ndarray
+    sigma_m: np.ndarray
+
+    def take(self, rows: np.ndarray) -> Candidates:
+        """Those of some keypoints."""
+        return Candidates(self.rays[rows], self.depth_m[rows], self.cost[rows], self.sigma_m[rows])
+
+
+def look_around(
+    keypoints: np.ndarray,
+    pixels_px: np.ndarray,
+    near_m: np.ndarray,
+    depth_m: np.ndarray,
+    intrinsics: Intrinsics,
+    below_m: np.ndarray,
+) -> Candidates:
+    """Candidates of keypoints that lie in the image.
+
+    Parameters
+    ----------
+    keypoints : array, shape (m,), which they are, Halpe order
+    pixels_px : array, shape (m, 2)
+    near_m : array, shape (m,), about how far away; sets the neighbourhood's size in pixels
+    below_m : array, shape (136,), how deep keypoints lie below the surface
+    """
+    radius_px = np.maximum(intrinsics.fx_px * RADIUS_M[keypoints] / near_m, 2)
+    steps = np.linspace(-1, 1, _SAMPLES)
+    columns, rows = (
+        np.rint(middle[:, None] + radius_px[:, None] * step.ravel()).astype(int)
+        for middle, step in zip(pixels_px.T, np.meshgrid(steps, steps), strict=True)
+    )
+    surface_m, is_steep = _sample(depth_m, rows, columns)
+    away = (columns - pixels_px[:, :1]) ** 2 + (rows - pixels_px[:, 1:]) ** 2
+    middle_px = np.array([intrinsics.cx_px, intrinsics.cy_px])
+    slopes = (pixels_px - middle_px) / [intrinsics.fx_px, intrinsics.fy_px]
+    rays = np.column_stack([slopes, np.ones(len(slopes))])
+    deeper_m = below_m[keypoints] / np.linalg.norm(rays, axis=1)
+    return Candidates(
+        rays=rays,
+        depth_m=surface_m + deeper_m[:, None],
+        cost=away / radius_px[:, None] ** 2 + _ON_STEP * is_steep,
+        sigma_m=_SIGMA_M[keypoints],
+    )
+
+
+def costs_of_depths(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
+    """What each depth of an even grid costs each keypoint, (m, g): the least over what explains it.
+
+    It is on the line of sight of a surface sampled, or hidden behind one; in front of all of them it
+    would be seen.
+    """
+    nearest_m = np.nanmin(candidates.depth_m, axis=1)
+    beyond_m = np.concatenate([[np.inf], grid_m, [np.inf]])  # what is not on the grid ends up at its ends
+    costs = np.where(beyond_m > nearest_m[:, None], _HIDDEN, _IN_FRONT)
+    keypoint, sample = np.nonzero(np.isfinite(candidates.depth_m))
+    depth_m, cost = candidates.depth_m[keypoint, sample], candidates.cost[keypoint, sample]
+    # A surface explains only depths near it for less than `_IN_FRONT`.
+    step_m = grid_m[1] - grid_m[0]
+    reach = int(np.sqrt(_IN_FRONT) * candidates.sigma_m.max(initial=0) / step_m + 0.5)
+    nearest = np.rint((depth_m - grid_m[0]) / step_m).astype(int) + 1
+    place = np.clip(nearest + np.arange(-reach, reach + 1)[:, None], 0, len(beyond_m) - 1)
+    apart = (beyond_m[place] - depth_m) / candidates.sigma_m[keypoint]
+    np.minimum.at(costs.reshape(-1), keypoint * len(beyond_m) + place, apart * apart + cost)
+    return costs[:, 1:-1]
+
+
+def settle(candidates: Candidates, chosen_m: np.ndarray, grid_step_m: float) -> np.ndarray:
+    """Depths (m,): the weighted mean of the candidates that agree with those chosen on the grid.
+
+    Without any, the keypoint is hidden, and the grid's depth remains.
+    """
+    within_m = np.maximum(2 * candidates.sigma_m, grid_step_m)[:, None]
+    agree = abs(candidates.depth_m - chosen_m[:, None]) < within_m
+    weights = np.where(agree, np.exp(-2 * candidates.cost), 0)
+    total = weights.sum(axis=1)
+    mean_m = (weights * np.nan_to_num(candidates.depth_m)).sum(axis=1) / np.where(total > 0, total, 1)
+    return np.where(total > 0, mean_m, chosen_m)
+
+
+def _sample(depth_m: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Depth at pixels, NaN where there is none, and whether there is a depth step or a hole beside them."""
+    height, width = depth_m.shape
+    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+    # One pixel in from the border, so that there are pixels on all sides.
+    rows, columns = np.clip(rows, 1, height - 2), np.clip(columns, 1, width - 2)
+    surface_m = depth_m[rows, columns]
+    across = abs(depth_m[rows, columns + 1] - depth_m[rows, columns - 1])
+    down = abs(depth_m[rows + 1, columns] - depth_m[rows - 1, columns])
+    with np.errstate(invalid="ignore"):
+        is_flat = (across < _STEEP_M) & (down < _STEEP_M)
+    return np.where(inside & has_depth(surface_m), surface_m, np.nan), ~is_flat

@@ -1,0 +1,254 @@
+"""Hands as a whole: where fingers are that others hide, from the shapes a hand can take.
+
+In the image a finger behind the hand is often found where it is, but what is seen there is the hand in
+front of it. The palm is rigid and fingers bend in known ways: of many turns and sizes of the palm those are
+kept that fit its keypoints in the image and what is seen there, and on each of them every finger takes the
+bends that fit best. The mean of the good ones, weighted by how well they fit, is where the joints are; it
+decides on those that have some other part of the hand before them, the rest are where they are seen.
+
+The shapes are the body model's with fingers bent at random (`tools/measure_hands.py`). Rendered people have
+hands of this model too, in other sizes; hands of real people differ more from it.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import HAND_LIMBS, LEFT_HAND, RIGHT_HAND
+from hicp_lib.core.memo import memoised
+from hicp_lib.core.quaternions import matrices_from_quaternions
+
+SHAPES_FILE = DATA_DIR / "hand_shapes.npz"
+PALM = np.array([0, 5, 9, 13, 17])
+"""Keypoints of a hand that do not move against each other: its root and the knuckles."""
+FINGERS = (np.arange(1, 5), *(np.arange(knuckle + 1, knuckle + 4) for knuckle in PALM[1:]))
+"""The keypoints of each finger that do, thumb first."""
+_FINGER_OF = np.full(21, -1)
+for _number, _finger in enumerate(FINGERS):
+    _FINGER_OF[_finger] = _number
+
+_LEAST_OF_PALM = 4  # fewer of it found do not tell how it is turned
+_SIZES, _SIZE_SIGMA = (0.88, 0.96, 1.04, 1.12), 0.1
+_N_TURNS = 600  # about 25 degrees apart
+_N_FITTING, _N_PLACES = 200, 40  # palms kept by their place in the image, and of these with depths
+_REACH_M, _STEP_M = 0.15, 0.01  # depths tried around the palm as it is seen
+_PALM_SIGMA_M, _FINGER_SIGMA_M = 0.008, 0.010  # misfit across the line of sight that costs 1
+_MOST = 9.0  # of the cost of a keypoint's misfit, and of its depth
+_LIKELY = 2.0  # a fit that costs so much more weighs 1/e of the best
+_DEPTH_SIGMA_M, _MOST_DEPTH = 0.010, 20.0  # cost of depths other than the fit's, where it decides
+_BESIDE_M, _BEHIND_M = 0.015, 0.010  # a keypoint so near a limb in the image, so far behind it, is hidden
+
+
+@memoised()
+def load_hand_shapes(path: Path = SHAPES_FILE) -> np.ndarray:
+    """Right hands, shape (n, 21, 3), metres, about the middle of the palm, palms turned alike.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or not such a file.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            return (stored["shapes_tenth_mm"].reshape(-1, 21, 3) / 10_000).astype(np.float32)
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: not shapes of hands ({error}); run tools/measure_hands.py") from None
+
+
+def favour_hand_shapes(
+    costs: np.ndarray, grid_m: np.ndarray, rays: np.ndarray, found: np.ndarray
+) -> np.ndarray:
+    """Costs (m, g) of depths; for what a hand hides, other depths than its shape gives cost more.
+
+    Parameters
+    ----------
+    costs : array, shape (m, g), of each keypoint at each depth
+    grid_m : array, shape (g,), evenly spaced
+    rays : array, shape (m, 3), lines of sight, z = 1
+    found : array, shape (m,), the keypoints, Halpe order, increasing
+    """
+    costs = costs.copy()
+    for hand, is_right in ((LEFT_HAND, False), (RIGHT_HAND, True)):
+        rows = np.flatnonzero(np.isin(found, hand))
+        which = found[rows] - hand[0]
+        if np.isin(PALM, which).sum() >= _LEAST_OF_PALM:
+            mean_m, spread_m = fit_hand(costs[rows], grid_m, rays[rows], which, is_right)
+            apart = (grid_m - mean_m[:, None]) / np.hypot(_DEPTH_SIGMA_M, spread_m)[:, None]
+            is_hidden = hidden_by_limbs(rays[rows, :2], mean_m, which)
+            costs[rows[is_hidden]] += np.minimum(apart[is_hidden] ** 2, _MOST_DEPTH)
+    return costs
+
+
+def fit_hand(
+    costs: np.ndarray, grid_m: np.ndarray, rays: np.ndarray, which: np.ndarray, is_right: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Depths of a hand's keypoints and how far the good fits disagree, (k,) each.
+
+    Parameters
+    ----------
+    costs, grid_m, rays : as of `favour_hand_shapes`, for k keypoints of one hand
+    which : array, shape (k,), their numbers in the hand, increasing
+    """
+    is_palm = _FINGER_OF[which] < 0
+    middle_m = np.median(grid_m[costs[is_palm].argmin(axis=1)])
+    places_m, costs = rays[:, :2].T * middle_m, np.minimum(costs, _MOST)
+    known = middle_m, places_m, grid_m - middle_m, costs
+    seen = _Seen(which, *(array.astype(np.float32) for array in known))
+    palms = _place_palm(seen.take(is_palm), is_right)
+    total, mean_m, square_m2 = palms.cost, *np.empty((2, len(which), len(palms.cost)))
+    mean_m[is_palm], square_m2[is_palm] = palms.behind_m, palms.behind_m**2
+    if not is_palm.all():
+        cost, mean_m[~is_palm], square_m2[~is_palm] = _bend(seen.take(~is_palm), palms)
+        total = total + cost
+    weights = np.exp((total.min() - total) / _LIKELY)
+    weights /= weights.sum()
+    behind_m = mean_m @ weights
+    return middle_m + behind_m, np.sqrt(np.maximum(square_m2 @ weights - behind_m**2, 0))
+
+
+def hidden_by_limbs(slopes: np.ndarray, depth_m: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Which of k keypoints of a hand lie behind a limb of it that they are no end of, (k,).
+
+    Parameters
+    ----------
+    slopes, depth_m : arrays, shapes (k, 2) and (k,), x / z and z
+    which : array, shape (k,), their numbers in the hand
+    """
+    row = np.full(21, -1)
+    row[which] = np.arange(len(which))
+    limbs = row[np.array(HAND_LIMBS)]
+    begin, end = limbs[(limbs >= 0).all(axis=1)].T
+    places_m = slopes * np.median(depth_m)
+    along_m = places_m[end] - places_m[begin]
+    from_begin_m = places_m[:, None] - places_m[begin]
+    share = np.clip((from_begin_m * along_m).sum(axis=2) / np.maximum((along_m**2).sum(axis=1), 1e-12), 0, 1)
+    beside_m = np.linalg.norm(from_begin_m - share[..., None] * along_m, axis=2)
+    behind_m = depth_m[:, None] - depth_m[begin] - share * (depth_m[end] - depth_m[begin])
+    is_end = (np.arange(len(which))[:, None] == begin) | (np.arange(len(which))[:, None] == end)
+    return ((beside_m < _BESIDE_M) & (behind_m > _BEHIND_M) & ~is_end).any(axis=1)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What is known of k keypoints of a hand, float32.
+
+    Attributes
+    ----------
+    which : array, shape (k,), their numbers in the hand
+    middle_m : how far away the palm's middle seems to be
+    places_m : array, shape (2, k), where they are seen, measured at that depth
+    grid_m, costs : arrays, shapes (g,) and (k, g), depths behind it and what they cost
+    """
+
+    which: np.ndarray
+    middle_m: np.ndarray
+    places_m: np.ndarray
+    grid_m: np.ndarray
+    costs: np.ndarray
+
+    def take(self, some: np.ndarray) -> _Seen:
+        return replace(self, which=self.which[some], places_m=self.places_m[:, some], costs=self.costs[some])
+
+    def apart_m(self, points_m: np.ndarray) -> np.ndarray:
+        """How far from where they are seen points (3, k, ...) about the middle appear, (2, k, ...)."""
+        scale = 1 / (1 + points_m[2] / self.middle_m)
+        return _beside(self.places_m, points_m) - points_m[:2] * scale
+
+    def look_up(self, behind_m: np.ndarray) -> np.ndarray:
+        """What depths (k, ...) behind the middle cost."""
+        per_m = 1 / (self.grid_m[1] - self.grid_m[0])
+        index = np.rint((behind_m - self.grid_m[0]) * per_m)
+        index = np.maximum(np.minimum(index, len(self.grid_m) - 1), 0).astype(np.intp)
+        index += _beside(np.arange(len(self.costs)) * len(self.grid_m), behind_m)
+        return self.costs.take(index)
+
+
+@dataclass(frozen=True)
+class _Palms:
+    """Palms that fit.
+
+    Attributes
+    ----------
+    turns : array, shape (p, 3, 3), times the size
+    z_m : array, shape (p,), how far their middles lie behind where they seem to be
+    shift_m : array, shape (2, p), across the line of sight
+    behind_m : array, shape (k, p), how far their k keypoints found lie behind where the middle seems to be
+    cost : array, shape (p,)
+    """
+
+    turns: np.ndarray
+    z_m: np.ndarray
+    shift_m: np.ndarray
+    behind_m: np.ndarray
+    cost: np.ndarray
+
+
+@memoised()
+def _turns(is_right: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Turns of the palm times its size, what the size costs, and where its keypoints are then.
+
+    Shapes (n, 3, 3), (n,) and (3, 5, n); left hands are mirrored. Even over all turns:
+    super-Fibonacci spirals (Alexa, "Super-Fibonacci Spirals", CVPR 2022).
+    """
+    share = (np.arange(_N_TURNS) + 0.5) / _N_TURNS
+    a = 2 * np.pi * _N_TURNS * share / np.sqrt(2)
+    b = 2 * np.pi * _N_TURNS * share / 1.533751168755204288118041
+    near, far = np.sqrt(share), np.sqrt(1 - share)
+    quaternions = np.column_stack([near * np.sin(a), near * np.cos(a), far * np.sin(b), far * np.cos(b)])
+    turns = matrices_from_quaternions(quaternions) * np.array([1 if is_right else -1, 1, 1])[:, None]
+    sizes = np.repeat(_SIZES, _N_TURNS)
+    scaled = (sizes[:, None, None] * np.tile(turns, (len(_SIZES), 1, 1))).astype(np.float32)
+    palms_m = _turned(load_hand_shapes()[0, PALM], scaled)
+    return scaled, (0.5 * ((sizes - 1) / _SIZE_SIGMA) ** 2).astype(np.float32), palms_m
+
+
+def _place_palm(seen: _Seen, is_right: bool) -> _Palms:
+    turns, total, points_m = _turns(is_right)
+    points_m = points_m[:, np.searchsorted(PALM, seen.which)]
+    apart_m = seen.apart_m(points_m)
+    shift_m = apart_m.mean(axis=1)
+    misfit = ((apart_m - shift_m[:, None]) ** 2).sum(axis=0) / _PALM_SIGMA_M**2
+    total = total + np.minimum(misfit, _MOST).sum(axis=0)
+    fitting = np.argpartition(total, _N_FITTING)[:_N_FITTING]
+    z_m = np.arange(-_REACH_M, _REACH_M + _STEP_M / 2, _STEP_M, dtype=np.float32)
+    total = total[fitting] + seen.look_up(points_m[2][:, None, fitting] + z_m[:, None]).sum(axis=0)
+    best = np.argpartition(total, _N_PLACES, axis=None)[:_N_PLACES]
+    place, palm = np.unravel_index(best, total.shape)
+    palm, z_m = fitting[palm], z_m[place]
+    return _Palms(turns[palm], z_m, shift_m[:, palm], points_m[2][:, palm] + z_m, total.ravel()[best])
+
+
+def _bend(seen: _Seen, palms: _Palms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fingers on each palm: what they cost in their best shapes, (p,), and how deep they lie, (k, p).
+
+    That is behind where the middle seems to be, in the mean over shapes by how well they fit; and the mean
+    of its square.
+    """
+    shapes_m = load_hand_shapes()[:, seen.which].swapaxes(0, 1)
+    points_m = _turned(shapes_m.reshape(-1, 3), palms.turns).reshape(3, *shapes_m.shape[:2], -1)
+    misfit = ((seen.apart_m(points_m) - palms.shift_m[:, None, None]) ** 2).sum(axis=0) / _FINGER_SIGMA_M**2
+    behind_m = points_m[2] + palms.z_m
+    finger = _FINGER_OF[seen.which]
+    first = np.flatnonzero(np.diff(finger, prepend=-1))
+    cost = np.add.reduceat(np.minimum(misfit, _MOST) + seen.look_up(behind_m), first, axis=0)
+    least = cost.min(axis=1, keepdims=True)
+    weights = np.exp((least - cost) / _LIKELY)
+    weights /= weights.sum(axis=1, keepdims=True)
+    weighted_m = weights.repeat(np.diff(first, append=len(finger)), axis=0) * behind_m
+    return least.sum(axis=(0, 1)), weighted_m.sum(axis=1), (weighted_m * behind_m).sum(axis=1)
+
+
+def _turned(points_m: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Points (k, 3) under every turn (p, 3, 3), shape (3, k, p)."""
+    return points_m @ turns.transpose(1, 2, 0)
+
+
+def _beside(values: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Values of keypoints with axes appended until they go with arrays of points."""
+    return values[(..., *[None] * (points.ndim - values.ndim))]

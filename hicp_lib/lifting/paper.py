@@ -1,0 +1,219 @@
+"""From image keypoints and a depth image to points in space, as the paper does it (section III-B).
+
+Around a keypoint lies a square neighbourhood: the pixels no further than fx r / d in u and in v from
+the pixel the keypoint lies on, d being the depth there. r is 20 mm for body and feet, 3 mm for face
+and hands. Every pixel of it that has a depth is lifted, x = d (u - cx) / fx, y = d (v - cy) / fy, z = d,
+and the point is the median of each coordinate.
+
+What the paper leaves open is defined here:
+
+- Where the keypoint's own pixel has no depth, the nearest pixel whose own depth sets a neighbourhood
+  that reaches the keypoint decides the size; without any the keypoint is not lifted.
+- At the image's border the neighbourhood is what lies inside. A keypoint outside the image, beyond the
+  outer edges of its pixels, is not lifted.
+- At a depth step the side with more pixels wins, also where the keypoint lies on the other one; each
+  coordinate on its own, so with sides of equal size the point may lie between them.
+- A keypoint that is not detected (NaN) is not lifted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from hicp_lib.core.camera import Intrinsics
+from hicp_lib.core.keypoints import BODY, N_KEYPOINTS
+from hicp_lib.core.memo import memoised
+
+RADIUS_M = np.full(N_KEYPOINTS, 0.003)
+RADIUS_M[BODY] = 0.020
+
+REASONS = ("lifted", "not_detected", "outside_image", "no_depth")
+"""What `Lifted.reason` counts: lifted, or why not."""
+LIFTED, NOT_DETECTED, OUTSIDE_IMAGE, NO_DEPTH = range(4)
+
+MIN_DEPTH_M = 0.1  # nearer than depth cameras measure; bounds the neighbourhood
+
+_BLOCK = 1 << 20  # pixels gathered at a time
+_LITTLE = 1 << 14  # pixels that cost less to look at than another round
+
+
+@dataclass(frozen=True)
+class Lifted:
+    """Keypoints in space.
+
+    Attributes
+    ----------
+    points_m : array, shape (n_people, 136, 3), camera frame; NaN where not lifted
+    reason : array, shape (n_people, 136), int8, index into `REASONS`
+    """
+
+    points_m: np.ndarray
+    reason: np.ndarray
+
+
+@dataclass(frozen=True)
+class InImage:
+    """Keypoints that lie in the image: `which` (n_people, 136) are; row and column of their pixels, (n,)."""
+
+    which: np.ndarray
+    rows: np.ndarray
+    columns: np.ndarray
+
+
+def lift(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intrinsics) -> Lifted:
+    """Lift the keypoints of everyone in an image by the paper's method; this module's head defines it.
+
+    Parameters
+    ----------
+    keypoints_px : array, shape (n_people, 136, 2), (u, v), pixel centres at integers; NaN: not detected
+    depth_m : array, shape (height, width), depth along the camera's z axis at the pixels of the image the
+        keypoints were found in; 0, NaN or infinite: no depth
+    intrinsics : of that image
+
+    Raises
+    ------
+    ValueError
+        If the shapes are not these.
+    """
+    keypoints_px, depth_m, reason, found = checked(keypoints_px, depth_m, intrinsics)
+    radius_px = intrinsics.fx_px * np.broadcast_to(RADIUS_M, reason.shape)[found.which]
+    half_px = _half_widths(depth_m, found.rows, found.columns, radius_px)
+    lifted = np.full((len(half_px), 3), np.nan)
+    for some in _of_like_size(half_px):
+        lifted[some] = _medians(depth_m, found.rows[some], found.columns[some], half_px[some], intrinsics)
+    reason[found.which] = np.where(np.isnan(lifted[:, 2]), NO_DEPTH, LIFTED)
+    points_m = np.full((*reason.shape, 3), np.nan)
+    points_m[found.which] = lifted
+    return Lifted(points_m, reason)
+
+
+def checked(
+    keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intrinsics
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, InImage]:
+    """Arguments of `lift` as float arrays, reasons as known so far (n_people, 136), what is in the image."""
+    keypoints_px, depth_m = np.asarray(keypoints_px, float), np.asarray(depth_m)
+    if keypoints_px.ndim != 3 or keypoints_px.shape[1:] != (N_KEYPOINTS, 2):
+        raise ValueError(f"keypoints have shape {keypoints_px.shape}, not (n_people, {N_KEYPOINTS}, 2)")
+    height, width = intrinsics.height_px, intrinsics.width_px
+    if depth_m.shape != (height, width):
+        raise ValueError(f"the depth image has shape {depth_m.shape}, the camera's is {(height, width)}")
+    if not np.issubdtype(depth_m.dtype, np.floating):
+        depth_m = depth_m.astype(float)
+    u, v = keypoints_px[..., 0], keypoints_px[..., 1]
+    which = (u >= -0.5) & (u < width - 0.5) & (v >= -0.5) & (v < height - 0.5)
+    reason = np.where(np.isnan(u + v), NOT_DETECTED, OUTSIDE_IMAGE).astype(np.int8)
+    columns, rows = np.floor(keypoints_px[which] + 0.5).astype(int).T
+    return keypoints_px, depth_m, reason, InImage(which, rows, columns)
+
+
+def windows(
+    depth_m: np.ndarray, rows: np.ndarray, columns: np.ndarray, half_px: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Square pieces of a depth image around pixels; 0 beyond the image's border.
+
+    Parameters
+    ----------
+    rows, columns : arrays, shape (n,), the middle pixels
+
+    Returns
+    -------
+    depth_m : array, shape (n, w, w), w = 2 half_px + 1
+    rows, columns : arrays, shape (n, w), those of the pieces
+    """
+    steps = np.arange(-half_px, half_px + 1)
+    height, width = depth_m.shape
+    rows, columns = rows[:, None] + steps, columns[:, None] + steps
+    inside_rows, inside_columns = (
+        np.maximum(np.minimum(at, n - 1), 0) for at, n in ((rows, height), (columns, width))
+    )
+    pieces = depth_m.take((inside_rows * width)[:, :, None] + inside_columns[:, None, :])
+    for beyond, lines in ((rows != inside_rows, pieces), (columns != inside_columns, pieces.swapaxes(1, 2))):
+        if beyond.any():
+            lines[beyond] = 0
+    return pieces, rows, columns
+
+
+def has_depth(depth_m: np.ndarray) -> np.ndarray:
+    """Where a depth image holds a depth: positive and finite."""
+    return (depth_m > 0) & (depth_m < np.inf)
+
+
+def _of_like_size(half_px: np.ndarray) -> Iterator[np.ndarray]:
+    """Indices of neighbourhoods that differ less than twofold in size, few enough to be gathered at once."""
+    octave = np.maximum(np.frexp(half_px)[1], 2)  # up to 3 pixels are one size
+    for number in np.flatnonzero(np.bincount(octave)):
+        alike = np.flatnonzero(octave == number)
+        n_blocks = 1 + len(alike) * (2 * half_px[alike].max() + 1) ** 2 // _BLOCK
+        yield from np.array_split(alike, n_blocks) if n_blocks > 1 else [alike]
+
+
+def _half_widths(depth_m, rows, columns, radius_px: np.ndarray) -> np.ndarray:
+    """Half widths of the neighbourhoods in whole pixels, (n,); `radius_px` is fx r, (n,), pixels x metres."""
+    half = _sizes(radius_px, depth_m[rows, columns])
+    lost, reach = np.flatnonzero(half < 0), 0
+    while len(lost):  # in holes; no corner of a neighbourhood is farther away than that of the least depth
+        limit = int(np.ceil(np.sqrt(2) * radius_px[lost].max() / MIN_DEPTH_M))
+        if reach >= limit:
+            break
+        is_little = len(lost) * (2 * limit + 1) ** 2 <= _LITTLE
+        reach = limit if reach and is_little else min(max(4 * reach, 2), limit)
+        half[lost] = _nearest_that_reaches(depth_m, rows[lost], columns[lost], radius_px[lost], reach)
+        lost = lost[half[lost] < 0]
+    return np.maximum(half, 0)  # a hole that nothing reaches is alone, and has no depth
+
+
+def _sizes(radius_px: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
+    """Half widths at some depths, whole numbers; -1 where there is no depth."""
+    sizes = radius_px / np.maximum(depth_m, MIN_DEPTH_M)
+    return np.where(has_depth(depth_m), sizes, -1).astype(int)
+
+
+def _nearest_that_reaches(depth_m, rows, columns, radius_px, reach: int) -> np.ndarray:
+    """Half width that the nearest pixel sets whose neighbourhood reaches the middle, (n,).
+
+    -1 where there is none within `reach` pixels.
+    """
+    pieces, _, _ = windows(depth_m, rows, columns, reach)
+    order, away = _disk(reach)
+    sizes = _sizes(radius_px[:, None], pieces.reshape(len(rows), -1)[:, order])
+    nearest = (sizes >= away).argmax(axis=1)  # the first, and the first of all where there is none
+    sizes = sizes[np.arange(len(rows)), nearest]
+    return np.where(sizes >= away[nearest], sizes, -1)
+
+
+@memoised()
+def _disk(reach: int) -> tuple[np.ndarray, np.ndarray]:
+    """Pixels of a square window at most `reach` from its middle, nearest first, and how wide each must be."""
+    steps = np.arange(-reach, reach + 1)
+    square = steps**2 + steps[:, None] ** 2
+    order = np.argsort(square, axis=None, kind="stable")[: np.count_nonzero(square <= reach**2)]
+    return order, np.maximum(abs(steps), abs(steps[:, None])).ravel()[order]
+
+
+def _medians(depth_m, rows, columns, half_px, intrinsics: Intrinsics) -> np.ndarray:
+    """Coordinate-wise medians of lifted neighbourhoods, (n, 3); gathered in windows of the largest's size."""
+    reach = int(half_px.max())
+    z, v, u = windows(depth_m, rows, columns, reach)
+    x = ((u - intrinsics.cx_px) / intrinsics.fx_px).astype(z.dtype)
+    y = ((v - intrinsics.cy_px) / intrinsics.fy_px).astype(z.dtype)
+    missing = ~has_depth(z)
+    if half_px.min() < reach:
+        far = abs(np.arange(-reach, reach + 1)) > half_px[:, None]
+        missing |= far[:, :, None]
+        missing |= far[:, None, :]
+    points = np.empty((3, *z.shape), z.dtype)
+    np.multiply(z, x[:, None, :], out=points[0])
+    np.multiply(z, y[:, :, None], out=points[1])
+    points[2] = z
+    n_missing = np.count_nonzero(missing, axis=(1, 2))
+    if n_missing.any():
+        np.copyto(points, np.inf, where=missing)  # sorted to the end
+    points = points.reshape(3, len(z), -1)
+    points.sort(axis=2)
+    n = points.shape[2] - n_missing
+    every = np.arange(len(n))
+    medians = (points[:, every, (n - 1) // 2].astype(float) + points[:, every, n // 2]) / 2
+    return np.where(n > 0, medians, np.nan).T

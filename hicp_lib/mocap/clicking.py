@@ -1,0 +1,143 @@
+"""Markers clicked in images: `clicks.csv` of a recording, and an image to read positions from.
+
+    frame,marker,u_px,v_px
+    12,elbow_left_1,311.5,207
+
+`show_frame` shows an image that zooms in the browser and says the pixel under the pointer; positions
+found so are written down by `record_click`. That needs no extension of Jupyter and works in exported
+pages, too.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.extras import needs
+from hicp_lib.core.files import write_bytes
+from hicp_lib.recordings.recording import Recording, read_rgb
+
+with needs("report"):
+    import plotly.graph_objects as go
+
+CLICKS_FILE = "clicks.csv"
+COLUMNS = ["frame", "marker", "u_px", "v_px"]
+
+
+def read_clicks(path: str | Path, recording: Recording, markers: Sequence[str]) -> pd.DataFrame:
+    """Read and check a clicks file.
+
+    Parameters
+    ----------
+    markers : the names there are in the motion capture
+
+    Returns
+    -------
+    DataFrame, columns `frame` (row of the recording), `marker`, `u_px, v_px`
+
+    Raises
+    ------
+    InputError
+        If it is not such a table; the row is named.
+    """
+    table = _read_table(path)
+    for row, click in enumerate(table.to_dict("records"), start=2):
+        _check_click(f"{path}: row {row}", click, recording, markers)
+    twice = table.duplicated(["frame", "marker"])
+    if twice.any():
+        click = table[twice].iloc[0]
+        raise InputError(
+            f"{path}: row {twice.idxmax() + 2}: {click['marker']} is clicked twice in this frame; "
+            "keep one of them"
+        )
+    return table.astype({"frame": int, "u_px": float, "v_px": float})
+
+
+def record_click(
+    recording: Recording, markers: Sequence[str], frame: int, marker: str, u_px: float, v_px: float
+) -> pd.DataFrame:
+    """Write a marker's position into the recording's `clicks.csv`, in place of an earlier one.
+
+    Returns
+    -------
+    All clicks so far, as `read_clicks`
+
+    Raises
+    ------
+    InputError
+        If there is no such frame, marker or pixel, or the file there is malformed.
+    """
+    path = recording.folder / CLICKS_FILE
+    click = {"frame": frame, "marker": marker, "u_px": u_px, "v_px": v_px}
+    _check_click("click", click, recording, markers)
+    clicks = pd.DataFrame([click], columns=COLUMNS)
+    if path.is_file():
+        before = read_clicks(path, recording, markers)
+        same = (before["frame"] == frame) & (before["marker"] == marker)
+        clicks = pd.concat([before[~same], clicks], ignore_index=True)
+    write_bytes(path, clicks.to_csv(index=False).encode())
+    return clicks
+
+
+def show_frame(recording: Recording, frame: int, clicks: pd.DataFrame | None = None) -> go.Figure:
+    """The image of a frame, to zoom into (drag) and read pixels from (hover); clicks so far are marked."""
+    source, width = _data_uri(read_rgb(recording, frame)), recording.intrinsics.width_px
+    figure = go.Figure(go.Image(source=source, hovertemplate="u %{x}, v %{y}<extra></extra>"))
+    if clicks is not None:
+        here = clicks[clicks["frame"] == frame]
+        marks = {"symbol": "cross-thin", "size": 14, "line": {"width": 2, "color": "#D55E00"}}
+        figure.add_scatter(
+            x=here["u_px"], y=here["v_px"], text=here["marker"], mode="markers+text", marker=marks,
+            textposition="top center", textfont={"color": "#D55E00"}, hoverinfo="text", showlegend=False,
+        )  # fmt: skip
+    title = f"frame {frame}: drag to zoom, double-click to go back"
+    return figure.update_layout(title=title, dragmode="zoom", width=width + 160, margin={"t": 40, "b": 20})
+
+
+def _data_uri(image: np.ndarray) -> str:
+    _, encoded = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+    return f"data:image/png;base64,{base64.b64encode(encoded.tobytes()).decode()}"
+
+
+def _read_table(path: str | Path) -> pd.DataFrame:
+    try:
+        table = pd.read_csv(path, skipinitialspace=True)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); give the clicked markers") from None
+    except (ValueError, pd.errors.ParserError):
+        raise InputError(f"{path}: is not a table with the columns {','.join(COLUMNS)}") from None
+    missing = [name for name in COLUMNS if name not in table.columns]
+    if missing or table.empty:
+        wrong = f"no column {missing[0]!r}" if missing else "no rows"
+        raise InputError(f"{path}: has {wrong}; expected {','.join(COLUMNS)} and a row per click")
+    return table[COLUMNS]
+
+
+def _check_click(where: str, click: dict, recording: Recording, markers: Sequence[str]) -> None:
+    frame, marker, *pixel = (click[name] for name in COLUMNS)
+    if not _is_number(frame) or frame != int(frame) or not 0 <= frame < len(recording):
+        raise InputError(
+            f"{where}: frame is {frame!r}; expected a whole number from 0 to {len(recording) - 1}"
+        )
+    if marker not in markers:
+        raise InputError(
+            f"{where}: marker {marker!r} is not in the motion capture; it has {', '.join(markers)}"
+        )
+    sizes = (recording.intrinsics.width_px, recording.intrinsics.height_px)
+    for name, value, size in zip(COLUMNS[2:], pixel, sizes, strict=True):
+        if not _is_number(value) or not -0.5 <= value <= size - 0.5:
+            raise InputError(f"{where}: {name} is {value!r}; expected a pixel from 0 to {size - 1}")
+
+
+def _is_number(value: object) -> bool:
+    return (
+        isinstance(value, int | float | np.number)
+        and not isinstance(value, bool)
+        and bool(np.isfinite(value))
+    )

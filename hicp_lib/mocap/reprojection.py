@@ -1,0 +1,124 @@
+"""Registration from pixels alone: the transform under which measured markers fall where they were clicked.
+
+Depth plays no part, so neither do its errors: beside an edge it is that of the wall behind, and next to a
+marker on a limb's side that of the skin before it. How far away the markers are follows from how far
+apart they appear, once the intrinsics are known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.camera import Intrinsics, project, transform
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.extras import needs
+from hicp_lib.mocap.registration import Registration
+from hicp_lib.mocap.synchronisation import interpolate_mocap
+from hicp_lib.recordings.qualisys import MotionCapture
+from hicp_lib.recordings.recording import Recording
+
+with needs("analysis"):
+    from scipy.optimize import least_squares
+    from scipy.spatial.transform import Rotation
+
+_MIN_CLICKS = 6
+# A click further off than this counts ever less.
+_CLICK_PX = 2.0
+_BEHIND_PX = 1e4  # residual of a marker that a transform puts behind the camera
+
+
+def by_reprojection(
+    recording: Recording,
+    clicks: pd.DataFrame,
+    mocap: MotionCapture,
+    start: Registration,
+    offset_s: float = 0.0,
+) -> Registration:
+    """The transform with the least distance, in pixels, between clicks and measured markers.
+
+    Nonlinear least squares over rotation and translation, with a robust loss (Cauchy) against wrong clicks.
+
+    Parameters
+    ----------
+    clicks : as from `hicp_lib.mocap.clicking.read_clicks`
+    start : where to begin; some degrees and decimetres off are near enough
+    offset_s : to add to the motion capture's stamps to have them on the camera's clock
+
+    Returns
+    -------
+    Registration whose errors are across the line of sight: pixels times depth over focal length
+
+    Raises
+    ------
+    InputError
+        If fewer than six clicked markers were measured.
+    """
+    seen = _matched(recording, clicks, mocap, offset_s)
+    n = len(seen.points_m)
+    if n < _MIN_CLICKS:
+        raise InputError(
+            f"{n} clicked markers were measured; registration by reprojection needs {_MIN_CLICKS}: click more"
+        )
+    T = _solve(recording.intrinsics, seen, start.T_base_mocap)
+    errors_m = _across_m(recording.intrinsics, seen, T)
+    left_out_m = [
+        _across_m(recording.intrinsics, seen.take([i]), _solve(recording.intrinsics, seen.take(others), T))
+        for i, others in enumerate(~np.eye(n, dtype=bool))
+    ]
+    rms_m = float(np.sqrt(np.mean(errors_m**2)))
+    return Registration("reprojection of all clicks", T, n, rms_m, float(np.median(left_out_m)))
+
+
+@dataclass(frozen=True)
+class _Clicked:
+    """Clicks (n, 2), the markers' measured positions (n, 3), and T_cam_base (n, 4, 4) of their images."""
+
+    pixels_px: np.ndarray
+    points_m: np.ndarray
+    T_cam_base: np.ndarray
+
+    def take(self, rows) -> _Clicked:
+        return _Clicked(self.pixels_px[rows], self.points_m[rows], self.T_cam_base[rows])
+
+
+def _matched(recording: Recording, clicks: pd.DataFrame, mocap: MotionCapture, offset_s: float) -> _Clicked:
+    frames = clicks["frame"].to_numpy()
+    columns = [mocap.names.index(name) for name in clicks["marker"]]
+    measured_m = interpolate_mocap(mocap.times_s, mocap.points_m, recording.times_s[frames] - offset_s)
+    points_m = measured_m[np.arange(len(clicks)), columns]
+    T_cam_base = np.linalg.inv(recording.T_base_cam[frames])
+    rows = np.flatnonzero(np.isfinite(points_m).all(axis=1))
+    return _Clicked(clicks[["u_px", "v_px"]].to_numpy(float), points_m, T_cam_base).take(rows)
+
+
+def _solve(intrinsics: Intrinsics, seen: _Clicked, T_start: np.ndarray) -> np.ndarray:
+    def residuals(step: np.ndarray) -> np.ndarray:
+        pixels_px, _ = _reprojected(intrinsics, seen, _moved(T_start, step, about_m))
+        return np.nan_to_num(pixels_px - seen.pixels_px, nan=_BEHIND_PX).ravel()
+
+    about_m = transform(T_start, seen.points_m).mean(axis=0)
+    found = least_squares(residuals, np.zeros(6), loss="cauchy", f_scale=_CLICK_PX, x_scale=0.01)
+    return _moved(T_start, found.x, about_m)
+
+
+def _moved(T: np.ndarray, step: np.ndarray, about_m: np.ndarray) -> np.ndarray:
+    """`T` followed by a small turn about a point (first three of `step`, a rotation vector) and a shift."""
+    moved = T.copy()
+    moved[:3, 3] -= about_m
+    moved[:3] = Rotation.from_rotvec(step[:3]).as_matrix() @ moved[:3]
+    moved[:3, 3] += about_m + step[3:]
+    return moved
+
+
+def _reprojected(intrinsics: Intrinsics, seen: _Clicked, T_base_mocap: np.ndarray):
+    """Pixels (n, 2) of the measured markers, NaN behind the camera, and their depths (n,) in metres."""
+    points_cam_m = transform(seen.T_cam_base @ T_base_mocap, seen.points_m[:, None])[:, 0]
+    return project(intrinsics, points_cam_m), points_cam_m[:, 2]
+
+
+def _across_m(intrinsics: Intrinsics, seen: _Clicked, T_base_mocap: np.ndarray) -> np.ndarray:
+    pixels_px, depth_m = _reprojected(intrinsics, seen, T_base_mocap)
+    return np.linalg.norm(pixels_px - seen.pixels_px, axis=1) * depth_m / intrinsics.fx_px

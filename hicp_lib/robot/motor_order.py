@@ -1,0 +1,69 @@
+"""Joint angles as a lab's iCub reports them: degrees, per motor board, the torso the other way round.
+
+The torso's board counts yaw, roll, pitch (joints 0, 1, 2); kinematics go pitch, roll, yaw. The head's
+board reports neck pitch, neck roll, neck yaw, then eyes tilt, version and vergence; an arm's board seven
+arm joints, then those of the fingers. Source: the robot's documentation and iKin (data/README.md).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.robot.kinematics import ARM_JOINTS, HEAD_JOINTS
+from hicp_lib.robot.tables import read_tables
+
+TOLERANCE_DEG = 5.0  # robots overshoot their limits a little; a swapped order or radians go beyond
+
+
+def head_from_boards(torso_deg: np.ndarray, head_deg: np.ndarray) -> np.ndarray:
+    """Angles of `HEAD_JOINTS` from the boards of torso and head.
+
+    Parameters
+    ----------
+    torso_deg : (..., 3) yaw, roll, pitch
+    head_deg : (..., 3 or more) neck pitch, roll, yaw; what follows (the eyes) is left out
+
+    Returns
+    -------
+    (..., 6) radians
+
+    Raises
+    ------
+    InputError
+        For angles that are not finite, or that the robot cannot have: usually another order or unit.
+    """
+    return _join(torso_deg, head_deg, HEAD_JOINTS)
+
+
+def arm_from_boards(torso_deg: np.ndarray, arm_deg: np.ndarray) -> np.ndarray:
+    """Angles of `ARM_JOINTS` (..., 10) from the boards of torso (..., 3) and arm (..., 7 or more).
+
+    Units and errors as `head_from_boards`; what follows in the arm's board (the fingers) is left out.
+    """
+    return _join(torso_deg, arm_deg, ARM_JOINTS)
+
+
+def _join(torso_deg: np.ndarray, limb_deg: np.ndarray, joints: tuple[str, ...]) -> np.ndarray:
+    torso, limb = np.asarray(torso_deg, dtype=float), np.asarray(limb_deg, dtype=float)
+    n_limb = len(joints) - 3
+    if torso.shape[-1:] != (3,) or limb.ndim != torso.ndim or limb.shape[-1] < n_limb:
+        raise InputError(
+            f"joint angles of shapes {torso.shape} and {limb.shape}: expected rows of 3 (torso: yaw, roll, "
+            f"pitch) and of {n_limb} or more; give as many rows of both"
+        )
+    angles = np.concatenate([torso[..., ::-1], limb[..., :n_limb]], axis=-1)
+    _check(angles.reshape(-1, len(joints)), joints)
+    return np.deg2rad(angles)
+
+
+def _check(angles_deg: np.ndarray, joints: tuple[str, ...]) -> None:
+    limits = np.rad2deg([read_tables().limits_rad["table"][joint] for joint in joints])
+    possible = (angles_deg >= limits[:, 0] - TOLERANCE_DEG) & (angles_deg <= limits[:, 1] + TOLERANCE_DEG)
+    if not possible.all():
+        row, column = np.argwhere(~possible)[0]
+        low, high = limits[column]
+        raise InputError(
+            f"joint angles: row {row}, {joints[column]}: {angles_deg[row, column]:g} degrees, expected "
+            f"{low:g} to {high:g}; give degrees, the torso as yaw, roll, pitch"
+        )

@@ -1,0 +1,277 @@
+"""Clothes: parts of the body's surface, cut along smooth fields, inflated, smoothed and folded.
+
+A garment's cut does not depend on the person's shape or pose, so it is made once and kept.
+On a posed body, the cut's vertices are smoothed as cloth bridges hollows, kept at least its
+thickness away from the skin, and folded.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from hicp_lib.core.memo import memoised, plain_fields
+from hicp_lib.simulation.body.model import REGIONS, Body, PosedBody, load_body
+from hicp_lib.simulation.rendering import mesh as g
+
+
+@dataclass(frozen=True)
+class Garment:
+    """What one garment covers and how it sits.
+
+    Attributes
+    ----------
+    kind : "top" or "bottom"
+    start, end : where it begins and ends. Top: height of hem and collar in the body's `torso` field.
+        Bottom: end in the `leg` field and waist in the `torso` field.
+    sleeve : end of the sleeves in the `arm` field
+    opening : how much deeper the collar is in front, in the `torso` field
+    thickness_m : everywhere
+    ease_m : further distance from the body at hems
+    smoothing : steps of smoothing; more bridges wider hollows
+    """
+
+    kind: str
+    start: float
+    end: float
+    sleeve: float = 0.0
+    opening: float = 0.0
+    thickness_m: float = 0.005
+    ease_m: float = 0.012
+    smoothing: int = 10
+
+    __post_init__ = plain_fields
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """A garment cut out, ready to be put on (n vertices).
+
+    `smoothing` (n, n) moves each vertex most of the way to the middle of its neighbours;
+    `distance` is how far inside the garment's edge each vertex is, in its field's units;
+    `rim` are the boundary's directed edges; `hidden` marks body triangles well underneath.
+    """
+
+    cut: g.Cut
+    smoothing: sparse.csr_array
+    distance: np.ndarray
+    rim: np.ndarray
+    hidden: np.ndarray
+
+
+def cut_pattern(garment: Garment) -> Pattern:
+    """Cut a garment out of the body's surface."""
+    # What it is made of does not change the cut.
+    return _cut_pattern(Garment(garment.kind, garment.start, garment.end, garment.sleeve, garment.opening))
+
+
+@memoised()
+def _cut_pattern(garment: Garment) -> Pattern:
+    body = load_body()
+    field = _FIELDS[garment.kind](body, garment)
+    candidates = np.flatnonzero((field[body.triangles] > 0).any(axis=1))
+    cut = g.cut(body.triangles[candidates], field)
+    cut = g.Cut(cut.i, cut.j, cut.t, cut.triangles, candidates[cut.source])
+    deep = field > 0.03
+    return Pattern(
+        cut=cut,
+        smoothing=_smoothing(g.neighbours(cut.triangles, len(cut.i))),
+        distance=np.maximum(cut.apply(field.astype(np.float32)), 0),
+        rim=g.boundary_edges(cut.triangles),
+        hidden=deep[body.triangles].all(axis=1),
+    )
+
+
+def _top_field(body: Body, garment: Garment) -> np.ndarray:
+    arm, torso = (body.field(name).astype(float) for name in ("arm", "torso"))
+    rest = body.vertices_m[0]
+    front = np.clip(rest[:, 0] / 0.08, 0, 1) * np.clip(1 - np.abs(rest[:, 1]) / 0.10, 0, 1)
+    trunk = np.minimum(torso - garment.start, garment.end - garment.opening * front.astype(float) - torso)
+    on_arm = arm > 0
+    trunk = np.where(on_arm, np.maximum(trunk, np.minimum(8 * arm, 0.5)), trunk)
+    field = np.minimum(trunk, np.where(on_arm, garment.sleeve - arm, 9))
+    return np.where(_is(body, "hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh"), field, -1)
+
+
+def _bottom_field(body: Body, garment: Garment) -> np.ndarray:
+    arm, leg, torso = (body.field(name).astype(float) for name in ("arm", "leg", "torso"))
+    field = np.minimum(garment.end - torso, garment.start - leg)
+    allowed = _is(body, "hips", "torso", "thigh", "shin", "foot") & (arm == 0)
+    return np.where(allowed, field, -1)
+
+
+_FIELDS = {"top": _top_field, "bottom": _bottom_field}
+
+
+def _is(body: Body, *names: str) -> np.ndarray:
+    return np.isin(body.regions, [REGIONS.index(name) for name in names])
+
+
+def put_on(
+    garment: Garment, posed: PosedBody, rest_m: np.ndarray, folds: np.ndarray, layers_m: np.ndarray
+) -> tuple[g.Mesh, np.ndarray]:
+    """Put a garment on a posed body.
+
+    Parameters
+    ----------
+    rest_m : array, shape (n_v, 3): the same person at rest; patterns and folds are tied to it
+    folds : array, shape (n_waves, 5): wave vector in rest coordinates (rad/m), phase, height (m)
+    layers_m : array, shape (n_v,): how far from the skin the clothes worn below reach; updated in place
+
+    Returns
+    -------
+    mesh : its coords are rest position (3), arm, leg and torso field, distance from the edge
+    source : body triangle that each of the mesh's triangles came from
+    """
+    pattern = cut_pattern(garment)
+    cut, body = pattern.cut, load_body()
+    skin, skin_normals = cut.apply(posed.vertices_m), g.unit(cut.apply(posed.normals))
+    rest = cut.apply(rest_m.astype(np.float32))
+    below = cut.apply(layers_m)
+    # Smoothing also slides cloth along the skin: its pattern slides with it.
+    smooth = np.concatenate([skin, rest], axis=1)
+    for _ in range(garment.smoothing):
+        smooth = pattern.smoothing @ smooth
+    smooth, laid = smooth[:, :3], smooth[:, 3:]
+    cloth = _drape(garment, pattern, smooth, skin, skin_normals, rest, folds, below)
+    height = np.einsum("ij,ij->i", cloth - skin, skin_normals)
+    for corners in (cut.i, cut.j):  # a cut edge lies between two of the body's vertices
+        np.maximum.at(layers_m, corners, height)
+    normals = g.vertex_normals(cloth, cut.triangles)
+    coords = np.column_stack(
+        [laid, *(cut.apply(body.field(f)) for f in ("arm", "leg", "torso")), pattern.distance]
+    )
+    return _with_rim(pattern, g.Mesh(cloth, cut.triangles, normals, coords.astype(np.float32)), skin)
+
+
+def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, folds, below) -> np.ndarray:
+    body = load_body()
+    leg = pattern.cut.apply(body.field("leg")).astype(float)
+    ends = pattern.distance if garment.kind == "top" else garment.start - leg
+    away = garment.thickness_m + garment.ease_m * np.exp(-ends / 0.25).astype(float)
+    torso = pattern.cut.apply(body.field("torso"))
+    if garment.kind == "bottom":  # a waistband is tight
+        away = np.where(torso > 0, np.minimum(away, garment.thickness_m), away)
+    away = np.maximum(away, below + 0.004 * (below > 0))
+    cloth = _keep_away(cloth, skin, skin_normals, away)
+    heights = sum(h * np.sin(rest @ np.array([x, y, z], np.float32) + p) for x, y, z, p, h in folds)
+    cloth = cloth + (heights * np.minimum(away / 0.01, 1.5))[:, None] * skin_normals
+    return _keep_away(
+        pattern.smoothing @ cloth.astype(np.float32),
+        skin,
+        skin_normals,
+        np.maximum(0.6 * away, below + 0.003 * (below > 0)),
+    )
+
+
+def _smoothing(neighbours: np.ndarray) -> sparse.csr_array:
+    """One step of smoothing as a matrix, from each vertex's neighbours (n, k)."""
+    n, k = neighbours.shape
+    rows = np.repeat(np.arange(n), k)
+    mean = sparse.csr_array((np.full(n * k, 1 / k, np.float32), (rows, neighbours.ravel())), shape=(n, n))
+    return sparse.csr_array(np.float32(0.4) * sparse.eye_array(n, dtype=np.float32) + np.float32(0.6) * mean)
+
+
+def _keep_away(cloth: np.ndarray, skin: np.ndarray, normals: np.ndarray, away: np.ndarray) -> np.ndarray:
+    distance = np.einsum("ij,ij->i", cloth - skin, normals)
+    return (cloth + np.maximum(away - distance, 0)[:, None] * normals).astype(np.float32)
+
+
+def _with_rim(pattern: Pattern, mesh: g.Mesh, skin: np.ndarray) -> tuple[g.Mesh, np.ndarray]:
+    """Turn the cloth's edge inwards, so that hems, cuffs and collars show their thickness."""
+    a, b = pattern.rim.T
+    used, place = np.unique(np.concatenate([a, b]), return_inverse=True)
+    inner = place.reshape(2, -1) + len(mesh.vertices_m)
+    strip = np.concatenate([np.stack([b, a, inner[0]], axis=1), np.stack([b, inner[0], inner[1]], axis=1)])
+    vertices = np.concatenate([mesh.vertices_m, 0.75 * skin[used] + 0.25 * mesh.vertices_m[used]])
+    owner = np.full(len(mesh.vertices_m), -1)
+    owner[mesh.triangles.T.ravel()] = np.tile(pattern.cut.source, 3)
+    return g.Mesh(
+        vertices.astype(np.float32),
+        np.concatenate([mesh.triangles, strip]).astype(np.int32),
+        np.concatenate([mesh.normals, mesh.normals[used]]),
+        np.concatenate([mesh.coords, mesh.coords[used]]),
+    ), np.concatenate([pattern.cut.source, np.tile(owner[a], 2)])
+
+
+def collar(garment: Garment, mesh: g.Mesh, posed: PosedBody, rise_m: float, open_m: float) -> g.Mesh:
+    """A shirt collar on the edge around the neck: up, then folded out and down; open in front."""
+    pattern = cut_pattern(garment)
+    n = len(pattern.cut.i)
+    edges = pattern.rim[
+        (mesh.coords[pattern.rim, 5] > 0.8).all(axis=1) & (mesh.coords[pattern.rim, 3] < 0.2).all(axis=1)
+    ]
+    gap = (mesh.coords[edges, 0] > 0).all(axis=1) & (np.abs(mesh.coords[edges, 1]) < open_m).any(axis=1)
+    edges = edges[~gap]
+    used, place = np.unique(edges, return_inverse=True)
+    place = place.reshape(edges.shape)
+    ring = mesh.vertices_m[:n][used]
+    neck = posed.keypoints_m[18]
+    up = g.unit((posed.keypoints_m[17] - neck)[None])[0]
+    out = ring - ring.mean(axis=0)
+    out = g.unit(out - np.outer(out @ up, up))
+    rows = [
+        ring,
+        ring + rise_m * up - 0.003 * out,
+        ring + (rise_m + 0.004) * up + 0.004 * out,
+        ring + 0.016 * out + 0.25 * rise_m * up,
+        ring + 0.024 * out - 0.45 * rise_m * up,
+    ]
+    vertices = np.concatenate(rows).astype(np.float32)
+    k = len(used)
+    a, b = place.T
+    strips = []
+    for row in range(len(rows) - 1):
+        lo, hi = row * k, (row + 1) * k
+        strips += [np.stack([b + lo, a + lo, a + hi], axis=1), np.stack([b + lo, a + hi, b + hi], axis=1)]
+    triangles = np.concatenate(strips).astype(np.int32)
+    coords = np.tile(mesh.coords[:n][used], (len(rows), 1))
+    coords[:, 2] += np.repeat([0, rise_m, rise_m + 0.01, rise_m + 0.02, 2 * rise_m + 0.02], k)
+    return g.Mesh(vertices, triangles, g.vertex_normals(vertices, triangles), coords)
+
+
+def skirt(posed: PosedBody, hip_rotation: np.ndarray, length_m: float, flare: float, phase: float) -> g.Mesh:
+    """A skirt around hips and legs: their outline at each height below the waist, folded towards the hem."""
+    body = load_body()
+    legs = (body.field("leg") > 0) | _is(body, "hips")
+    legs |= _is(body, "torso") & (body.field("torso") < 0.22) & (body.field("arm") == 0)
+    hips = posed.keypoints_m[19]
+    points = (posed.vertices_m[legs] - hips) @ hip_rotation  # x forward, y left, z up, whatever the pose
+    n_angles, n_rows = 72, 16
+    angle = np.linspace(0, 2 * np.pi, n_angles, endpoint=False)
+    ray = np.stack([np.cos(angle), np.sin(angle)])
+    heights = np.linspace(0.14, -length_m, n_rows)
+    radius = np.empty((n_rows, n_angles))
+    for row, height in enumerate(heights):
+        near = points[np.abs(points[:, 2] - height) < 0.05, :2]
+        radius[row] = (near @ ray).max(axis=0) if len(near) > 8 else radius[row - 1]
+    below = np.linspace(0, 1, n_rows)[:, None]
+    radius = np.maximum.accumulate(radius * 0.97, axis=0) * (1 + flare * below**1.3) + 0.008
+    radius += below * 0.016 * np.sin(9 * angle + phase + 2 * below) + below * 0.008 * np.sin(
+        17 * angle + 3 * phase
+    )
+    radius = (radius + np.roll(radius, 1, 1) + np.roll(radius, -1, 1)) / 3
+    local = np.stack(
+        [radius * ray[0], radius * ray[1], np.broadcast_to(heights[:, None], radius.shape)], axis=-1
+    )
+    grid = np.concatenate([local, local[:, :1]], axis=1)
+    vertices = (grid.reshape(-1, 3) @ hip_rotation.T + hips).astype(np.float32)
+    triangles = g.grid_triangles(n_rows, n_angles + 1)
+    rest = np.stack([0.2 * np.cos(angle), 0.2 * np.sin(angle)], axis=1)
+    rest = np.concatenate([rest, rest[:1]])
+    coords = np.zeros((n_rows, n_angles + 1, 7), np.float32)
+    coords[..., :2], coords[..., 2], coords[..., 6] = rest, heights[:, None], (1 - below)
+    normals = g.vertex_normals(vertices, triangles).reshape(n_rows, n_angles + 1, 3)
+    normals[:, 0] = normals[:, -1] = g.unit(normals[:, 0] + normals[:, -1])
+    return g.Mesh(vertices, triangles, normals.reshape(-1, 3), coords.reshape(-1, 7))
+
+
+def random_folds(rng: np.random.Generator, height_m: float, n_waves: int = 8) -> np.ndarray:
+    """Waves for `put_on`: mostly upright folds, some slanting."""
+    direction = rng.normal(size=(n_waves, 3)) * [1, 1, 0.55]
+    number = 2 * np.pi / rng.uniform(0.05, 0.16, n_waves)
+    waves = g.unit(direction) * number[:, None]
+    heights = height_m * rng.uniform(0.3, 1, n_waves) / np.sqrt(n_waves)
+    return np.column_stack([waves, rng.uniform(0, 2 * np.pi, n_waves), heights]).astype(np.float32)

@@ -1,0 +1,226 @@
+"""Fabrics: patterns that follow the cloth, weave, folds and seams."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from hicp_lib.simulation.appearance.materials import any_colour, hsv, linear
+from hicp_lib.simulation.rendering import textures
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+
+Rng = np.random.Generator
+
+
+@dataclass(frozen=True)
+class Cuts:
+    """How a person's garments are laid out flat: axes of trunk and limbs at rest.
+
+    `origins_m`, `axes`, `sides` have one row per panel: 0 trunk, 1 left arm, 2 right arm,
+    3 left leg, 4 right leg; coordinates run along the axis and around it, from the outside.
+    """
+
+    origins_m: np.ndarray
+    axes: np.ndarray
+    fronts: np.ndarray
+    radii_m: np.ndarray
+
+
+def make_cuts(landmarks_m: np.ndarray) -> Cuts:
+    """Panels for a person with these keypoints at rest, shape (136, 3)."""
+    k = landmarks_m
+    starts = [k[19], k[5], k[6], k[11], k[12]]
+    ends = [k[18], k[9], k[10], k[15], k[16]]
+    axes = np.array([(b - a) / np.linalg.norm(b - a) for a, b in zip(starts, ends, strict=True)])
+    axes[0] = [0, 0, 1]
+    forward = np.array([1.0, 0, 0])
+    fronts = np.array([forward - axis * (forward @ axis) for axis in axes])
+    fronts /= np.linalg.norm(fronts, axis=1, keepdims=True)
+    return Cuts(np.array(starts), axes, fronts, np.array([0.15, 0.06, 0.06, 0.085, 0.085]))
+
+
+def flat_coordinates(cuts: Cuts, coords: np.ndarray, limbs: str) -> tuple[np.ndarray, np.ndarray]:
+    """Metres around and along each panel, (2, n), and the panel (n,), for a garment's coords (7, n).
+
+    `limbs` is "arms" for tops, whose sleeves begin where the `arm` field does, "legs" for
+    trousers, whose halves meet in the middle, "" for skirts.
+    """
+    rest, arm = coords[:3], coords[3]
+    left = rest[1] > 0
+    panel = np.zeros(len(arm), np.int8)
+    if limbs == "arms":
+        panel = np.where(arm > 0.15, np.where(left, 1, 2), 0)
+    elif limbs == "legs":
+        panel = np.where(left, 3, 4)
+    uv = np.empty((2, len(arm)), np.float32)
+    for number in range(len(cuts.axes)):
+        rows = np.flatnonzero(panel == number)
+        if len(rows) == 0:
+            continue
+        local = rest.take(rows, axis=1) - np.float32(cuts.origins_m[number])[:, None]
+        axis, front = np.float32(cuts.axes[number]), np.float32(cuts.fronts[number])
+        side = np.cross(axis, front).astype(np.float32)
+        around = np.arctan2(side @ local, front @ local) * np.float32(cuts.radii_m[number])
+        along = axis @ local
+        if number == 0 and limbs:  # two flat panels, front and back, that bend round the sides
+            x, y = local[0], local[1]
+            around = y + np.sign(y) * np.maximum(0.04 - np.abs(x), 0)
+        uv[0, rows], uv[1, rows] = around, along
+    return uv, panel
+
+
+Weights = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Fabric:
+    """A cloth: up to three colours (linear RGB, (3, 3)), the pattern that mixes them, its surface.
+
+    `pattern` maps flat coordinates (2, n) and footprints (n,) to weights of the second and
+    third colour, (2, n); None for plain cloth. `weave_m` and `crease_m` are bump heights.
+    """
+
+    colours: np.ndarray
+    pattern: Weights | None = None
+    weave_m: float = 0.00012
+    crease_m: float = 0.004
+    roughness: float = 0.85
+    gloss: float = 0.02
+    fuzz: float = 0.15
+
+
+def random_fabric(rng: Rng, plain: float = 0.5) -> Fabric:
+    """Cloth for shirts; `plain` is the chance of a single colour."""
+    colours = np.array([any_colour(rng) for _ in range(3)])
+    if rng.random() < 0.3:  # white, black and grey are what people wear
+        colours[0] = linear(np.full(3, rng.choice([0.93, 0.06, 0.15, 0.55])))
+    finish = dict(
+        weave_m=rng.choice([0.0, 0.0001, 0.0002]),
+        crease_m=rng.uniform(0.002, 0.006),
+        fuzz=rng.uniform(0.05, 0.3),
+    )
+    if rng.random() < plain:
+        return Fabric(colours, **finish)
+    return Fabric(colours, _random_pattern(rng), **finish)
+
+
+def _random_pattern(rng: Rng) -> Weights:
+    kind = rng.choice(["stripes", "uprights", "checks", "dots", "blobs"], p=[0.3, 0.12, 0.28, 0.12, 0.18])
+    if kind == "stripes":
+        return _tiled(partial(textures.stripes, float(rng.choice([0.2, 0.35, 0.5]))), rng.uniform(0.02, 0.12))
+    if kind == "uprights":
+        stripes = partial(textures.stripes, float(rng.choice([0.12, 0.3])))
+        return _tiled(stripes, rng.uniform(0.01, 0.05), upright=True)
+    if kind == "checks":
+        return _tiled(partial(textures.checks, int(rng.integers(3))), rng.uniform(0.03, 0.16))
+    if kind == "dots":
+        return _tiled(textures.dots, rng.uniform(0.015, 0.06))
+    return _tiled(partial(textures.blobs, int(rng.integers(6))), rng.uniform(0.2, 0.6))
+
+
+def _tiled(texture: Callable, period_m: float, upright: bool = False) -> Weights:
+    def weights(uv: np.ndarray, footprint: np.ndarray) -> np.ndarray:
+        found = texture().sample((uv[::-1] if upright else uv) / period_m, footprint / period_m)
+        return found if len(found) > 1 else np.concatenate([found, 0 * found])
+
+    return weights
+
+
+def printed(rng: Rng, colours: np.ndarray) -> Weights:
+    """A print on the chest."""
+    number, size = int(rng.integers(24)), rng.uniform(0.7, 1.1)
+
+    def weights(uv: np.ndarray, footprint: np.ndarray) -> np.ndarray:
+        place = np.stack([0.15 + uv[0] / size, 0.15 - (uv[1] - 0.34) / size])
+        found = textures.prints(number).sample(place, footprint / size)
+        inside = (np.abs(place - 0.15) < 0.15).all(axis=0)
+        return found * inside
+
+    return weights
+
+
+def denim(rng: Rng) -> Fabric:
+    """Jeans, from raw to bleached; sometimes black."""
+    value = rng.uniform(0.18, 0.62)
+    blue = hsv(rng.uniform(0.58, 0.63), rng.uniform(0.35, 0.65), value)
+    if rng.random() < 0.25:
+        blue = linear(np.full(3, rng.uniform(0.06, 0.2)))
+    worn = np.minimum(blue * 1.8 + 0.03, 0.6)
+
+    def fade(uv: np.ndarray, footprint: np.ndarray) -> np.ndarray:
+        cloud = textures.cloud().sample(uv * 0.8, footprint)
+        grain = textures.carpet().sample(uv * np.float32(1.5), footprint * 1.5)[0] - 0.5
+        thigh = np.exp(-((uv[0] / 0.05) ** 2)) * np.exp(-(((uv[1] - 0.2) / 0.25) ** 2))
+        weight = np.clip(0.55 * thigh + 0.10 * cloud[0] + 1.1 * grain, 0, 1)
+        return np.stack([weight, 0 * weight])
+
+    return Fabric(np.array([blue, worn, worn]), fade, 0.0002, rng.uniform(0.004, 0.007), 0.8, 0.02, 0.1)
+
+
+def plain_fabric(rng: Rng, dark: bool = False) -> Fabric:
+    """Plain cloth for trousers and jackets, mostly in the colours those have."""
+    colour = hsv(rng.uniform(0, 1), rng.uniform(0, 0.35), rng.uniform(0.08, 0.3 if dark else 0.7))
+    if rng.random() < 0.4:
+        colour = hsv(rng.uniform(0.07, 0.12), rng.uniform(0.15, 0.45), rng.uniform(0.25, 0.8))
+    return Fabric(
+        np.array([colour] * 3), None, 0.0001, rng.uniform(0.003, 0.006), 0.85, 0.02, rng.uniform(0.05, 0.2)
+    )
+
+
+@dataclass(frozen=True)
+class Trim:
+    """Sewn details: how wide hems are (in units of the garment's edge distance), and a line in front.
+
+    `line` is "none", "buttons" or "zip"; `band` the colour of collar, cuffs and hem as a factor.
+    """
+
+    hem: float = 0.03
+    band: float = 0.92
+    line: str = "none"
+
+
+def cloth_material(fabric: Fabric, cuts: Cuts, limbs: str, trim: Trim) -> Material:
+    """The look of a garment whose mesh has `clothing.put_on`'s coords; `limbs` as in `flat_coordinates`."""
+    base = np.float32(fabric.colours[0])[:, None]
+    extra = (np.float32(fabric.colours[1:3]) - np.float32(fabric.colours[:1])).T
+
+    def look(hits: Hits) -> Look:
+        rest, distance = hits.coords[:3], hits.coords[6]
+        uv, panel = flat_coordinates(cuts, hits.coords, limbs)
+        albedo = np.repeat(base, uv.shape[1], axis=1)
+        if fabric.pattern is not None:
+            albedo += extra @ fabric.pattern(uv, hits.footprint_m)[:2]
+        weave = textures.weave().sample(uv, hits.footprint_m)[0]
+        soft, creased = textures.wrinkles().sample(uv, hits.footprint_m)
+        height = fabric.crease_m * (0.55 * soft + 0.30 * creased)
+        albedo *= 1 + 0.10 * weave * (fabric.weave_m > 0) + 0.04 * soft
+        height, albedo = _sew(trim, distance, rest, panel, height, albedo)
+        height += np.float32(fabric.weave_m) * weave * (hits.footprint_m < 0.002)
+        return Look(np.clip(albedo, 0.002, 0.95), height, fabric.gloss, fabric.roughness, fabric.fuzz)
+
+    return look
+
+
+def _sew(trim: Trim, distance, rest, panel, height, albedo) -> tuple[np.ndarray, np.ndarray]:
+    band = distance < trim.hem
+    seam = np.abs(distance - trim.hem) < 0.006
+    one = np.float32(1)  # with Python's numbers alone, np.where would compute in double precision
+    albedo = albedo * (np.where(band, np.float32(trim.band), one) * np.where(seam, np.float32(0.8), one))
+    height = height * np.where(band, np.float32(0.4), one) + np.float32(0.0006) * band
+    if trim.line == "none":
+        return height, albedo
+    front = (rest[0] > 0) & (panel == 0)
+    across = np.abs(rest[1])
+    placket = front & (across < 0.016)
+    albedo *= np.where(front & (np.abs(across - 0.016) < 0.0015), np.float32(0.75), one)
+    height = height + np.float32(0.001) * placket
+    if trim.line == "zip":
+        albedo = np.where(front & (across < 0.004), np.float32(0.25), albedo)
+    else:
+        along = np.mod(rest[2], 0.085) - 0.04
+        button = front & (rest[1] ** 2 + along**2 < 0.0042**2)
+        albedo = np.where(button, 0.55 * albedo + 0.25, albedo)
+    return height, albedo

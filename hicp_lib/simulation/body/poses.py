@@ -1,0 +1,141 @@
+"""Poses of people near a robot, drawn within the limits of their joints.
+
+A pose is put together from legs and trunk, arms and hands. Angles are drawn from ranges in
+degrees, arms that go to a place are solved by `reach`, and a pose in which the body runs through
+itself is drawn again with more room for the arms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hicp_lib.simulation.body import arms
+from hicp_lib.simulation.body.arms import Draft, Joints, Ranges, uniform
+from hicp_lib.simulation.body.hands import sample_hand
+from hicp_lib.simulation.body.joints import LIMITS_DEG, pose_from_joints, within_limits
+from hicp_lib.simulation.body.model import Body, Pose
+from hicp_lib.simulation.body.self_collision import clearance_m, outline
+
+_N_TRIES = 30
+_ROOM_STEP_M = 0.006  # arms keep this much further from the body with every try
+_PENETRATION_M = 0.02  # skin and clothes give way this far
+
+_TRUNK_DEG: Ranges = {
+    "spine_flexion": (-4, 8), "spine_bend": (-4, 4), "spine_turn": (-8, 8),
+    "neck_flexion": (-10, 14), "neck_bend": (-8, 8), "neck_turn": (-22, 22),
+    "eye_pitch": (-8, 8), "eye_turn": (-15, 15),
+}  # fmt: skip
+_STANDING_DEG: Ranges = {
+    "hip_flexion": (-4, 8), "hip_abduction": (-1, 5), "hip_rotation": (-18, 2), "knee_flexion": (1, 10),
+}  # fmt: skip
+_SITTING_DEG: Ranges = {
+    "hip_flexion": (78, 95), "hip_abduction": (0, 14), "hip_rotation": (-12, 5), "knee_flexion": (70, 100),
+}  # fmt: skip
+
+
+def sample_pose(
+    rng: np.random.Generator, body: Body, kind: str | None = None, shape: int | str | np.ndarray = 0
+) -> Pose:
+    """A random pose.
+
+    Parameters
+    ----------
+    kind : one of `KINDS`; drawn as well when left out
+    shape : whose pose it will be, as in `pose_body`; arms keep clear of that shape's body
+
+    Raises
+    ------
+    ValueError
+        For an unknown kind.
+    """
+    return pose_from_joints(sample_joints(rng, body, kind, shape))
+
+
+def sample_joints(
+    rng: np.random.Generator, body: Body, kind: str | None = None, shape: int | str | np.ndarray = 0
+) -> Joints:
+    """Joint angles (radians) of a random pose, within `joints.LIMITS_DEG`; see `sample_pose`."""
+    kind = str(rng.choice(list(KINDS))) if kind is None else kind
+    if kind not in KINDS:
+        raise ValueError(f"no kind of pose {kind!r}; there are {', '.join(KINDS)}")
+    person = outline(body, shape)
+    best, best_gap_m = None, -np.inf
+    for attempt in range(_N_TRIES):
+        joints = _draw(rng, Draft(body, person, attempt * _ROOM_STEP_M), kind)
+        if joints is None or not within_limits(joints):
+            continue
+        gap_m = clearance_m(body, person, pose_from_joints(joints))
+        if gap_m > best_gap_m:
+            best, best_gap_m = joints, gap_m
+        if gap_m > -_PENETRATION_M:
+            break
+    # Hardly ever needed: the pose that comes nearest to keeping clear, or none at all.
+    return best if best is not None else _draw(rng, Draft(body, person, 0.0), "standing")
+
+
+def _draw(rng: np.random.Generator, draft: Draft, kind: str) -> Joints | None:
+    """One draw of a kind, hands included; None where an arm cannot go where it should."""
+    legs, place_arms, hands = KINDS[kind]
+    joints = uniform(rng, _TRUNK_DEG) | legs(rng)
+    for side in ("left", "right"):
+        hand = sample_hand(rng, str(rng.choice(hands)))
+        joints |= {f"{side}_{name}": angle for name, angle in (arms.hanging_arm(rng, draft) | hand).items()}
+    return place_arms(rng, draft, joints)
+
+
+# Legs and trunk
+
+
+def _stand(rng: np.random.Generator) -> Joints:
+    joints = uniform(rng, _STANDING_DEG, "left_") | uniform(rng, _STANDING_DEG, "right_")
+    return joints | _level_feet(joints)
+
+
+def _walk(rng: np.random.Generator) -> Joints:
+    joints = _stand(rng)
+    swing = np.sin(rng.uniform(0, 2 * np.pi))
+    for side, sign in (("left", 1), ("right", -1)):
+        joints[f"{side}_hip_flexion"] = np.radians(6 + 24 * sign * swing)
+        joints[f"{side}_knee_flexion"] = np.radians(rng.uniform(6, 14) + 14 * max(0, -sign * swing))
+    joints["spine_turn"] = np.radians(6 * swing)
+    return joints | _level_feet(joints)
+
+
+def _sit(rng: np.random.Generator) -> Joints:
+    joints = uniform(rng, _SITTING_DEG, "left_") | uniform(rng, _SITTING_DEG, "right_")
+    return joints | _level_feet(joints) | uniform(rng, {"spine_flexion": (-5, 22)})
+
+
+def _lean(rng: np.random.Generator) -> Joints:
+    return _stand(rng) | uniform(rng, {"spine_flexion": (-2, 25), "neck_flexion": (-20, 8)})
+
+
+def _level_feet(joints: Joints) -> Joints:
+    """Ankles that keep the soles level, as far as they bend."""
+    limits = np.radians(LIMITS_DEG["left_ankle_flexion"])
+    return {
+        f"{side}_ankle_flexion": float(
+            np.clip(joints[f"{side}_hip_flexion"] - joints[f"{side}_knee_flexion"], *limits)
+        )
+        for side in ("left", "right")
+    }
+
+
+_CALM = ("relaxed", "relaxed", "open", "grip")
+_ACTIVE = ("open", "open", "spread", "relaxed", "grip")
+
+KINDS: dict[str, tuple[Callable, Callable, tuple[str, ...]]] = {
+    "standing": (_stand, arms.hanging, (*_CALM, "fist")),
+    "walking": (_walk, arms.swinging, (*_CALM, "fist")),
+    "reaching": (_lean, arms.one_reaching, _ACTIVE),
+    "reaching_both": (_lean, arms.both_reaching, _ACTIVE),
+    "pointing": (_stand, arms.pointing, ("pointing",)),
+    "crossed": (_stand, arms.crossed, ("relaxed", "grip")),
+    "raised": (_stand, arms.raised, (*_ACTIVE, "fist")),
+    "hips": (_stand, arms.on_hips, ("relaxed", "open")),
+    "face": (_stand, arms.near_face, _CALM),
+    "sitting": (_sit, arms.of_any_kind, (*_CALM, *_ACTIVE)),
+}
+"""Kinds of poses: what draws legs and trunk, what places the arms, and kinds of hands."""

@@ -1,0 +1,135 @@
+"""How far a posed person's arms keep from trunk, head, thighs and from each other.
+
+A cheap test on the bones alone, for rejecting poses in which the body runs through itself: the
+trunk is a stack of elliptic slices, the head an ellipsoid, limbs are rows of balls.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from hicp_lib.core.memo import memoised
+from hicp_lib.simulation.body.model import REGIONS, Body, Pose, pose_bones, rest_shape, shape_weights
+
+_N_SLICES = 12
+# Limbs as balls: region, first and last bone head, fractions of the way between them. Most of the
+# upper arm may touch the trunk; a bit more than the whole way to the last knuckle is a fingertip.
+_UPPER_ARM = ("upper_arm", "upperarm01", "lowerarm01", (0.85,))
+_FOREARM = ("forearm", "lowerarm01", "wrist", (0.0, 0.2, 0.4, 0.6, 0.8, 1.0))
+_HAND = ("hand", "wrist", "finger3-3", (0.35, 0.7, 1.05))
+_THIGH = ("thigh", "upperleg01", "lowerleg01", (0.25, 0.4, 0.55, 0.7, 0.85))
+_HAND_FLATNESS = 0.5  # half the thickness of a hand over its vertices' distance from its middle line
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Sizes of one shape: its trunk's slices from below, then its head; metres, from the pelvis."""
+
+    weights: np.ndarray  # (n_shapes,) of the shape
+    bones: np.ndarray  # (n_parts,) which bone each part moves with
+    bone_heads_m: np.ndarray  # (n_parts, 3) where that bone begins at rest
+    centres_m: np.ndarray  # (n_parts, 3) at rest
+    half_axes_m: np.ndarray  # (n_parts, 3); a slice's last one is half its height
+    radii_m: dict[str, float]  # of limbs, by region
+
+    def trunk_at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
+        """Centre and half axes (3,) of the trunk's slice at a height from 0 (crotch) to 1 (neck), at rest."""
+        part = int(np.clip(height, 0, 1) * (len(self.bones) - 2) + 0.5)
+        return self.centres_m[part], self.half_axes_m[part]
+
+
+def outline(body: Body, shape: int | str | np.ndarray) -> Outline:
+    """Measure a shape; `shape` as in `pose_body`."""
+    weights = shape_weights(body, shape)
+    vertices, heads = rest_shape(body, weights)
+    vertices, heads = vertices - heads[0], heads - heads[0]
+    trunk, head = _vertices_of(body, "torso", "hips"), _vertices_of(body, "face", "scalp")
+    z = vertices[trunk, 2]
+    edges = np.linspace(z.min(), _extent(z[:, None])[1, 0], _N_SLICES + 1)
+    parts = [trunk[(z >= low) & (z <= high)] for low, high in zip(edges[:-1], edges[1:], strict=True)]
+    parts.append(head)
+    bones = _moved_by(body, parts)
+    low, high = np.stack([_extent(vertices[part]) for part in parts], axis=1)
+    half_axes = (high - low) / 2
+    half_axes[:-1, 2] = (edges[1] - edges[0]) / 2
+    radii = {limb[0]: _radius(body, vertices, heads, limb) for limb in (_UPPER_ARM, _FOREARM, _HAND, _THIGH)}
+    radii["hand"] *= _HAND_FLATNESS
+    return Outline(weights, bones, heads[bones], (low + high) / 2, half_axes, radii)
+
+
+def clearance_m(body: Body, shape: Outline, pose: Pose) -> float:
+    """Smallest gap between an arm and trunk, head, thighs or the other arm; negative inside.
+
+    Gaps to trunk and head are approximate; only their sign near zero is to be relied on.
+    """
+    rotations, heads = pose_bones(body, shape.weights, pose)
+    balls = {side: _balls(body, shape, heads, (_UPPER_ARM, _FOREARM, _HAND), side) for side in "LR"}
+    arms = [np.concatenate(both) for both in zip(balls["L"], balls["R"], strict=True)]
+    gaps = [_gap_to_trunk(shape, rotations, heads, *arms).min(), _gap(*balls["L"], *balls["R"])]
+    for side in "LR":
+        gaps.append(_gap(*arms, *_balls(body, shape, heads, (_THIGH,), side)))
+    return float(min(gaps))
+
+
+def _gap_to_trunk(shape: Outline, rotations, heads, points, radii) -> np.ndarray:
+    """Gap (n_points,) to the nearest slice of the trunk, and to the head."""
+    R = rotations[shape.bones]
+    centres = heads[shape.bones] + np.einsum("pij,pj->pi", R, shape.centres_m - shape.bone_heads_m)
+    local = np.einsum("pij,npi->npj", R, points[:, None] - centres)
+    across = np.minimum(shape.half_axes_m[:, 0], shape.half_axes_m[:, 1])
+    scaled = np.abs(local) / shape.half_axes_m
+    # A slice is an endless cylinder cut at its height, the head is round.
+    flat = np.linalg.norm(scaled[..., :2], axis=2)
+    flat[:, -1] = np.linalg.norm(scaled[:, -1], axis=1)
+    gap = (flat - 1) * across - radii[:, None]
+    gap[:, :-1][scaled[:, :-1, 2] > 1] = np.inf
+    return gap.min(axis=1)
+
+
+def _gap(points_a, radii_a, points_b, radii_b) -> float:
+    distance = np.linalg.norm(points_a[:, None] - points_b[None], axis=2)
+    return float((distance - radii_a[:, None] - radii_b).min())
+
+
+def _balls(body: Body, shape: Outline, heads, limbs, side: str) -> tuple[np.ndarray, np.ndarray]:
+    points, radii = [], []
+    for region, first, last, fractions in limbs:
+        a, b = (heads[body.bone_numbers[f"{bone}.{side}"]] for bone in (first, last))
+        points += [a + t * (b - a) for t in fractions]
+        radii += [shape.radii_m[region]] * len(fractions)
+    return np.array(points), np.array(radii)
+
+
+def _radius(body: Body, vertices, heads, limb) -> float:
+    region, first, last, _ = limb
+    a, b = (heads[body.bone_numbers[f"{bone}.L"]] for bone in (first, last))
+    limb_m = vertices[_vertices_of(body, region)]
+    own = limb_m[limb_m[:, 1] > 0] - a
+    along = (b - a) / np.linalg.norm(b - a)
+    return float(np.median(np.linalg.norm(own - np.outer(own @ along, along), axis=1)))
+
+
+def _extent(points: np.ndarray) -> np.ndarray:
+    """The 3rd and 97th percentile of each component, (2, k), of points (n, k); `np.percentile` is slower."""
+    ordered = np.sort(points.T, axis=1)
+    below, share = np.divmod(np.array([0.03, 0.97]) * (len(points) - 1), 1)
+    low, high = ordered[:, below.astype(int)], ordered[:, below.astype(int) + 1]
+    return (low + share * (high - low)).T
+
+
+def _moved_by(body: Body, parts: list[np.ndarray]) -> np.ndarray:
+    """The bone that moves most of each part, given as numbers of vertices; (n_parts,)."""
+    ends = np.cumsum([0, *map(len, parts)])
+    numbers = np.concatenate(parts)
+    shape = (len(parts), len(body.skin_weights))
+    members = sparse.csr_array((np.ones(len(numbers), np.float32), numbers, ends), shape=shape)
+    return (members @ body.sparse_skin_weights).toarray().argmax(axis=1)
+
+
+@memoised(32)
+def _vertices_of(body: Body, *regions: str) -> np.ndarray:
+    """Numbers of the vertices of some regions."""
+    return np.flatnonzero(np.isin(body.regions, [REGIONS.index(region) for region in regions]))

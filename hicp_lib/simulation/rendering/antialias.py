@@ -1,0 +1,99 @@
+"""Smooth edges: where surfaces meet, pixels mix their neighbours' colours by coverage.
+
+Only rays are cast anew, nothing is shaded again: one ray through each border between two pixels,
+which takes the colour of the one that shows the same thing. A pixel's four borders are met at
+points of a rotated square, mirrored from pixel to pixel so that neighbours share them
+(FLIPQUAD: Akenine-Moller, "An extremely inexpensive multisampling scheme", 2003); its own middle
+counts as a fifth sample.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hicp_lib.simulation.rendering.camera import Camera, join_rays, ray_parts
+from hicp_lib.simulation.rendering.raycast import RayScene, Trace
+
+_SHIFT_PX = 0.17  # along the border, from its middle
+
+
+def edge_pixels(trace: Trace, sharp: np.ndarray) -> np.ndarray:
+    """Numbers of the pixels at an outline or a step in depth where one side is `sharp`.
+
+    `sharp` is a mask of the image's shape, (height, width).
+    """
+    shape = sharp.shape
+    surface, depth = trace.surface.reshape(shape), trace.depth_m.reshape(shape)
+    edge = np.zeros(shape, bool)
+    with np.errstate(invalid="ignore"):
+        for low, high in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
+            step = (surface[low] != surface[high]) | (np.abs(depth[low] - depth[high]) > 0.03 * depth[low])
+            step &= sharp[low] | sharp[high]
+            edge[low] |= step
+            edge[high] |= step
+    return np.flatnonzero(edge)
+
+
+def smooth_edges(
+    image: np.ndarray, edges: np.ndarray, trace: Trace, scene: RayScene, camera: Camera
+) -> np.ndarray:
+    """The image (height, width, 3) with its edge pixels replaced by the mean of five samples."""
+    if len(edges) == 0:
+        return image
+    around = _borders(edges, *image.shape[:2])
+    used = np.zeros(2 * image.shape[0] * image.shape[1] + sum(image.shape[:2]), bool)
+    for numbers in around:
+        used[numbers] = True
+    shown = _alike(np.flatnonzero(used), trace, scene, camera)
+    flat = image.reshape(-1, 3)
+    # Averaged after compression: a bright window does not eat its frame.
+    colour, mixed = _compressed(flat.take(shown, axis=0)), _compressed(flat.take(edges, axis=0))
+    place = np.cumsum(used) - 1
+    for numbers in around:
+        mixed += colour.take(place.take(numbers), axis=0)
+    mixed /= 1 + len(around)
+    flat[edges] = mixed / (1 - mixed)
+    return image
+
+
+def _compressed(light: np.ndarray) -> np.ndarray:
+    return light / (1 + light)
+
+
+def _borders(pixels: np.ndarray, height: int, width: int) -> list[np.ndarray]:
+    """Numbers of the left, right, upper and lower borders of pixels.
+
+    Upright borders come first, row by row, then level ones.
+    """
+    left = pixels + pixels // width
+    upper = pixels + height * (width + 1)
+    return [left, left + 1, upper, upper + width]
+
+
+def _alike(borders: np.ndarray, trace: Trace, scene: RayScene, camera: Camera) -> np.ndarray:
+    """Which of the two pixels at each border shows what a ray through the border meets, (n,)."""
+    height, width = camera.height_px, camera.width_px
+    n_upright = height * (width + 1)
+    upright = borders < n_upright
+    # Of the pixel to the right of an upright border, or below a level one.
+    row = np.where(upright, borders // (width + 1), (borders - n_upright) // width)
+    column = np.where(upright, borders - row * (width + 1), borders - n_upright - row * width)
+    shift = _SHIFT_PX * ((row + column) % 2 * 2 - 1)
+    u, v = column + np.where(upright, -0.5, -shift), row + np.where(upright, shift, -0.5)
+    found = scene.trace(join_rays(camera.centre_m, sum(ray_parts(camera, u, v))))
+    first, second = (
+        np.clip(v, 0, height - 1) * width + np.clip(u, 0, width - 1)
+        for v, u in ((row - ~upright, column - upright), (row, column))
+    )
+    better = _difference(trace, second, found, scene) < _difference(trace, first, found, scene)
+    return np.where(better, second, first)
+
+
+def _difference(trace: Trace, pixels: np.ndarray, found: Trace, scene: RayScene) -> np.ndarray:
+    """How little pixels show what samples found: another surface, another depth, another slant."""
+    depth = np.minimum(found.depth_m, np.float32(1e3))
+    cost = np.abs(np.minimum(trace.depth_m.take(pixels), np.float32(1e3)) - depth) / depth
+    cost += 10 * (trace.surface.take(pixels) != found.surface)
+    triangles = trace.triangle.take(pixels), found.triangle
+    faces = [scene.face_normals.take(triangle, axis=0, mode="wrap") for triangle in triangles]
+    return cost + np.float32(0.04) * (1 - np.einsum("ij,ij->i", *faces))

@@ -1,0 +1,146 @@
+"""Lights, and how surfaces return them.
+
+Area lights are sampled once per pixel on a repeating 4 x 4 pattern of positions, so that a
+filter over 4 x 4 pixels which respects edges removes the noise and leaves soft shadows (interleaved
+sampling: Keller and Heidrich, 2001). Highlights are Cook-Torrance with the GGX distribution
+(Walter et al., 2007), in Karis's approximation of the masking term (2013).
+Vectors have their components first, (3, n).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hicp_lib.simulation.rendering.raycast import dot
+
+
+@dataclass(frozen=True)
+class Light:
+    """A rectangular light.
+
+    Attributes
+    ----------
+    centre_m, half_u_m, half_v_m : arrays, shape (3,); the corners are centre +- half_u +- half_v
+    power : linear RGB, shape (3,): irradiance at one metre, seen face on
+    direction : unit, where a one-sided light (a window) shines; None for one that shines all around
+    """
+
+    centre_m: np.ndarray
+    half_u_m: np.ndarray
+    half_v_m: np.ndarray
+    power: np.ndarray
+    direction: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Ambient:
+    """Light from everywhere: linear RGB from above, from below, and more from one side."""
+
+    up: np.ndarray
+    down: np.ndarray
+    side: np.ndarray
+    side_direction: np.ndarray
+
+
+# Bayer's matrix: neighbours take samples that lie far apart.
+_STRATA = np.array([0, 8, 2, 10, 12, 4, 14, 6, 3, 11, 1, 9, 15, 7, 13, 5])
+# Where in the square each pixel of the pattern samples, in sixteenths.
+_PLACES = np.stack([_STRATA % 8 * 2 + _STRATA // 8, 5 * _STRATA % 16]).astype(np.float32)
+
+
+def sample_offsets(cell: np.ndarray, kind: int, rng: np.random.Generator) -> np.ndarray:
+    """Points of the unit square, (2, n): 16 points of a lattice that repeat every 4 x 4 pixels, jittered.
+
+    `cell` is each pixel's number in the 4 x 4 pattern, row by row; every `kind` of light has
+    the pattern moved. The pixels of either colour of a chessboard cover the square as well.
+    """
+    moved = np.roll(_PLACES.reshape(2, 4, 4), (-kind, -3 * kind), axis=(1, 2)).reshape(2, 16)
+    offsets = rng.random((2, len(cell)), np.float32)
+    offsets += moved.take(cell, axis=1)
+    offsets *= np.float32(1 / 16)
+    return offsets
+
+
+def towards_light(light: Light, positions_m: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """Vectors from positions to points of the light, (3, n), float32."""
+    s, t = 2 * offsets - 1
+    c, u, v = (x.astype(np.float32)[:, None] for x in (light.centre_m, light.half_u_m, light.half_v_m))
+    return c + s * u + t * v - positions_m
+
+
+def hemisphere(normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """Cosine-distributed directions about unit normals, (3, n), float32."""
+    angle, z = np.float32(2 * np.pi) * offsets[0], 1 - 2 * offsets[1]
+    radius = np.float32(0.98) * np.sqrt(np.maximum(1 - z * z, 0))
+    return normals + np.stack([radius * np.cos(angle), radius * np.sin(angle), np.float32(0.98) * z])
+
+
+def diffuse_and_highlight(
+    light: Light,
+    positions_m: np.ndarray,
+    normals: np.ndarray,
+    view: np.ndarray,
+    gloss: np.ndarray,
+    roughness: np.ndarray,
+    softness: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """What unshadowed light does at each of n points.
+
+    `view` are unit vectors to the camera. Softness lets red light creep past the terminator
+    further than green and blue, which is what makes skin look like skin.
+
+    Returns
+    -------
+    diffuse : light that the albedo is to be multiplied with, (3, n)
+    highlight : reflected light, (3, n)
+    """
+    to_light = light.centre_m.astype(np.float32)[:, None] - positions_m
+    strength = 1 / dot(to_light, to_light)
+    to_light *= np.sqrt(strength)
+    if light.direction is not None:
+        strength *= np.clip(-dot(to_light, light.direction.astype(np.float32)), 0, 1)
+    n_l = dot(normals, to_light)
+    power = light.power.astype(np.float32)[:, None]
+    lit = np.clip(n_l, 0, 1) * strength
+    diffuse = _creeping(n_l, softness) * (strength * power) if softness.any() else lit * power
+    half = to_light
+    half += view
+    half /= np.maximum(np.sqrt(dot(half, half)), np.float32(1e-6))
+    lit *= gloss
+    lit *= _mirrored(np.clip(dot(normals, half), 0, 1), dot(view, half), roughness)
+    return diffuse, lit * power
+
+
+def _creeping(n_l: np.ndarray, softness: np.ndarray) -> np.ndarray:
+    """Diffuse light by the cosine `n_l` of its angle, where red creeps furthest, (3, n)."""
+    wrap = softness * np.float32([[0.40], [0.16], [0.10]])
+    creeping = n_l + wrap
+    wrap += 1
+    wrap *= wrap
+    creeping /= wrap
+    return np.maximum(creeping, 0, out=creeping)
+
+
+def _mirrored(n_h: np.ndarray, v_h: np.ndarray, roughness: np.ndarray) -> np.ndarray:
+    """GGX's distribution times masking, by the half vector's cosines with normal and view."""
+    a2 = roughness * roughness
+    a2 *= a2
+    n_h *= n_h
+    n_h *= a2 - 1
+    n_h += 1
+    n_h *= n_h
+    v_h *= v_h
+    v_h *= 4 * (roughness + np.float32(0.5))
+    n_h *= np.maximum(v_h, np.float32(0.1))
+    a2 /= n_h
+    return np.minimum(a2, 60, out=a2)
+
+
+def ambient_light(ambient: Ambient, normals: np.ndarray) -> np.ndarray:
+    """Diffuse light from all around by normal, (3, n)."""
+    up = 0.5 + 0.5 * normals[2]
+    lo, hi, extra = (x.astype(np.float32)[:, None] for x in (ambient.down, ambient.up, ambient.side))
+    side = np.clip(dot(normals, ambient.side_direction.astype(np.float32)), 0, 1)
+    return lo + up * (hi - lo) + side * extra

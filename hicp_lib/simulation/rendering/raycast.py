@@ -1,0 +1,197 @@
+"""Rays against surfaces, through Open3D's RaycastingScene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+
+from hicp_lib.core.environment import with_variables
+from hicp_lib.simulation.rendering.camera import join_rays
+from hicp_lib.simulation.rendering.surfaces import Surface
+
+# Open3D would announce and start its web viewer in every notebook that renders.
+with with_variables(OPEN3D_DISABLE_WEB_VISUALIZER="true"):
+    import open3d as o3d
+
+N_THREADS = 1  # frames are rendered in parallel by processes; one scene takes calls from one thread only
+
+
+@dataclass(frozen=True)
+class Trace:
+    """The first thing each ray met; every array has n rows.
+
+    `depth_m` is the ray parameter (infinite: nothing hit), `triangle` the triangle's number in
+    the whole scene (-1: nothing), `surface` the surface's number (-1: nothing), `barycentric`
+    the weights of the triangle's second and third corner.
+    """
+
+    depth_m: np.ndarray
+    triangle: np.ndarray
+    surface: np.ndarray
+    barycentric: np.ndarray
+
+
+class RayScene:
+    """Surfaces that rays can be cast at."""
+
+    def __init__(self, surfaces: list[Surface]):
+        self.surfaces = surfaces
+        n_triangles = [len(s.mesh.triangles) for s in surfaces]
+        self.first_vertex = np.cumsum([0, *(len(s.mesh.vertices_m) for s in surfaces)])
+        # One more for the triangle that is none, -1.
+        self.surface_of_triangle = np.append(
+            np.repeat(np.arange(len(surfaces), dtype=np.int16), n_triangles), np.int16(-1)
+        )
+        self.vertices_m = np.concatenate([s.mesh.vertices_m for s in surfaces], dtype=np.float32)
+        self.triangles = np.concatenate(
+            [s.mesh.triangles + first for s, first in zip(surfaces, self.first_vertex, strict=False)]
+        ).astype(np.uint32)
+        self._scene = o3d.t.geometry.RaycastingScene(nthreads=N_THREADS)
+        self._scene.add_triangles(_tensor(self.vertices_m), _tensor(self.triangles))
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Of all vertices, (3, n_vertices)."""
+        return np.concatenate([s.mesh.normals.T for s in self.surfaces], axis=1, dtype=np.float32)
+
+    @cached_property
+    def face_normals(self) -> np.ndarray:
+        """Unit normals of all triangles, (n_triangles, 3)."""
+        a, b, c = (self.vertices_m.take(self.triangles[:, k], axis=0).T for k in range(3))
+        face = cross(b - a, c - a)
+        face /= np.maximum(np.sqrt(dot(face, face)), np.float32(1e-20))
+        return np.ascontiguousarray(face.T)
+
+    @cached_property
+    def owners(self) -> np.ndarray:
+        """The person each surface belongs to, -1 for none and (last) for surface -1; int16."""
+        return np.array([s.person for s in self.surfaces] + [-1], np.int16)
+
+    @cached_property
+    def parts(self) -> np.ndarray:
+        """The body part of each triangle, -1 for none and (last) for triangle -1; int16."""
+        parts = [np.full(len(s.mesh.triangles), -1) if s.parts is None else s.parts for s in self.surfaces]
+        return np.concatenate([*parts, [-1]], dtype=np.int16)
+
+    def trace(self, rays: np.ndarray) -> Trace:
+        """Cast rays, shape (n, 6), float32; their direction's length sets the unit of `depth_m`."""
+        answer = self._scene.cast_rays(_tensor(rays), nthreads=N_THREADS)
+        triangle = answer["primitive_ids"].numpy().view(np.int32)  # Open3D's "nothing" is -1 then
+        return Trace(
+            answer["t_hit"].numpy(),
+            triangle,
+            self.surface_of_triangle.take(triangle, mode="wrap"),
+            answer["primitive_uvs"].numpy(),
+        )
+
+    def occluded(self, rays: np.ndarray, end: float = 1.0) -> np.ndarray:
+        """Whether rays (n, 6) meet something before ``origin + end * direction``, shape (n,), bool."""
+        return self._scene.test_occlusions(_tensor(rays), tnear=0.0, tfar=end, nthreads=N_THREADS).numpy()
+
+
+def _tensor(values: np.ndarray) -> o3d.core.Tensor:
+    return o3d.core.Tensor.from_numpy(np.ascontiguousarray(values))  # no copy is made
+
+
+def trace_image(scene: RayScene, centre_m: np.ndarray, directions: np.ndarray, fine: np.ndarray) -> Trace:
+    """Trace an image's rays, directions (3, height, width), but not where it is plain.
+
+    Every second row and column is traced. Between four of those that meet one and the same
+    triangle the rest is known: 1 / depth is linear over a plane's image. Everything else is
+    traced as well, and so is all that lies near surfaces with a true `fine` (one per surface).
+    Rows of the answer are the image's pixels; `barycentric` is left undefined between traced ones.
+    """
+    height, width = directions.shape[1:]
+    every_second = (slice(None, None, 2), slice(None, None, 2))
+    coarse = scene.trace(join_rays(centre_m, directions[:, ::2, ::2].reshape(3, -1)))
+    coarse_shape = (-(-height // 2), -(-width // 2))
+    triangle = coarse.triangle.reshape(coarse_shape)
+    inner = (triangle >= 0) & ~np.append(fine, False).take(coarse.surface, mode="wrap").reshape(coarse_shape)
+    plain = _inside_one(triangle, inner)
+    depth_m = _between(1 / coarse.depth_m.reshape(coarse_shape), height, width)
+    with np.errstate(divide="ignore"):  # infinite where nothing is
+        np.reciprocal(depth_m, out=depth_m)
+    depth_m[every_second] = coarse.depth_m.reshape(coarse_shape)
+    triangles = np.ascontiguousarray(doubled(triangle, (height, width)))
+    barycentric = np.empty((height, width, 2), np.float32)
+    barycentric[every_second] = coarse.barycentric.reshape(*coarse_shape, 2)
+    unknown = doubled(~plain, (height, width))
+    unknown[every_second] = False
+    rest = np.flatnonzero(unknown)
+    traced = scene.trace(join_rays(centre_m, pick(directions.reshape(3, -1), rest)))
+    depth_m.ravel()[rest], triangles.ravel()[rest] = traced.depth_m, traced.triangle
+    place(barycentric.reshape(-1, 2).T, rest, traced.barycentric.T)
+    return Trace(
+        depth_m.ravel(),
+        triangles.ravel(),
+        scene.surface_of_triangle.take(triangles.ravel(), mode="wrap"),
+        barycentric.reshape(-1, 2),
+    )
+
+
+def _inside_one(triangle: np.ndarray, inner: np.ndarray) -> np.ndarray:
+    """Whether a place, its neighbours below and to the right and all around them show one triangle.
+
+    `triangle` are the triangles seen, `inner` where that may be so, both (rows, columns).
+    """
+    plain = inner.copy()
+    here = triangle[:-1, :-1]
+    for other in (triangle[1:, :-1], triangle[1:, 1:], triangle[:-1, 1:]):
+        plain[:-1, :-1] &= here == other
+    plain[-1], plain[:, -1] = False, False
+    return cv2.erode(plain.view(np.uint8), np.ones((3, 3), np.uint8)).view(bool)
+
+
+def doubled(values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Each place (rows, columns) as two by two, cut to `shape`."""
+    return values.repeat(2, axis=0).repeat(2, axis=1)[: shape[0], : shape[1]]
+
+
+def _between(values: np.ndarray, height: int, width: int) -> np.ndarray:
+    """Values at every second row and column, and the means between them, (height, width)."""
+    full = np.zeros((2 * values.shape[0], 2 * values.shape[1]), np.float32)
+    full[::2, ::2] = values
+    full[::2, 1:-1:2] = (values[:, :-1] + values[:, 1:]) / 2
+    full[1:-1:2, ::2] = (values[:-1] + values[1:]) / 2
+    full[1:-1:2, 1:-1:2] = (values[:-1, :-1] + values[1:, 1:]) / 2
+    return full[:height, :width]
+
+
+def interpolate(values: np.ndarray, corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Values per vertex (k, n_vertices) at n places of triangles, corners and weights (3, n): (k, n)."""
+    result = np.empty((len(values), corners.shape[1]), np.float32)
+    for found, component in zip(result, values, strict=True):
+        np.multiply(pick(component, corners[0]), weights[0], out=found)
+        for k in (1, 2):
+            found += pick(component, corners[k]) * weights[k]
+    return result
+
+
+# Row by row and without checks, numpy copies chosen places several times faster than by indexing.
+
+
+def pick(values: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """The same places of every row, (..., n) to (..., len(places)); places must be within bounds."""
+    return values.take(places, axis=-1, mode="clip")
+
+
+def place(values: np.ndarray, places: np.ndarray, chosen: np.ndarray) -> None:
+    """Put chosen values (k, len(places)) at these places of every row of `values` (k, n)."""
+    for row, new in zip(values, chosen, strict=True):
+        row[places] = new
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Dot products of vectors (3, n)."""
+    result = a[0] * b[0]
+    result += a[1] * b[1]
+    result += a[2] * b[2]
+    return result
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross products of vectors (3, n)."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])

@@ -1,0 +1,56 @@
+"""How much of each light every pixel sees: one ray towards a point of each light, then a filter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hicp_lib.simulation.rendering import lights
+from hicp_lib.simulation.rendering.camera import join_rays
+from hicp_lib.simulation.rendering.filters import View, sum_within
+from hicp_lib.simulation.rendering.raycast import RayScene, dot, pick
+
+AMBIENT_REACH_M = 0.7
+_OFF_SURFACE_M = 0.003  # where rays begin
+
+
+def visibility(
+    sources: list[lights.Light],
+    scene: RayScene,
+    view: View,
+    normals: np.ndarray,
+    sharp: bool,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """Visible share of each light and (last) of the surroundings, (n_lights + 1, n) in [0, 1].
+
+    `normals` are those of all of the view's pixels, (3, rows, columns).
+    Every second pixel is asked, as on a chessboard, and the filter fills in the others; in a
+    `sharp` view it reaches less far.
+    """
+    row, column = np.arange(view.surface.shape[0])[:, None], np.arange(view.surface.shape[1])
+    turn = (row + column) % 2 == 0
+    asked = np.flatnonzero(turn.ravel().take(view.pixels))
+    pixels = view.pixels.take(asked)
+    cell = (row % 4 * 4 + column % 4).ravel().take(pixels)
+    facing_out = pick(normals.reshape(3, -1), pixels)
+    origins = pick(view.positions_m.reshape(3, -1), pixels) + np.float32(_OFF_SURFACE_M) * facing_out
+    counts = np.zeros((len(sources) + 2, view.surface.size), np.int16)
+    for kind, source in enumerate([*sources, None]):
+        offsets = lights.sample_offsets(cell, kind, rng)
+        counts[kind][pixels] = _sees(scene, source, origins, facing_out, offsets)
+    counts[-1] = turn.ravel()
+    counts = counts.reshape(-1, *view.surface.shape)
+    sums = sum_within(counts, view.surface, view.positions_m, normals, 2 if sharp else 3)
+    *seen, weight = view.from_grid(sums).astype(np.float32)
+    return np.where(weight > 0, np.stack(seen) / np.maximum(weight, 1), np.float32(1))
+
+
+def _sees(scene: RayScene, source: lights.Light | None, origins_m, normals, offsets) -> np.ndarray:
+    """Whether points (3, n) see a point of a light, or of their surroundings (None); (n,), bool."""
+    if source is None:
+        return ~scene.occluded(join_rays(origins_m, lights.hemisphere(normals, offsets)), AMBIENT_REACH_M)
+    towards = lights.towards_light(source, origins_m, offsets)
+    facing = np.flatnonzero(dot(towards, normals) > 0)  # what faces away is dark without asking
+    seen = np.ones(len(origins_m.T), bool)
+    seen[facing] = ~scene.occluded(join_rays(origins_m, towards).take(facing, axis=0), 0.98)
+    return seen

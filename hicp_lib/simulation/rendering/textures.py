@@ -1,0 +1,294 @@
+"""Procedural textures: periodic tiles with mip levels, sampled at metres.
+
+A tile holds mixing weights or a height, not colours: a scene chooses the colours, so one
+tile serves every paint, wood and cloth. Tiles are made once per process from fixed seeds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scipy import fft
+
+from hicp_lib.core.memo import memoised
+
+_REMAP_COLUMNS = 8192  # OpenCV's remap takes no array longer than 32767
+
+
+@dataclass(frozen=True)
+class Texture:
+    """A periodic tile, (size, size, channels) float32, `width_m` metres wide, with its mip levels."""
+
+    levels: list[np.ndarray]
+    width_m: float
+
+    def sample(self, uv_m: np.ndarray, footprint_m: np.ndarray | float) -> np.ndarray:
+        """Look the tile up, bilinearly, blurred to the footprint.
+
+        Parameters
+        ----------
+        uv_m : array, shape (2, n), metres
+        footprint_m : how many metres of surface one pixel sees, shape (n,) or one number
+
+        Returns
+        -------
+        array, shape (channels, n), float32
+        """
+        texel_m = self.width_m / (self.levels[0].shape[0] - 1)
+        level = np.log2(np.maximum(np.asarray(footprint_m, np.float32) / texel_m, 1e-6))
+        level = np.clip(np.rint(level), 0, len(self.levels) - 1).astype(np.int8)
+        if level.ndim == 0 or level.min() == level.max():
+            return self._lookup(int(level.flat[0]), uv_m)
+        result = np.empty((self.levels[0].shape[2], uv_m.shape[1]), np.float32)
+        for number in range(level.min(), level.max() + 1):
+            rows = np.flatnonzero(level == number)
+            for channel, found in zip(result, self._lookup(number, uv_m.take(rows, axis=1)), strict=True):
+                channel[rows] = found
+        return result
+
+    def _lookup(self, number: int, uv_m: np.ndarray) -> np.ndarray:
+        tile = self.levels[number]
+        size, channels = tile.shape[0] - 1, tile.shape[2]
+        n = uv_m.shape[1]
+        if n == 0:
+            return np.empty((channels, 0), np.float32)
+        rows = -(-n // _REMAP_COLUMNS)
+        columns = -(-n // rows)
+        xy = np.zeros((2, rows * columns), np.float32)
+        scaled = uv_m * np.float32(1 / self.width_m)
+        xy[:, :n] = (scaled - np.floor(scaled)) * np.float32(size)
+        maps = xy.reshape(2, rows, columns)
+        found = cv2.remap(tile, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        return np.ascontiguousarray(found.reshape(rows * columns, channels)[:n].T)
+
+
+def make_texture(tile: np.ndarray, width_m: float) -> Texture:
+    """A texture from one period of a pattern, shape (size, size[, channels]), size a power of two."""
+    tile = np.atleast_3d(tile).astype(np.float32)
+    levels = []
+    while True:
+        levels.append(np.ascontiguousarray(np.pad(tile, ((0, 1), (0, 1), (0, 0)), mode="wrap")))
+        if tile.shape[0] <= 2:
+            return Texture(levels, width_m)
+        tile = (tile[::2, ::2] + tile[1::2, ::2] + tile[::2, 1::2] + tile[1::2, 1::2]) / 4
+
+
+def noise(
+    size: int,
+    rng: np.random.Generator,
+    slope: float = 1.5,
+    low: float = 1,
+    stretch: tuple[float, float] = (1, 1),
+) -> np.ndarray:
+    """Periodic Gaussian noise, shape (size, size), mean 0, standard deviation 1.
+
+    Its amplitude spectrum falls as frequency ** -slope and is flat below `low` cycles per
+    tile; `stretch` lengthens the features along (rows, columns).
+    """
+    rows, columns = fft.fftfreq(size, 1 / size), fft.rfftfreq(size, 1 / size)
+    radius = np.hypot(rows[:, None] * stretch[0], columns * stretch[1]).astype(np.float32)
+    amplitude = np.maximum(radius, low) ** np.float32(-slope)
+    amplitude[0, 0] = 0
+    spectrum = fft.rfft2(rng.standard_normal((size, size)).astype(np.float32))
+    field = fft.irfft2(spectrum * amplitude, (size, size))
+    return field / field.std()
+
+
+def _rng(number: int) -> np.random.Generator:
+    return np.random.default_rng([20220, number])
+
+
+@memoised()
+def cloud() -> Texture:
+    """Smooth noise of all sizes, two independent channels; 1 m."""
+    return make_texture(np.dstack([noise(512, _rng(k), 1.6, 2) for k in (1, 2)]), 1.0)
+
+
+@memoised()
+def planks() -> Texture:
+    """Wooden boards: (light to dark, gap between boards); 1.2 m, boards along v."""
+    size, boards = 512, 8
+    v, u = np.mgrid[:size, :size] / size
+    board = np.floor(u * boards)
+    shift = _rng(4).random(boards)[board.astype(int)]
+    end = np.mod(v + shift, 1)
+    tone = _rng(5).random((boards, 2))[board.astype(int), (end > 0.5).astype(int)]
+    fibre = noise(size, _rng(6), 1.1, 4, (14, 1))
+    gap = np.minimum(
+        np.abs(np.mod(u * boards + 0.5, 1) - 0.5) / boards,
+        np.minimum(np.abs(end - 0.5), np.minimum(end, 1 - end)),
+    )
+    return make_texture(np.dstack([np.clip(0.5 * tone + 0.25 + 0.12 * fibre, 0, 1), gap < 0.0025]), 1.2)
+
+
+@memoised()
+def wood() -> Texture:
+    """Sawn wood, light to dark, grain along v; 0.8 m."""
+    rings = noise(512, _rng(7), 1.7, 1, (10, 1))
+    fibre = noise(512, _rng(8), 0.8, 8, (20, 1))
+    return make_texture(np.clip(0.5 + 0.28 * np.sin(4 * rings) + 0.12 * fibre, 0, 1), 0.8)
+
+
+@memoised()
+def tiles() -> Texture:
+    """Square tiles: (tone, grout); four tiles across, 1.2 m."""
+    size, count = 512, 4
+    v, u = np.mgrid[:size, :size] / size * count
+    tone = _rng(9).random((count, count))[v.astype(int), u.astype(int)]
+    edge = np.minimum(np.abs(np.mod(u + 0.5, 1) - 0.5), np.abs(np.mod(v + 0.5, 1) - 0.5))
+    return make_texture(
+        np.dstack([0.35 + 0.3 * tone + 0.08 * noise(size, _rng(10), 1.2, 3), edge < 0.012]), 1.2
+    )
+
+
+@memoised()
+def carpet() -> Texture:
+    """Short pile, light to dark; 0.6 m."""
+    return make_texture(0.5 + 0.13 * noise(512, _rng(11), 0.4, 40) + 0.05 * noise(512, _rng(12), 1.2, 2), 0.6)
+
+
+@memoised()
+def plaster() -> Texture:
+    """Painted wall: slight unevenness, light to dark; 1.6 m."""
+    return make_texture(0.5 + 0.12 * noise(512, _rng(13), 1.4, 2) + 0.12 * noise(512, _rng(14), 0.7, 40), 1.6)
+
+
+@memoised()
+def bricks() -> Texture:
+    """Brick wall: (tone, mortar); 1 m, 4 bricks by 12 courses."""
+    size, across, courses = 512, 4, 12
+    v, u = np.mgrid[:size, :size] / size
+    course = np.floor(v * courses)
+    x = np.mod(u * across + 0.5 * np.mod(course, 2), across)
+    tone = _rng(15).random((courses, across))[course.astype(int), x.astype(int) % across]
+    edge_u = np.abs(np.mod(x + 0.5, 1) - 0.5) / across
+    edge_v = np.abs(np.mod(v * courses + 0.5, 1) - 0.5) / courses
+    rough = noise(size, _rng(16), 1.0, 8)
+    return make_texture(
+        np.dstack(
+            [
+                np.clip(tone * 0.7 + 0.15 + 0.1 * rough, 0, 1),
+                np.minimum(edge_u, edge_v) < 0.006 + 0.001 * rough,
+            ]
+        ),
+        1.0,
+    )
+
+
+@memoised()
+def weave() -> Texture:
+    """Woven or knitted cloth seen close, around 0; 0.06 m at a tenth of a millimetre."""
+    size, threads = 512, 60
+    v, u = np.mgrid[:size, :size] / size * 2 * np.pi * threads
+    cross = np.sin(u) * np.sin(v) + 0.5 * np.sin(u + v)
+    return make_texture(0.6 * cross + 0.5 * noise(size, _rng(17), 0.8, 10), 0.06)
+
+
+@memoised()
+def wrinkles() -> Texture:
+    """Height of small folds in cloth, around 0, two channels (soft, creased); 0.5 m, folds run along v."""
+    soft = noise(512, _rng(18), 2.6, 3, (2.0, 1))
+    ridges = [1 - 2 * np.abs(noise(512, _rng(k), 2.2, 2, (1.5, 1))) for k in (19, 20)]
+    creased = cv2.GaussianBlur(np.tile(np.minimum(*ridges), (3, 3)), (0, 0), 3)[512:1024, 512:1024]
+    return make_texture(np.dstack([soft, creased]), 0.5)
+
+
+@memoised()
+def strands() -> Texture:
+    """Hair: brightness of single strands and locks, around 0; 0.1 m, strands along v."""
+    fine = noise(512, _rng(21), 0.2, 30, (60, 1))
+    locks = noise(512, _rng(22), 1.0, 5, (25, 1))
+    return make_texture(0.6 * fine + 0.6 * locks, 0.1)
+
+
+@memoised()
+def skin() -> Texture:
+    """Skin: (blotches of redness, pores and lines, freckles 0..1), the first two around 0; 0.12 m."""
+    blotches = noise(512, _rng(23), 1.8, 4)
+    pores = noise(512, _rng(24), 0.5, 60)
+    freckles = np.clip(noise(512, _rng(25), 0.8, 40) - 1.7, 0, 1)
+    return make_texture(np.dstack([blotches, pores, freckles]), 0.12)
+
+
+@memoised()
+def stripes(duty: float = 0.5) -> Texture:
+    """Stripes along u, 0 and 1; one period per metre (scale the coordinates)."""
+    profile = ((np.arange(256) + 0.5) / 256 < duty).astype(np.float32)
+    return make_texture(np.repeat(profile[:, None], 256, axis=1), 1.0)
+
+
+@memoised()
+def checks(kind: int) -> Texture:
+    """Gingham, tartan or window pane: weights of (second, third) colour; one period per metre."""
+    t = (np.arange(256) + 0.5) / 256
+    if kind == 0:
+        a = (t < 0.5) * 0.5
+        return make_texture(np.dstack([a[:, None] + a[None, :], np.zeros((256, 256))]), 1.0)
+    if kind == 1:
+        a = 0.5 * ((np.abs(t - 0.3) < 0.17) | (np.abs(t - 0.8) < 0.04))
+        b = 0.55 * (np.abs(t - 0.3) < 0.025) + 0.4 * (np.abs(t - 0.65) < 0.02)
+        return make_texture(np.dstack([a[:, None] + a[None, :], np.maximum(b[:, None], b[None, :])]), 1.0)
+    line = 0.9 * (np.abs(t - 0.5) < 0.03)
+    return make_texture(np.dstack([np.maximum(line[:, None], line[None, :]), np.zeros((256, 256))]), 1.0)
+
+
+@memoised()
+def dots() -> Texture:
+    """Dots on a staggered grid, 0 and 1; one period per metre."""
+    v, u = (np.mgrid[:256, :256] + 0.5) / 256
+    distance = [np.hypot(np.mod(u - x, 1) - 0.5, np.mod(v - x, 1) - 0.5) for x in (0, 0.5)]
+    return make_texture(np.minimum(*distance) < 0.16, 1.0)
+
+
+@memoised()
+def blobs(number: int) -> Texture:
+    """Flower-, leaf- or camouflage-like blobs: weights of (second, third) colour; one period per metre."""
+    a, b = (
+        noise(256, _rng(30 + 2 * number + k), (2.5, 1.2, 3.5)[number % 3], (4, 9, 2)[number % 3])
+        for k in (0, 1)
+    )
+    return make_texture(np.dstack([a > 0.6, (b > 0.8) & (a <= 0.6)]), 1.0)
+
+
+@memoised()
+def prints(number: int) -> Texture:
+    """What is printed on a shirt's chest: weights of (second, third) colour; one print per 0.3 m."""
+    rng, size = _rng(60 + number), 256
+    ink = np.zeros((2, size, size), np.uint8)
+    kind = number % 4
+    if kind in (0, 3):
+        letters = "".join(rng.choice(list("ABCDEFGHKLMNOPRSTUVXZ0123456789"), rng.integers(2, 6)))
+        scale = 9.0 / len(letters)
+        thickness = int(3 * scale) + 1
+        (w, h), _ = cv2.getTextSize(letters, cv2.FONT_HERSHEY_DUPLEX, scale, thickness)
+        origin = ((size - w) // 2, (size + h) // 2)
+        cv2.putText(ink[0], letters, origin, cv2.FONT_HERSHEY_DUPLEX, scale, 255, thickness, cv2.LINE_AA)
+    if kind in (1, 3):
+        cv2.circle(ink[1], (128, 128), 110 if kind == 1 else 124, 255, -1 if kind == 1 else 6, cv2.LINE_AA)
+    if kind == 1:
+        for _ in range(5):
+            cv2.fillPoly(ink[0], [rng.normal(128, 45, (3, 2)).astype(np.int32)], 255, cv2.LINE_AA)
+    if kind == 2:
+        for row in range(4):
+            cv2.rectangle(ink[row % 2], (40, 50 + 42 * row), (216, 72 + 42 * row), 255, -1)
+    weights = np.moveaxis(ink, 0, -1).astype(np.float32) / 255
+    weights[..., 1] *= 1 - weights[..., 0]
+    return make_texture(weights, 0.3)
+
+
+@memoised()
+def picture(number: int) -> Texture:
+    """A picture to hang on a wall, three channels in [0, 1]; one per metre."""
+    rng = _rng(100 + number)
+    tile = np.dstack([noise(256, rng, 2.2, 1.5) for _ in range(3)]) * 0.15 + rng.random(3)
+    tile = np.ascontiguousarray(np.clip(255 * tile, 0, 255).astype(np.uint8))
+    for _ in range(rng.integers(3, 12)):
+        colour = tuple(int(c) for c in rng.integers(0, 256, 3))
+        centre, axes = rng.integers(0, 256, 2), rng.integers(8, 90, 2)
+        cv2.ellipse(
+            tile, centre.tolist(), axes.tolist(), float(rng.integers(180)), 0, 360, colour, -1, cv2.LINE_AA
+        )
+    blurred = 0.6 * tile + 0.4 * cv2.GaussianBlur(tile, (0, 0), 6)
+    return make_texture(np.clip(blurred / 255, 0.02, 0.95), 1.0)

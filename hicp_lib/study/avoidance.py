@@ -1,0 +1,162 @@
+"""What a run of avoidance was worth: how near the person came, how soon the robot gave way and came back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.keypoints import mirror
+from hicp_lib.experiments.avoidance.reaching import LEAVES_S, PHASES_S
+from hicp_lib.experiments.avoidance.runs import IDEAL, NO_AVOIDANCE, Run, keypoints_m
+from hicp_lib.robot.home import HOME_M
+from hicp_lib.robot.loop import AVOIDING
+from hicp_lib.robot.separation import Separation
+
+WITHIN_M = (0.05, 0.10, 0.20)
+FIELD_M = 0.25
+"""The person is near the robot's skin when nearer than this: about where its receptive fields begin."""
+REACH_M = 0.4  # keypoints this near the post can threaten the hand
+CROSSED_M = 0.2  # reactions count from here
+MOVED_M = 0.005  # the hand has begun to give way
+LOST_S = 0.5  # without a sighting for longer, the robot has forgotten
+BACK_M = 0.02  # the hand is back at its post
+SURE = 0.3  # the paper's threshold for scores
+
+
+def metrics(runs: Iterable[Run]) -> pd.DataFrame:
+    """One row per run; seconds and metres, NaN for what did not happen.
+
+    Columns: `script`, `detector` (the condition), `delay_s`, `min_distance_m`, `under_5cm_s`, `under_10cm_s`,
+    `under_20cm_s`, `reaction_s` (from the person's coming within `CROSSED_M` to the first motion),
+    `retreat_m` (the hand's largest distance from its post), `false_retreats` (begun while the person was
+    farther than `FIELD_M`), `idle_error_m` (the hand's mean error before the person moves), `back_s` (from
+    the person's having left to the hand's being back), `seen_share` (of the images taken while the person
+    is near, those with any sure keypoint in space), `blind_s` (longest time the person was near with
+    nothing new seen of them).
+    """
+    return pd.DataFrame([_metrics(run) for run in runs])
+
+
+def against_no_avoidance(table: pd.DataFrame, times: float = 2.0) -> pd.DataFrame:
+    """How many times the least distance without avoidance each condition keeps, and whether that is enough.
+
+    Adds to `metrics`: `value` (the ratio), `enough` (at least `times`), and `why` in words where it is not.
+    """
+    base = table[table["detector"] == NO_AVOIDANCE].set_index("script")["min_distance_m"]
+    rest = table[table["detector"] != NO_AVOIDANCE].copy()
+    rest["value"] = rest["min_distance_m"].to_numpy() / base[rest["script"]].to_numpy()
+    rest["enough"] = rest["value"] >= times
+    rest["why"] = ["" if row.enough else _why(row) for row in rest.itertuples()]
+    columns = ["script", "detector", "min_distance_m", "value", "enough", "why"]
+    return rest[columns].reset_index(drop=True)
+
+
+def keypoint_errors(runs: Iterable[Run]) -> pd.DataFrame:
+    """Error of every sure keypoint that reached the loop: `script`, `detector`, `t_s`, `near`, `error_m`.
+
+    To the person's true keypoint of that name on either side, the nearer one: which of the two hands it is
+    matters to names, not to distances. `near`: perceived within `REACH_M` of the hand's post.
+    """
+    parts = []
+    for run in runs:
+        for _, frame in run.frames.iterrows():
+            points, scores, truth = keypoints_m(frame)
+            kept = (scores > SURE) & np.isfinite(points[..., 0])
+            either_m = [np.linalg.norm(points - side, axis=2) for side in (truth, truth[mirror("halpe136")])]
+            near = np.linalg.norm(points - HOME_M["left"], axis=2) < REACH_M
+            about = {"script": run.job.trial.script, "detector": run.job.condition, "t_s": frame["t_s"]}
+            errors = {"error_m": np.min(either_m, axis=0)[kept], "near": near[kept]}
+            parts.append(pd.DataFrame(errors).assign(**about))
+    empty = {"error_m": np.zeros(0), "near": np.zeros(0, bool), "script": [], "detector": [], "t_s": []}
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(empty)
+
+
+def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> dict[str, Separation]:
+    """The separation each detector would need: its delay, its error near the hand (95th percentile), speeds.
+
+    The robot's speed is the fastest the hand was in any of the runs. It brakes within one control period,
+    which is when its velocities can be zero: an assumption, real joints take longer. Detectors that gave
+    no keypoint have no error, and no separation.
+    """
+    runs = list(runs)
+    robot_m_s = max(float(run.cycles["hand_error_m"].diff().abs().max()) for run in runs) / period_s
+    delays_s = {run.job.condition: run.job.delay_s for run in runs if run.job.condition not in IDEAL}
+    by_detector = errors[errors["near"]].groupby("detector")["error_m"].quantile(0.95)
+    return {
+        name: Separation(robot_m_s, delay_s + period_s, period_s, float(by_detector[name]))
+        for name, delay_s in delays_s.items()
+        if name in by_detector.index
+    }
+
+
+def measured_times(runs: Iterable[Run]) -> pd.DataFrame:
+    """What detector and lifting took per image when a run was first simulated, beside the stated delay.
+
+    Columns: `script`, `detector`, `t_s`, `delay_s`, `time_ms`. The first image of a run is left out: the
+    detector is made ready with it.
+    """
+    runs = [run for run in runs if len(run.frames)]
+    parts = [
+        run.frames[["t_s", "time_ms"]]
+        .iloc[1:]
+        .assign(script=run.job.trial.script, detector=run.job.condition, delay_s=run.job.delay_s)
+        for run in runs
+    ]
+    columns = ["script", "detector", "t_s", "delay_s", "time_ms"]
+    return pd.concat(parts, ignore_index=True)[columns] if parts else pd.DataFrame(columns=columns)
+
+
+def _metrics(run: Run) -> dict:
+    cycles, job = run.cycles, run.job
+    t, distance, away = (cycles[name].to_numpy() for name in ("t_s", "distance_m", "hand_error_m"))
+    period_s = t[1] - t[0]
+    row = {"script": job.trial.script, "detector": job.condition, "delay_s": job.delay_s}
+    row["min_distance_m"] = distance.min()
+    row |= {f"under_{round(100 * m)}cm_s": period_s * (distance < m).sum() for m in WITHIN_M}
+    row["reaction_s"] = _first(t, away > MOVED_M) - _crossing_s(t, distance)
+    row["retreat_m"] = away.max()
+    begins = (cycles["status"] == AVOIDING) & (cycles["status"].shift() != AVOIDING)
+    row["false_retreats"] = int((begins & (distance >= FIELD_M)).sum())
+    row["idle_error_m"] = away[t < PHASES_S["far"]].mean()
+    far = np.flatnonzero(away > BACK_M)
+    back = far[-1] + 1 if len(far) else 0
+    row["back_s"] = max(0.0, t[back] - LEAVES_S[1]) if 0 < back < len(t) else np.nan
+    return row | _sightings(run, t[distance < FIELD_M])
+
+
+def _sightings(run: Run, near_s: np.ndarray) -> dict:
+    """How well the person was seen while near, from the images of a run."""
+    if not len(run.frames) or not len(near_s):
+        return {"seen_share": np.nan, "blind_s": np.nan}
+    frames = run.frames[run.frames["t_s"].between(near_s[0], near_s[-1])]
+    seen = np.array([_is_seen(frame) for _, frame in frames.iterrows()], bool)
+    times = np.concatenate([[near_s[0]], frames["t_s"].to_numpy()[seen], [near_s[-1]]])
+    return {"seen_share": float(seen.mean()), "blind_s": float(np.diff(times).max())}
+
+
+def _is_seen(frame: pd.Series) -> bool:
+    points, scores, _ = keypoints_m(frame)
+    return bool(((scores > SURE) & np.isfinite(points[..., 0])).any())
+
+
+def _crossing_s(t: np.ndarray, distance_m: np.ndarray) -> float:
+    """When the distance falls below `CROSSED_M` for the last time before it is least; NaN: it never does."""
+    before = distance_m[: distance_m.argmin() + 1]
+    outside = np.flatnonzero(before >= CROSSED_M)
+    return float(t[outside[-1]]) if len(outside) and before[-1] < CROSSED_M else np.nan
+
+
+def _first(t: np.ndarray, which: np.ndarray) -> float:
+    return float(t[which.argmax()]) if which.any() else np.nan
+
+
+def _why(row) -> str:
+    if np.isnan(row.seen_share):
+        return "the controller is too slow"
+    if row.seen_share == 0:
+        return "the detector never finds the person while they are near"
+    if row.blind_s > LOST_S:
+        return f"the person is lost in {1 - row.seen_share:.0%} of the images, for up to {row.blind_s:.1f} s"
+    return f"found in {row.seen_share:.0%} of the images, but the hand moves {row.reaction_s:.1f} s late"

@@ -1,0 +1,154 @@
+"""Claims as data: what the paper says, in our words, and the statement about result files that tests it.
+
+`data/claims.json` holds a list of claims. The tests of one claim must all hold. A test compares
+`left` with `right` (each a number or a selection of rows in a result table) by a `relation`:
+
+    >, <      the difference left - right lies above `margin`, or below -`margin`
+    within    left and right differ by at most `tolerance`
+
+Margins and tolerances are fixed in the file, before any result is seen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json
+
+CLAIMS_FILE = DATA_DIR / "claims.json"
+RELATIONS = (">", "<", "within")
+PICKS = ("each", "least", "greatest")
+ONLY_ON = ("photographs", "rendered people")
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Rows of a result table.
+
+    Attributes
+    ----------
+    notebook, table : the file `<notebook>/<table>.parquet` of the results
+    where : column -> the value rows must have there, or a list of such values; imported detections
+        (`mmpose-imported`) count as the detector's
+    unlike : column -> the value, or values, that rows must not have
+    pick : "each" row, or the one with the "least" or "greatest" value
+    value, low, high : columns of the quantity and of its interval; no interval when they are ""
+    scale : multiplies the quantity, to bring it to the claim's unit
+    name : columns that name a row in the evidence
+    """
+
+    notebook: str
+    table: str
+    where: dict[str, Any]
+    value: str
+    unlike: dict[str, Any] = field(default_factory=dict)
+    pick: str = "each"
+    low: str = ""
+    high: str = ""
+    scale: float = 1.0
+    name: tuple[str, ...] = ("detector",)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One comparison; every selected row on the left is compared with every one on the right.
+
+    `match` names columns that must agree between the two rows compared.
+    """
+
+    relation: str
+    left: Selection
+    right: Selection | float
+    margin: float = 0.0
+    tolerance: float = 0.0
+    match: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper.
+
+    Attributes
+    ----------
+    id, section, text : where the paper makes it, and what it says in our words
+    statement : what the tests ask, for readers
+    paper : the paper's value as text, "" where it gives none
+    unit : of the quantities that the evidence shows
+    tests : all must hold
+    only_on : "", or one of `ONLY_ON`. "photographs": the claim is about these, and nothing rendered can test
+        it. "rendered people": its tables hold nothing else, whatever data the run was given
+    reason, command : for what no result can test here: why not, and what would
+    """
+
+    id: str
+    section: str
+    text: str
+    statement: str
+    paper: str = ""
+    unit: str = ""
+    tests: tuple[Comparison, ...] = ()
+    only_on: str = ""
+    reason: str = ""
+    command: str = ""
+
+
+def read_claims(path: Path = CLAIMS_FILE) -> list[Claim]:
+    """Read the claims.
+
+    Raises
+    ------
+    InputError
+        Naming the claim and what is wrong with it.
+    """
+    rows = read_json(path)
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise InputError(f"{path}: expected a list of claims, each an object")
+    claims = []
+    for number, row in enumerate(rows):
+        try:
+            claims.append(_claim(row))
+        except (TypeError, KeyError, ValueError, AttributeError) as error:
+            name = row.get("id", f"number {number}")
+            raise InputError(
+                f"{path}: claim {name}: {error}; see hicp_lib/study/claims/statements.py for the layout"
+            ) from None
+    repeated = {claim.id for claim in claims if [c.id for c in claims].count(claim.id) > 1}
+    if repeated:
+        raise InputError(f"{path}: claim {min(repeated)} is there twice; give each its own id")
+    return claims
+
+
+def _claim(row: dict[str, Any]) -> Claim:
+    claim = Claim(**row | {"tests": tuple(_test(test) for test in row.get("tests", []))})
+    if not claim.tests and not claim.reason:
+        raise ValueError("has neither tests nor a reason why it has none")
+    if claim.only_on not in ("", *ONLY_ON):
+        raise ValueError(f"only_on is {claim.only_on!r}; expected one of {', '.join(ONLY_ON)}")
+    return claim
+
+
+def _test(row: dict[str, Any]) -> Comparison:
+    if row["relation"] not in RELATIONS:
+        raise ValueError(f"relation {row['relation']!r} is unknown; use one of {', '.join(RELATIONS)}")
+    if row["relation"] == "within" and not row.get("tolerance", 0) > 0:
+        raise ValueError("`within` needs a tolerance above 0")
+    sides = {side: _side(row[side]) for side in ("left", "right")}
+    if not isinstance(sides["left"], Selection):
+        raise ValueError("the left side must select rows of a table")
+    return Comparison(**row | sides | {"match": tuple(row.get("match", ()))})
+
+
+def _side(side: Any) -> Selection | float:
+    if isinstance(side, (int, float)):
+        return float(side)
+    notebook, _, table = side["table"].partition("/")
+    if not table:
+        raise ValueError(f"table {side['table']!r} is not NOTEBOOK/TABLE")
+    if side.get("pick", "each") not in PICKS:
+        raise ValueError(f"pick {side['pick']!r} is unknown; use one of {', '.join(PICKS)}")
+    name = tuple(side.get("name", ("detector",)))
+    return Selection(**side | {"notebook": notebook, "table": table, "name": name})

@@ -1,0 +1,224 @@
+"""The motion capture test's material: one recording, its clock offset, and its registration.
+
+A simulated recording knows its exact transform and clock; clicks are simulated there. A laboratory's own
+holds `clicks.csv` (markers clicked in images, see `hicp_lib.mocap.clicking`), or `registration.json` when
+the transform is known from elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.cached_tables import kept
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
+from hicp_lib.detectors.runtime.run import detect_images
+from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_ablation
+from hicp_lib.evaluation.space.mocap_error import (
+    MIN_SCORES,
+    POSITION,
+    TABLE_JOINTS,
+    marker_means,
+    mocap_errors,
+)
+from hicp_lib.evaluation.space.occlusion import lines_of_sight
+from hicp_lib.evaluation.space.stability import position_array
+from hicp_lib.lifting.robust import METHODS
+from hicp_lib.lifting.table import lift_found
+from hicp_lib.mocap.clicking import CLICKS_FILE, read_clicks
+from hicp_lib.mocap.registration import (
+    CAMERA_MARKER,
+    N_PAPER_MARKERS,
+    REGISTRATION_FILE,
+    Registration,
+    all_clicks,
+    as_in_paper,
+    lift_clicks,
+    papers_choice,
+    read_registration,
+    same_clicks,
+)
+from hicp_lib.mocap.reprojection import by_reprojection
+from hicp_lib.mocap.synchronisation import ClockOffset, clock_offset
+from hicp_lib.recordings.qualisys import MotionCapture, read_mocap
+from hicp_lib.recordings.recording import MOCAP_FILE, Recording, open_recording, read_simulation, read_truth
+
+
+@dataclass(frozen=True)
+class Registered:
+    """The registrations of a recording.
+
+    Attributes
+    ----------
+    fits : in the order of the module `hicp_lib.mocap.registration`, then by reprojection: the one to use
+    exact : the true transform T_base_mocap, (4, 4); None where it is not known
+    clicks : the clicks of the images the paper's registration rests on; empty where the transform was given
+    """
+
+    fits: list[Registration]
+    exact: np.ndarray | None
+    clicks: pd.DataFrame
+
+
+def open_mocap(recording: Recording) -> MotionCapture:
+    """The recording's motion capture.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is not an export of 3D data.
+    """
+    if recording.mocap_path is None:
+        raise InputError(
+            f"{recording.folder}: has no {MOCAP_FILE}; export 3D data from Qualisys with header into it"
+        )
+    return read_mocap(recording.mocap_path)
+
+
+def detect_frames(recording: Recording, detectors: Sequence[str]) -> dict[str, list[Detections]]:
+    """Detector -> detections of every frame; kept on disk."""
+    paths = dict(enumerate(recording.rgb_paths))
+    return {
+        detector: [result.detections for result in detect_images(detector, paths).values()]
+        for detector in detectors
+    }
+
+
+def lift_frames(
+    recording: Recording, found: Mapping[str, Sequence[Detections]]
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Everyone's keypoints in space, columns as of `hicp_lib.lifting.table.lift_found`; kept on disk.
+
+    Returns
+    -------
+    Those by each of `METHODS`; and the first detector's also by every step between them, where true
+    positions are known (for `ablation`)
+    """
+    n_steps = METHODS if read_truth(recording) is None else METHODS | N_STEPS
+    table = kept(lift_found, recording, found, n_steps)
+    return table[table["method"].isin(METHODS)], table[table["detector"] == next(iter(found))]
+
+
+def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame) -> ClockOffset:
+    """What to add to the motion capture's stamps, from how fast elbows and wrists move.
+
+    Parameters
+    ----------
+    points : the first of `lift_frames`; those of all detectors and methods are compared at once
+
+    Raises
+    ------
+    InputError
+        If nothing moves together (`hicp_lib.mocap.synchronisation.clock_offset`).
+    """
+    best = points[points["person"] == 0]
+    cases = [rows for _, rows in best.groupby(["detector", "method"], sort=False)]
+    seen_m = [position_array(rows, TABLE_JOINTS, len(recording)) for rows in cases]
+    # Speeds are the same in any frame: no registration is needed yet.
+    means = marker_means(mocap, mocap.times_s, np.eye(4), TABLE_JOINTS)
+    means_m = means[POSITION].to_numpy(float).reshape(len(mocap.times_s), len(TABLE_JOINTS), 3)
+    return clock_offset(
+        recording.times_s, np.concatenate(seen_m, axis=1), mocap.times_s, np.tile(means_m, (1, len(cases), 1))
+    )
+
+
+def register(
+    recording: Recording,
+    mocap: MotionCapture,
+    offset_s: float,
+    n_images: int = 12,
+    noise_px: float = 1.0,
+    seed: int = 0,
+) -> Registered:
+    """Every registration a recording allows; of one cut short, clicks beyond its end are not used.
+
+    Parameters
+    ----------
+    offset_s : of the motion capture's clock, as from `find_clock`
+    n_images, noise_px, seed : of the simulated clicks; not used on a laboratory's own recording
+
+    Raises
+    ------
+    InputError
+        If the recording has neither clicks nor a registration, or they are malformed.
+    """
+    simulation = read_simulation(recording)
+    clicks_path, given = recording.folder / CLICKS_FILE, recording.folder / REGISTRATION_FILE
+    if simulation:
+        from hicp_lib.simulation.sensors.clicks import simulate_clicks
+
+        exact = np.array(simulation["T_base_mocap"])
+        clicks = simulate_clicks(
+            recording, mocap, exact, n_images, noise_px, simulation["mocap_offset_s"], seed
+        )
+        return _from_clicks(recording, mocap, clicks, offset_s, exact)
+    if clicks_path.is_file():
+        clicks = read_clicks(clicks_path, open_recording(recording.folder), mocap.names)
+        clicks = clicks[clicks["frame"] < len(recording)]
+        return _from_clicks(recording, mocap, clicks, offset_s, None)
+    if given.is_file():
+        return Registered([read_registration(given)], None, pd.DataFrame())
+    raise InputError(
+        f"{recording.folder}: has neither {CLICKS_FILE} (frame,marker,u_px,v_px) nor {REGISTRATION_FILE}; "
+        f"click {N_PAPER_MARKERS} or more markers with hicp_lib.mocap.clicking, or give T_base_mocap"
+    )
+
+
+def medians_under(
+    registered: Registered, points: pd.DataFrame, recording: Recording, mocap: MotionCapture, offset_s: float
+) -> pd.DataFrame:
+    """What the choice of the registration does to the median errors of elbows and wrists.
+
+    Returns
+    -------
+    DataFrame, columns `registration, detector, method, part`, `median_m` (both sides together; score above
+    0.1); the exact transform, where it is known, comes last
+    """
+    fits = {fit.method: fit.T_base_mocap for fit in registered.fits}
+    if registered.exact is not None:
+        fits["exact"] = registered.exact
+    tables = []
+    for name, T_base_mocap in fits.items():
+        reference = marker_means(mocap, recording.times_s - offset_s, T_base_mocap, TABLE_JOINTS)
+        errors = mocap_errors(points, reference)
+        errors = errors[errors["score"] > MIN_SCORES[-1]]
+        part = errors["keypoint"].str.split("_").str[1].rename("part")
+        medians = errors.groupby(["detector", "method", part], sort=False)["error_m"].median()
+        tables.append(medians.rename("median_m").reset_index().assign(registration=name))
+    return pd.concat(tables, ignore_index=True)[["registration", "detector", "method", "part", "median_m"]]
+
+
+def errors_at_joints(
+    points: pd.DataFrame, registered: Registered, recording: Recording, mocap: MotionCapture, offset_s: float
+) -> pd.DataFrame:
+    """`mocap_errors` under the best registration, with the lines of sight: columns `distance_m, sight`."""
+    stamps_s, T_base_mocap = recording.times_s - offset_s, registered.fits[-1].T_base_mocap
+    reference = marker_means(mocap, stamps_s, T_base_mocap)
+    errors = mocap_errors(points, reference, read_truth(recording))
+    return errors.merge(lines_of_sight(recording, reference), on=["frame", "keypoint"])
+
+
+def ablation(recording: Recording, stepwise: pd.DataFrame) -> pd.DataFrame | None:
+    """`lifting_ablation` of the second of `lift_frames`; None where no true positions are known."""
+    truth = read_truth(recording)
+    return None if truth is None else lifting_ablation(stepwise, truth)
+
+
+def _from_clicks(
+    recording: Recording,
+    mocap: MotionCapture,
+    clicks: pd.DataFrame,
+    offset_s: float,
+    exact: np.ndarray | None,
+) -> Registered:
+    matched = lift_clicks(recording, clicks, mocap, offset_s)
+    eight = papers_choice(matched)
+    fits = [same_clicks(eight), all_clicks(matched)]
+    fits.append(by_reprojection(recording, clicks, mocap, fits[-1], offset_s))
+    if CAMERA_MARKER in mocap.names:
+        fits.insert(0, as_in_paper(eight, recording, mocap, offset_s))
+    return Registered(fits, exact, clicks.merge(eight[["frame", "marker"]]))

@@ -1,0 +1,192 @@
+"""What a notebook says to the report: its figures, tables and numbers, and what they were made with.
+
+    study = Study("01_dataset", source=source, n_images=n_images, seed=seed)
+    study.figure("crops", plots.crops(...))
+    study.table("counts", counts, "Images per subset.")
+    study.value("n_basic", len(basic))
+    study.finish()
+
+A notebook opened in Jupyter writes to `results/interactive/<name>/` of the study it lies in; `hicp report`
+runs it into `results/<profile>/<name>/`. The book takes every number and figure from there.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import json
+import math
+import os
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.checkout import working_folder
+from hicp_lib.core.extras import needs
+from hicp_lib.core.files import atomic_path, write_bytes, write_json
+from hicp_lib.report import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
+from hicp_lib.study.provenance import peak_memory_mb, provenance, provenance_html
+
+with needs("report"):
+    import matplotlib as mpl
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+    from IPython.display import HTML, display
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+    from hicp_lib.study.plots import Figure
+
+SCHEMA_VERSION = 1
+PLOTLY_MIME = "application/vnd.plotly.v1+json"
+_SVG_STYLE = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
+_SAVE_OPTIONS: dict[str, dict[str, Any]] = {
+    "png": {},
+    "svg": {"metadata": {"Date": None}},
+    "webp": {"pil_kwargs": {"quality": 88, "method": 4}},
+}
+
+
+class Study:
+    """Collects what one notebook found.
+
+    Parameters
+    ----------
+    name : the notebook's file name without `.ipynb`
+    parameters : every parameter of the notebook's `parameters` cell, by its name; `hicp report`
+        refuses a run whose stamp differs from what it was given
+
+    Attributes
+    ----------
+    folder : where this run's results are written
+    results : where the notebooks before this one left theirs, a folder each; in Jupyter, those of the
+        last full report
+    """
+
+    def __init__(self, name: str, /, **parameters: Any):
+        profile = os.environ.get(PROFILE_VARIABLE, "interactive")
+        kept = working_folder() / "results"
+        results = Path(os.environ.get(RESULTS_VARIABLE) or kept / profile)
+        self.name = name
+        self.parameters = _plain(parameters)
+        self.folder = results / name
+        self.results = Path(os.environ.get(EARLIER_RESULTS_VARIABLE) or kept / "full")
+        self._link = f"../results/{profile}/{name}"
+        self._values: dict[str, Any] = {}
+        self._captions: dict[str, dict[str, str]] = {}
+        self._start_s = time.perf_counter()
+
+    def figure(self, name: str, figure: Figure) -> None:
+        """Save a figure and show it with its caption, alt text and downloads.
+
+        A drawing is saved as PNG and SVG with its numbers, a picture (without any) as WebP.
+        """
+        kind = "webp" if figure.table is None else "png"
+        content = _rendered(figure.figure, kind)
+        write_bytes(self.folder / f"{name}.{kind}", content)
+        downloads = [kind]
+        if figure.table is not None:
+            figure.figure.set_layout_engine("none")  # what was found for the PNG holds for the SVG
+            write_bytes(self.folder / f"{name}.svg", _rendered(figure.figure, "svg"))
+            self.save(name, figure.table)
+            _write_csv(self.folder / f"{name}.csv", figure.table)
+            downloads += ["svg", "parquet", "csv"]
+        self._captions[name] = {"file": f"{name}.{kind}", "caption": figure.caption, "alt": figure.alt}
+        source = f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
+        image = f'<img src="{source}" alt="{html.escape(figure.alt)}">'
+        self._show_figure(name, image, figure.caption, downloads)
+
+    def animation(self, name: str, webp: bytes, caption: str, alt: str) -> None:
+        """Save an animated WebP and show it; it plays offline, on its own."""
+        write_bytes(self.folder / f"{name}.webp", webp)
+        self._captions[name] = {"file": f"{name}.webp", "caption": caption, "alt": alt}
+        source = f"data:image/webp;base64,{base64.b64encode(webp).decode()}"
+        self._show_figure(name, f'<img src="{source}" alt="{html.escape(alt)}">', caption, ["webp"])
+
+    def scene(self, name: str, scene: go.Figure, caption: str, alt: str) -> None:
+        """Save an interactive 3D scene (its data as JSON) and show it.
+
+        JupyterLab and VS Code draw the data with the plotly.js they bring; the book's page loads it once.
+        """
+        data = scene.to_json()
+        write_bytes(self.folder / f"{name}.json", data.encode())
+        body = scene.to_html(full_html=False, include_plotlyjs=False, div_id=f"scene-{name}")
+        body = f'<div class="hicp-scene" role="img" aria-label="{html.escape(alt)}">{body}</div>'
+        self._captions[name] = {"caption": caption, "alt": alt}
+        display({PLOTLY_MIME: json.loads(data), "text/html": body}, raw=True)
+        self._show_figure(name, "", caption, ["json"])
+
+    def table(self, name: str, table: pd.DataFrame, caption: str, digits: int = 3) -> None:
+        """Save a table (Parquet, CSV) and show it; NaN is shown as a dash, floats with `digits` decimals."""
+        self.save(name, table)
+        _write_csv(self.folder / f"{name}.csv", table)
+        self._captions[name] = {"caption": caption}
+        style = table.style.hide(axis="index").format(precision=digits, na_rep="–").set_uuid(name)
+        shown = style.to_html(table_attributes='class="table"')
+        self._show_figure(name, f'<div class="hicp-table">{shown}</div>', caption, ["parquet", "csv"])
+
+    def save(self, name: str, table: pd.DataFrame) -> None:
+        """Save a table as Parquet without showing it; its parameters travel in the file's metadata."""
+        arrow = pa.Table.from_pandas(table, preserve_index=False)
+        stamp = {"schema": SCHEMA_VERSION, "notebook": self.name, "parameters": self.parameters}
+        arrow = arrow.replace_schema_metadata(
+            (arrow.schema.metadata or {}) | {b"hicp": json.dumps(stamp).encode()}
+        )
+        with atomic_path(self.folder / f"{name}.parquet") as temporary:
+            pq.write_table(arrow, temporary)
+
+    def value(self, name: str, value: Any) -> None:
+        """Record a number, text or list for the prose of the book; None means "not run".
+
+        Raises
+        ------
+        ValueError
+            If it is not finite: a number is honest or absent.
+        """
+        self._values[name] = _plain(value)
+
+    def finish(self) -> None:
+        """Write the values and the provenance stamp, and show the stamp. The last line of every notebook."""
+        stamp = {"notebook": self.name, "schema": SCHEMA_VERSION} | provenance(self.parameters)
+        stamp |= {"wall_s": round(time.perf_counter() - self._start_s, 2), "peak_memory_mb": peak_memory_mb()}
+        write_json(self.folder / "values.json", self._values, indent=2)
+        write_json(self.folder / "captions.json", self._captions, indent=2)
+        write_json(self.folder / "provenance.json", stamp, indent=2)
+        display(HTML(provenance_html(stamp)))
+
+    def _show_figure(self, name: str, body: str, caption: str, downloads: list[str]) -> None:
+        links = " ".join(
+            f'<a href="{self._link}/{name}.{kind}" download>{kind.upper()}</a>' for kind in downloads
+        )
+        caption = f'{html.escape(caption)} <span class="hicp-download">{links}</span>'
+        display(HTML(f'<figure class="hicp" id="{name}">{body}<figcaption>{caption}</figcaption></figure>'))
+
+
+def _rendered(figure, kind: str) -> bytes:
+    """The same bytes for the same figure: no date, fixed identifiers."""
+    buffer = io.BytesIO()
+    with mpl.rc_context(_SVG_STYLE):
+        figure.savefig(buffer, format=kind, **_SAVE_OPTIONS[kind])
+    return buffer.getvalue()
+
+
+def _write_csv(path: Path, table: pd.DataFrame) -> None:
+    write_bytes(path, table.to_csv(index=False).encode())
+
+
+def _plain(value: Any) -> Any:
+    """`value` with NumPy's types turned into JSON's; what is not finite is refused."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple, set)):
+        return [_plain(item) for item in value]
+    if isinstance(value, (np.generic, np.ndarray)):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"a result is {value}; record None for what was not measured")
+    return str(value) if isinstance(value, Path) else value

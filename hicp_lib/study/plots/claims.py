@@ -1,0 +1,47 @@
+"""Figure of the claims: how many of the paper's got which verdict, by section."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.study.claims.verdicts import (
+    NOT_REPRODUCED,
+    NOT_TESTABLE,
+    ON_RENDERED_DATA,
+    REPRODUCED,
+    VERDICTS,
+)
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
+
+# Okabe and Ito's palette; the hatch says the same without colour.
+_LOOKS = {
+    REPRODUCED: ("#009E73", ""),
+    ON_RENDERED_DATA: ("#56B4E9", "//"),
+    NOT_REPRODUCED: ("#D55E00", "xx"),
+    NOT_TESTABLE: ("#D9D9D9", ".."),
+}
+
+
+@in_style
+def verdicts(table: pd.DataFrame) -> Figure:
+    """Claims by section of the paper and verdict; `table` from `verdict_table`."""
+    sections = list(dict.fromkeys(table["section"]))
+    counts = table.groupby(["section", "verdict"], sort=False).size().unstack(fill_value=0)
+    counts = counts.reindex(index=sections, columns=VERDICTS, fill_value=0)
+    figure, axis = new_figure(1, 1, 8.0, 1.4 + 0.32 * len(sections))
+    left = np.zeros(len(sections))
+    for verdict in VERDICTS:
+        colour, hatch = _LOOKS[verdict]
+        axis.barh(
+            sections, counts[verdict], left=left, color=colour, hatch=hatch, edgecolor="white", label=verdict
+        )
+        left += counts[verdict].to_numpy()
+    axis.invert_yaxis()
+    axis.set(xlabel="claims", ylabel="section of the paper", xticks=range(int(left.max()) + 1))
+    axis.grid(axis="y", visible=False)
+    figure.legend(loc="outside upper center", ncols=2)
+    said = [f"{counts[verdict].sum()} {verdict}" for verdict in VERDICTS]
+    caption = f"The paper's claims by section and verdict: {in_words(said)}."
+    numbers = counts.reset_index().melt("section", var_name="verdict", value_name="claims")
+    return Figure(figure, caption, f"Stacked bars of claims per section. {caption}", numbers)

@@ -1,0 +1,87 @@
+"""Figures of the combination: what its ingredients buy, and what scores are worth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.study.plots.style import SUBSET_COLOURS, Figure, detector_colour, in_style, in_words, new_figure
+
+_MEASURES = {"AP": "average precision of hands", "share": "share of labelled hands found"}
+_GROUPS = {"body": "body", "hand": "hands"}
+
+
+@in_style
+def ingredients(table: pd.DataFrame, note: str) -> Figure:
+    """Average precision and hands found per variant and subset; `table` from `compare_hands`."""
+    variants = list(dict.fromkeys(table["variant"]))
+    figure, axes = new_figure(1, 2, 10.0, 1.2 + 0.5 * len(variants), sharey=True)
+    for axis, (measure, label) in zip(axes, _MEASURES.items(), strict=True):
+        for k, (subset, rows) in enumerate(table.groupby("subset", sort=False)):
+            y = np.array([variants.index(variant) for variant in rows["variant"]]) + 0.2 * (k - 0.5)
+            value = rows[measure].to_numpy()
+            whiskers = np.abs(rows[[f"{measure}_low", f"{measure}_high"]].to_numpy().T - value)
+            axis.errorbar(
+                value, y, xerr=whiskers, fmt="o", color=SUBSET_COLOURS.get(subset), label=subset, capsize=3
+            )
+        axis.set(xlabel=label, xlim=(0, None))
+    axes[0].set(yticks=range(len(variants)), yticklabels=variants, ylim=(len(variants) - 0.5, -0.5))
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
+    said = [f"{row.variant} {row.AP:.2f} on {row.subset}" for row in table.itertuples()]
+    caption = (
+        "What each ingredient buys: average precision of hands, and the share of labelled hands found, "
+        f"with 95 % bootstrap intervals over source images: {note}."
+    )
+    return Figure(
+        figure, caption, f"Dots with whiskers per variant. Average precision: {in_words(said)}.", table
+    )
+
+
+@in_style
+def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, note: str) -> Figure:
+    """Hit rate against score, raw and calibrated, over the number of keypoints per bin of the score.
+
+    `curves` and `errors` from `calibration_study`.
+    """
+    cases = list(dict.fromkeys(zip(curves["detector"], curves["group"], strict=True)))
+    figure, axes = new_figure(
+        2, len(cases), max(3.1 * len(cases), 6.0), 4.6, sharex=True, squeeze=False, sharey="row",
+        height_ratios=[3, 1],
+    )  # fmt: skip
+    for column, (detector, group) in enumerate(cases):
+        upper, lower = axes[:, column]
+        rows = curves[(curves["detector"] == detector) & (curves["group"] == group)]
+        _draw_curves(upper, lower, rows, detector_colour(detector))
+        upper.set_title(f"{detector.removeprefix('combined:')}\n{_GROUPS.get(group, group)}", fontsize=8)
+        lower.set(xlabel="score", xlim=(-0.02, 1.02))
+    axes[0, 0].set(ylabel="share of hits", ylim=(-0.02, 1.02))
+    axes[1, 0].set(ylabel="keypoints")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
+    said = [
+        f"{row.detector} {_GROUPS.get(row.group, row.group)} {row.raw:.2f} to {row.calibrated:.2f}"
+        for row in errors.itertuples()
+    ]
+    caption = (
+        "Reliability of keypoint scores: share of hits (OKS term of at least .5) per bin of the score, and "
+        "how many keypoints have it; dashed: a score that says what it is worth. Raw scores, and scores "
+        f"calibrated on other images, with 95 % bootstrap intervals over source images: {note}."
+    )
+    alt = f"Curves of hits against score per detector. Expected calibration error: {in_words(said)}."
+    return Figure(figure, caption, alt, curves)
+
+
+def _draw_curves(upper, lower, rows: pd.DataFrame, colour: str) -> None:
+    upper.plot([0, 1], [0, 1], "--", color="#888888", lw=1)
+    for shift, (kind, marker, fill) in zip(
+        (-0.02, 0.02), (("raw", "o", "white"), ("calibrated", "s", colour)), strict=True
+    ):
+        part = rows[rows["scores"] == kind]
+        whiskers = np.abs(part[["low", "high"]].to_numpy().T - part["rate"].to_numpy())
+        upper.errorbar(
+            part["score"], part["rate"], yerr=whiskers, fmt=f"{marker}-", color=colour, mfc=fill, lw=1,
+            elinewidth=0.7, markersize=5, label=kind,
+        )  # fmt: skip
+        lower.bar((part["bin"] + 0.5) / 10 + shift, part["count"], 0.036, color=fill, ec=colour)
+    lower.grid(axis="x", visible=False)

@@ -1,0 +1,35 @@
+"""Skeletons from tables as lines to draw."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.keypoints import HANDS, INDEX, LIMBS, N_KEYPOINTS
+
+BODY_LIMBS = [limb for limb in LIMBS if limb[0] not in HANDS]
+HAND_LIMBS = [limb for limb in LIMBS if limb[0] in HANDS]
+
+
+def limb_lines(
+    rows: pd.DataFrame, columns: Sequence[str], limbs: Sequence[tuple[int, int]] = LIMBS
+) -> np.ndarray:
+    """Limbs whose both ends are known, as one line that is interrupted by NaN.
+
+    Parameters
+    ----------
+    rows : table with `keypoint` (Halpe names) and coordinates; of a table with many frames, the first counts
+    columns : the d coordinates
+
+    Returns
+    -------
+    array, shape (3 n, d): start, end and NaN of every limb
+    """
+    points = np.full((N_KEYPOINTS, len(columns)), np.nan)
+    rows = rows.drop_duplicates("keypoint")
+    points[rows["keypoint"].map(INDEX)] = rows[list(columns)]
+    ends = points[np.array(limbs)]
+    ends = ends[np.isfinite(ends).all(axis=(1, 2))]
+    return np.concatenate([ends, np.full_like(ends[:, :1], np.nan)], axis=1).reshape(-1, len(columns))

@@ -1,0 +1,174 @@
+"""What a result was made with: code, data, environment, machine.
+
+The same hashes decide whether a result is still fresh (`hicp_lib.report.runs`) and are
+printed below it (`hicp_lib.study.page`), so the two can never disagree.
+"""
+
+from __future__ import annotations
+
+import functools
+import html
+import importlib.metadata
+import json
+import os
+import platform
+import re
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from hicp_lib.core.cache import LIBRARY_DIR, digest, files_sha256
+from hicp_lib.core.checkout import CHECKOUT
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import read_json, sha256_file
+from hicp_lib.detectors.weights.user import own_sha256
+
+LOCK_PATH = (CHECKOUT or LIBRARY_DIR) / "environment.lock"
+
+_SHOWN_VERSIONS = (
+    "numpy",
+    "pandas",
+    "opencv-python-headless",
+    "onnxruntime",
+    "mediapipe",
+    "open3d-cpu",
+    "open3d",
+    "pycocotools",
+    "matplotlib",
+)
+_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+
+
+def library_sha256() -> str:
+    """SHA-256 of every source file of `hicp_lib`."""
+    return files_sha256(LIBRARY_DIR.rglob("*.py"), LIBRARY_DIR)
+
+
+def data_sha256() -> str:
+    """SHA-256 of every file under `data/`; the detector registry with the weights' hashes is among them."""
+    return files_sha256((path for path in DATA_DIR.rglob("*") if path.is_file()), DATA_DIR)
+
+
+def lock_sha256() -> str:
+    """SHA-256 of the checkout's `environment.lock`, or "missing" (as where hicp was installed)."""
+    return sha256_file(LOCK_PATH) if LOCK_PATH.is_file() else "missing"
+
+
+@functools.cache
+def installed_sha256() -> str:
+    """SHA-256 of what is installed, whatever the lock says: distributions, Python, the kind of machine."""
+    distributions = {d.name: d.version for d in importlib.metadata.distributions()}
+    return digest([distributions, sys.version, platform.machine(), platform.system()])
+
+
+def git_state() -> dict[str, Any]:
+    """Commit of the library's checkout, and how many files differ; "unknown" without git or a checkout.
+
+    An installed library may lie within somebody else's repository, whose commit says nothing of it.
+    """
+    commit = _git("rev-parse", "HEAD")
+    status = _git("status", "--porcelain")
+    return {
+        "commit": commit or "unknown",
+        "changed_files": None if status is None else len(status.splitlines()),
+    }
+
+
+def _git(*arguments: str) -> str | None:
+    if CHECKOUT is None:
+        return None
+    try:
+        done = subprocess.run(["git", *arguments], cwd=CHECKOUT, capture_output=True, text=True, timeout=20)
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None
+
+
+def versions() -> dict[str, str]:
+    """Python's version and those of the libraries that can move a number."""
+    installed = {d.name.lower(): d.version for d in importlib.metadata.distributions()}
+    return {"python": platform.python_version()} | {
+        n: installed[n] for n in _SHOWN_VERSIONS if n in installed
+    }
+
+
+def weights_sha256() -> dict[str, str]:
+    """SHA-256 of each weight file by name, from the registry; a detector loads no file that differs.
+
+    Further ones are of what the user named for detectors, by these.
+    """
+    weights = read_json(DATA_DIR / "detectors.json")["weights"]
+    return {name: row["sha256"] for name, row in weights.items()} | own_sha256()
+
+
+def machine() -> dict[str, Any]:
+    """Processor, cores, system and the thread limits set by the environment."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    threads = {name: os.environ[name] for name in _THREAD_VARIABLES if name in os.environ}
+    return {
+        "cpu": _cpu_model(),
+        "cores": cores,
+        "system": f"{platform.system()} {platform.machine()}",
+    } | threads
+
+
+def _cpu_model() -> str:
+    try:
+        found = re.search(r"^model name\s*:\s*(.+)$", Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+    except OSError:
+        found = None
+    return found.group(1).strip() if found else platform.processor() or "unknown"
+
+
+def peak_memory_mb() -> int:
+    """Most memory this process ever held, without other processes it started."""
+    unit = 1 if sys.platform == "darwin" else 1024  # bytes there, kibibytes elsewhere
+    return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6)
+
+
+def onnx_providers() -> list[str]:
+    """ONNX Runtime's available execution providers; empty when this process has not loaded it."""
+    runtime = sys.modules.get("onnxruntime")
+    return list(runtime.get_available_providers()) if runtime else []
+
+
+def provenance(parameters: dict[str, Any]) -> dict[str, Any]:
+    """Everything a reader needs to judge or repeat a result made now, in this process, with `parameters`."""
+    return {
+        "parameters": parameters,
+        "git": git_state(),
+        "library_sha256": library_sha256(),
+        "lock_sha256": lock_sha256(),
+        "data_sha256": data_sha256(),
+        "weights_sha256": weights_sha256(),
+        "versions": versions(),
+        "onnx_providers": onnx_providers(),
+        "machine": machine(),
+    }
+
+
+def provenance_html(stamp: dict[str, Any]) -> str:
+    """The footer of a page: what the notebook ran with, folded away until asked for."""
+    git, machine = stamp["git"], stamp["machine"]
+    changed = {None: "", 0: ""}.get(git["changed_files"], f" with {git['changed_files']} changed files")
+    rows = {
+        "Parameters": ", ".join(
+            f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in stamp["parameters"].items()
+        ),
+        "Commit": git["commit"][:12] + changed,
+        "Hashes": ", ".join(f"{k} {stamp[k + '_sha256'][:12]}" for k in ("library", "lock", "data")),
+        "Weights": ", ".join(f"{k} {v[:12]}" for k, v in stamp["weights_sha256"].items()),
+        "Versions": ", ".join(f"{k} {v}" for k, v in stamp["versions"].items()),
+        "Inference": ", ".join(stamp["onnx_providers"]) or "ONNX Runtime not used",
+        "Machine": ", ".join(f"{k} {v}" for k, v in machine.items()),
+        "Wall time": f"{stamp['wall_s']:.1f} s",
+    }
+    body = "".join(
+        f'<tr><th scope="row">{k}</th><td>{html.escape(str(v))}</td></tr>' for k, v in rows.items()
+    )
+    return (
+        '<details class="hicp-provenance"><summary>What this page was made with</summary>'
+        f"<table><tbody>{body}</tbody></table></details>"
+    )

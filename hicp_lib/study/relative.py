@@ -1,0 +1,109 @@
+"""The relative 3D test's material: recordings of a still person, detected and lifted, view by view.
+
+A *view* is one recording: "upper" and "lower" when simulated, as the paper's two holders of the camera; a
+lab's own are called after their folders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
+from hicp_lib.detectors.runtime.run import detect_images
+from hicp_lib.experiments.recordings.open import open_experiment
+from hicp_lib.lifting.table import lift_found
+from hicp_lib.recordings.recording import Recording, read_joints, read_truth
+from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
+from hicp_lib.robot.segments import Segment, body_segments
+
+Found = Mapping[tuple[str, str], Sequence[Detections]]
+
+
+def open_views(
+    recording: str = "", recording_lower: str = "", n_frames: int = 100, seed: int = 0
+) -> dict[str, Recording]:
+    """View -> recording: the folders given, or two simulated ones where none is.
+
+    Parameters
+    ----------
+    recording, recording_lower : a lab's own recordings of a person who sits still; the second is optional
+    n_frames, seed : of the simulated ones
+
+    Raises
+    ------
+    InputError
+        If a folder is not a recording.
+    """
+    given = [folder for folder in (recording, recording_lower) if folder]
+    if given:
+        return {
+            name: open_experiment("relative-upper", folder)
+            for name, folder in zip(_names(given), given, strict=True)
+        }
+    return {view: open_experiment(f"relative-{view}", "", n_frames, seed) for view in ("upper", "lower")}
+
+
+def _names(folders: Sequence[str]) -> list[str]:
+    names = [Path(folder).name for folder in folders]
+    return names if len(set(names)) == len(names) else list(folders)
+
+
+def detect_views(
+    views: Mapping[str, Recording], detectors: Sequence[str]
+) -> dict[tuple[str, str], list[Detections]]:
+    """(view, detector) -> detections of every frame; kept on disk."""
+    return {
+        (view, detector): [
+            result.detections
+            for result in detect_images(detector, dict(enumerate(recording.rgb_paths))).values()
+        ]
+        for view, recording in views.items()
+        for detector in detectors
+    }
+
+
+def lift_views(views: Mapping[str, Recording], found: Found) -> pd.DataFrame:
+    """Everything lifted by every method: columns `view` and those of `lift_found`.
+
+    Raises
+    ------
+    InputError
+        If no keypoint was found and lifted in any view, or a depth image cannot be read.
+    """
+    tables = []
+    for view, recording in views.items():
+        table = lift_found(recording, found_in(found, view))
+        tables.append(table.assign(view=view)[["view", *table.columns]])
+    points = pd.concat(tables, ignore_index=True)
+    if points["x_m"].isna().all():
+        folders = ", ".join(str(recording.folder) for recording in views.values())
+        raise InputError(
+            f"{folders}: nobody was found and lifted in any image; record people in view, with depth"
+        )
+    return points
+
+
+def found_in(found: Found, view: str) -> dict[str, Sequence[Detections]]:
+    """Detector -> detections of a view's frames."""
+    return {detector: detections for (of_view, detector), detections in found.items() if of_view == view}
+
+
+def true_positions(views: Mapping[str, Recording]) -> dict[str, pd.DataFrame] | None:
+    """View -> table of `read_truth`; None when a view has none."""
+    truth = {view: read_truth(recording) for view, recording in views.items()}
+    return None if any(table is None for table in truth.values()) else truth
+
+
+def robot_body(views: Mapping[str, Recording]) -> list[Segment]:
+    """The robot's body in the first view's first frame (base frame); empty where joints are not known."""
+    recording = next(iter(views.values()))
+    joints = read_joints(recording)
+    columns = [f"{name}_rad" for name in HEAD_JOINTS]
+    if joints is None or not set(columns) <= set(joints):
+        return []
+    head_rad = joints.set_index("frame").loc[0, columns].to_numpy(float)
+    return body_segments(load_icub(), head_rad)

@@ -1,0 +1,100 @@
+"""Where the study's people come from: rendered scenes, or COCO images with Halpe annotations."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from hicp_lib.core.cache import key
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import cache_dir, read_json, sha256_file
+from hicp_lib.datasets.subsets import create_hicp
+
+SOURCES = ("rendered", "halpe")
+
+
+@dataclass(frozen=True)
+class Source:
+    """Whole images, and the HiCP subsets made of them.
+
+    Attributes
+    ----------
+    kind : "rendered" or "halpe"
+    note : what the people are, in the words of captions
+    annotations, images : the whole images' annotation file and folder
+    basic, headless : dataset folders (`images/` and `annotations.json`)
+    summary : what `create_hicp` kept and left out, and why
+    """
+
+    kind: str
+    note: str
+    annotations: Path
+    images: Path
+    basic: Path
+    headless: Path
+    summary: dict
+
+    @property
+    def subsets(self) -> dict[str, Path]:
+        """The dataset folders by name."""
+        return {"basic": self.basic, "headless": self.headless}
+
+
+def open_source(
+    source: str = "rendered",
+    annotations_path: str | Path = "",
+    images_dir: str | Path = "",
+    n_scenes: int = 160,
+    seed: int = 0,
+    min_pixels: int = 20_000,
+) -> Source:
+    """Open the study's people; what is missing in the cache is rendered and cropped first.
+
+    Parameters
+    ----------
+    source : "rendered" (uses `n_scenes`, `seed`) or "halpe" (uses `annotations_path`, `images_dir`)
+    min_pixels : the smallest crop that is kept
+
+    Raises
+    ------
+    InputError
+        For an unknown source, or Halpe annotations or images that are not there.
+    """
+    if source == "rendered":
+        annotations, images = _rendered(n_scenes, seed)
+        note = f"rendered people ({n_scenes} scenes)"
+    elif source == "halpe":
+        if not (annotations_path and images_dir):
+            raise InputError(
+                "source=halpe needs annotations_path=HALPE.json and images_dir=DIR of the COCO images"
+            )
+        annotations, images = Path(annotations_path), Path(images_dir)
+        note = f"COCO images with Halpe annotations ({annotations.name})"
+    else:
+        raise InputError(f"source={source!r} is unknown; use one of {', '.join(SOURCES)}")
+    folder = _crops(annotations, images, min_pixels)
+    summary = read_json(folder / "summary.json")
+    return Source(source, note, annotations, images, folder / "basic", folder / "headless", summary)
+
+
+def _rendered(n_scenes: int, seed: int) -> tuple[Path, Path]:
+    made_by = "hicp_lib.simulation.world.scenes"
+    folder = cache_dir() / "scenes" / key([made_by], n=n_scenes, seed=seed)[:16]
+    if not (folder / "annotations.json").is_file():
+        from hicp_lib.simulation.world.scenes import render_dataset  # Open3D takes a second to load
+
+        render_dataset(folder, n=n_scenes, seed=seed, progress=sys.stderr.isatty())
+    return folder / "annotations.json", folder / "images"
+
+
+def _crops(annotations: Path, images: Path, min_pixels: int) -> Path:
+    if not annotations.is_file():
+        raise InputError(f"{annotations}: is not there; give the path of the annotation file")
+    if not images.is_dir():
+        raise InputError(f"{images}: is not there; give the folder that holds the annotated images")
+    people = {"annotations": sha256_file(annotations), "folder": str(images.resolve()), "images": images}
+    folder = cache_dir() / "hicp" / key([create_hicp], **people, min_pixels=min_pixels)[:16]
+    if not (folder / "summary.json").is_file():
+        create_hicp(annotations, images, folder, min_pixels=min_pixels, progress=sys.stderr.isatty())
+    return folder

@@ -1,0 +1,137 @@
+"""The command: exit codes, one line for every mistake, and no library loaded before it is needed."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from hicp_lib.cli import main as cli
+
+
+def mistake(capsys, *arguments: str) -> str:
+    """The line a mistake is told in."""
+    assert cli.run(list(arguments)) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("hicp: ")
+    assert captured.err.count("\n") == 1
+    return captured.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["nonsense"], "No such command 'nonsense'"),
+        (["report", "--nonsense"], "No such option"),
+        (["report", "-p", "seed"], "requires 2 arguments"),
+        (["report", "--profile", "slow"], "has no profile 'slow'; choose one of"),
+        (["report", "-p", "sed", "1"], "-p sed: no notebook has such a parameter; known are"),
+        (["detect", "--out", "x.json"], "Missing option '--detector'"),
+        (["detect", "--detector", "x", "--out", "x.json"], "Give either --dataset DIR or --images DIR"),
+        (["detect", "--detector", "x", "--images", "/nowhere", "--out", "x"], "/nowhere: is not a folder"),
+        (["scenes", "render", "out", "--n", "0"], "0 is not in the range x>=1"),
+        (["evaluate", "--annotations", "/no.json", "--detections", "x"], "/no.json: cannot be read"),
+        (["dataset", "create", "--annotations", "/no.json", "--images", ".", "--out", "x"], "/no.json: "),
+        (["models", "fetch", "nonsense"], "'nonsense'"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(capsys, arguments, expected):
+    assert expected in mistake(capsys, *arguments)
+
+
+def test_an_unknown_detector_lists_those_there_are(capsys, tmp_path):
+    (tmp_path / "a.png").write_bytes(b"")
+    arguments = ["detect", "--detector", "x", "--images", str(tmp_path), "--out", str(tmp_path / "d.json")]
+    assert "mediapipe" in mistake(capsys, *arguments)
+
+
+def test_what_cannot_be_written_is_told_in_one_line(capsys, monkeypatch):
+    import hicp_lib.report.build
+
+    def full(*arguments, **keywords):
+        raise OSError(28, "No space left on device", "/results/x")
+
+    monkeypatch.setattr(hicp_lib.report.build, "make_report", full)
+    assert "/results/x: No space left on device; check" in mistake(capsys, "report")
+
+
+def test_a_failed_notebook_is_another_exit_code(capsys, monkeypatch):
+    import hicp_lib.report.build
+    from hicp_lib.report.runs import RunError
+
+    def fail(*arguments, **keywords):
+        raise RunError("05_tiny: In [3] failed")
+
+    monkeypatch.setattr(hicp_lib.report.build, "make_report", fail)
+    assert cli.run(["report"]) == 1
+    assert capsys.readouterr().err == "hicp: 05_tiny: In [3] failed\n"
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["report", "--help"], ["models", "--help"]])
+def test_help_is_no_mistake(capsys, arguments):
+    assert cli.run(arguments) == 0
+    assert "Usage: hicp" in capsys.readouterr().out
+
+
+def test_help_loads_no_library():
+    code = (
+        "import sys; from hicp_lib import cli; cli.run(['--help']); "
+        "print(sorted({'numpy', 'pandas', 'cv2', 'matplotlib', 'papermill'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_weights_are_listed(capsys):
+    assert cli.run(["models", "list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any("pose_landmark" in line and "Apache-2.0" in line for line in lines)
+
+
+def test_image_numbers_are_those_of_coco_or_the_order_of_names(tmp_path):
+    for name in ("000000000139.jpg", "000000000285.jpg", "notes.txt"):
+        (tmp_path / name).write_bytes(b"")
+    assert list(cli._numbered_images(tmp_path)) == [139, 285]
+    (tmp_path / "photo.png").write_bytes(b"")
+    assert list(cli._numbered_images(tmp_path)) == [1, 2, 3]
+
+
+def test_evaluation_of_perfect_detections(capsys, tmp_path):
+    keypoints = [value for i in range(136) for value in (100 + i, 50 + 2 * i, 2)]
+    person = {"category_id": 1, "iscrowd": 0, "keypoints": keypoints}
+    person |= {"bbox": [90, 40, 160, 300], "area": 30000, "num_keypoints": 136}
+    image = {"width": 400, "height": 400}
+    truth, found = tmp_path / "annotations.json", tmp_path / "detections.json"
+
+    def write(n: int) -> None:
+        images = [image | {"id": i, "file_name": f"{i}.jpg"} for i in range(n)]
+        people = [person | {"id": i, "image_id": i} for i in range(n)]
+        results = [{"image_id": i, "category_id": 1, "keypoints": keypoints, "score": 0.9} for i in range(n)]
+        truth.write_text(json.dumps({"images": images, "annotations": people, "categories": [{"id": 1}]}))
+        found.write_text(json.dumps(results))
+
+    write(12)
+    arguments = ["evaluate", "--annotations", str(truth), "--detections", str(found), "--group", "hand"]
+    assert cli.run([*arguments, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["metrics"]["AP"] == pytest.approx({"value": 1.0, "low": 1.0, "high": 1.0})
+    assert printed["n_people"] == 12
+    assert cli.run(arguments) == 0
+    assert "AP    1.000  [1.000, 1.000]" in capsys.readouterr().out
+    assert "group" in mistake(capsys, *arguments[:-1], "feet")
+
+    found.write_text("[]")
+    assert cli.run(arguments) == 0
+    printed = capsys.readouterr().out
+    assert f"{found}: an empty list: nobody was found in any image" in printed
+    assert "AP    0.000  [0.000, 0.000]" in printed
+
+    write(9)
+    assert cli.run(arguments) == 0
+    printed = capsys.readouterr().out
+    assert "no intervals: they ask for 10 source images" in printed and "AP    1.000\n" in printed
+    assert cli.run([*arguments, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["metrics"]["AP"] == {"value": 1.0, "low": None, "high": None}

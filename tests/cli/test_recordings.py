@@ -1,0 +1,76 @@
+"""Commands for recordings: what they print, and their exit codes."""
+
+from __future__ import annotations
+
+import pytest
+
+from hicp_lib.cli import main as cli
+from tests.rgbd.conftest import write_small
+
+
+@pytest.fixture
+def small(tmp_path):
+    return write_small(tmp_path / "small")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["simulate", "nonsense", "out"], "no scenario 'nonsense'; choose one of relative-upper"),
+        (["simulate", "relative-upper", "out", "--n-frames", "101"], "n_frames is 101; relative-upper takes"),
+        (["import", "out"], "Give either --bag FILE or --open3d DIR"),
+        (["import", "out", "--bag", "/no.bag"], "/no.bag: is not there"),
+        (["import", "out", "--open3d", "/no"], "/no/intrinsic.json: cannot be read"),
+        (["import", "out", "--open3d", "/no", "--poses", "/no.txt"], "/no.txt: cannot be read"),
+        (["import", "out", "--open3d", "/no", "--rate", "nan"], "rate is nan; expected frames per second"),
+        (["import", "out", "--open3d", "/no", "--mount", "x"], "'x' is not one of"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(capsys, tmp_path, monkeypatch, arguments, expected):
+    monkeypatch.chdir(tmp_path)
+    assert cli.run(["record", *arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == "" and captured.err.count("\n") == 1 and expected in captured.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_good_recording_is_told_so(capsys, small):
+    assert cli.run(["record", "check", str(small)]) == 0
+    assert capsys.readouterr().out == f"ok   {small}: 4 frames in 0.3 s\n"
+
+
+def test_a_simulated_recording_is_one(capsys, tmp_path):
+    out = tmp_path / "out"
+    simulate = ["record", "simulate", "relative-lower", str(out), "--n-frames", "1", "--workers", "1"]
+    assert cli.run(simulate) == 0
+    assert capsys.readouterr().out == f"{out}: 1 frames\n"
+    assert cli.run(["record", "check", str(out)]) == 0
+
+
+def test_findings_are_told_one_a_line(capsys, small):
+    (small / "depth/000001.png").unlink()
+    (small / "camera.json").unlink()
+    assert cli.run(["record", "check", str(small)]) == 2
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 2 and all(line.startswith("FAIL ") for line in lines)
+
+
+def test_notes_do_not_fail(capsys, small):
+    text = (small / "depth.txt").read_text().replace("100.1", "100.15")
+    (small / "depth.txt").write_text(text)
+    assert cli.run(["record", "check", str(small)]) == 0
+    note, ok = capsys.readouterr().out.splitlines()
+    assert note.startswith("note ") and ok.startswith("ok ") and "3 frames" in ok
+
+
+def test_a_method_of_lifting_is_asked_for_before_anybody_is_looked_for(capsys, small, monkeypatch):
+    monkeypatch.setattr("hicp_lib.detectors.runtime.run.detect_images", None)
+    arguments = ["lift", "--recording", str(small), "--detector", "mediapipe", "--out", "k.parquet"]
+    assert cli.run([*arguments, "--method", "nonsense"]) == 2
+    assert capsys.readouterr().err.startswith("hicp: no method 'nonsense' of lifting; choose one of paper")
+
+
+def test_lift_needs_a_recording(capsys, tmp_path):
+    arguments = ["lift", "--recording", str(tmp_path), "--detector", "mediapipe", "--out", "k.parquet"]
+    assert cli.run(arguments) == 2
+    assert "camera.json: cannot be read" in capsys.readouterr().err

@@ -1,0 +1,73 @@
+"""OpenPose on MobileNet-thin: real maps from real weights."""
+
+import numpy as np
+import pytest
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import COCO_17, INDEX
+from hicp_lib.detectors.registry import make_detector
+from hicp_lib.detectors.weights import default as zoo
+
+from .plain_people import render_person
+
+
+def test_rendered_people_are_found_to_a_few_pixels(weights):
+    detector = make_detector("openpose-mobilenet")
+    errors = []
+    for seed in range(4):
+        image, truth_px = render_person(seed)
+        found = detector.detect(image)
+        best = np.argmax(found.person_scores)
+        errors.append(np.linalg.norm(found.keypoints_px[best, :13] - truth_px[:13], axis=1))
+    assert np.isfinite(errors).mean() > 0.8
+    assert np.nanmedian(errors) < 8
+    shoulders = np.array(errors)[:, [5, 6]]
+    assert np.nanmax(shoulders) < 40, "left and right shoulder are 90 px apart"
+
+
+def test_two_people_are_two_people(weights):
+    """Twice the same rendering, side by side."""
+    image, truth_px = render_person(0)
+    middle = image[:, 120:360]
+    found = make_detector("openpose-mobilenet").detect(np.hstack([middle, middle]))
+    nose_x = np.sort(found.keypoints_px[:, 0, 0])
+    expected = truth_px[0, 0] - 120 + np.array([0, 240])
+    assert len(found) == 2
+    assert nose_x == pytest.approx(expected, abs=8)
+
+
+def test_a_photograph(weights, photograph):
+    """A portrait, facing the camera: his left shoulder is on the right."""
+    found = make_detector("openpose-mobilenet").detect(photograph)
+    best = np.argmax(found.person_scores)
+    nose, left_shoulder, right_shoulder = found.keypoints_px[best, [0, 5, 6]]
+    assert np.linalg.norm(nose - (270, 225)) < 20
+    assert left_shoulder[0] - right_shoulder[0] == pytest.approx(360, abs=50)
+
+
+def test_it_gives_coco_points_and_the_neck_only(weights, photograph):
+    found = make_detector("openpose-mobilenet").detect(photograph)
+    given = np.isfinite(found.keypoints_px).all(axis=-1)
+    assert set(np.flatnonzero(given.any(axis=0))) <= {*COCO_17, INDEX["neck"]}
+    assert np.array_equal(found.scores > 0, given)
+    assert found.scores.max() <= 1 and found.person_scores.max() <= 1
+
+
+def test_an_empty_image_has_nobody(weights):
+    found = make_detector("openpose-mobilenet").detect(np.full((90, 50, 3), 128, np.uint8))
+    assert found.keypoints_px.shape == (0, 136, 2)
+    assert found.scores.shape == (0, 136) and found.person_scores.shape == (0,)
+
+
+def test_the_size_of_the_network_is_checked(weights):
+    with pytest.raises(ValueError, match="multiple of 16"):
+        make_detector("openpose-mobilenet", net_height_px=100)
+
+
+def test_a_damaged_weight_is_refused(own_cache):
+    path = zoo.weight_path("openpose_mobilenet_thin.pb")
+    content = bytearray(path.read_bytes())
+    content[1000] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"openpose_mobilenet_thin\.pb.*damaged"):
+        make_detector("openpose-mobilenet")

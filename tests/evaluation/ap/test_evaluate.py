@@ -1,0 +1,246 @@
+"""AP and AR: pycocotools' own, worked-out cases for every option, and what is refused."""
+
+import contextlib
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pycocotools.coco import COCO
+from pycocotools.cocoeval import COCOeval
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import GROUPS, HANDS, SIGMAS
+from hicp_lib.evaluation.ap.evaluate import evaluate, person_oks, sensitivity_table
+from hicp_lib.formats.annotations import read_detections, write_detections
+
+RNG = np.random.default_rng(1)
+PERSON = RNG.uniform(100, 300, (136, 2))
+AWAY = PERSON + 5000
+ONE = pytest.approx(1)  # pycocotools divides by the count plus 2e-16
+
+
+def by_pycocotools(annotations, detections, group) -> dict[str, float]:
+    """The same evaluation the usual way: plain dictionaries, loadRes, summarize's definitions."""
+    points = GROUPS[group]
+    truth, results = COCO(), []
+    rows = [
+        {"id": i + 1, "image_id": int(annotations.image_ids[i]), "category_id": 1,
+         "area": annotations.areas_px2[i], "bbox": annotations.boxes_px[i].tolist(),
+         "iscrowd": int(annotations.is_crowd[i]),
+         "num_keypoints": int((annotations.visibility[i, points] > 0).sum()),
+         "keypoints": np.nan_to_num(np.column_stack(
+             [annotations.keypoints_px[i, points], annotations.visibility[i, points]])).ravel().tolist()}
+        for i in range(len(annotations))
+    ]  # fmt: skip
+    for image_id, found in detections.items():
+        for person, score in zip(found.keypoints_px[:, points], found.person_scores, strict=True):
+            flat = np.concatenate([person, np.ones((len(points), 1))], axis=1).ravel().tolist()
+            results.append({"image_id": image_id, "category_id": 1, "keypoints": flat, "score": float(score)})
+    truth.dataset = {"images": [{"id": i} for i in annotations.images], "annotations": rows,
+                     "categories": [{"id": 1}]}  # fmt: skip
+    with contextlib.redirect_stdout(io.StringIO()):
+        truth.createIndex()
+        run = COCOeval(truth, truth.loadRes(results), "keypoints")
+        run.params.kpt_oks_sigmas = SIGMAS["halpe"][points]
+        run.evaluate()
+        run.accumulate()
+        run.summarize()
+    return dict(zip(("AP", "AP50", "AP75", "AR", "AR50", "AR75"), run.stats[[0, 1, 2, 5, 6, 7]], strict=True))
+
+
+@pytest.mark.parametrize("group", ["body", "hand"])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_is_what_pycocotools_gives_the_usual_way(scene, group, seed):
+    annotations, detections = scene(seed)
+    ours = evaluate(annotations, detections, group)
+    expected = by_pycocotools(annotations, detections, group)
+    assert ours.metrics() == expected
+    assert 0.05 < ours.AP < 0.95  # a case that says something
+    assert ours.n_people + ours.n_ignored == len(annotations)
+    assert ours.n_detections == sum(len(found) for found in detections.values())
+
+
+@pytest.mark.parametrize("group", ["body", "hand"])
+def test_the_truth_itself_scores_one(scene, group):
+    annotations, _ = scene(5)
+    detections = {
+        i: Detections(points, np.isfinite(points[..., 0]).astype(float), np.linspace(1, 0.5, len(points)))
+        for i in annotations.images
+        for points in [annotations.keypoints_px[annotations.image_ids == i]]
+    }
+    figures = evaluate(annotations, detections, group).metrics()
+    assert figures == dict.fromkeys(figures, 1.0)
+    fits = person_oks(annotations, detections, group)
+    assert (fits["oks"] == 1).all() and len(fits) == evaluate(annotations, detections, group).n_people
+
+
+def test_missing_keypoints_cost_their_share(annotated, detected):
+    found = PERSON.copy()
+    found[13:17] = np.nan  # 13 of 17 exact: OKS .765, over six of the ten thresholds
+    one = evaluate(annotated([PERSON], [3]), {3: detected([found])})
+    assert one.metrics() == pytest.approx({"AP": 0.6, "AP50": 1, "AP75": 1, "AR": 0.6, "AR50": 1, "AR75": 1})
+    assert person_oks(annotated([PERSON], [3]), {3: detected([found])})["oks"].tolist() == [
+        pytest.approx(13 / 17)
+    ]
+
+
+def test_nobody_found_is_zero_and_nobody_there_is_not_a_number(annotated, detected):
+    figures = evaluate(annotated([PERSON], [3]), {}).metrics()
+    assert figures == dict.fromkeys(figures, 0.0)
+    nobody = annotated(np.zeros((0, 136, 2)), [], n_images=2)
+    for detections in ({}, {1: detected([PERSON])}):
+        assert np.isnan(list(evaluate(nobody, detections).metrics().values())).all()
+
+
+def test_ids_may_be_zero_negative_or_huge(annotated, detected):
+    annotations = annotated([PERSON, PERSON], [0, -(2**62)], first_id=0)
+    detections = {i: detected([PERSON]) for i in annotations.images}
+    assert evaluate(annotations, detections).AP == ONE
+
+
+def test_only_the_twenty_best_of_an_image_take_part(annotated, detected):
+    found = [*[AWAY] * 20, PERSON]
+    annotations = annotated([PERSON], [3])
+    assert evaluate(annotations, {3: detected(found, np.linspace(1, 0.5, 21))}).AR == 0
+    assert evaluate(annotations, {3: detected(found[1:], np.linspace(1, 0.5, 20))}).AR == 1
+
+
+def test_says_nothing(scene, capsys):
+    evaluate(*scene(0))
+    assert capsys.readouterr() == ("", "")
+
+
+# ---- options, one case each
+
+
+def person_and_unlabelled(annotated):
+    """Image 1 with a labelled person; image 2 with one whose keypoints are not labelled."""
+    visibility = np.array([np.full(136, 2.0), np.zeros(136)])
+    box = [[*PERSON.min(axis=0), *np.ptp(PERSON, axis=0)]] * 2
+    return annotated([PERSON, PERSON], [1, 2], visibility=visibility, boxes_px=box)
+
+
+def test_unlabelled_people_forgive_detections_nearby_unless_dropped(annotated, detected):
+    annotations = person_and_unlabelled(annotated)
+    near = {1: detected([PERSON], [0.5]), 2: detected([PERSON], [0.9])}
+    far = near | {2: detected([AWAY], [0.9])}
+    assert evaluate(annotations, near).AP == ONE
+    assert evaluate(annotations, near, unlabelled="drop").AP == pytest.approx(0.5)
+    assert evaluate(annotations, far).AP == pytest.approx(0.5)
+    assert (
+        evaluate(annotations, near).n_ignored,
+        evaluate(annotations, near, unlabelled="drop").n_ignored,
+    ) == (1, 0)
+
+
+def test_detections_without_the_group_are_dropped_unless_counted(annotated, detected):
+    body_only = PERSON.copy()
+    body_only[HANDS] = np.nan
+    detections = {1: detected([PERSON], [0.5]), 2: detected([body_only], [0.9])}
+    annotations = annotated([PERSON, PERSON], [1, 2])
+    assert evaluate(annotations, detections, "hand").AP == pytest.approx(51 / 101)  # recall 1/2, all right
+    counted = evaluate(annotations, detections, "hand", absent="count")
+    assert counted.AP == pytest.approx(51 / 101 / 2) and counted.n_detections == 2  # behind a false positive
+    assert evaluate(annotations, detections, "hand").n_detections == 1
+    assert evaluate(annotations, detections, "body").AP == ONE
+
+
+def test_absent_keypoints_match_nobody_not_even_the_unlabelled(annotated, detected):
+    nothing = np.full((1, 136, 2), np.nan)
+    detections = {1: detected([PERSON], [0.5]), 2: detected(nothing, [0.9])}
+    annotations = person_and_unlabelled(annotated)
+    assert evaluate(annotations, detections).AP == ONE
+    assert evaluate(annotations, detections, absent="count").AP == pytest.approx(0.5)
+
+
+def test_area_is_the_scale(annotated, detected):
+    # All points off by d: OKS is exp(-d^2 / (2 A k^2)) averaged over the sigmas' k.
+    annotations = annotated([PERSON], [1], areas_px2=9_000.0, boxes_px=[[100, 100, 200, 150.0]],
+                            extras=[{"source_area": 12_000.0}])  # fmt: skip
+    detections = {1: detected([PERSON + [6, 0]])}
+    k = 2 * SIGMAS["halpe"][:17]
+    for area, value in {"segment": 9_000, "box": 30_000, "box53": 15_900, "source": 12_000}.items():
+        expected = np.exp(-36 / (2 * value * k**2)).mean()
+        assert person_oks(annotations, detections, area=area)["oks"].item() == pytest.approx(
+            expected, abs=1e-12
+        )
+        above = np.sum(np.linspace(0.5, 0.95, 10) <= expected) / 10
+        assert evaluate(annotations, detections, area=area).AP == pytest.approx(above)
+    with pytest.raises(InputError, match="annotation 1: has no 'source_area'"):
+        evaluate(annotated([PERSON], [1]), detections, area="source")
+
+
+def test_others_in_a_crop_forgive_unless_counted(annotated, detected):
+    annotations = annotated([PERSON, AWAY], [1, 1], crowd=[1], extras=[{}, {"other": True}])
+    detections = {1: detected([AWAY, PERSON], [0.9, 0.5])}
+    assert evaluate(annotations, detections).AP == ONE
+    assert evaluate(annotations, detections, others="count").AP == pytest.approx(0.5)
+
+
+def test_ranking_by_the_groups_own_scores(annotated, detected):
+    found = detected([PERSON, AWAY], [0.5, 0.9])
+    scores = found.scores.copy()
+    scores[0, HANDS], scores[1, HANDS] = 0.8, 0.1
+    detections = {1: replace(found, scores=scores)}
+    annotations = annotated([PERSON], [1])
+    assert evaluate(annotations, detections, "hand").AP == pytest.approx(0.5)
+    assert evaluate(annotations, detections, "hand", score="group").AP == ONE
+
+
+def test_wholebody_sigmas_are_kinder_to_hands(scene):
+    annotations, detections = scene(0)
+    table = sensitivity_table(annotations, detections, "hand").set_index("changed")
+    assert table.loc["default", "AP"] == evaluate(annotations, detections, "hand").AP
+    assert table.loc["sigmas=wholebody", "AP"] > table.loc["default", "AP"]
+    assert table.loc["sigmas=wholebody", "AP_change"] > 0 == table.loc["default", "AP_change"]
+    changed = "sigmas=wholebody area=box area=box53 unlabelled=drop absent=count others=count score=group"
+    assert table.index.tolist() == ["default", *changed.split()]
+    body = sensitivity_table(annotations, detections, "body").set_index("changed")
+    assert body.loc["sigmas=wholebody", "AP_change"] == 0
+
+
+# ---- what pycocotools swallows (the seven malformed inputs)
+
+
+def refused_or_ap(annotations, detections, path) -> str | float:
+    """Through a file, as a user's results come: the error's text, or AP."""
+    write_detections(path, detections)
+    try:
+        return evaluate(annotations, read_detections(path, annotations)).AP
+    except InputError as error:
+        return str(error)
+
+
+def test_empty_unknown_duplicate_and_negative(annotated, detected, tmp_path):
+    annotations, path = annotated([PERSON], [1]), tmp_path / "d.json"
+    assert refused_or_ap(annotations, {}, path) == 0  # nobody found is a result, not a mistake
+    assert "image_id 2 is not among" in refused_or_ap(annotations, {2: detected([PERSON])}, path)
+    assert refused_or_ap(annotations, {1: detected([PERSON, PERSON])}, path) == ONE
+    assert refused_or_ap(annotations, {1: detected([PERSON], [-0.3])}, path) == ONE
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_what_is_no_number_is_refused_in_memory_too(annotated, detected, value):
+    annotations, good = annotated([PERSON], [1]), detected([PERSON])
+    points = good.keypoints_px.copy()
+    points[0, 7, 0] = value
+    with pytest.raises(InputError, match="image 1: left_elbow of person 0 is .*; expected finite"):
+        evaluate(annotations, {1: replace(good, keypoints_px=points)})
+    with pytest.raises(InputError, match="image 1: score of person 0 is (nan|inf); expected"):
+        evaluate(annotations, {1: replace(good, person_scores=np.array([value]))})
+    with pytest.raises(InputError, match="image 1: nose of person 0"):
+        evaluate(annotations, {1: replace(good, scores=np.where(np.arange(136) == 0, value, good.scores))})
+
+
+def test_other_shapes_unknown_images_groups_and_options_are_refused(annotated, detected):
+    annotations, good = annotated([PERSON], [1]), detected([PERSON])
+    with pytest.raises(InputError, match=r"shapes .*; expected \(n, 136, 2\)"):
+        evaluate(annotations, {1: replace(good, keypoints_px=good.keypoints_px[:, :5])})
+    with pytest.raises(InputError, match="detections of image 2: not among the annotated images"):
+        evaluate(annotations, {2: good})
+    with pytest.raises(InputError, match="group 'foot': expected one of body, hand"):
+        evaluate(annotations, {1: good}, "foot")
+    with pytest.raises(InputError, match="option area='bbox': expected one of segment, box"):
+        evaluate(annotations, {1: good}, area="bbox")

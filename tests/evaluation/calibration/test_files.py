@@ -1,0 +1,92 @@
+"""Calibrations on disk: fitted to known hit rates, applied with the raw scores kept."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hicp_lib.cli import main as cli
+from hicp_lib.core.errors import InputError
+from hicp_lib.evaluation.calibration.files import apply_calibrations, read_calibrations
+from hicp_lib.formats.annotations import read_detections
+
+N = 40
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Annotations and results of N images: the left eye, score .6, is right in a fourth, all else in all."""
+    people, found = [], []
+    for i in range(1, N + 1):
+        truth = np.zeros((136, 3))
+        truth[:5] = [[100 + 9 * k, 50, 2] for k in range(5)]
+        points = truth.copy()
+        points[:5, 2] = [0.9, 0.6, 0.9, 0.9, 0.9]
+        points[1, 1] += 0 if i % 4 == 0 else 200
+        people.append({"id": i, "image_id": i, "category_id": 1, "iscrowd": 0, "area": 30000.0,
+                       "bbox": [90, 40, 160, 300], "keypoints": truth.ravel().tolist()})  # fmt: skip
+        found.append({"image_id": i, "category_id": 1, "keypoints": points.ravel().tolist(), "score": 0.5,
+                      "box": [1, 2, 3, 4]})  # fmt: skip
+    images = [{"id": i, "file_name": f"{i}.jpg", "width": 400, "height": 400} for i in range(1, N + 1)]
+    annotations = {"images": images, "annotations": people, "categories": [{"id": 1, "name": "person"}]}
+    (tmp_path / "annotations.json").write_text(json.dumps(annotations))
+    (tmp_path / "found.json").write_text(json.dumps(found))
+    return tmp_path
+
+
+def run(*arguments) -> None:
+    assert cli.run([str(argument) for argument in arguments]) == 0
+
+
+def test_scores_become_hit_rates_and_raw_ones_stay_beside(files, capsys):
+    run("calibration", "fit", "--annotations", files / "annotations.json", "--detections",
+        files / "found.json", "--detector", "mmpose", "--out", files / "cal.csv")  # fmt: skip
+    assert capsys.readouterr().out.endswith(f"cal.csv: body fitted to {5 * N} keypoints\n")
+    run("calibration", "apply", "--calibrations", files / "cal.csv", "--detections", files / "found.json",
+        "--out", files / "calibrated.json")  # fmt: skip
+    before, after = (read_detections(files / name) for name in ("found.json", "calibrated.json"))
+    for image_id, people in after.items():
+        np.testing.assert_allclose(people.scores[0, :5], [1, 0.25, 1, 1, 1])
+        assert np.array_equal(people.keypoints_px, before[image_id].keypoints_px, equal_nan=True)
+        assert people.person_scores.tolist() == [0.5] and (people.scores[0, 5:] == 0).all()
+    row = json.loads((files / "calibrated.json").read_text())[0]
+    assert row["raw_keypoint_scores"][:6] == [0.9, 0.6, 0.9, 0.9, 0.9, 0] and row["box"] == [1, 2, 3, 4]
+    # Of what an importer wrote, the tool's own scores stay.
+    imported = [{**row, "raw_keypoint_scores": [7.0] * 136}]
+    (files / "imported.json").write_text(json.dumps(imported))
+    apply_calibrations(files / "imported.json", read_calibrations(files / "cal.csv"), files / "out.json")
+    assert json.loads((files / "out.json").read_text())[0]["raw_keypoint_scores"] == [7.0] * 136
+
+
+def test_the_reports_table_is_read_by_detector(files):
+    table = pd.DataFrame(
+        [("a", "body", 0.2, 0.1), ("a", "body", 0.8, 0.9), ("b", "hand", 0.5, 0.5)],
+        columns=["detector", "group", "score", "rate"],
+    )
+    table.to_parquet(files / "calibrations.parquet")
+    assert read_calibrations(files / "calibrations.parquet", "a")["body"](0.5) == pytest.approx(0.5)
+    assert list(read_calibrations(files / "calibrations.parquet", "b")) == ["hand"]
+    for name in ("", "c"):
+        with pytest.raises(InputError, match="is not in it; expected one of: a, b"):
+            read_calibrations(files / "calibrations.parquet", name)
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ("", "cannot be read as a table"),
+        ("a,b\n1,2\n", "has not the columns"),
+        ("detector,group,score,rate\nx,feet,0.1,0.2\n", "group 'feet' is not known"),
+        ("detector,group,score,rate\nx,body,0.1,0.2\nx,body,0.2,0.1\n", "rates that do not fall"),
+        ("detector,group,score,rate\nx,body,0.1,1.2\n", "rates that do not fall"),
+        ("detector,group,score,rate\nx,body,much,0.2\n", "rates that do not fall"),
+    ],
+)
+def test_what_is_no_calibration_is_refused_in_one_line(tmp_path, content, expected):
+    (tmp_path / "cal.csv").write_text(content)
+    with pytest.raises(InputError, match=expected) as refused:
+        read_calibrations(tmp_path / "cal.csv")
+    assert "\n" not in str(refused.value)
+    with pytest.raises(InputError, match="cannot be read as a table"):
+        read_calibrations(tmp_path / "absent.csv")

@@ -1,0 +1,37 @@
+"""Scores of what is not there to be seen, and the paper's remarks as measures."""
+
+import numpy as np
+import pytest
+from made_people import HIDDEN
+
+from hicp_lib.evaluation.failures.error_kinds import all_errors
+from hicp_lib.evaluation.failures.false_confidence import MEASURES, paper_remarks, scores_by_state
+from hicp_lib.evaluation.failures.placed_keypoints import placed_keypoints
+
+
+def test_scores_are_set_against_hits_apart_for_every_state(world):
+    source, truth, found = world
+    found["headless", "mediapipe-pose"][5].scores[0, :5] = 0.95
+    found["headless", "mediapipe-pose"][5].keypoints_px[0, :5] += 400
+    table = scores_by_state(placed_keypoints(truth, found, source), n_resamples=5).set_index("state")
+    assert table.loc["outside", ["score", "value", "n"]].tolist() == pytest.approx([0.95, 0, 5])
+    assert table.loc["visible", "value"] == table.loc["hidden", "value"] == 1
+
+
+def test_every_remark_of_the_paper_is_measured_and_what_was_not_run_is_said(world):
+    source, truth, found = world
+    run = {"headless": found["headless", "mediapipe-pose"][5]}["headless"]
+    run.scores[0, [5, 6]] = 0.1  # shoulders
+    run.keypoints_px[0, HIDDEN] = np.nan  # the left wrist is not given, the left hand is
+    run.scores[0, HIDDEN] = 0
+    found = {("headless", "mediapipe"): {5: run}}
+    placed, errors = placed_keypoints(truth, found, source), all_errors(truth, found)
+    table = paper_remarks(placed, errors, truth, found, n_resamples=5)
+    assert list(dict.fromkeys(table["measure"])) == list(MEASURES)
+    value = table[table["status"] == "run"].set_index("measure")["value"]
+    assert value["outside the picture: given"] == 1
+    assert value["hands given without their wrist"] == 0.5
+    assert value["mean score of shoulders, less that of the other joints"] == pytest.approx(-0.4)
+    assert value["labelled keypoints given with a score of at least 0.3"] == pytest.approx(8 / 11)
+    absent = table[table["status"] == "not run"]
+    assert set(absent["detector"]) == set(MEASURES.values()) and absent["value"].isna().all()

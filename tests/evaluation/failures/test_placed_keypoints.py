@@ -1,0 +1,64 @@
+"""Keypoints outside the picture: what is known of them, and what a detector makes of them."""
+
+import numpy as np
+import pytest
+from made_people import HIDDEN, UNKNOWN
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import INDEX
+from hicp_lib.evaluation.failures.error_kinds import all_errors
+from hicp_lib.evaluation.failures.false_confidence import MEASURES, paper_remarks, scores_by_state
+from hicp_lib.evaluation.failures.placed_keypoints import from_the_cut, landed, placed_keypoints
+from hicp_lib.evaluation.failures.without_head import invented_heads, invented_shares
+from hicp_lib.study.plots import failures as draw
+
+
+def by_keypoint(table, column):
+    return table.set_index("keypoint")[column]
+
+
+def test_states_come_from_the_crop_and_from_the_image_it_was_cut_from(world):
+    source, truth, found = world
+    state = by_keypoint(placed_keypoints(truth, found, source), "state")
+    assert state[0] == "outside" and state[HIDDEN] == "hidden" and state[UNKNOWN] == "unknown"
+    assert state[INDEX["left_hip"]] == "visible"
+
+
+def test_what_is_right_outside_the_picture_is_a_hit_and_what_is_unknown_is_neither(world):
+    source, truth, found = world
+    hit = by_keypoint(placed_keypoints(truth, found, source), "hit")
+    assert hit[0] == 1 and np.isnan(hit[UNKNOWN])
+    found["headless", "mediapipe-pose"][5].keypoints_px[0, 0] += 300
+    found["headless", "mediapipe-pose"][5].keypoints_px[0, 1] = np.nan
+    found["headless", "mediapipe-pose"][5].scores[0, 1] = 0
+    table = placed_keypoints(truth, found, source)
+    assert by_keypoint(table, "hit")[0] == 0 and np.isnan(by_keypoint(table, "hit")[1])
+    assert by_keypoint(table, "given").tolist() == [k != 1 for k in range(17)]
+
+
+def test_where_nobody_is_found_every_table_and_figure_is_empty_but_there(world):
+    source, truth, _ = world
+    found = {("headless", "mediapipe-pose"): {5: Detections.none()}}
+    placed = placed_keypoints(truth, found, source)
+    assert placed.empty and placed["given"].dtype.kind == "b"
+    assert invented_shares(placed, 0.3, 10).empty
+    assert "(0)" in draw.invented_heads(invented_heads(placed), "drawn").figure.axes[0].get_title("left")
+    assert draw.scores_by_state(scores_by_state(placed, 10), "drawn").table.empty
+    remarks = paper_remarks(placed, all_errors(truth, found), truth, found, 10)
+    assert remarks["measure"].nunique() == len(MEASURES)
+
+
+def test_places_are_named_by_the_picture_border(world):
+    source, truth, found = world
+    points = found["headless", "mediapipe-pose"][5].keypoints_px
+    points[0, :4] = [[320, 240], [5, 240], [-3, 240], [320, 479]]
+    place = by_keypoint(placed_keypoints(truth, found, source).assign(place=lambda t: landed(t)), "place")
+    assert place[:4].tolist() == ["inside", "at the border", "outside", "at the border"]
+
+
+@pytest.mark.parametrize("side, place", [("top", (0.3, -0.1)), ("bottom", (0.3, 1.1)), ("left", (-0.1, 0.3)),
+                                         ("right", (1.1, 0.3))])  # fmt: skip
+def test_pictures_are_turned_so_that_the_cut_is_above(world, side, place):
+    table = placed_keypoints(world[1], world[2], world[0]).iloc[:1]
+    turned = from_the_cut(table.assign(x=place[0], y=place[1], cut_side=side))
+    assert turned.to_numpy()[0] == pytest.approx([0.3, -0.1])

@@ -1,0 +1,21 @@
+"""The worst cases, found by rule."""
+
+import numpy as np
+import pytest
+from made_people import POINTS, make_annotations, make_detections
+
+from hicp_lib.evaluation.failures.error_kinds import all_errors
+from hicp_lib.evaluation.failures.worst_cases import worst_cases
+
+
+def test_worst_cases_are_the_surest_mistakes_and_the_overlooked():
+    people = make_annotations(np.stack([POINTS] * 3), [0, 1, 2])
+    points = np.stack([POINTS] * 2)
+    points[0, 9:11] += 5_000
+    points[1, 9] += 5_000
+    found = {("basic", "mediapipe-pose"): {i: make_detections(points[i : i + 1]) for i in range(2)}}
+    table = worst_cases(all_errors({"basic": people}, found))
+    assert table[["case", "rank", "image_id"]].to_numpy().tolist() == [
+        ["surest mistakes", 1, 0], ["surest mistakes", 2, 1], ["overlooked", 1, 2],
+    ]  # fmt: skip
+    assert table["badness"].tolist() == pytest.approx([1.0, 0.5, 17])

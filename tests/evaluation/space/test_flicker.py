@@ -1,0 +1,87 @@
+"""Flicker, jitter and latency, on tracks whose values are known."""
+
+import numpy as np
+import pytest
+from made_people import make_detections
+
+from hicp_lib.core.keypoints import N_KEYPOINTS
+from hicp_lib.evaluation.space.flicker import best_person, causal_filter, flicker, latency_s
+
+RATE_HZ = 20.0
+TIMES_S = np.arange(100) / RATE_HZ
+POINTS = np.random.default_rng(2).uniform(50, 400, (N_KEYPOINTS, 2))
+
+
+def frames(shift_px, given=None):
+    """Detections of a person moved by (n, 2); keypoints of every frame given where (n,) is true."""
+    given = np.ones(len(shift_px), bool) if given is None else given
+    return [
+        make_detections(POINTS[None] + shift if seen else np.full((1, N_KEYPOINTS, 2), np.nan))
+        for shift, seen in zip(shift_px, given, strict=True)
+    ]
+
+
+def values(found):
+    table = flicker({"d": found}, TIMES_S, n_resamples=20)
+    return table.set_index(["tracks", "measure"])["value"]
+
+
+def test_a_still_person_neither_flickers_nor_jumps():
+    found = values(frames(np.zeros((100, 2))))
+    assert found["as detected", "flicker rate"] == found["filtered", "flicker rate"] == 0
+    assert found["as detected", "jitter [px]"] == pytest.approx(0, abs=1e-9)
+
+
+def test_steady_motion_is_no_jitter():
+    assert values(frames(TIMES_S[:, None] * [80.0, -20.0]))["as detected", "jitter [px]"] == pytest.approx(
+        0, abs=1e-9
+    )
+
+
+def test_jitter_measures_independent_errors():
+    noise = np.random.default_rng(0).normal(0, 2.0, (100, 2))
+    # Rayleigh distribution: the mean length of a normal vector is sigma sqrt(pi / 2).
+    assert values(frames(noise))["as detected", "jitter [px]"] == pytest.approx(
+        2 * np.sqrt(np.pi / 2), rel=0.15
+    )
+
+
+def test_single_frames_that_drop_out_flicker_and_the_filter_bridges_them():
+    given = np.arange(100) % 10 != 5
+    found = values(frames(np.zeros((100, 2)), given))
+    assert found["as detected", "flicker rate"] == pytest.approx(20 / 99)
+    assert found["filtered", "flicker rate"] == 0
+
+
+def test_the_filter_smooths_errors_and_does_not_see_the_future():
+    noise = np.random.default_rng(0).normal(0, 2.0, (100, 2))
+    found = values(frames(noise))
+    assert found["filtered", "jitter [px]"] < 0.6 * found["as detected", "jitter [px]"]
+    tracks = best_person(frames(noise))
+    changed = tracks.copy()
+    changed[60:] += 100
+    np.testing.assert_array_equal(causal_filter(tracks, TIMES_S)[:60], causal_filter(changed, TIMES_S)[:60])
+
+
+def test_latency_is_the_delay_of_moving_tracks():
+    tracks = best_person(frames(np.stack([40 * np.sin(2 * TIMES_S), 30 * np.cos(TIMES_S)], axis=1)))
+    late = np.roll(tracks, 2, axis=0)
+    late[:2] = np.nan
+    assert latency_s(tracks, late, TIMES_S) == pytest.approx(2 / RATE_HZ, rel=0.1)
+    assert latency_s(tracks, tracks, TIMES_S) == 0
+    assert np.isnan(latency_s(tracks[:1].repeat(5, axis=0), tracks[:5], TIMES_S[:5]))
+
+
+def test_frames_far_apart_are_not_compared():
+    found = flicker(
+        {"d": frames(np.zeros((5, 2)), np.array([1, 0, 1, 0, 1], bool))}, np.arange(5.0), n_resamples=5
+    )
+    assert found.loc[found["measure"] == "flicker rate", "n"].tolist() == [0, 0]
+
+
+def test_only_sure_keypoints_of_the_best_person_count():
+    people = make_detections(np.stack([POINTS, POINTS + 1000]), [0.2, 0.9])
+    people.scores[1, 3] = 0.1
+    track = best_person([people])
+    assert np.isnan(track[0, 3]).all()
+    np.testing.assert_array_equal(track[0, 4], POINTS[4] + 1000)

@@ -1,0 +1,141 @@
+"""Errors against motion capture: marker means, medians and fractions on errors that are known."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hicp_lib.core.camera import transform
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import NAMES
+from hicp_lib.evaluation.space import mocap_error as me
+from hicp_lib.recordings.qualisys import MotionCapture
+
+N = 60
+STAMPS_S = 1 + np.arange(N) / 30
+T_BASE_MOCAP = np.array([[0.0, -1, 0, 0.3], [1, 0, 0, -0.2], [0, 0, 1, 0.6], [0, 0, 0, 1]])
+
+
+def joint_path(times_s: np.ndarray) -> np.ndarray:
+    """Joints (n, 6, 3) in the motion capture's frame, each on its own line."""
+    return np.arange(6)[:, None] * [0.1, 0.2, 0.0] + times_s[:, None, None] * [0.05, 0.0, 0.02]
+
+
+@pytest.fixture
+def mocap() -> MotionCapture:
+    times_s = np.arange(0, 5, 0.01)
+    offsets = np.array([[0, 0, 0.03], [0, 0, -0.03]])
+    points = (joint_path(times_s)[:, :, None] + offsets).reshape(len(times_s), 12, 3)
+    names = tuple(name for joint in me.JOINTS for name in me.MARKERS[joint])
+    camera = np.zeros((len(times_s), 1, 3))
+    return MotionCapture(times_s, (*names, "camera"), np.concatenate([points, camera], axis=1), 100.0)
+
+
+def lifted(reference: pd.DataFrame, error_m: float = 0.0, score: float = 0.8, **columns) -> pd.DataFrame:
+    """Every joint found, off by `error_m` along z."""
+    table = reference.assign(z_m=reference["z_m"] + error_m, score=score, person=0)
+    return table.assign(**({"detector": "made-up", "method": "paper"} | columns))
+
+
+@pytest.fixture
+def reference(mocap) -> pd.DataFrame:
+    return me.marker_means(mocap, STAMPS_S, T_BASE_MOCAP)
+
+
+def test_markers_are_named_after_their_joints():
+    assert me.MARKERS["left_elbow"] == ("elbow_left_1", "elbow_left_2")
+    assert set(me.JOINTS) <= set(NAMES) and len(me.MARKERS) == 6
+
+
+def test_the_reference_is_the_mean_of_two_markers_in_the_base_frame(reference):
+    expected = transform(T_BASE_MOCAP, joint_path(STAMPS_S))
+    for k, joint in enumerate(me.JOINTS):
+        rows = reference[reference["keypoint"] == joint]
+        assert rows["frame"].tolist() == list(range(N))
+        assert rows[me.POSITION].to_numpy() == pytest.approx(expected[:, k])
+
+
+def test_one_marker_alone_is_no_reference(mocap):
+    mocap.points_m[:, mocap.names.index("wrist_right_2")] = np.nan
+    table = me.marker_means(mocap, STAMPS_S, T_BASE_MOCAP).groupby("keypoint")["x_m"].count()
+    assert table["right_wrist"] == 0 and table.drop("right_wrist").eq(N).all()
+
+
+def test_a_missing_marker_is_named(mocap):
+    names = tuple("left elbow" if name == "elbow_left_1" else name for name in mocap.names)
+    with pytest.raises(InputError, match="no marker 'elbow_left_1'"):
+        me.marker_means(MotionCapture(mocap.times_s, names, mocap.points_m, 100.0), STAMPS_S, T_BASE_MOCAP)
+
+
+def test_errors_are_distances_to_markers_and_to_centres(reference):
+    truth = reference.assign(z_m=reference["z_m"] - 0.03)
+    errors = me.mocap_errors(lifted(reference, 0.04), reference, truth)
+    assert len(errors) == 6 * N
+    assert errors["error_m"].to_numpy() == pytest.approx(0.04)
+    assert errors["centre_error_m"].to_numpy() == pytest.approx(0.07)
+
+
+def test_what_was_not_found_keeps_its_row_and_others_people_do_not_count(reference):
+    points = lifted(reference, 0.04)
+    points.loc[points["keypoint"] == "left_wrist", "person"] = 1
+    points.loc[points["keypoint"] == "left_elbow", me.POSITION] = np.nan
+    errors = me.mocap_errors(points, reference).set_index("keypoint")
+    assert (errors.loc["left_wrist", "score"] == 0).all() and errors.loc["left_wrist", "error_m"].isna().all()
+    assert (errors.loc["left_elbow", "score"] == 0.8).all() and errors.loc[
+        "left_elbow", "error_m"
+    ].isna().all()
+    assert errors["centre_error_m"].isna().all()
+
+
+def test_medians_count_what_is_above_the_score(reference):
+    rng = np.random.default_rng(0)
+    points = lifted(reference, rng.uniform(0, 0.1, len(reference)), rng.uniform(0, 1, len(reference)))
+    errors = me.mocap_errors(points, reference)
+    medians = me.median_errors(errors, n_resamples=100)
+    for row in medians.to_dict("records"):
+        part = errors[(errors["keypoint"] == row["keypoint"]) & (errors["score"] > row["min_score"])]
+        assert row["count"] == len(part) and row["n_frames"] == N
+        assert row["median_m"] == pytest.approx(part["error_m"].median())
+        assert row["low_m"] <= row["median_m"] <= row["high_m"]
+
+
+def test_a_joint_never_found_counts_zero_and_has_no_median(reference):
+    medians = me.median_errors(me.mocap_errors(lifted(reference, score=0.05), reference), n_resamples=10)
+    assert (medians["count"] == 0).all() and medians[["median_m", "low_m", "high_m"]].isna().all().all()
+
+
+def test_fractions_are_of_the_frames_with_motion_capture(reference):
+    reference.loc[reference["frame"] >= 40, me.POSITION] = np.nan
+    points = lifted(reference, 0.03)
+    points.loc[points["frame"] < 10, "score"] = 0.0
+    fractions = me.fractions_within(me.mocap_errors(points, reference), n_resamples=50)
+    shares = fractions.groupby("threshold_m")["value"].unique()
+    assert (
+        shares[0.025] == [0]
+        and shares[0.05] == pytest.approx([0.75])
+        and shares[0.1] == pytest.approx([0.75])
+    )
+
+
+def test_errors_are_binned_by_another_column_sides_together(reference):
+    errors = me.mocap_errors(lifted(reference, 0.01 + reference["frame"] / 1000), reference)
+    table = me.errors_by(errors, "frame", [0, 20, 40, 100]).query("part == 'wrist'")
+    assert table["bin"].tolist() == ["0 to 20", "20 to 40", "40 to 100"]
+    assert table["middle"].tolist() == [10, 30, 70] and table["n"].tolist() == [40, 40, 40]
+    assert table["median_m"].to_numpy() == pytest.approx([0.0195, 0.0395, 0.0595])
+    assert (table["lower_m"] < table["median_m"]).all() and (table["median_m"] < table["upper_m"]).all()
+
+
+def test_errors_are_grouped_by_labels(reference):
+    errors = me.mocap_errors(lifted(reference, 0.01 + (reference["frame"] >= 50) * 0.1), reference)
+    errors["sight"] = np.where(errors["frame"] >= 50, "hidden", "clear")
+    table = me.errors_by(errors, "sight").query("part == 'elbow'").set_index("bin")
+    assert table.loc["clear", ["n", "median_m"]].tolist() == pytest.approx([100, 0.01])
+    assert table.loc["hidden", ["n", "median_m"]].tolist() == pytest.approx([20, 0.11])
+
+
+def test_the_papers_tables_are_whole():
+    paper = me.paper_medians()
+    assert len(paper) == 4 * 4 * 2 and paper["median_m"].between(0.02, 0.2).all()
+    first = paper.query("detector == 'mmpose' and keypoint == 'left_elbow' and min_score == 0.3").iloc[0]
+    assert (first["count"], first["median_m"]) == (419, 0.034)
+    assert not paper.duplicated(["detector", "keypoint", "min_score"]).any()

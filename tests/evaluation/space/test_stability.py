@@ -1,0 +1,128 @@
+"""Stability and accuracy on keypoints whose errors are known."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from still_person import KEYPOINTS, TRUE_M, make_points, make_truth
+
+from hicp_lib.evaluation.space.stability import (
+    PARTS,
+    counted,
+    median_positions,
+    spread_and_bias,
+    within_distance,
+)
+
+FAR = [9.0, 0, 0]
+NONE = [np.nan] * 3
+
+
+def along_x(*offsets_m):
+    return [[x, 0, 0] for x in offsets_m]
+
+
+def value(table, part, threshold_m):
+    row = table[(table["part"] == part) & (table["threshold_m"] == threshold_m)]
+    assert len(row) == 1
+    return float(row["value"].iloc[0])
+
+
+def test_only_the_best_person_with_a_score_above_the_limit_and_a_position_counts():
+    points = make_points([[0, 0, 0]] * 4, keypoints=["left_wrist"])
+    points.loc[0, "person"] = 1
+    points.loc[1, "score"] = 0.1  # not above
+    points.loc[2, ["x_m", "y_m", "z_m"]] = np.nan
+    assert counted(points)["frame"].tolist() == [3]
+
+
+def test_median_positions_shrug_off_outliers():
+    points = make_points([*along_x(0.01, 0.02, 0.03), FAR, NONE], keypoints=["left_wrist", "right_elbow"])
+    medians = median_positions(points).set_index("keypoint")
+    assert set(medians.index) == {"left_wrist", "right_elbow"} and (medians["n"] == 4).all()
+    at = medians.loc["left_wrist", ["x_m", "y_m", "z_m"]].to_numpy(float)
+    np.testing.assert_allclose(at, TRUE_M["left_wrist"] + [0.025, 0, 0], atol=1e-12)
+
+
+def test_images_without_the_keypoint_count_as_not_within():
+    points = make_points([*along_x(0, 0, 0, 0.03, 0.2), NONE])  # the median is the true position
+    table = within_distance(points, {"upper": 8}, n_resamples=0)  # two more images in which nobody is found
+    for part in PARTS:
+        assert value(table, part, 0.025) == pytest.approx(3 / 8)
+        assert value(table, part, 0.05) == pytest.approx(4 / 8)
+        assert value(table, part, 0.1) == pytest.approx(4 / 8)
+    assert table["found"].to_numpy() == pytest.approx(5 / 8)
+
+
+def test_a_detector_that_is_always_wrong_alike_is_stable_but_not_accurate():
+    points, n = make_points([[0.06, 0, 0]] * 10), {"upper": 10}
+    truth = {"upper": make_truth(10)}
+    stable = within_distance(points, n, n_resamples=0)
+    accurate = within_distance(points, n, truth, n_resamples=0)
+    assert stable["value"].to_numpy() == pytest.approx(1) and set(stable["reference"]) == {"median"}
+    assert accurate.groupby("threshold_m")["value"].mean().tolist() == pytest.approx([0, 0, 1])
+    row = spread_and_bias(points, n, truth, n_resamples=0).iloc[0]
+    assert (row["spread_m"], row["bias_m"], row["error_m"]) == pytest.approx((0, 0.06, 0.06))
+
+
+def test_spread_without_bias_is_told_from_bias_without_spread():
+    offsets = along_x(*np.tile([-0.04, 0.04], 10), 0)
+    row = spread_and_bias(make_points(offsets), {"upper": 21}, {"upper": make_truth(21)}, n_resamples=0).iloc[
+        0
+    ]
+    assert (row["spread_m"], row["bias_m"], row["error_m"]) == pytest.approx((0.04, 0, 0.04))
+
+
+def test_a_hand_counts_all_its_keypoints():
+    hand = list(PARTS["left hand"])
+    points = pd.concat(
+        [make_points([[0, 0, 0]] * 3, hand[:7]), make_points([[0, 0, 0], NONE, NONE], hand[7:])]
+    )
+    table = within_distance(points, {"upper": 3}, n_resamples=0)
+    assert value(table, "left hand", 0.1) == pytest.approx((7 * 3 + 14) / (21 * 3))
+    assert value(table, "right hand", 0.1) == 0  # hands are given, this one was never found
+    assert set(table["part"]) == {"left hand", "right hand"}
+
+
+def test_views_and_detectors_are_kept_apart():
+    points = pd.concat(
+        [
+            make_points(along_x(0, 0, 0, 0.2), view="upper"),
+            make_points(along_x(0, 0, 0.2, -0.2), view="lower"),
+            make_points(along_x(0, 0), view="lower", detector="openpose-mobilenet", keypoints=["left_wrist"]),
+        ]
+    )
+    table = within_distance(points, {"upper": 4, "lower": 4}, n_resamples=0)
+    wrist = table[(table["part"] == "left wrist") & (table["threshold_m"] == 0.1)]
+    assert wrist.set_index(["view", "detector"])["value"].to_dict() == pytest.approx(
+        {
+            ("upper", "mediapipe"): 0.75,
+            ("lower", "mediapipe"): 0.5,
+            ("lower", "openpose-mobilenet"): 0.5,
+            ("upper", "openpose-mobilenet"): 0,
+        }
+    )
+    assert set(table[table["detector"] == "openpose-mobilenet"]["part"]) == {"left wrist", "right wrist"}
+
+
+def test_intervals_hold_the_value_and_narrow_with_more_images():
+    rng = np.random.default_rng(0)
+    widths = []
+    for n in (20, 180):
+        points = make_points(rng.normal(0, 0.03, (n, 3)), ["left_wrist", "right_wrist"])
+        row = within_distance(points, {"upper": n}, thresholds_m=[0.05], n_resamples=300).iloc[0]
+        assert row["low"] < row["value"] < row["high"]
+        widths.append(row["high"] - row["low"])
+    assert 2 < widths[0] / widths[1] < 4.5  # theory: 3
+
+
+def test_nothing_found_is_a_share_of_zero_and_no_distance():
+    points = make_points([NONE] * 3, ["left_wrist"])
+    assert (within_distance(points, {"upper": 3}, n_resamples=5)["value"] == 0).all()
+    distances = spread_and_bias(points, {"upper": 3}, {"upper": make_truth(3)}, n_resamples=5)
+    assert (distances["n_images"] == 0).all() and distances[["spread_m", "bias_m", "error_m"]].isna().all(
+        axis=None
+    )
+
+
+def test_parts_name_every_keypoint_once():
+    assert len(KEYPOINTS) == len(set(KEYPOINTS)) == 6 + 42

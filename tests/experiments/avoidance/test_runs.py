@@ -1,0 +1,85 @@
+"""Runs are kept with what was seen in them, and read back instead of simulated again."""
+
+import time
+
+import numpy as np
+import pytest
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import N_KEYPOINTS
+from hicp_lib.experiments.avoidance import head_camera
+from hicp_lib.experiments.avoidance import runs as avoidance_runs
+from hicp_lib.experiments.avoidance.closed_loop import Trial
+from hicp_lib.experiments.avoidance.reaching import in_root, script
+from hicp_lib.experiments.avoidance.runs import Job, choose, image, keypoints_m, run_all
+
+TRIAL = Trial("sitting, head", 0.14)
+
+
+class TwoPeople:
+    """A detector that always finds the same two people."""
+
+    settings = {"name": "two people"}
+
+    def __init__(self):
+        self.found = Detections(
+            np.random.default_rng(0).uniform(20, 460, (2, N_KEYPOINTS, 2)),
+            np.linspace(0, 1, 2 * N_KEYPOINTS).reshape(2, -1),
+            np.ones(2),
+        )
+
+    def detect(self, rgb):
+        return self.found
+
+
+@pytest.fixture
+def detector(monkeypatch, tmp_path):
+    found = TwoPeople()
+    picture = np.full((480, 640, 3), (40, 90, 160), np.uint8), np.full((480, 640), 3.0, np.float32)
+    monkeypatch.setenv("HICP_CACHE", str(tmp_path))
+    monkeypatch.setattr(avoidance_runs, "_detector", lambda name: found)
+    monkeypatch.setattr(head_camera, "photograph", lambda *_: picture)
+    return found
+
+
+def test_what_was_seen_is_kept_as_it_was(detector, monkeypatch):
+    (run,) = run_all([Job(TRIAL, "two people", 0.02)])
+    assert run.frames["t_s"].tolist() == pytest.approx([0.0, 0.1]) and len(run.cycles) == 7
+    frame = run.frames.iloc[1]
+    points, scores, truth = keypoints_m(frame)
+    assert points.shape == (2, N_KEYPOINTS, 3)
+    np.testing.assert_allclose(scores, detector.found.scores, atol=1e-6)
+    np.testing.assert_allclose(truth, in_root(script("sitting, head").person_at(0.1).keypoints_m), atol=1e-6)
+    rgb, seen = image(frame)
+    assert rgb.shape == (240, 320, 3) and np.abs(rgb.astype(int) - (40, 90, 160)).max() < 6
+    # The picture is half as large, its first pixel's edge where it was.
+    np.testing.assert_allclose(2 * seen.keypoints_px + 0.5, detector.found.keypoints_px, atol=1e-4)
+
+    monkeypatch.setattr(avoidance_runs, "simulate", lambda *_: pytest.fail("simulated again"))
+    (again,) = run_all([Job(TRIAL, "two people", 0.02)])
+    assert again.cycles.equals(run.cycles) and again.frames["jpeg"].equals(run.frames["jpeg"])
+
+
+def test_how_long_a_detector_takes_moves_nothing_but_its_time(detector, monkeypatch, tmp_path):
+    (quick,) = run_all([Job(TRIAL, "two people", 0.02)])
+    monkeypatch.setenv("HICP_CACHE", str(tmp_path / "other"))
+    monkeypatch.setattr(detector, "detect", lambda rgb: time.sleep(0.05) or detector.found)
+    (slow,) = run_all([Job(TRIAL, "two people", 0.02)])
+    assert slow.frames["time_ms"].min() >= 50
+    assert slow.cycles.equals(quick.cycles)
+    columns = [column for column in quick.frames if column != "time_ms"]
+    assert slow.frames[columns].map(str).equals(quick.frames[columns].map(str))
+
+
+@pytest.mark.parametrize("delay_s", [-0.1, float("nan"), float("inf"), "0.1", None])
+def test_a_delay_that_is_none_is_refused(delay_s):
+    with pytest.raises(InputError, match="delay of 'two people' is .*; expected seconds, 0 or more"):
+        Job(TRIAL, "two people", delay_s)
+
+
+def test_the_run_to_show_is_that_of_the_script_or_the_first_of_the_condition(detector):
+    runs = run_all([Job(TRIAL, "two people", 0.02)])
+    assert choose(runs, "standing, hand", "two people") is runs[0]
+    with pytest.raises(InputError, match="no run of 'mediapipe'"):
+        choose(runs, "sitting, head", "mediapipe")

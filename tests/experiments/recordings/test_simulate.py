@@ -1,0 +1,223 @@
+"""Simulated recordings: consistent with the robot and the scene, resumed, a prefix of longer ones."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from hicp_lib.core.camera import deproject, project, transform
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.images import read_image
+from hicp_lib.experiments.recordings import simulate
+from hicp_lib.experiments.recordings.open import open_experiment
+from hicp_lib.experiments.recordings.simulate import simulate_recording
+from hicp_lib.mocap.synchronisation import interpolate_mocap
+from hicp_lib.recordings.check import check_recording
+from hicp_lib.recordings.qualisys import read_mocap
+from hicp_lib.recordings.recording import (
+    read_depth_m,
+    read_exact_depth_m,
+    read_joints,
+    read_rgb,
+    read_simulation,
+    read_truth,
+)
+from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
+
+
+@pytest.fixture(scope="module")
+def lower(tmp_path_factory):
+    out = tmp_path_factory.mktemp("recordings") / "lower"
+    return simulate_recording(out, "relative-lower", n_frames=2, workers=1, progress=False)
+
+
+@pytest.fixture(scope="module")
+def mocap(tmp_path_factory):
+    out = tmp_path_factory.mktemp("recordings") / "mocap"
+    return simulate_recording(out, "mocap", n_frames=2, workers=1, progress=False)
+
+
+def points_of(truth, frame, names):
+    rows = truth[truth["frame"] == frame].set_index("keypoint").loc[names]
+    return rows[["x_m", "y_m", "z_m"]].to_numpy(), rows[["u_px", "v_px"]].to_numpy(), rows["visible"]
+
+
+def test_a_simulated_recording_has_nothing_to_be_found(lower):
+    assert check_recording(lower.folder) == []
+    assert read_simulation(lower)["scenario"] == "relative-lower"
+
+
+def test_poses_are_those_of_the_joints(lower):
+    joints = read_joints(lower)[[f"{joint}_rad" for joint in HEAD_JOINTS]].to_numpy()
+    expected = load_icub().T_root_camera(joints, "tilted")
+    np.testing.assert_allclose(lower.T_base_cam, expected, atol=1e-8)
+
+
+def test_keypoints_project_to_where_the_truth_says(lower):
+    truth = read_truth(lower)
+    assert len(truth) == 2 * 136 and set(truth["visible"]) <= {0, 1, 2}
+    for frame in (0, 1):
+        points_m, pixels_px, _ = points_of(truth, frame, ["left_wrist", "right_elbow"])
+        in_camera = transform(np.linalg.inv(lower.T_base_cam[frame]), points_m)
+        np.testing.assert_allclose(project(lower.intrinsics, in_camera), pixels_px, atol=1e-6)
+
+
+def test_the_person_does_not_move(lower):
+    truth = read_truth(lower)
+    first, second = (points_of(truth, frame, ["left_wrist", "neck"])[0] for frame in (0, 1))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_depth_lies_on_the_person_a_little_before_the_joint(lower):
+    truth = read_truth(lower)
+    for frame in (0, 1):
+        points_m, pixels_px, visible = points_of(truth, frame, ["left_wrist", "right_wrist"])
+        assert (visible == 2).all()
+        for depth_m in (read_exact_depth_m(lower, frame), read_depth_m(lower, frame)):
+            column, row = pixels_px.round().astype(int).T
+            surface = deproject(lower.intrinsics, pixels_px, depth_m[row, column])
+            in_base = transform(lower.T_base_cam[frame], surface)
+            assert (np.linalg.norm(in_base - points_m, axis=1) < 0.06).all()
+
+
+def test_measured_depth_is_the_exact_one_but_for_the_sensor(lower):
+    measured, exact = read_depth_m(lower, 0), read_exact_depth_m(lower, 0)
+    assert 0.7 < np.isfinite(measured).mean() < np.isfinite(exact).mean()
+    difference = np.abs(measured - exact)
+    assert 0 < np.nanmedian(difference) < 0.01
+
+
+def test_a_frame_depends_on_scenario_seed_and_number_only(lower):
+    rgb, depth_m, _, truth = simulate.record_frame("relative-lower", 0, 1)
+    stored = read_rgb(lower, 1).astype(int)
+    assert np.abs(stored - rgb).mean() < 3  # JPEG
+    np.testing.assert_allclose(read_depth_m(lower, 1), depth_m, atol=0.00051)
+    np.testing.assert_allclose(truth["keypoints_m"], points_of(read_truth(lower), 1, slice(None))[0])
+    other = simulate.record_frame("relative-lower", 1, 1)[0]
+    assert np.abs(other.astype(int) - rgb).mean() > 10
+
+
+def test_finished_frames_are_kept_and_a_shorter_recording_is_a_prefix(lower, tmp_path, monkeypatch):
+    out = tmp_path / "again"
+    shutil.copytree(lower.folder, out)
+    (out / "rgb.txt").unlink()
+    (out / ".frames" / "000001.json").unlink()  # as if stopped while writing frame 1
+    made = []
+    real = simulate.record_frame
+    monkeypatch.setattr(simulate, "record_frame", lambda *job: made.append(job[2]) or real(*job))
+    simulate_recording(out, "relative-lower", n_frames=2, workers=1, progress=False)
+    assert made == [1]
+    for name in ("rgb/000001.jpg", "depth/000001.png", "truth.parquet", "groundtruth.txt", "rgb.txt"):
+        assert (out / name).read_bytes() == (lower.folder / name).read_bytes()
+    shorter = simulate_recording(out, "relative-lower", n_frames=1, workers=1, progress=False)
+    assert made == [1] and len(shorter) == 1
+    assert [path.name for path in (out / "rgb").iterdir()] == ["000000.jpg"]
+    assert len(read_truth(shorter)) == 136
+
+
+def test_what_another_seed_made_is_dropped(lower, tmp_path, monkeypatch):
+    out = tmp_path / "other"
+    shutil.copytree(lower.folder, out)
+    blank = np.zeros((480, 640, 3), np.uint8)
+    truth = json.loads((out / ".frames" / "000000.json").read_text())
+    fake = blank, np.ones((480, 640)), np.ones((480, 640)), truth
+    (out / "mocap.tsv").write_text("of another scenario")
+    monkeypatch.setattr(simulate, "record_frame", lambda *job: fake)
+    simulate_recording(out, "relative-lower", n_frames=1, seed=5, workers=1, progress=False)
+    assert read_image(out / "rgb" / "000000.jpg").max() == 0
+    assert not (out / "rgb" / "000001.jpg").exists() and not (out / "mocap.tsv").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (dict(name="relative-sideways"), "no scenario"),
+        (dict(n_frames=0), "n_frames is 0"),
+        (dict(n_frames=101), "takes a whole number from 1 to 100"),
+        (dict(seed=-1), "seed is -1"),
+        (dict(workers=0), "workers is 0"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused(tmp_path, arguments, expected):
+    with pytest.raises(InputError, match=expected):
+        simulate_recording(tmp_path / "x", **(dict(name="relative-lower") | arguments))
+    assert not (tmp_path / "x").exists()
+
+
+def test_a_folder_with_other_things_is_refused(tmp_path):
+    (tmp_path / "thesis.tex").write_text("precious")
+    with pytest.raises(InputError, match="holds files that were not simulated"):
+        simulate_recording(tmp_path, "relative-lower", n_frames=1)
+
+
+def test_markers_are_around_their_joints_with_the_true_clock_and_frame(mocap):
+    told, motion = read_simulation(mocap), read_mocap(mocap.mocap_path)
+    stamps_s = mocap.times_s - told["mocap_offset_s"]
+    measured = interpolate_mocap(motion.times_s, motion.points_m, stamps_s)
+    in_base = transform(np.array(told["T_base_mocap"]), measured)
+    truth = read_truth(mocap)
+    for frame in (0, 1):
+        for joint in ("left_elbow", "right_wrist"):
+            side, part = joint.split("_")
+            columns = [motion.names.index(f"{part}_{side}_{number}") for number in (1, 2)]
+            middle = in_base[frame, columns].mean(axis=0)
+            assert np.linalg.norm(middle - points_of(truth, frame, [joint])[0][0]) < 0.03
+        camera = in_base[frame, motion.names.index("camera")]
+        assert 0.01 < np.linalg.norm(camera - mocap.T_base_cam[frame, :3, 3]) < 0.06
+
+
+def test_both_files_of_motion_capture_say_the_same(mocap):
+    tsv, c3d = (read_mocap(mocap.mocap_path.with_suffix(kind)) for kind in (".tsv", ".c3d"))
+    assert tsv.names == c3d.names and len(tsv.names) == 13
+    np.testing.assert_allclose(tsv.points_m, c3d.points_m, atol=2e-6)
+    assert np.ptp(tsv.times_s) >= np.ptp(mocap.times_s) + 0.9
+
+
+def test_an_experiment_is_simulated_once_into_the_cache(tmp_path, monkeypatch, lower):
+    monkeypatch.setenv("HICP_CACHE", str(tmp_path))
+    calls = []
+
+    def copied(folder, scenario, **keywords):
+        calls.append((scenario, keywords["n_frames"], keywords["seed"]))
+        shutil.copytree(lower.folder, folder)
+        return lower
+
+    monkeypatch.setattr(simulate, "simulate_recording", copied)
+    open_experiment("relative-lower", n_frames=2)
+    assert len(open_experiment("relative-lower", n_frames=2)) == 2
+    assert calls == [("relative-lower", 2, 0)]
+    open_experiment("relative-lower", n_frames=2, seed=1)
+    assert calls[1:] == [("relative-lower", 2, 1)]
+
+
+def test_a_given_recording_is_opened_instead(lower):
+    assert len(open_experiment("relative-lower", recording=lower.folder)) == 2
+    shorter = open_experiment("relative-lower", recording=lower.folder, n_frames=1)
+    assert len(shorter) == 1 and read_truth(shorter)["frame"].max() == 0
+    with pytest.raises(InputError, match="is not a folder"):
+        open_experiment("relative-lower", recording="/no/recording")
+    with pytest.raises(InputError, match="no scenario"):
+        open_experiment("sideways")
+
+
+# What these do to a recording shows in no number or pixel of it.
+UNDECIDED = {"hicp_lib.rgbd", "hicp_lib.recordings.recording", "hicp_lib.robot", "hicp_lib.simulation.experiments",
+             "hicp_lib.simulation.sensors"}  # fmt: skip
+
+
+def test_the_version_covers_all_code_that_takes_part():
+    code = (
+        "import sys, hicp_lib.experiments.recordings.simulate\n"
+        "for name, module in sorted(sys.modules.items()):\n"
+        "    if name.startswith(('hicp_lib.simulation', 'hicp_lib.rgbd', 'hicp_lib.robot')):\n"
+        "        print(name, module.__file__)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = dict(line.split(" ", 1) for line in run.stdout.splitlines())
+    covered = {str(path) for path in simulate.deciding_files()}
+    assert {name for name, path in loaded.items() if path not in covered} == UNDECIDED

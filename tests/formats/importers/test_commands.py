@@ -1,0 +1,59 @@
+"""`hicp import` and `hicp export`, from a tool's files to an evaluation and out again."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from hicp_lib.cli import main as cli
+
+EXAMPLES = Path(__file__).parents[2] / "data" / "examples" / "native"
+ANNOTATIONS = ["--annotations", str(EXAMPLES / "annotations.json")]
+
+
+def run(capsys, *arguments) -> str:
+    assert cli.run([str(argument) for argument in arguments]) == 0
+    return capsys.readouterr().out
+
+
+def mistake(capsys, *arguments) -> str:
+    assert cli.run([str(argument) for argument in arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == "" and captured.err.startswith("hicp: ") and captured.err.count("\n") == 1
+    return captured.err
+
+
+def importing(kind: str, out: Path, *more) -> list:
+    return ["import", "--format", kind, "--predictions", EXAMPLES / kind, *ANNOTATIONS, "--out", out, *more]
+
+
+@pytest.mark.parametrize("kind", ["openpose", "alphapose", "mmpose", "detectron2", "coco"])
+def test_import_evaluate_export(capsys, tmp_path, kind):
+    detections = tmp_path / "d.json"
+    assert f"{kind}: 3 people in 2 of 3 images" in run(capsys, *importing(kind, detections))
+    evaluated = run(capsys, "evaluate", *ANNOTATIONS, "--detections", detections, "--json")
+    assert json.loads(evaluated)["metrics"]["AP50"]["value"] == pytest.approx(1)
+    exported = tmp_path / "coco.json"
+    export = ["export", "--detections", detections, "--out", exported]
+    assert "3 people" in run(capsys, *export, "--format", "coco", "--layout", "coco17")
+    assert {len(row["keypoints"]) for row in json.loads(exported.read_text())} == {51}
+    run(capsys, *export, "--format", "fiftyone", *ANNOTATIONS)
+    assert len(json.loads(exported.read_text())["images"]) == 3
+
+
+def test_the_summary_as_json(capsys, tmp_path):
+    arguments = importing("mmpose", tmp_path / "d.json", "--score-scale", 20, "--json")
+    summary = json.loads(run(capsys, *arguments))
+    assert summary["score_scale"] == 20 and summary["unmatched"] == ["elsewhere_000004"]
+
+
+def test_mistakes(capsys, tmp_path):
+    out = tmp_path / "d.json"
+    wrong = ["import", "--format", "mmpose", "--predictions", EXAMPLES / "coco", *ANNOTATIONS, "--out", out]
+    assert "results.json: instances[0]: has no 'keypoint_scores'" in mistake(capsys, *wrong)
+    assert "format 'x' is not known" in mistake(capsys, *importing("coco", out)[:2], "x", *wrong[3:])
+    assert "--score-scale is -1" in mistake(capsys, *importing("mmpose", out, "--score-scale", -1))
+    assert not out.exists()
+    run(capsys, *importing("coco", out))
+    export = ["export", "--detections", out, "--out", tmp_path / "e.json", "--format", "fiftyone"]
+    assert "needs the annotations" in mistake(capsys, *export)

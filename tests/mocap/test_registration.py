@@ -1,0 +1,202 @@
+"""Registration from clicked markers: discs before a wall, seen by a moving camera."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+
+from hicp_lib.core.camera import Intrinsics, project, transform
+from hicp_lib.core.errors import InputError
+from hicp_lib.mocap.registration import (
+    REGISTRATION_FILE,
+    all_clicks,
+    as_in_paper,
+    lift_clicks,
+    papers_choice,
+    read_registration,
+    same_clicks,
+    write_registration,
+)
+from hicp_lib.recordings.qualisys import MotionCapture
+from hicp_lib.recordings.recording import open_recording
+from hicp_lib.recordings.writer import RecordingWriter
+from hicp_lib.simulation.sensors.clicks import simulate_clicks
+
+INTRINSICS = Intrinsics(320, 240, 300.0, 300.0, 159.5, 119.5)
+NAMES = (*(f"m{k}" for k in range(9)), "camera")
+MARKERS_CAM = np.array(
+    [[-0.4, -0.3, 1.2], [0.1, -0.28, 1.0], [0.5, -0.25, 1.4], [-0.3, 0.05, 0.9], [0.15, 0.1, 1.5],
+     [0.45, 0.02, 1.1], [-0.25, 0.3, 1.3], [0.1, 0.28, 1.0], [0.4, 0.3, 1.2]]
+)  # fmt: skip
+CAMERA_MARKER_CAM = np.array([0.02, -0.03, -0.01])
+T_BASE_MOCAP = np.eye(4)
+T_BASE_MOCAP[:3, :3] = Rotation.from_euler("xyz", [0.3, -0.2, 2.0]).as_matrix()
+T_BASE_MOCAP[:3, 3] = [-1.5, 0.4, 0.2]
+
+
+def camera_pose(k: int) -> np.ndarray:
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_euler("xyz", [0.02 * k, 0.03 * k, -0.1]).as_matrix()
+    T[:3, 3] = [0.01 * k, 0.02, 0.3]
+    return T
+
+
+def depth_of(points_cam: np.ndarray) -> np.ndarray:
+    """A wall at 3 m, and before it a disc of 4 cm about every point."""
+    v, u = np.mgrid[: INTRINSICS.height_px, : INTRINSICS.width_px]
+    depth = np.full(u.shape, 3.0)
+    for centre, point in zip(project(INTRINSICS, points_cam), points_cam, strict=True):
+        disc = np.hypot(u - centre[0], v - centre[1]) <= INTRINSICS.fx_px * 0.04 / point[2]
+        depth[disc] = np.minimum(depth[disc], point[2])
+    return depth
+
+
+@pytest.fixture(scope="module")
+def laboratory(tmp_path_factory):
+    """A recording of four frames with its motion capture."""
+    writer = RecordingWriter(tmp_path_factory.mktemp("rooms") / "room", INTRINSICS, 10_000.0)
+    markers = transform(camera_pose(0), MARKERS_CAM)
+    times_s = np.arange(0, 1, 0.01)
+    T_mocap_base = np.linalg.inv(T_BASE_MOCAP)
+    in_mocap = np.full((len(times_s), 10, 3), np.nan)
+    in_mocap[:, :9] = transform(T_mocap_base, markers)
+    for k in range(4):
+        depth = depth_of(transform(np.linalg.inv(camera_pose(k)), markers))
+        writer.add(0.2 * k, np.zeros((240, 320, 3), np.uint8), depth, camera_pose(k))
+        in_mocap[20 * k : 20 * k + 20, 9] = transform(T_mocap_base @ camera_pose(k), CAMERA_MARKER_CAM)
+    writer.finish()
+    recording = open_recording(writer.folder)
+    return recording, MotionCapture(times_s, NAMES, in_mocap, 100.0)
+
+
+@pytest.fixture
+def clicks(laboratory) -> pd.DataFrame:
+    recording, mocap = laboratory
+    rows = []
+    for k in range(4):
+        points = transform(np.linalg.inv(recording.T_base_cam[k]) @ T_BASE_MOCAP, mocap.points_m[0, :9])
+        pixels = project(INTRINSICS, points)
+        rows += [(k, name, *pixel) for name, pixel in zip(NAMES, pixels.tolist(), strict=False)]
+    return pd.DataFrame(rows, columns=["frame", "marker", "u_px", "v_px"])
+
+
+def errors_of(registration) -> tuple[float, float]:
+    """Angle [rad] from the exact rotation, and largest displacement [m] of the markers."""
+    T = registration.T_base_mocap
+    angle = Rotation.from_matrix(T[:3, :3].T @ T_BASE_MOCAP[:3, :3]).magnitude()
+    points = transform(np.linalg.inv(T_BASE_MOCAP) @ camera_pose(0), MARKERS_CAM)
+    moved = transform(T, points) - transform(T_BASE_MOCAP, points)
+    return angle, np.linalg.norm(moved, axis=1).max()
+
+
+def test_clicks_are_lifted_to_where_the_markers_are(laboratory, clicks):
+    matched = lift_clicks(laboratory[0], clicks, laboratory[1])
+    seen, measured = matched[["x_m", "y_m", "z_m"]], matched[["mocap_x_m", "mocap_y_m", "mocap_z_m"]]
+    assert len(matched) == len(clicks)
+    # A pixel at 1.5 m is 5 mm.
+    assert np.abs(seen.to_numpy() - transform(T_BASE_MOCAP, measured.to_numpy())).max() < 0.004
+
+
+def test_arun_alone_finds_what_the_markers_say(laboratory, clicks):
+    matched = papers_choice(lift_clicks(laboratory[0], clicks, laboratory[1]))
+    assert len(matched) == 8 and matched["frame"].nunique() <= 2
+    registration = same_clicks(matched)
+    angle, displacement = errors_of(registration)
+    assert angle < 0.005 and displacement < 0.005
+    assert registration.n_points == 8 and registration.rms_m < 0.004
+    assert registration.rms_m < registration.leave_one_out_m * 2
+
+
+def test_the_papers_translation_is_off_by_where_the_camera_marker_sits(laboratory, clicks):
+    recording, mocap = laboratory
+    matched = papers_choice(lift_clicks(recording, clicks, mocap))
+    registration = as_in_paper(matched, recording, mocap)
+    assert np.allclose(registration.T_base_mocap[:3, :3], same_clicks(matched).T_base_mocap[:3, :3])
+    _, displacement = errors_of(registration)
+    assert displacement == pytest.approx(np.linalg.norm(CAMERA_MARKER_CAM), abs=0.01)
+
+
+def test_wrong_clicks_do_not_spoil_the_fit_to_many(laboratory, clicks):
+    wrong = clicks.copy()
+    wrong.loc[::7, "u_px"] += 25
+    matched = lift_clicks(laboratory[0], wrong, laboratory[1])
+    robust = all_clicks(matched)
+    assert errors_of(robust)[1] < 0.004 < 0.02 < errors_of(same_clicks(matched))[1]
+    assert robust.n_points == len(clicks) - len(wrong[::7])
+
+
+def test_clicks_on_the_wall_behind_are_not_among_the_eight(laboratory, clicks):
+    matched = lift_clicks(laboratory[0], clicks, laboratory[1])
+    matched.loc[::4, ["x_m", "y_m", "z_m"]] += [-0.4, 0.9, 1.2]
+    eight = papers_choice(matched)
+    assert len(eight) == 8 and same_clicks(eight).rms_m < 0.005
+
+
+def test_many_clicks_on_the_wall_behind_do_not_spoil_the_fit(laboratory, clicks):
+    matched = lift_clicks(laboratory[0], clicks, laboratory[1])
+    rng = np.random.default_rng(0)
+    behind = rng.random(len(matched)) < 0.4
+    matched.loc[behind, ["x_m", "y_m", "z_m"]] += rng.normal(0, 1.0, (behind.sum(), 3)) + [0.5, 0.5, 1.5]
+    found = all_clicks(matched)
+    assert errors_of(found)[1] < 0.005 and found.n_points == (~behind).sum()
+
+
+def test_what_cannot_be_matched_is_left_out(laboratory, clicks):
+    recording, mocap = laboratory
+    points = mocap.points_m.copy()
+    points[:, 2] = np.nan
+    clicks.loc[clicks["marker"] == "m5", "u_px"] = 400
+    matched = lift_clicks(recording, clicks, replace(mocap, points_m=points))
+    assert set(NAMES[:9]) - set(matched["marker"]) == {"m2", "m5"}
+
+
+def test_a_missing_camera_marker_is_refused(laboratory, clicks):
+    recording, mocap = laboratory
+    matched = lift_clicks(recording, clicks, mocap)
+    without = replace(mocap, names=NAMES[:9], points_m=mocap.points_m[:, :9])
+    with pytest.raises(InputError, match="no marker 'camera'"):
+        as_in_paper(matched, recording, without)
+    mocap = replace(mocap, points_m=np.full_like(mocap.points_m, np.nan))
+    with pytest.raises(InputError, match="measured in no frame"):
+        as_in_paper(matched, recording, mocap)
+
+
+def test_a_given_transform_is_read_back(tmp_path, laboratory, clicks):
+    registration = same_clicks(lift_clicks(laboratory[0], clicks, laboratory[1]))
+    write_registration(tmp_path / REGISTRATION_FILE, registration)
+    read = read_registration(tmp_path / REGISTRATION_FILE)
+    assert np.array_equal(read.T_base_mocap, registration.T_base_mocap)
+    assert read.method == "given" and read.n_points == 0
+
+
+@pytest.mark.parametrize(
+    "content",
+    ["[]", "{}", '{"T_base_mocap": [[1, 0], [0, 1]]}', '{"T_base_mocap": "eye"}',
+     '{"T_base_mocap": [[2,0,0,0],[0,2,0,0],[0,0,2,0],[0,0,0,1]]}',
+     '{"T_base_mocap": [[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]}',
+     '{"T_base_mocap": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0.1,0,0,1]]}'],
+)  # fmt: skip
+def test_what_is_no_rigid_transform_is_refused_in_one_line(tmp_path, content):
+    (tmp_path / REGISTRATION_FILE).write_text(content)
+    with pytest.raises(InputError, match="T_base_mocap") as error:
+        read_registration(tmp_path / REGISTRATION_FILE)
+    assert "\n" not in str(error.value)
+
+
+def test_simulated_clicks_are_on_what_can_be_seen(laboratory):
+    recording, mocap = laboratory
+    exact = recording.folder / "exact_depth"
+    exact.symlink_to(recording.folder / "depth")
+    clicks = simulate_clicks(recording, mocap, T_BASE_MOCAP, n_images=3, noise_px=0.5)
+    assert clicks["frame"].unique().tolist() == [0, 2, 3]
+    assert set(clicks["marker"]) == set(NAMES[:9])
+    again = simulate_clicks(recording, mocap, T_BASE_MOCAP, n_images=3, noise_px=0.0)
+    offsets = clicks[["u_px", "v_px"]].to_numpy() - again[["u_px", "v_px"]].to_numpy()
+    assert 0.3 < offsets.std() < 0.7
+    behind = mocap.points_m.copy()
+    T_mocap_cam = np.linalg.inv(T_BASE_MOCAP) @ camera_pose(0)
+    behind[:, 3] = transform(T_mocap_cam, MARKERS_CAM[3] * 1.2)
+    hidden = simulate_clicks(recording, replace(mocap, points_m=behind), T_BASE_MOCAP, 1, 0.0)
+    assert set(NAMES[:9]) - set(hidden["marker"]) == {"m3"}

@@ -1,0 +1,96 @@
+"""One clock: positions between samples, and the offset between clocks."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.mocap.synchronisation import MAX_GAP_S, _speeds, clock_offset, interpolate_mocap
+
+
+def test_between_samples_positions_lie_on_the_line():
+    times = np.arange(0, 1, 0.01)
+    points = np.stack([times[:, None] * [1.0, 2, 3], 1 - times[:, None] * [0.0, 0, 1]], axis=1)
+    stamps = np.array([0.0, 0.005, 0.3333, 0.99])
+    assert interpolate_mocap(times, points, stamps)[:, 0] == pytest.approx(stamps[:, None] * [1, 2, 3])
+
+
+@given(st.integers(1, 12), st.integers(1, 80))
+def test_gaps_are_bridged_up_to_the_limit_and_no_further(n_missing, start):
+    times = np.arange(0, 1, 0.01)
+    points = times[:, None, None] * np.ones(3)
+    points[start : start + n_missing] = np.nan
+    middle = (times[start - 1] + times[min(start + n_missing, 99)]) / 2
+    found = interpolate_mocap(times, points, np.array([middle]))[0, 0]
+    if (n_missing + 1) * 0.01 <= MAX_GAP_S:
+        assert found == pytest.approx(np.full(3, middle))
+    else:
+        assert np.isnan(found).all()
+
+
+def test_markers_have_their_own_gaps_and_nothing_is_made_up_at_the_ends():
+    times = np.array([0.0, 0.01, 0.02])
+    points = np.zeros((3, 2, 3))
+    points[0, 0] = np.nan
+    found = interpolate_mocap(times, points, np.array([-0.001, 0.0, 0.005, 0.02, 0.021]))
+    assert np.isnan(found[:, 0, 0]).tolist() == [True, True, True, False, True]
+    assert np.isnan(found[:, 1, 0]).tolist() == [True, False, False, False, True]
+    assert np.isnan(interpolate_mocap(times[:0], points[:0], times)).all()
+
+
+def walk(times_s):
+    """Two wrists that wave, turn and rest, at any time."""
+    t = times_s[:, None]
+    wave = np.c_[0.3 * np.sin(2 * t) * np.cos(0.7 * t), 0.2 * np.cos(3.1 * t), 0.1 * np.sin(5 * t + 1)]
+    return np.stack([wave, 0.5 * wave[:, ::-1] + 0.2 * np.sin(1.3 * t)], axis=1)
+
+
+@settings(max_examples=25)
+@given(st.floats(-500, 500), st.integers(0, 1000))
+def test_the_offset_is_found_in_any_frame_with_noise_and_gaps(offset, seed):
+    rng = np.random.default_rng(seed)
+    camera_s, mocap_s = np.arange(0, 16, 1 / 15), np.arange(-2, 19, 0.01)
+    seen = Rotation.random(rng=rng).apply(walk(camera_s).reshape(-1, 3)).reshape(-1, 2, 3) + 5
+    seen += rng.normal(0, 0.005, seen.shape)
+    seen[rng.random(seen.shape[:2]) < 0.05] = np.nan
+    found = clock_offset(camera_s, seen, mocap_s - offset, walk(mocap_s))
+    assert found.offset_s == pytest.approx(offset, abs=0.012)
+    assert found.halves_s == pytest.approx((offset, offset), abs=0.02)
+    assert found.correlation > 0.8
+
+
+def test_exact_positions_give_the_offset_to_a_millisecond():
+    times_s = np.arange(0, 20, 0.01)
+    found = clock_offset(times_s, walk(times_s), times_s - 0.1234, walk(times_s))
+    assert found.offset_s == pytest.approx(0.1234, abs=1e-3)
+    assert found.correlation > 0.999
+
+
+def test_a_clock_that_drifts_shows_in_the_halves():
+    camera_s, mocap_s = np.arange(0, 20, 1 / 30), np.arange(-1, 22, 0.01)
+    found = clock_offset(camera_s, walk(camera_s * 1.01), mocap_s, walk(mocap_s))
+    assert found.halves_s[1] - found.halves_s[0] == pytest.approx(-0.1, abs=0.03)
+
+
+def test_it_is_the_correlation_numpy_finds_at_that_offset():
+    times_s = np.arange(0, 10, 0.01)
+    rng = np.random.default_rng(0)
+    a, b = walk(times_s), walk(times_s) + np.cumsum(rng.normal(0, 0.003, (1000, 2, 3)), axis=0)
+    b[300:400, 1] = np.nan
+    found = clock_offset(times_s, a, times_s, b)
+    lag = round(found.offset_s * 100)
+    va, vb = _speeds(times_s, a), _speeds(times_s, b)
+    va, vb = (va[lag:], vb[: len(vb) - lag]) if lag >= 0 else (va[:lag], vb[-lag:])
+    both = np.isfinite(va) & np.isfinite(vb)
+    va, vb = (np.concatenate([v[m, k] - v[m, k].mean() for k, m in enumerate(both.T)]) for v in (va, vb))
+    assert found.correlation == pytest.approx(va @ vb / np.sqrt(va @ va * (vb @ vb)))
+
+
+@pytest.mark.parametrize("seconds, moves", [(10, False), (1, True), (0.1, True)])
+def test_without_enough_movement_there_is_no_offset(seconds, moves):
+    camera_s = np.arange(0, seconds, 1 / 30)
+    seen = walk(camera_s) if moves else np.zeros((len(camera_s), 2, 3))
+    with pytest.raises(InputError, match="no clock offset"):
+        clock_offset(camera_s, seen, np.arange(0, 10, 0.01), walk(np.arange(0, 10, 0.01)))

@@ -1,0 +1,120 @@
+"""Rendered data sets: valid, the same whatever the workers, resumed after an interruption."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.images import read_image
+from hicp_lib.formats.annotations import read_annotations
+from hicp_lib.simulation.world import scenes
+from hicp_lib.simulation.world.scenes import render_dataset, render_scene
+
+N, SEED = 3, 11
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("rendered")
+    render_dataset(out, N, SEED, workers=1, progress=False)
+    return out
+
+
+def test_annotations_are_those_of_the_images(dataset):
+    people = read_annotations(dataset / "annotations.json")
+    assert len(people.images) == N and len(people) >= N
+    assert list(people.ids) == list(range(1, len(people) + 1))
+    for info in people.images.values():
+        assert read_image(dataset / "images" / info.file_name).shape == (info.height_px, info.width_px, 3)
+    for row in range(len(people)):
+        info = people.images[int(people.image_ids[row])]
+        x, y, width, height = people.boxes_px[row]
+        assert x >= 0 and y >= 0 and x + width <= info.width_px and y + height <= info.height_px
+        assert 0 < people.areas_px2[row] <= width * height
+        points = people.keypoints_px[row][people.visibility[row] > 0]
+        assert (points >= 0).all() and (points <= [info.width_px - 1, info.height_px - 1]).all()
+        seen = people.keypoints_px[row][people.visibility[row] == 2]
+        assert (seen >= [x - 12, y - 12]).all() and (seen <= [x + width + 12, y + height + 12]).all()
+        assert 0.4 < people.extras[row]["distance_m"] < 8
+    assert set(np.unique(people.visibility)) <= {0, 1, 2}
+
+
+def test_points_outside_are_written_as_zeros(dataset):
+    for person in json.loads((dataset / "annotations.json").read_text())["annotations"]:
+        triples = np.array(person["keypoints"]).reshape(136, 3)
+        assert (triples[triples[:, 2] == 0] == 0).all()
+        assert person["category_id"] == 1 and person["iscrowd"] == 0
+
+
+def test_workers_change_nothing(dataset, tmp_path):
+    render_dataset(tmp_path / "two", N, SEED, workers=2, progress=False)
+    for path in sorted((dataset / "images").iterdir()):
+        assert (tmp_path / "two" / "images" / path.name).read_bytes() == path.read_bytes()
+    assert (tmp_path / "two" / "annotations.json").read_bytes() == (dataset / "annotations.json").read_bytes()
+
+
+def test_seeds_and_numbers_give_different_images():
+    images = [render_scene(seed, index)[0] for seed, index in ((11, 0), (12, 0))]
+    assert images[0].shape != images[1].shape or (images[0] != images[1]).mean() > 0.5
+
+
+def test_an_interrupted_run_is_taken_up_where_it_stopped(dataset, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    rendered = []
+
+    def counted(seed, index):
+        rendered.append(index)
+        if len(rendered) == 2:
+            raise KeyboardInterrupt
+        return render_scene(seed, index)
+
+    monkeypatch.setattr(scenes, "render_scene", counted)
+    with pytest.raises(KeyboardInterrupt):
+        render_dataset(out, N, SEED, workers=1, progress=False)
+    assert not (out / "annotations.json").exists()
+    (out / "images" / "000001.jpg").write_bytes(b"half")  # an image without its people does not count
+    render_dataset(out, N, SEED, workers=1, progress=False)
+    assert rendered == [0, 1, 1, 2]
+    assert (out / "annotations.json").read_bytes() == (dataset / "annotations.json").read_bytes()
+
+
+def test_another_seed_reuses_nothing(tmp_path, monkeypatch):
+    fake = {"bbox": [0, 0, 2, 2], "area": 4, "keypoints": np.zeros((136, 3)).tolist(), "distance_m": 1.0}
+    calls = []
+
+    def quick(seed, index):
+        calls.append((seed, index))
+        return np.zeros((4, 4, 3), np.uint8), [fake]
+
+    monkeypatch.setattr(scenes, "render_scene", quick)
+    out = tmp_path / "out"
+    render_dataset(out, 2, 1, workers=1, progress=False)
+    render_dataset(out, 2, 1, workers=1, progress=False)
+    assert calls == [(1, 0), (1, 1)]
+    render_dataset(out, 2, 2, workers=1, progress=False)
+    assert calls[2:] == [(2, 0), (2, 1)]
+    render_dataset(out, 1, 2, workers=1, progress=False)
+    assert [p.name for p in (out / "images").iterdir()] == ["000000.jpg"]
+    monkeypatch.setattr(scenes, "renderer_version", lambda: "another")
+    render_dataset(out, 1, 2, workers=1, progress=False)
+    assert calls[4:] == [(2, 0)]
+
+
+@pytest.mark.parametrize(
+    "arguments", [dict(n=0), dict(n=-1), dict(n=1.5), dict(seed=-1), dict(workers=0), dict(n=10**9)]
+)
+def test_numbers_out_of_range_are_refused(tmp_path, arguments):
+    with pytest.raises(InputError, match="expected"):
+        render_dataset(tmp_path / "out", **(dict(n=1, seed=0, workers=1) | arguments))
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_with_other_things_is_refused(tmp_path):
+    (tmp_path / "thesis.tex").write_text("precious")
+    with pytest.raises(InputError, match="holds files"):
+        render_dataset(tmp_path, 1, 0, workers=1)
+    file = tmp_path / "thesis.tex"
+    with pytest.raises(InputError, match="is a file"):
+        render_dataset(file, 1, 0, workers=1)

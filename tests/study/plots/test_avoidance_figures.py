@@ -1,0 +1,53 @@
+"""Figures and the animation of avoidance are drawn from a short run, and say what they show."""
+
+import io
+
+import cv2
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+
+from hicp_lib.experiments.avoidance.closed_loop import Trial
+from hicp_lib.experiments.avoidance.runs import Job, Run
+from hicp_lib.robot.home import home_posture
+from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
+from hicp_lib.robot.separation import Separation
+from hicp_lib.robot.skin import read_skin
+from hicp_lib.study.plots.avoidance import joint_motion, over_time, separation_terms
+from hicp_lib.study.plots.avoidance_pictures import animation, filmstrip
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    t = np.arange(40) * 0.02
+    angles = np.tile(home_posture(load_icub()).angles("left"), (len(t), 1))
+    angles[:, 6] += 0.2 * t
+    columns = {"t_s": t, "distance_m": 0.3 - 0.1 * t, "activation": t, "hand_error_m": 0.1 * t}
+    columns |= {f"{joint}_rad": angles[:, k] for k, joint in enumerate(ARM_JOINTS)}
+    cycles = pd.DataFrame(columns).assign(activations=[np.full(len(read_skin()), 0.3)] * len(t))
+    jpeg = cv2.imencode(".jpg", np.full((240, 320, 3), 90, np.uint8))[1].tobytes()
+    empty = {name: [] for name in ("keypoints_px", "scores", "keypoints_m")}
+    frames = pd.DataFrame([{"t_s": 0.0, "jpeg": jpeg, "truth_m": np.zeros(408).tolist()} | empty])
+    return Run(Job(Trial("sitting, hand"), "mediapipe", 0.04), cycles, frames)
+
+
+def test_lines_over_time_carry_their_numbers(run):
+    separations = {"mediapipe": Separation(0.2, 0.06, 0.02, 0.05)}
+    figure = over_time([run], separations, "made up")
+    assert "22.2" in figure.alt and "not a safety function" in figure.caption
+    assert {"script", "detector", "t_s", "distance_m"} <= set(figure.table.columns)
+    terms = separation_terms(separations, "made up")
+    values_m = terms.table.set_index("term")["value"]
+    assert values_m["sum"] == pytest.approx(separations["mediapipe"].distance_m)
+    assert values_m.drop("sum").sum() == pytest.approx(values_m["sum"])
+
+
+def test_the_joint_that_turns_most_is_named(run):
+    assert "elbow" in joint_motion([run], "made up").alt
+
+
+def test_pictures_stand_still_and_move(run):
+    assert filmstrip(run, (0.1, 0.6), "made up").table is None
+    movie = Image.open(io.BytesIO(animation(run, rate_hz=4.0)))
+    assert movie.format == "WEBP" and movie.n_frames == 4

@@ -1,0 +1,105 @@
+"""Figures of the failure analysis and of doses: what they carry and say."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.evaluation.failures.error_kinds import KINDS
+from hicp_lib.evaluation.space.flicker import flicker
+from hicp_lib.study.plots import doses, failures
+
+DETECTORS = ("mediapipe", "openpose-mobilenet")
+
+
+def test_precision_per_class_says_which_classes_are_too_small():
+    rows = [
+        (name, group, detector, metric, value, value, value, n)
+        for name, value, n in (("whole upper body", 0.8, 50), ("only legs", np.nan, 3))
+        for group in ("body", "hand")
+        for detector in DETECTORS
+        for metric in ("AP", "AP50", "AR")
+    ]
+    columns = ["class", "group", "detector", "metric", "value", "low", "high", "n_people"]
+    figure = failures.class_precision(pd.DataFrame(rows, columns=columns), "made up")
+    for axis in figure.figure.axes:
+        assert [text.get_text() for text in axis.texts] == ["too few to judge"]
+    labels = [label.get_text() for label in figure.figure.axes[0].get_yticklabels()]
+    assert labels == ["whole upper body (50)", "only legs (3)"]
+    assert len(figure.figure.axes[0].containers) == 4  # AP and AR of two detectors
+    assert "0.80 for whole upper body" in figure.alt and "made up" in figure.caption
+
+
+def test_bars_of_kinds_fill_the_whole_length():
+    rows = [
+        (d, "body", name, kind, share, 70)
+        for d in DETECTORS
+        for name, share in (("no head", 1 / len(KINDS)), ("only legs", np.nan))
+        for kind in KINDS
+    ]
+    table = pd.DataFrame(rows, columns=["detector", "group", "class", "kind", "share", "n_keypoints"])
+    figure = failures.error_kinds(table, "class", "made up")
+    for axis in figure.figure.axes:
+        assert np.nansum([bar.get_width() for bar in axis.patches]) == pytest.approx(1)
+        assert [text.get_text() for text in axis.texts] == ["too few to judge"]
+    assert [text.get_text() for text in figure.figure.legends[0].get_texts()] == list(KINDS)
+
+
+def test_change_without_the_head_is_drawn_for_every_keypoint():
+    rows = [(d, k, -0.1, -0.2, 0.0) for d in DETECTORS for k in ("left_shoulder", "left_hip")]
+    table = pd.DataFrame(rows, columns=["detector", "keypoint", "change", "low", "high"])
+    figure = failures.head_change(table, "made up")
+    assert [x.get_text() for x in figure.figure.axes[0].get_yticklabels()] == ["left shoulder", "left hip"]
+    assert "mediapipe -0.10 and openpose-mobilenet -0.10" in figure.alt
+
+
+def test_invented_heads_are_scattered_where_they_were_put():
+    table = pd.DataFrame(
+        {"detector": "mediapipe", "along": [0.2, 0.8], "below": [-0.1, 0.4], "score": [0.9, 0.1]}
+    )
+    figure = failures.invented_heads(table, "made up")
+    dots = figure.figure.axes[0].collections[0].get_offsets()
+    np.testing.assert_allclose(dots, [[0.2, -0.1], [0.8, 0.4]])
+    assert "mediapipe 0.50" in figure.alt
+
+
+def test_scores_are_drawn_by_state():
+    rows = [
+        ("mediapipe", state, 0.9, value, value, value) for state, value in (("visible", 1), ("outside", 0.1))
+    ]
+    table = pd.DataFrame(rows, columns=["detector", "state", "score", "value", "low", "high"])
+    figure = failures.scores_by_state(table, "made up")
+    assert [x.get_text() for x in figure.figure.legends[0].get_texts()] == ["visible", "outside"]
+    assert "mediapipe 0.10 at 0.90" in figure.alt
+
+
+def test_dose_curves_have_a_panel_for_each_dose_and_say_the_lowest():
+    rows = [
+        (dose, level, "mediapipe", "body", measure, level / 2, 0, 1)
+        for dose in ("light", "hidden")
+        for level in (0.5, 1.0)
+        for measure in ("AP", "visible keypoints hit", "hidden keypoints hit")
+    ]
+    columns = ["dose", "level", "detector", "group", "measure", "value", "low", "high"]
+    figure = doses.dose_curves(pd.DataFrame(rows, columns=columns), "body")
+    light, hidden = figure.figure.axes
+    assert light.get_xscale() == "log" and hidden.get_xscale() == "linear"
+    assert len(light.lines) == 2 and "mediapipe 0.25 for light" in figure.alt
+
+
+def test_observed_curves_are_drawn_for_every_subset():
+    rows = [("distance", s, "mediapipe", x, x, x, x) for s in ("basic", "headless") for x in (0.1, 0.6)]
+    columns = ["dose", "subset", "detector", "level", "value", "low", "high"]
+    figure = doses.observed_curves(pd.DataFrame(rows, columns=columns), "made up")
+    assert len(figure.figure.axes[0].lines) == 2 and "mediapipe 0.50 for distance" in figure.alt
+
+
+def test_flicker_says_the_delay_of_the_filter():
+    points = np.random.default_rng(0).uniform(50, 400, (1, 136, 2))
+    sure = np.full((1, 136), 0.9)
+    run = [Detections(points + [20 * i, 0], sure, np.ones(1)) for i in range(30)]
+    table = flicker({"mediapipe": run}, np.arange(30) / 10, n_resamples=10)
+    figure = doses.flicker_rates(table, "made up")
+    lag = table[(table["measure"] == "latency [s]") & (table["tracks"] == "filtered")]["value"].iloc[0]
+    assert f"{1000 * lag:.0f} ms" in figure.caption and lag > 0
+    assert "mediapipe 0.000" in figure.alt

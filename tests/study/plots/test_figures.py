@@ -1,0 +1,120 @@
+"""Figures: what they carry, and that what is drawn is where it belongs."""
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import pytest
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import INDEX
+from hicp_lib.study.plots import evaluation, people
+from hicp_lib.study.plots.style import DETECTOR_COLOURS, Figure, detector_colour, in_words
+
+METRICS = ("AP", "AP50", "AP75", "AR", "AR50", "AR75")
+
+
+@pytest.fixture
+def metrics() -> pd.DataFrame:
+    rng = np.random.default_rng(0)
+    rows = [
+        (subset, group, detector, metric, value := rng.uniform(0.2, 0.8), value - 0.1, value + 0.1)
+        for subset in ("basic", "headless")
+        for group in ("body", "hand")
+        for detector in ("mediapipe", "openpose-mobilenet")
+        for metric in METRICS
+    ]
+    return pd.DataFrame(rows, columns=["subset", "group", "detector", "metric", "value", "low", "high"])
+
+
+def person(**points) -> tuple[np.ndarray, np.ndarray]:
+    keypoints, scores = np.full((1, 136, 2), np.nan), np.zeros((1, 136))
+    for name, (u, v, score) in points.items():
+        keypoints[0, INDEX[name]], scores[0, INDEX[name]] = (u, v), score
+    return keypoints, scores
+
+
+def test_a_keypoint_is_drawn_around_its_pixel_in_its_colour():
+    canvas = people.draw_people(
+        np.zeros((60, 80, 3), np.uint8), *person(nose=(30, 20, 1)), "#FF0000", thickness_px=3
+    )
+    assert canvas[20, 30].tolist() == [255, 0, 0]
+    rows, columns = np.nonzero(canvas[..., 0] > 200)
+    assert (rows.mean(), columns.mean()) == pytest.approx((20, 30), abs=0.1)
+
+
+def test_limbs_join_shown_points_only():
+    image = np.zeros((60, 80, 3), np.uint8)
+    shown = person(left_shoulder=(10, 30, 1), left_elbow=(70, 30, 1))
+    weak = person(left_shoulder=(10, 30, 1), left_elbow=(70, 30, 0.05))
+    assert people.draw_people(image, *shown, "white")[30, 40].tolist() == [255, 255, 255]
+    assert people.draw_people(image, *weak, "white")[30, 40].tolist() == [0, 0, 0]
+
+
+def test_drawing_leaves_the_image_and_survives_wild_points():
+    image = np.zeros((20, 20, 3), np.uint8)
+    people.draw_people(image, *person(nose=(1e9, -1e9, 1), left_eye=(-40, 400, 1)), "white")
+    assert not image.any()
+
+
+def test_flags_become_scores():
+    flags = np.zeros(136)
+    flags[:3] = [2, 1, 0.4]
+    assert people.visible_scores(flags)[0, :4].tolist() == [1.0, 0.5, 0.5, 0.0]
+
+
+@pytest.mark.parametrize("draw", [evaluation.precision_recall, evaluation.loss_without_head])
+def test_comparison_figures_say_on_what_data_and_what_they_show(metrics, draw):
+    figure = draw(metrics, "made-up people")
+    assert "made-up people" in figure.caption
+    assert "mediapipe" in figure.alt and len(figure.alt) < 600
+    assert len(figure.table)
+    for axis in figure.figure.axes:
+        assert axis.has_data()
+
+
+def test_alt_text_names_the_best_detector(metrics):
+    metrics.loc[(metrics["detector"] == "openpose-mobilenet") & (metrics["metric"] == "AP"), "value"] = 0.99
+    assert "openpose-mobilenet with 0.99 on basic body" in evaluation.precision_recall(metrics, "x").alt
+
+
+def test_the_share_of_people_falls_with_oks():
+    table = pd.DataFrame(
+        {"subset": "basic", "group": "body", "detector": "mediapipe", "oks": [0, 0.5, 0.9, 1.0]}
+    )
+    line = evaluation.oks_curves(table, "x").figure.axes[0].get_lines()[0]
+    heights = np.array(line.get_ydata())
+    assert heights[0] == 1 and heights[-1] == 0 and (np.diff(heights) <= 0).all()
+
+
+def test_times_are_in_milliseconds_from_zero():
+    table = pd.DataFrame({"detector": ["mediapipe"] * 5, "time_ms": [10.0, 11, 12, 13, 14]})
+    figure = evaluation.time_per_image(table, "alone")
+    assert figure.figure.axes[0].get_xlabel().endswith("[ms]") and figure.figure.axes[0].get_xlim()[0] == 0
+    assert "mediapipe 12 ms" in figure.alt
+
+
+def test_grids_have_a_picture_per_detector_and_room_for_missing_ones():
+    image = np.full((40, 30, 3), 90, np.uint8)
+    found = {"mediapipe": Detections.none(), "openpose-mobilenet": Detections.none()}
+    figure = people.detections_grid({"one": (image, found), "two": (image, found)}, 0.3)
+    assert sum(len(axis.images) for axis in figure.figure.axes) == 4
+    sparse = people.picture_grid([[image, None]], caption="c", alt="a")
+    assert [len(axis.images) for axis in sparse.figure.axes] == [1, 0]
+
+
+def test_drawing_leaves_matplotlib_as_it_was(metrics):
+    before = dict(mpl.rcParams)
+    assert isinstance(evaluation.precision_recall(metrics, "x"), Figure)
+    assert dict(mpl.rcParams) == before
+
+
+def test_colours_are_fixed_and_distinct():
+    assert len(set(DETECTOR_COLOURS.values())) == len(DETECTOR_COLOURS)
+    assert detector_colour("mmpose-imported") == DETECTOR_COLOURS["mmpose"]
+    assert detector_colour("combined:mmpose+b") == DETECTOR_COLOURS["combined"]
+    assert detector_colour("something else") not in DETECTOR_COLOURS.values()
+
+
+@pytest.mark.parametrize(("items", "text"), [([], "nothing"), (["a"], "a"), (["a", "b", "c"], "a, b and c")])
+def test_words(items, text):
+    assert in_words(items) == text

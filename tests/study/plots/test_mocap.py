@@ -1,0 +1,111 @@
+"""Figures of the test against motion capture, on tables made up: what they draw, carry and say."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hicp_lib.evaluation.space.mocap_error import JOINTS, TABLE_JOINTS, error_dependence, paper_medians
+from hicp_lib.study.plots import mocap as draw
+from hicp_lib.study.plots.style import detector_colour
+
+N = 90
+TIMES_S = 100 + np.arange(N) / 15
+DETECTORS = ("mediapipe", "openpose-mobilenet")
+
+
+@pytest.fixture(scope="module")
+def errors() -> pd.DataFrame:
+    """A joint that circles; one detector off by 3 cm, one by 8 cm and blind in a third of the frames."""
+    rng = np.random.default_rng(0)
+    tables = []
+    for detector, off_m in zip(DETECTORS, (0.03, 0.08), strict=True):
+        for joint in JOINTS:
+            phase = np.arange(N) / 10
+            reference = np.c_[-1 + 0.1 * np.sin(phase), 0.3 * np.cos(phase), 0.5 + 0.1 * phase / 9]
+            error = off_m * np.exp(rng.normal(0, 0.3, N))
+            score = np.where(
+                (np.arange(N) % 3 == 0) & (detector == DETECTORS[1]), 0.0, rng.uniform(0.2, 1, N)
+            )
+            reference[40:50] = np.nan
+            columns = {f"reference_{axis}_m": reference[:, k] for k, axis in enumerate("xyz")}
+            columns |= {f"{axis}_m": reference[:, k] + error * (axis == "x") for k, axis in enumerate("xyz")}
+            error[40:50] = np.nan
+            tables.append(
+                pd.DataFrame(
+                    columns | {"error_m": np.where(score > 0, error, np.nan), "score": score}
+                ).assign(
+                    detector=detector,
+                    method="paper",
+                    frame=np.arange(N),
+                    keypoint=joint,
+                    distance_m=1 + 0.01 * np.arange(N),
+                    sight=np.where(np.arange(N) % 4, "clear", "hidden"),
+                )  # fmt: skip
+            )
+    return pd.concat(tables, ignore_index=True)
+
+
+def colours(axis) -> set[str]:
+    return {line.get_color() for line in axis.lines}
+
+
+def test_fraction_curves_rise_to_the_share_that_was_found(errors):
+    figure = draw.fraction_curves(errors, 0.1, "made up")
+    assert [axis.get_title("left") for axis in figure.figure.axes] == [
+        "left elbow", "left wrist", "left shoulder", "right elbow", "right wrist", "right shoulder",
+    ]  # fmt: skip
+    assert all(colours(axis) == set(map(detector_colour, DETECTORS)) for axis in figure.figure.axes)
+    shares = figure.table.groupby(["detector", "keypoint"])["share"]
+    assert (shares.first() == 0).all() and all(part.is_monotonic_increasing for _, part in shares)
+    seen = errors[~errors["frame"].between(40, 49)]
+    for (detector, joint), end in shares.last().items():
+        part = seen[(seen["detector"] == detector) & (seen["keypoint"] == joint)]
+        assert end == pytest.approx((part["error_m"] <= 0.2).mean())
+    assert "made up" in figure.caption and "mediapipe 0.9" in figure.alt
+
+
+def test_distributions_stand_beside_the_papers_medians(errors):
+    figure = draw.error_distributions(errors, paper_medians(), 0.1, "made up")
+    assert len(figure.figure.axes) == len(TABLE_JOINTS)
+    axis = figure.figure.axes[0]
+    labels = [label.get_text() for label in axis.get_yticklabels()]
+    assert labels == [
+        *DETECTORS,
+        *(f"{name} (paper)" for name in ("alphapose", "mmpose", "detectron2", "openpose")),
+    ]
+    diamonds = [line for line in axis.lines if line.get_marker() == "D"]
+    assert [float(line.get_xdata()[0]) for line in diamonds] == pytest.approx([4.0, 3.5, 16.7, 15.4])
+    assert [float(line.get_ydata()[0]) for line in diamonds] == [2, 3, 4, 5]
+    assert len(axis.patches) == len(DETECTORS)
+
+
+def test_a_detector_that_found_nothing_has_no_box(errors):
+    blind = errors.assign(score=errors["score"] * (errors["detector"] != "mediapipe"))
+    figure = draw.error_distributions(blind, paper_medians(), 0.3, "made up")
+    assert len(figure.figure.axes[0].patches) == 1 and "mediapipe" not in figure.alt
+
+
+def test_trajectories_show_gaps_of_the_motion_capture(errors):
+    figure = draw.trajectories(errors, TIMES_S, "right_wrist", 0.1, "made up")
+    line = figure.figure.axes[0].lines[0]
+    assert np.isnan(line.get_ydata()[40:50]).all() and np.isfinite(line.get_ydata()[:40]).all()
+    assert line.get_xdata()[0] == 0 and line.get_xdata()[-1] == pytest.approx((N - 1) / 15)
+    assert len(figure.figure.axes[2].lines) == 1 + len(DETECTORS)
+    assert f"mediapipe in {N - 10} frames" in figure.alt and set(figure.table["detector"]) == set(DETECTORS)
+
+
+def test_a_joint_motion_capture_never_saw_can_still_be_drawn(errors):
+    unseen = errors.assign(**{f"reference_{axis}_m": np.nan for axis in "xyz"}, error_m=np.nan)
+    assert draw.trajectories(unseen, TIMES_S, "left_wrist", 0.1, "made up").figure.axes
+
+
+def test_dependence_is_drawn_for_numbers_and_labels(errors):
+    figure = draw.error_dependence(error_dependence(errors), "made up")
+    axes = np.array(figure.figure.axes).reshape(2, 3)
+    assert [axis.get_xlabel() for axis in axes[1]] == [
+        "distance from the camera [m]",
+        "score",
+        "line of sight",
+    ]
+    assert {label.get_text() for label in axes[0, 2].get_xticklabels()} == {"clear", "hidden"}
+    assert "mediapipe 3." in figure.alt and "when hidden" in figure.alt

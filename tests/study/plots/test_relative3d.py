@@ -1,0 +1,139 @@
+"""Figures of the relative 3D test, on tables made up: what they draw, carry and say."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import INDEX
+from hicp_lib.study.plots import relative3d, within_distance
+from hicp_lib.study.plots.style import DETECTOR_COLOURS
+
+VIEWS, DETECTORS = ("upper", "lower"), ("mediapipe", "openpose-mobilenet")
+PARTS = ("left wrist", "right wrist", "left hand", "right hand")
+SKELETON = {
+    "left_shoulder": (-0.7, -0.2, 0.4),
+    "left_elbow": (-0.7, -0.25, 0.15),
+    "left_wrist": (-0.5, -0.2, 0.1),
+}
+
+
+@pytest.fixture
+def shares() -> pd.DataFrame:
+    rows = [
+        (view, detector, method, part, "median", threshold, 4 * threshold, 3 * threshold, 5 * threshold, 0.9)
+        for view in VIEWS
+        for detector in DETECTORS
+        for method in ("robust", "paper")
+        for part in PARTS
+        for threshold in (0.025, 0.05, 0.1)
+    ]
+    columns = [
+        "view",
+        "detector",
+        "method",
+        "part",
+        "reference",
+        "threshold_m",
+        "value",
+        "low",
+        "high",
+        "found",
+    ]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def test_curves_rise_with_the_distance_one_per_detector_and_method(shares):
+    figure = within_distance.within_curves(shares, (0.025, 0.05, 0.1), "made up")
+    axis = figure.figure.axes[0]
+    assert len(axis.get_lines()) == len(DETECTORS) * 2
+    assert axis.get_lines()[0].get_xdata().tolist() == pytest.approx([2.5, 5, 10])
+    assert axis.get_lines()[0].get_ydata().tolist() == pytest.approx([0.1, 0.2, 0.4])
+    assert "mediapipe upper robust 20%" in figure.alt and "made up" in figure.caption
+    assert "median position" in figure.caption
+
+
+def test_bars_are_as_high_as_the_shares_and_say_of_what(shares):
+    rows = shares[shares["method"] == "robust"].assign(reference="truth")
+    figure = within_distance.within_bars(rows, "made up")
+    axis = figure.figure.axes[0]
+    heights = {round(bar.get_height(), 6) for bar in axis.patches}
+    assert {0.1, 0.2, 0.4, 0.9} <= heights
+    lowest = figure.figure.axes[-1]
+    assert [label.get_text() for label in lowest.get_xticklabels()] == list(PARTS)
+    assert "2.5, 5 and 10 cm of its true position" in figure.caption
+    assert figure.table["value"].tolist() == rows["value"].tolist()
+
+
+def test_bars_lie_over_each_other_with_the_closest_in_front(shares):
+    rows = shares[(shares["method"] == "robust") & (shares["view"] == "upper")]
+    axis = within_distance.within_bars(rows, "x").figure.axes[0]
+    coloured = [bar.get_height() for bar in axis.patches if bar.get_alpha() is not None and bar.get_height()]
+    assert coloured[:4] == pytest.approx([0.4] * 4) and coloured[8:12] == pytest.approx([0.1] * 4)
+
+
+def test_skeletons_are_drawn_per_view_and_direction_with_the_truth_dashed():
+    keypoints = pd.DataFrame(
+        [(name, *at) for name, at in SKELETON.items()], columns=["keypoint", "x_m", "y_m", "z_m"]
+    )
+    medians = pd.concat(
+        [
+            keypoints.assign(view=view, detector=detector, method="robust", n=9)
+            for view in VIEWS
+            for detector in DETECTORS
+        ]
+    )
+    figure = relative3d.median_skeletons(medians, dict.fromkeys(VIEWS, keypoints), "made up")
+    assert len(figure.figure.axes) == 6
+    front = figure.figure.axes[0]
+    drawn = [line for line in front.get_lines() if len(line.get_xydata())]
+    assert {line.get_linestyle() for line in drawn} == {"-", "--"}
+    ends = {tuple(np.round(end, 3)) for line in drawn for end in line.get_xydata() if np.isfinite(end).all()}
+    assert ends == {(y, z) for _, y, z in SKELETON.values()}
+    assert "mediapipe 3 (upper)" in figure.alt and "true skeleton" in figure.caption
+    assert "true" not in relative3d.median_skeletons(medians, None, "made up").caption
+
+
+def test_spread_and_bias_are_in_centimetres_and_rare_parts_left_out():
+    rows = [("upper", "mediapipe", "robust", part, n, 0.01, 0.009, 0.011, 0.03, 0.02, 0.04, 0.03, 0.02, 0.04)
+            for part, n in (("left wrist", 50), ("right wrist", 2))]  # fmt: skip
+    names = [f"{name}{end}" for name in ("spread_m", "bias_m", "error_m") for end in ("", "_low", "_high")]
+    figure = relative3d.spread_against_bias(
+        pd.DataFrame(rows, columns=["view", "detector", "method", "part", "n_images", *names]),
+        "robust",
+        "made up",
+    )
+    assert figure.table["part"].tolist() == ["left wrist"]
+    marker = figure.figure.axes[0].get_lines()[0]
+    assert marker.get_xydata()[0].tolist() == pytest.approx([1, 3])
+    assert marker.get_color() == DETECTOR_COLOURS["mediapipe"]
+    assert "mediapipe 1 with more bias" in figure.alt
+
+
+def test_causes_are_dots_with_the_tail_as_a_line():
+    rows = [
+        ("upper", "mediapipe", "left wrist", cause, 30, spread, 2 * spread, 0.05)
+        for cause, spread in (("depth sensor", 0.004), ("2D detection", 0.016))
+    ]
+    columns = ["view", "detector", "part", "cause", "n", "spread_m", "p90_m", "bias_m"]
+    figure = relative3d.spread_causes(pd.DataFrame(rows, columns=columns), "made up")
+    dots = [line.get_xdata()[0] for line in figure.figure.axes[0].get_lines()]
+    assert dots == pytest.approx([0.4, 1.6])
+    off = [line.get_xdata()[0] for line in figure.figure.axes[1].get_lines()]
+    assert off == pytest.approx([5, 5])
+    assert "depth sensor 0.4 and 5.0 cm and 2D detection 1.6 and 5.0 cm" in figure.alt
+
+
+def test_camera_views_have_a_row_per_frame_and_a_column_per_view_and_detector(monkeypatch):
+    monkeypatch.setattr(
+        relative3d, "read_rgb", lambda recording, frame: np.full((30, 40, 3), frame, np.uint8)
+    )
+    pixels, scores = np.full((1, 136, 2), np.nan), np.zeros((1, 136))
+    pixels[0, INDEX["left_wrist"]], scores[0, INDEX["left_wrist"]] = (20, 10), 0.9
+    found, nobody = Detections(pixels, scores, np.ones(1)), Detections.none()
+    people = {("upper", "mediapipe"): [found] * 3, ("lower", "mediapipe"): [nobody, nobody, found]}
+    figure = relative3d.camera_views({"upper": None, "lower": None}, people, [0, 2], 0.1, "made up")
+    images = [axis.images[0].get_array() for axis in figure.figure.axes]
+    assert [int(image[0, 0, 0]) for image in images] == [0, 0, 2, 2]
+    assert [bool((image != image[0, 0]).any()) for image in images] == [True, False, True, True]
+    assert "mediapipe 2 (upper) and mediapipe 1 (lower)" in figure.alt and "made up" in figure.caption
