@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hicp_lib.core.camera import Intrinsics, transform
+from hicp_lib.core.camera import Camera, transform
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.registry import make_detector
@@ -31,7 +31,7 @@ from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.loop import AvoidanceLoop, Perception
 from hicp_lib.robot.peripersonal_space import ReceptiveField, gains, response
-from hicp_lib.simulation.rendering.camera import project
+from hicp_lib.simulation.rendering.camera import project_world
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import render
 from hicp_lib.simulation.sensors.depth_camera import D435, simulate_depth
@@ -67,7 +67,7 @@ class Clock:
         }
 
 
-def make_frames(n: int) -> list[tuple[np.ndarray, np.ndarray, Intrinsics, Detections]]:
+def make_frames(n: int) -> list[tuple[np.ndarray, np.ndarray, Camera, Detections]]:
     """Colour image, depth, camera and true keypoints of rendered scenes."""
     frames = []
     for index in range(n):
@@ -76,9 +76,9 @@ def make_frames(n: int) -> list[tuple[np.ndarray, np.ndarray, Intrinsics, Detect
         camera, frame = stage.camera, render(stage.world, stage.camera, rng)
         image = expose(frame.radiance, stage.sensor, rng, frame.person >= 0)
         depth = simulate_depth(frame.rays, camera, D435, rng)
-        pixels = np.stack([project(camera, person.keypoints_m)[0] for person in stage.people])
+        pixels = np.stack([project_world(camera, person.keypoints_m)[0] for person in stage.people])
         true = Detections(pixels, np.ones(pixels.shape[:2]), np.ones(len(pixels)))
-        intrinsics = Intrinsics(
+        intrinsics = Camera(
             camera.width_px, camera.height_px, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px
         )
         frames.append((image, depth, intrinsics, true))

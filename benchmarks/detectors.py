@@ -34,8 +34,7 @@ import psutil
 
 from hicp_lib.core.images import read_image, write_png
 from hicp_lib.detectors import registry
-from hicp_lib.detectors.mediapipe import bundle as mediapipe_bundle
-from hicp_lib.detectors.mediapipe import child as mediapipe_child
+from hicp_lib.detectors.mediapipe import bundles, child
 from hicp_lib.detectors.openpose import mobilenet as openpose_net
 from hicp_lib.detectors.runtime import isolation as native
 from hicp_lib.detectors.runtime import run
@@ -98,7 +97,7 @@ def stopwatch(work: Callable, *arguments: object) -> tuple[float, float]:
 
 def processor_s() -> float:
     """Processor time of this process and of its children, running or ended."""
-    running = [child.cpu_times() for child in psutil.Process().children()]
+    running = [other.cpu_times() for other in psutil.Process().children()]
     return sum(os.times()[:4]) + sum(times.user + times.system for times in running)
 
 
@@ -126,7 +125,7 @@ def measure_process(name: str, size_px: tuple[int, int], calls: int) -> dict:
     photograph = read_image(Path(matplotlib.get_data_path()) / "sample_data" / "grace_hopper.jpg")
     image = cv2.resize(photograph, size_px, interpolation=cv2.INTER_AREA)
     task, n = {"mediapipe-pose": ("pose", 1), "mediapipe-hands": ("hand", 2)}[name]
-    here = mediapipe_child.detection(mediapipe_bundle.assemble(task), task, n=n, min_score=0.5)
+    here = child.detection(bundles.assemble(task), task, n=n, min_score=0.5)
     process = registry.make_detector(name)._process
     start_s, start_cpu_s = stopwatch(process.start)
     own = process.ask

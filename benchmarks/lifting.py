@@ -17,15 +17,15 @@ from pathlib import Path
 import numpy as np
 from timing import best_seconds
 
-from hicp_lib.core.camera import Intrinsics, deproject
+from hicp_lib.core.camera import Camera, deproject
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.lifting.paper import RADIUS_M, lift
 from hicp_lib.lifting.robust import lift_robust
 from hicp_lib.simulation.body.model import load_body, pose_body
-from hicp_lib.simulation.rendering.camera import Camera, look_at, pixel_rays, project
+from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at, pixel_rays, project_world
 from hicp_lib.simulation.sensors.markers import body_scene
 
-INTRINSICS = Intrinsics(640, 480, 615.0, 615.0, 319.5, 239.5)
+INTRINSICS = Camera(640, 480, 615.0, 615.0, 319.5, 239.5)
 VIEWS = {"whole person, 2.4 m": ("mid_hip", 2.4), "upper body, 1 m": ("neck", 1.0)}
 HOLES = 0.02  # share of pixels without depth
 
@@ -35,14 +35,14 @@ def make_frame(middle: str, distance_m: float) -> tuple[np.ndarray, np.ndarray]:
     person = pose_body(load_body(), "woman_35_average", {})
     target_m = person.keypoints_m[INDEX[middle]] + [0, 0, -0.05]
     pose = look_at(target_m + [distance_m, 0, 0], target_m)
-    camera = Camera(640, 480, 615.0, 615.0, 319.5, 239.5, pose)
+    camera = PlacedCamera(640, 480, 615.0, 615.0, 319.5, 239.5, pose)
     depth_m = body_scene(person).trace(pixel_rays(camera)).depth_m.reshape(480, 640)
     depth_m = np.where(np.isfinite(depth_m), depth_m, distance_m + 1).astype(np.float32)
     depth_m[np.random.default_rng(0).random(depth_m.shape) < HOLES] = 0
-    return project(camera, person.keypoints_m)[0][None], depth_m
+    return project_world(camera, person.keypoints_m)[0][None], depth_m
 
 
-def lift_one_by_one(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intrinsics) -> np.ndarray:
+def lift_one_by_one(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera) -> np.ndarray:
     """The baseline: (n, 136, 3); keypoints on holes are left out, which the paper's text does not treat."""
     points_m = np.full((*keypoints_px.shape[:2], 3), np.nan)
     for person, keypoint in np.ndindex(keypoints_px.shape[:2]):

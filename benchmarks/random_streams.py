@@ -23,8 +23,8 @@ from tqdm import tqdm
 from hicp_lib.robot.home import home_posture
 from hicp_lib.robot.kinematics import load_icub
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "robot"))
-from keypoint_streams import first_violation  # noqa: E402
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests.robot.keypoint_streams import first_violation  # noqa: E402
 
 
 def main() -> None:

@@ -17,8 +17,8 @@ import sys
 import time
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "simulation"))
-import made_results  # noqa: E402
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests.simulation import made_results  # noqa: E402
 
 
 def names(n_scenes: int, n_rendered: int, n_others: int) -> list[str]:

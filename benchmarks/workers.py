@@ -27,7 +27,7 @@ from hicp_lib.detectors.weights import default as zoo
 
 _PROGRAM = """
 import sys, time
-from hicp_lib.detectors import run
+from hicp_lib.detectors.runtime import run
 name, workers, *paths = sys.argv[1:]
 run.DetectorPool(name, {})  # loads its libraries
 print("ready", flush=True)

@@ -18,7 +18,7 @@ from hicp_lib.core.keypoints import HANDS, INDEX
 from hicp_lib.experiments.laboratory import COLOUR, robot_camera
 from hicp_lib.experiments.recordings.seated_person import VIEWS, seated
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
-from hicp_lib.simulation.rendering.camera import inside_image, project
+from hicp_lib.simulation.rendering.camera import project_world
 
 N_POSES = 100
 SEED = 2022
@@ -66,10 +66,10 @@ def is_framed(
 ) -> bool:
     """Whether the wanted keypoints are well inside the image, and the unwanted ones outside."""
     camera = robot_camera(COLOUR, T_root_camera)
-    pixels_px = project(camera, points_m)[0]
+    pixels_px = project_world(camera, points_m)[0]
     size = np.array([camera.width_px, camera.height_px])
     well_inside = ((pixels_px > MARGIN_PX) & (pixels_px < size - MARGIN_PX)).all(axis=1)
-    return bool(well_inside[wanted].all() and not inside_image(camera, pixels_px[unwanted]).any())
+    return bool(well_inside[wanted].all() and not camera.contains(pixels_px[unwanted]).any())
 
 
 if __name__ == "__main__":

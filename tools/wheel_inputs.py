@@ -9,13 +9,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hicp_lib.core.camera import Intrinsics
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.formats.annotations import read_annotations
 from hicp_lib.recordings.writer import RecordingWriter
 
-sys.path.append(str(Path(__file__).parents[1] / "tests" / "detectors" / "onnx"))
-from onnx_models import colour_maps_model  # noqa: E402
+sys.path.append(str(Path(__file__).parents[1]))
+from tests.detectors.onnx.onnx_models import colour_maps_model  # noqa: E402
 
 
 def main(out: Path) -> None:
@@ -27,7 +27,7 @@ def main(out: Path) -> None:
         pixels = noise.integers(0, 256, (image.height_px, image.width_px, 3), np.uint8)
         cv2.imwrite(str(out / "images" / image.file_name), pixels)
     colour_maps_model(out / "net.onnx", (192, 256), 133)
-    recording = RecordingWriter(out / "rec", Intrinsics(64, 48, 60.0, 60.0, 31.5, 23.5))
+    recording = RecordingWriter(out / "rec", Camera(64, 48, 60.0, 60.0, 31.5, 23.5))
     for k in range(3):
         pixels = noise.integers(0, 256, (48, 64, 3), np.uint8)
         recording.add(100 + k / 10, pixels, np.full((48, 64), 1.0), np.eye(4))

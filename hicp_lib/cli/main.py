@@ -207,9 +207,8 @@ def evaluate(
     """Average precision and recall by OKS, with 95 % bootstrap intervals over images."""
     from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals
     from hicp_lib.evaluation.ap.evaluate import evaluate as evaluate_detections
-    from hicp_lib.evaluation.ap.metric_table import source_images
     from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN
-    from hicp_lib.formats.annotations import read_annotations, read_detections
+    from hicp_lib.formats.annotations import read_annotations, read_detections, source_images
 
     people = read_annotations(annotations)
     found = read_detections(detections, people)

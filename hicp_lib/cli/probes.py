@@ -1,7 +1,7 @@
 """Small trials of what runs on native libraries: each detector, the renderer, the controller.
 
-`python -m hicp_lib.cli.probes NAME` makes one trial and prints what came of it. The doctor runs each in a process
-of its own: a native library may abort, or hang, and must not take anything along.
+`python -m hicp_lib.cli.probes NAME` makes one trial and prints what came of it. The doctor runs each in a
+process of its own: a native library may abort, or hang, and must not take anything along.
 """
 
 from __future__ import annotations

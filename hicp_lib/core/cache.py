@@ -1,7 +1,8 @@
-"""Keys of cached results: the code that makes a result, the data it reads, the libraries it calls, its inputs.
+"""Keys of cached results: the code that makes a result, its data, the libraries it calls, its inputs.
 
-The code is found, not listed: every module of the library that the entry points import, from whatever place
-(the *import closure*). So a module that moves, or is imported anew, is part of the key by itself.
+The code is found, not listed: every module of the library that the entry points import, wherever in their
+code, or name in a string that holds nothing else, and what these import in turn (the *import closure*). So a
+module that moves, or is imported anew, is part of the key by itself.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ _DISTRIBUTIONS = {
     "open3d": ("open3d-cpu", "open3d"),
     "pinocchio": ("pin",),
 }
+_NAMED = re.compile(r'"(hicp_lib(?:\.\w+)+)"')  # modules that are imported by name, or run as programs
 _DATA = re.compile(r'\bDATA_DIR\b(?:\s*/\s*"([^"]+)")?')
 ALL_DATA = "**/*"
 
@@ -74,8 +76,8 @@ def key(entry_points: Sequence[Any], *, without: Sequence[str] = (), **inputs: A
     without : sequence of str
         Names of modules where that stops: what they do to the result is said by `inputs`.
     **inputs
-        What the code is given, by any names: plain values, arrays, tables, dataclasses of these; a path counts
-        by the names, sizes and times of its files.
+        What the code is given, by any names: plain values, arrays, tables, dataclasses of these; a path
+        counts by the names, sizes and times of its files.
 
     Raises
     ------
@@ -92,14 +94,18 @@ def key(entry_points: Sequence[Any], *, without: Sequence[str] = (), **inputs: A
     return digest([_code_digest(names, tuple(without)), content(inputs)])
 
 
-@cache
+@cache  # what a process runs is what it first loaded, whatever becomes of the files
 def _code_digest(names: tuple[str, ...], without: tuple[str, ...]) -> str:
     found = code(names, without=without)
     return digest([found.modules, found.data, found.libraries])
 
 
 def code(
-    names: Iterable[str], *, without: Sequence[str] = (), library: Path = LIBRARY_DIR, data: Path = DATA_DIR
+    names: Iterable[str],
+    *,
+    without: Sequence[str] = (),
+    library: Path | None = None,
+    data: Path | None = None,
 ) -> Code:
     """The import closure of modules of the library, with the data and the libraries it uses.
 
@@ -109,14 +115,15 @@ def code(
         Modules; what is not of the library counts as a library that is called.
     without : sequence of str
         Modules that are left out, with what only they import.
-    library, data : Path
-        Folders of the library's code and of its data.
+    library, data : Path, optional
+        Folders of the library's code and of its data, where they are not those that are running.
 
     Examples
     --------
     >>> sorted(code(["hicp_lib.core.errors"]).modules)
     ['hicp_lib', 'hicp_lib.core', 'hicp_lib.core.errors']
     """
+    library = library or LIBRARY_DIR
     waiting, modules, others = list(names), {}, set()
     while waiting:
         name = waiting.pop()
@@ -124,7 +131,8 @@ def code(
             continue
         path = _path(name, library)
         if path is not None:
-            modules[name] = _read(path)
+            state = path.stat()
+            modules[name] = _read(path, state.st_mtime_ns, state.st_size)
             waiting += [name.rpartition(".")[0], *modules[name].imports]
         elif name.startswith("hicp_lib."):
             waiting.append(name.rpartition(".")[0])  # something within a module
@@ -133,7 +141,7 @@ def code(
     patterns = frozenset().union(*(module.data for module in modules.values()))
     return Code(
         {name: module.sha256 for name, module in modules.items()},
-        _data_sha256(patterns, data),
+        _data_sha256(patterns, data or DATA_DIR),
         {name: _version(name) for name in others - sys.stdlib_module_names},
     )
 
@@ -220,18 +228,21 @@ def _path(name: str, library: Path) -> Path | None:
 
 
 @cache
-def _read(path: Path) -> _Module:
-    """A module as it was when it was first asked for: later changes are not in the code this process runs."""
+def _read(path: Path, *state: int) -> _Module:
+    """A module's file; `state` differs when it was written anew."""
     source = path.read_bytes()
     statements = list(_imports(ast.parse(source)))
-    names = frozenset(name for statement in statements for name in _imported(statement))
+    names = {name for statement in statements for name in _imported(statement)}
+    names |= set(_NAMED.findall(source.decode()))
     lines = source.decode().splitlines()
     for statement in statements:
         lines[statement.lineno - 1 : statement.end_lineno] = [""] * (
             statement.end_lineno - statement.lineno + 1
         )
     data = frozenset(name or ALL_DATA for name in _DATA.findall("\n".join(lines)))
-    return _Module(sha256_bytes(source), names, frozenset() if path.name == "datafiles.py" else data)
+    if path.name == "datafiles.py":  # defines the folder, and names no file of it
+        data = frozenset()
+    return _Module(sha256_bytes(source), frozenset(names), data)
 
 
 def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:

@@ -22,8 +22,9 @@ from hicp_lib.core.files import cache_dir, sha256_bytes, write_bytes
 def kept(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> pd.DataFrame:
     """The table ``make(*arguments, **named)``, made only if it is not in the cache.
 
-    The key is all it depends on (`hicp_lib.core.cache.key`): the function and what it imports, and its inputs. A damaged file is never an
-    answer: the table is made again. What is returned was read from the file, the first time too.
+    The key is all it depends on (`hicp_lib.core.cache.key`): the function and what it imports, and its
+    inputs. A damaged file is never an answer: the table is made again. What is returned was read from the
+    file, the first time too.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ def kept(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> pd
     """
     given = inspect.signature(make).bind(*arguments, **named)
     given.apply_defaults()
-    result_key = key([make], function=make.__qualname__, **given.arguments)
+    result_key = key([make, kept], function=make.__qualname__, arguments=given.arguments)
     path = cache_dir() / "tables" / make.__name__ / f"{result_key[:32]}.bin"
     table = _read(path)
     if table is None:

@@ -12,6 +12,12 @@ _BESIDE_LIBRARY = Path(__file__).resolve().parents[2]
 CHECKOUT: Path | None = _BESIDE_LIBRARY if (_BESIDE_LIBRARY / _MARK).is_file() else None
 """The checkout that the library itself runs from; None where it was installed."""
 
+# Set for the kernel of a run: where its results go, where those of earlier notebooks are, and the profile's
+# name. Absent in Jupyter.
+RESULTS_VARIABLE = "HICP_RESULTS"
+EARLIER_RESULTS_VARIABLE = "HICP_EARLIER_RESULTS"
+PROFILE_VARIABLE = "HICP_PROFILE"
+
 
 def working_folder() -> Path:
     """Where results go: the working folder, or the study around it, since Jupyter works in `notebooks`."""

@@ -57,8 +57,9 @@ class Detector(Protocol):
     its results: two detectors with equal name and settings give equal detections. A detector
     with a true attribute `takes_boxes` is given the people's boxes, `detect(image, boxes_px)`.
     One that is made of others has them in a dictionary `parts` and asks them there, so that
-    their answers can be kept (see `hicp_lib.detectors.runtime.cached_parts`). One whose first call would take longer than the
-    others, since something is started for it, starts that in a method `start()` too, if it is called before.
+    their answers can be kept (see `hicp_lib.detectors.runtime.cached_parts`). One whose first call would
+    take longer than the others, since something is started for it, starts that in a method `start()` too, if
+    it is called before.
     """
 
     name: str

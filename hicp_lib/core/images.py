@@ -10,6 +10,8 @@ import numpy as np
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import write_bytes
 
+Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom exclusive
+
 
 def read_image(path: str | Path) -> np.ndarray:
     """Read an image as RGB, shape (height, width, 3), uint8; EXIF rotation is not applied.
@@ -44,3 +46,27 @@ def write_png(path: str | Path, image: np.ndarray) -> None:
     options = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP]
     _, encoded = cv2.imencode(".png", pixels, options)
     write_bytes(path, encoded.tobytes())
+
+
+def inside(pixels_px: np.ndarray, box_px: Box) -> np.ndarray:
+    """Whether positions lie on the pixels of a box; pixel i is [i - 0.5, i + 0.5).
+
+    Parameters
+    ----------
+    pixels_px : array, shape (..., 2)
+        (u, v); NaN lies nowhere.
+    box_px : tuple of int
+        Left, top, right, bottom; right and bottom exclusive.
+
+    Returns
+    -------
+    array of bool, shape (...)
+
+    Examples
+    --------
+    >>> inside(np.array([[0, 0], [2.4, 1], [2.5, 1], [np.nan, 0]]), (0, 0, 3, 2))
+    array([ True,  True, False, False])
+    """
+    left, top, right, bottom = box_px
+    u, v = np.moveaxis(np.asarray(pixels_px, float), -1, 0)
+    return (u >= left - 0.5) & (u < right - 0.5) & (v >= top - 0.5) & (v < bottom - 0.5)

@@ -120,15 +120,12 @@ def _joined(source: Annotations, parts: list[tuple[int, Box, Annotations]]) -> A
         for image_id, extra in zip(source.image_ids, source.extras, strict=True)
         if not extra.get("other")
     }
-    images, extras = {}, []
-    pieces = [source.take(np.zeros(0, dtype=int))]  # so that no crop at all is a data set, too
+    images, pieces = {}, []
     for number, (image_id, box, people) in enumerate(parts, start=1):
         images[number] = ImageInfo(number, _file_name(number), box[2] - box[0], box[3] - box[1])
         left, top = origins[image_id]["crop_px"][:2]
         in_source = [box[0] + left, box[1] + top, box[2] + left, box[3] + top]
-        extras.append(origins[image_id] | {"subset": "close", "crop_px": in_source})
-        extras += [{"other": True} for _ in people.ids[1:]]
-        pieces.append(replace(people, image_ids=np.full(len(people), number)))
-    arrays = ("image_ids", "boxes_px", "areas_px2", "is_crowd", "keypoints_px", "visibility")
-    joined = {name: np.concatenate([getattr(piece, name) for piece in pieces]) for name in arrays}
-    return Annotations(images=images, ids=np.arange(1, len(extras) + 1), extras=extras, **joined)
+        about = origins[image_id] | {"subset": "close", "crop_px": in_source}
+        extras = [about, *({"other": True} for _ in people.ids[1:])]
+        pieces.append(replace(people, image_ids=np.full(len(people), number), extras=extras))
+    return Annotations.concatenate(pieces, images).numbered()

@@ -23,6 +23,7 @@ from typing import Literal
 
 import numpy as np
 
+from hicp_lib.core.images import Box, inside
 from hicp_lib.core.keypoints import BODY, HEAD, INDEX
 from hicp_lib.formats.annotations import Annotations
 
@@ -30,7 +31,6 @@ TRUNK = np.setdiff1d(BODY, HEAD)
 _MID_HEAD = np.arange(0, 5)  # nose, eyes, ears
 _TOP, _CHIN = INDEX["head_top"], INDEX["face_8"]
 
-Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom exclusive
 Side = Literal["left", "top", "right", "bottom"]
 
 
@@ -69,13 +69,6 @@ def whole_pixel_boxes(boxes_px: np.ndarray, widths_px: np.ndarray, heights_px: n
     first = np.clip(np.floor(start), 0, limits)
     past = np.where(end > start, np.clip(np.ceil(end), 0, limits), first)
     return np.concatenate([first, past], axis=-1).astype(int)
-
-
-def inside(keypoints_px: np.ndarray, crop_px: Box) -> np.ndarray:
-    """Whether keypoints, shape (..., 2), lie on the pixels of a crop; shape (...), False for NaN."""
-    left, top, right, bottom = crop_px
-    u, v = np.moveaxis(keypoints_px, -1, 0)
-    return (u >= left - 0.5) & (u < right - 0.5) & (v >= top - 0.5) & (v < bottom - 0.5)
 
 
 def headless_cut(keypoints_px: np.ndarray, visibility: np.ndarray, crop_px: Box) -> HeadCut | None:

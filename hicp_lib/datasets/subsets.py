@@ -20,6 +20,7 @@ import json
 import shutil
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -132,27 +133,16 @@ def crop_annotations(annotations: Annotations, table: pd.DataFrame, subset: str)
         others_about = [{"other": True, "source_id": i} for i in people.ids[1:].tolist()]
         ids = np.r_[person_id, next_id : next_id + len(others_about)]
         next_id += len(others_about)
-        crowd = np.arange(len(people)) > 0
-        parts.append((ids, np.full(len(people), person_id), people, crowd, [about, *others_about]))
-    return _joined(images, parts)
-
-
-def _joined(images: dict[int, ImageInfo], parts: list[tuple]) -> Annotations:
-    def rows(arrays: list[np.ndarray], *shape: int, dtype: type = float) -> np.ndarray:
-        return np.concatenate([np.zeros((0, *shape), dtype), *arrays])
-
-    people = [part[2] for part in parts]
-    return Annotations(
-        images,
-        rows([part[0] for part in parts], dtype=np.int64),
-        rows([part[1] for part in parts], dtype=np.int64),
-        rows([p.boxes_px for p in people], 4),
-        rows([p.areas_px2 for p in people]),
-        rows([part[3] for part in parts], dtype=bool),
-        rows([p.keypoints_px for p in people], 136, 2),
-        rows([p.visibility for p in people], 136),
-        [extra for part in parts for extra in part[4]],
-    )
+        parts.append(
+            replace(
+                people,
+                ids=ids,
+                image_ids=np.full(len(people), person_id),
+                is_crowd=np.arange(len(people)) > 0,
+                extras=[about, *others_about],
+            )
+        )
+    return Annotations.concatenate(parts, images)
 
 
 def _file_name(annotation_id: int) -> str:

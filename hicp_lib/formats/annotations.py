@@ -14,8 +14,8 @@ Both are checked where they enter. Conventions of this module, where formats in 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path, PureWindowsPath
 
 import numpy as np
@@ -23,7 +23,7 @@ import numpy as np
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
-from hicp_lib.core.keypoints import COCO_17, NAMES
+from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS, NAMES
 from hicp_lib.formats.json_validation import PART_KEYS, Rows, shown
 
 PERSON_CATEGORY = 1
@@ -79,6 +79,44 @@ class Annotations:
         arrays = (self.ids, self.image_ids, self.boxes_px, self.areas_px2, self.is_crowd, self.keypoints_px)
         chosen = (array[rows] for array in (*arrays, self.visibility))
         return Annotations(self.images, *chosen, [self.extras[i] for i in rows])
+
+    def of_images(self, image_ids: Collection[int]) -> Annotations:
+        """The people of some images, and these images only."""
+        chosen = np.array([i in image_ids for i in self.image_ids.tolist()], dtype=bool)
+        images = {i: image for i, image in self.images.items() if i in image_ids}
+        return replace(self.take(chosen), images=images)
+
+    @classmethod
+    def concatenate(cls, parts: Sequence[Annotations], images: dict[int, ImageInfo]) -> Annotations:
+        """The people of all parts, in `images`, with the ids they have; parts may be none at all."""
+        arrays = {
+            name: np.concatenate([empty, *(getattr(part, name) for part in parts)])
+            for name, empty in _NOBODY.items()
+        }
+        return cls(images=images, extras=[extra for part in parts for extra in part.extras], **arrays)
+
+    def numbered(self) -> Annotations:
+        """The same people with ids from 1."""
+        return replace(self, ids=np.arange(1, len(self) + 1))
+
+
+_NOBODY = {
+    "ids": np.zeros(0, np.int64),
+    "image_ids": np.zeros(0, np.int64),
+    "boxes_px": np.zeros((0, 4)),
+    "areas_px2": np.zeros(0),
+    "is_crowd": np.zeros(0, bool),
+    "keypoints_px": np.zeros((0, N_KEYPOINTS, 2)),
+    "visibility": np.zeros((0, N_KEYPOINTS)),
+}
+
+
+def source_images(annotations: Annotations) -> dict[int, int]:
+    """Image id -> the image it was cropped from (itself where the annotations do not say)."""
+    source = {i: i for i in annotations.images}
+    for image_id, extra in zip(annotations.image_ids.tolist(), annotations.extras, strict=True):
+        source[image_id] = extra.get("source_image_id", source[image_id])
+    return source
 
 
 def read_annotations(path: str | Path) -> Annotations:

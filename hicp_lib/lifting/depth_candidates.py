@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hicp_lib.core.camera import Intrinsics
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.keypoints import BODY, N_KEYPOINTS
 from hicp_lib.lifting.paper import has_depth
 
@@ -46,7 +46,7 @@ def look_around(
     pixels_px: np.ndarray,
     near_m: np.ndarray,
     depth_m: np.ndarray,
-    intrinsics: Intrinsics,
+    intrinsics: Camera,
     below_m: np.ndarray,
 ) -> Candidates:
     """Candidates of keypoints that lie in the image.

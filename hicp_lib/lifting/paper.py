@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hicp_lib.core.camera import Intrinsics
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.keypoints import BODY, N_KEYPOINTS
 from hicp_lib.core.memo import memoised
 
@@ -63,7 +63,7 @@ class InImage:
     columns: np.ndarray
 
 
-def lift(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intrinsics) -> Lifted:
+def lift(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera) -> Lifted:
     """Lift the keypoints of everyone in an image by the paper's method; this module's head defines it.
 
     Parameters
@@ -91,7 +91,7 @@ def lift(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intrinsics) 
 
 
 def checked(
-    keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intrinsics
+    keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, InImage]:
     """Arguments of `lift` as float arrays, reasons as known so far (n_people, 136), what is in the image."""
     keypoints_px, depth_m = np.asarray(keypoints_px, float), np.asarray(depth_m)
@@ -103,7 +103,7 @@ def checked(
     if not np.issubdtype(depth_m.dtype, np.floating):
         depth_m = depth_m.astype(float)
     u, v = keypoints_px[..., 0], keypoints_px[..., 1]
-    which = (u >= -0.5) & (u < width - 0.5) & (v >= -0.5) & (v < height - 0.5)
+    which = intrinsics.contains(keypoints_px)
     reason = np.where(np.isnan(u + v), NOT_DETECTED, OUTSIDE_IMAGE).astype(np.int8)
     columns, rows = np.floor(keypoints_px[which] + 0.5).astype(int).T
     return keypoints_px, depth_m, reason, InImage(which, rows, columns)
@@ -193,7 +193,7 @@ def _disk(reach: int) -> tuple[np.ndarray, np.ndarray]:
     return order, np.maximum(abs(steps), abs(steps[:, None])).ravel()[order]
 
 
-def _medians(depth_m, rows, columns, half_px, intrinsics: Intrinsics) -> np.ndarray:
+def _medians(depth_m, rows, columns, half_px, intrinsics: Camera) -> np.ndarray:
     """Coordinate-wise medians of lifted neighbourhoods, (n, 3); gathered in windows of the largest's size."""
     reach = int(half_px.max())
     z, v, u = windows(depth_m, rows, columns, reach)

@@ -31,7 +31,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from hicp_lib.core.camera import Intrinsics
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.keypoints import BODY, FACE, N_KEYPOINTS
 from hicp_lib.lifting.body_measures import load_measures
 from hicp_lib.lifting.depth_candidates import Candidates, costs_of_depths, look_around, settle
@@ -49,7 +49,7 @@ _REACH_M, _GRID_M = 0.90, 0.02  # grid of depths around the person's middle
 _IN_BODY, _IN_FACE = (np.isin(np.arange(N_KEYPOINTS), part) for part in (BODY, FACE))
 
 
-def lift_robust(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intrinsics) -> Lifted:
+def lift_robust(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera) -> Lifted:
     """Lift the keypoints of everyone in an image; this module's head says how.
 
     Parameters and errors as in `lifting.lift`. Keypoints are lifted when there is depth within 30 mm (body
@@ -59,7 +59,7 @@ def lift_robust(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intri
 
 
 def lift_in_steps(
-    keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intrinsics, n_steps: Sequence[int]
+    keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera, n_steps: Sequence[int]
 ) -> list[Lifted]:
     """Lift the keypoints of everyone in an image with the first of `STEPS`: what each brings.
 
@@ -88,7 +88,7 @@ def lift_in_steps(
 
 
 def _depths(
-    found: np.ndarray, first_m: np.ndarray, pixels_px: np.ndarray, depth_m: np.ndarray, intrinsics: Intrinsics
+    found: np.ndarray, first_m: np.ndarray, pixels_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera
 ) -> tuple[np.ndarray, Candidates]:
     """Depths in question for one person (g,), and what is seen around the keypoints found (m,).
 

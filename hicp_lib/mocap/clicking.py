@@ -131,7 +131,7 @@ def _check_click(where: str, click: dict, recording: Recording, markers: Sequenc
         )
     sizes = (recording.intrinsics.width_px, recording.intrinsics.height_px)
     for name, value, size in zip(COLUMNS[2:], pixel, sizes, strict=True):
-        if not _is_number(value) or not -0.5 <= value <= size - 0.5:
+        if not _is_number(value) or not -0.5 <= value < size - 0.5:
             raise InputError(f"{where}: {name} is {value!r}; expected a pixel from 0 to {size - 1}")
 
 

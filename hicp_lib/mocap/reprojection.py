@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.camera import Intrinsics, project, transform
+from hicp_lib.core.camera import Camera, project, transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
 from hicp_lib.mocap.registration import Registration
@@ -94,7 +94,7 @@ def _matched(recording: Recording, clicks: pd.DataFrame, mocap: MotionCapture, o
     return _Clicked(clicks[["u_px", "v_px"]].to_numpy(float), points_m, T_cam_base).take(rows)
 
 
-def _solve(intrinsics: Intrinsics, seen: _Clicked, T_start: np.ndarray) -> np.ndarray:
+def _solve(intrinsics: Camera, seen: _Clicked, T_start: np.ndarray) -> np.ndarray:
     def residuals(step: np.ndarray) -> np.ndarray:
         pixels_px, _ = _reprojected(intrinsics, seen, _moved(T_start, step, about_m))
         return np.nan_to_num(pixels_px - seen.pixels_px, nan=_BEHIND_PX).ravel()
@@ -113,12 +113,12 @@ def _moved(T: np.ndarray, step: np.ndarray, about_m: np.ndarray) -> np.ndarray:
     return moved
 
 
-def _reprojected(intrinsics: Intrinsics, seen: _Clicked, T_base_mocap: np.ndarray):
+def _reprojected(intrinsics: Camera, seen: _Clicked, T_base_mocap: np.ndarray):
     """Pixels (n, 2) of the measured markers, NaN behind the camera, and their depths (n,) in metres."""
     points_cam_m = transform(seen.T_cam_base @ T_base_mocap, seen.points_m[:, None])[:, 0]
     return project(intrinsics, points_cam_m), points_cam_m[:, 2]
 
 
-def _across_m(intrinsics: Intrinsics, seen: _Clicked, T_base_mocap: np.ndarray) -> np.ndarray:
+def _across_m(intrinsics: Camera, seen: _Clicked, T_base_mocap: np.ndarray) -> np.ndarray:
     pixels_px, depth_m = _reprojected(intrinsics, seen, T_base_mocap)
     return np.linalg.norm(pixels_px - seen.pixels_px, axis=1) * depth_m / intrinsics.fx_px

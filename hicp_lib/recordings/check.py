@@ -9,8 +9,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from hicp_lib.core.camera import read_camera
 from hicp_lib.core.errors import InputError
+from hicp_lib.recordings.camera_file import read_camera
 from hicp_lib.recordings.recording import (
     CAMERA_FILE,
     DEPTH_LIST,

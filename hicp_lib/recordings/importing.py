@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.camera import Intrinsics, read_camera, write_camera
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.environment import with_variables
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
 from hicp_lib.core.files import atomic_path, read_json
+from hicp_lib.recordings.camera_file import read_camera, write_camera
 from hicp_lib.recordings.recording import CAMERA_FILE, DEPTH_LIST, POSES_FILE, RGB_LIST
 from hicp_lib.recordings.tum import read_poses, write_file_list, write_poses
 from hicp_lib.recordings.writer import depth_name, refuse_used_folder, rgb_name, write_depth, write_rgb
@@ -138,7 +139,7 @@ def import_bag(bag: str | Path, out: str | Path, poses: PoseSource) -> int:
         times_s.append(time_s)
     if not times_s:
         raise InputError(f"{bag}: holds no frames with colour and depth; record both streams")
-    intrinsics = Intrinsics(meta.width, meta.height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2])
+    intrinsics = Camera(meta.width, meta.height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2])
     numbers = range(len(times_s))
     names = [rgb_name(k) for k in numbers], [depth_name(k) for k in numbers]
     _write_lists(out, intrinsics, meta.depth_scale, np.array(times_s), *names, poses)

@@ -20,11 +20,12 @@ import cv2
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.camera import Intrinsics, read_camera
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
 from hicp_lib.core.files import read_json
 from hicp_lib.core.images import read_image
+from hicp_lib.recordings.camera_file import read_camera
 from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, associate, read_file_list, read_poses
 
 CAMERA_FILE, RGB_LIST, DEPTH_LIST, POSES_FILE = "camera.json", "rgb.txt", "depth.txt", "groundtruth.txt"
@@ -50,7 +51,7 @@ class Recording:
     """
 
     folder: Path
-    intrinsics: Intrinsics
+    intrinsics: Camera
     depth_units_per_m: float
     times_s: np.ndarray
     rgb_paths: list[Path]
@@ -199,7 +200,7 @@ def _read_depth_m(recording: Recording, path: Path) -> np.ndarray:
     return depth_m
 
 
-def _check_size(path: Path, image: np.ndarray, intrinsics: Intrinsics) -> None:
+def _check_size(path: Path, image: np.ndarray, intrinsics: Camera) -> None:
     height, width = image.shape[:2]
     if (width, height) != (intrinsics.width_px, intrinsics.height_px):
         expected = f"{intrinsics.width_px} x {intrinsics.height_px}"

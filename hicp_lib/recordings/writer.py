@@ -7,10 +7,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from hicp_lib.core.camera import Intrinsics, write_camera
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import write_bytes
 from hicp_lib.core.images import write_png
+from hicp_lib.recordings.camera_file import write_camera
 from hicp_lib.recordings.recording import CAMERA_FILE, DEPTH_LIST, POSES_FILE, RGB_LIST
 from hicp_lib.recordings.tum import write_file_list, write_poses
 
@@ -32,7 +33,7 @@ class RecordingWriter:
         If the folder holds files.
     """
 
-    def __init__(self, folder: str | Path, intrinsics: Intrinsics, depth_units_per_m: float = 1000.0):
+    def __init__(self, folder: str | Path, intrinsics: Camera, depth_units_per_m: float = 1000.0):
         self.folder = Path(folder)
         refuse_used_folder(self.folder)
         self.intrinsics, self.depth_units_per_m = intrinsics, depth_units_per_m
@@ -82,7 +83,7 @@ class RecordingWriter:
 
 def write_index(
     folder: str | Path,
-    intrinsics: Intrinsics,
+    intrinsics: Camera,
     depth_units_per_m: float,
     times_s: np.ndarray,
     T_base_cam: np.ndarray,

@@ -12,8 +12,8 @@ from typing import Any
 
 import nbformat
 
+from hicp_lib.core.cache import digest, imports_of
 from hicp_lib.core.errors import InputError
-from hicp_lib.study.provenance import digest
 
 PARAMETERS_TAG = "parameters"
 
@@ -27,11 +27,13 @@ class Notebook:
     path : the file; `name` is its name without `.ipynb`
     defaults : name -> value of every parameter, as its `parameters` cell assigns them
     source_sha256 : hash of its cells' kinds, tags and text; outputs and other metadata do not count
+    imports : names of the modules it imports
     """
 
     path: Path
     defaults: dict[str, Any]
     source_sha256: str
+    imports: frozenset[str]
 
     @property
     def name(self) -> str:
@@ -81,7 +83,16 @@ def read_notebook(path: Path) -> Notebook:
     if len(tagged) != 1:
         raise InputError(f"{path}: has {len(tagged)} cells tagged `{PARAMETERS_TAG}`; expected exactly one")
     source = [[cell.cell_type, cell.metadata.get("tags", []), cell.source] for cell in cells]
-    return Notebook(path, _assignments(tagged[0], path), digest(source))
+    code = [cell.source for cell in cells if cell.cell_type == "code"]
+    return Notebook(path, _assignments(tagged[0], path), digest(source), _imports(path, code))
+
+
+def _imports(path: Path, cells: list[str]) -> frozenset[str]:
+    lines = [line for cell in cells for line in cell.splitlines() if not line.startswith(("%", "!"))]
+    try:
+        return imports_of("\n".join(lines))
+    except SyntaxError as error:
+        raise InputError(f"{path}: its code is not Python ({error.msg}: {error.text}); correct it") from None
 
 
 def _assignments(source: str, path: Path) -> dict[str, Any]:

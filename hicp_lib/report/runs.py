@@ -24,9 +24,10 @@ from typing import Any
 
 import nbformat
 
+from hicp_lib.core.cache import code, digest, input_sha256
+from hicp_lib.core.checkout import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_file, write_json
-from hicp_lib.report import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
 from hicp_lib.report.notebooks import Notebook, is_path
 from hicp_lib.report.schedule import run_when_ready
 from hicp_lib.study import provenance
@@ -122,12 +123,12 @@ def _bring_up_to_date(run: Run, before: list[Future], folders: Folders, children
     reason = why_stale(run.notebook.name, key, folders)
     if reason is None:
         say(f"{run.notebook.name}: unchanged")
-        return provenance.digest(key)
+        return digest(key)
     say(f"{run.notebook.name}: running ({reason}) ...")
     start_s = time.perf_counter()
     run_notebook(run, key, folders, children)
     say(f"{run.notebook.name}: done in {time.perf_counter() - start_s:.1f} s")
-    return provenance.digest(key)
+    return digest(key)
 
 
 def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
@@ -138,22 +139,19 @@ def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
     InputError
         If a parameter names a file or folder that does not exist.
     """
+    made_by = code([*run.notebook.imports, "hicp_lib.report.execute"])
+    inputs = {name: input_sha256(path) for name, path in _input_paths(run).items()}
     return {
         "notebook": run.notebook.source_sha256,
-        "parameters": provenance.digest(run.parameters),
-        "library": provenance.library_sha256(),
+        "parameters": digest(run.parameters),
+        "library": digest(made_by.modules),
         "lock": provenance.lock_sha256(),
         "installed packages": provenance.installed_sha256(),
-        "data": provenance.data_sha256(),
-        "weights": provenance.digest(provenance.weights_sha256()),
-        "input files": provenance.digest(_inputs(run)),
-        "earlier notebooks": provenance.digest(before or []),
+        "data": digest(made_by.data),
+        "weights": digest(provenance.weights_sha256()),
+        "input files": digest(inputs),
+        "earlier notebooks": digest(before or []),
     }
-
-
-def _inputs(run: Run) -> dict[str, str]:
-    """Identity of the files and folders that parameters point to; an empty one points to nothing."""
-    return {name: provenance.input_sha256(path) for name, path in _input_paths(run).items()}
 
 
 def _input_paths(run: Run) -> dict[str, Path]:
@@ -201,7 +199,7 @@ def run_notebook(run: Run, key: dict[str, Any], folders: Folders, children: _Chi
     try:
         status = children.execute(run, copy, staging, folders)
         _check(run, status, copy, staging)
-        if provenance.library_sha256() != key["library"]:
+        if run_key(run)["library"] != key["library"]:
             raise RunError(f"{name}: hicp_lib was changed while it ran; run the report again")
         _discard(name, folders)
         folders.results.mkdir(parents=True, exist_ok=True)

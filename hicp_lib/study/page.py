@@ -25,10 +25,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.checkout import working_folder
+from hicp_lib.core.checkout import (
+    EARLIER_RESULTS_VARIABLE,
+    PROFILE_VARIABLE,
+    RESULTS_VARIABLE,
+    working_folder,
+)
 from hicp_lib.core.extras import needs
 from hicp_lib.core.files import atomic_path, write_bytes, write_json
-from hicp_lib.report import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
 from hicp_lib.study.provenance import peak_memory_mb, provenance, provenance_html
 
 with needs("report"):

@@ -14,6 +14,7 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.runtime.run import detect_images
+from hicp_lib.evaluation.space.spread_causes import found_in
 from hicp_lib.experiments.recordings.open import open_experiment
 from hicp_lib.lifting.table import lift_found
 from hicp_lib.recordings.recording import Recording, read_joints, read_truth
@@ -85,11 +86,6 @@ def lift_views(views: Mapping[str, Recording], found: Found) -> pd.DataFrame:
             f"{folders}: nobody was found and lifted in any image; record people in view, with depth"
         )
     return points
-
-
-def found_in(found: Found, view: str) -> dict[str, Sequence[Detections]]:
-    """Detector -> detections of a view's frames."""
-    return {detector: detections for (of_view, detector), detections in found.items() if of_view == view}
 
 
 def true_positions(views: Mapping[str, Recording]) -> dict[str, pd.DataFrame] | None:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from hicp_lib.evaluation.ap.cocoeval import METRICS
+
 
 def with_bounds(value: float, low: float, high: float, digits: int = 2) -> str:
     """A value with its interval as "0.71 [0.65, 0.77]", alone where it has none; a dash where it is NaN."""
@@ -40,3 +42,11 @@ def wide(
     table = table.reindex(list(dict.fromkeys(rows[index].itertuples(index=False, name=None))))
     table = table[[name for name in order or dict.fromkeys(rows[columns]) if name in table]]
     return table.rename_axis(columns=None).reset_index()
+
+
+def metrics_text(table: pd.DataFrame, group: str) -> pd.DataFrame:
+    """One group of a `compare` table for reading: "0.71 [0.65, 0.77]" per subset, detector and metric."""
+    rows = table[table["group"] == group]
+    rows = rows.assign(text=bounds_of(rows))
+    table = wide(rows, ["subset", "detector", "n_people"], "metric", METRICS)
+    return table.rename(columns={"n_people": "people"})

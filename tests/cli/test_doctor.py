@@ -65,7 +65,7 @@ def test_a_trial_that_dies_is_one_line_with_its_signal_and_its_last_words(code, 
 )
 def test_a_missing_shared_library_is_told_with_its_package(monkeypatch, library, remedy):
     words = f"{library}: cannot open shared object file: No such file or directory"
-    fail = f"import sys; from hicp_lib import probes; probes.probes = lambda: dict(renderer=fail)\n" \
+    fail = f"import sys; from hicp_lib.cli import probes; probes.probes = lambda: dict(renderer=fail)\n" \
            f"def fail(): raise OSError({words!r})\nsys.exit(probes.main('renderer'))"  # fmt: skip
     assert trial(fail) == doctor.Check("renderer", doctor.FAIL, words, remedy)
     # Before the trial could begin: the interpreter's own traceback
@@ -76,7 +76,8 @@ def test_a_missing_shared_library_is_told_with_its_package(monkeypatch, library,
 
 def test_a_package_that_is_not_installed_is_no_fault():
     code = (
-        "import sys; from hicp_lib import extras, probes; probes.probes = lambda: dict(renderer=absent)\n"
+        "import sys; from hicp_lib.core import extras\nfrom hicp_lib.cli import probes\n"
+        "probes.probes = lambda: dict(renderer=absent)\n"
         "def absent(): extras.require('render', 'no_such_package')\nsys.exit(probes.main('renderer'))"
     )
     check = trial(code)

@@ -78,7 +78,7 @@ def test_help_is_no_mistake(capsys, arguments):
 
 def test_help_loads_no_library():
     code = (
-        "import sys; from hicp_lib import cli; cli.run(['--help']); "
+        "import sys; from hicp_lib.cli import main as cli; cli.run(['--help']); "
         "print(sorted({'numpy', 'pandas', 'cv2', 'matplotlib', 'papermill'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

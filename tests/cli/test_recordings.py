@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hicp_lib.cli import main as cli
-from tests.rgbd.conftest import write_small
+from tests.recordings.conftest import write_small
 
 
 @pytest.fixture

@@ -78,7 +78,7 @@ def test_a_damaged_table_and_one_of_other_code_are_made_again(folder, monkeypatc
     for damaged in (bytes(content), content[:-9], b""):
         path.write_bytes(damaged)
         pd.testing.assert_frame_equal(kept(table_of, 1), whole, check_exact=True)
-    monkeypatch.setattr(kept_tables, "_code", lambda: ["another library"])
+    monkeypatch.setattr(kept_tables, "key", lambda *_, **__: "of other code")
     kept(table_of, 1)
     assert len(CALLS) == 5
 

@@ -8,16 +8,17 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hicp_lib.core.camera import Intrinsics, deproject, project, read_camera, transform, write_camera
+from hicp_lib.core.camera import Camera, deproject, project, transform
 from hicp_lib.core.errors import InputError
+from hicp_lib.recordings.camera_file import read_camera, write_camera
 
-VGA = Intrinsics(640, 480, 615.0, 613.5, 318.2, 241.7)
+VGA = Camera(640, 480, 615.0, 613.5, 318.2, 241.7)
 
 fast = settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 focal = st.floats(50, 5_000)
 cameras = st.builds(
-    Intrinsics, st.integers(1, 4_000), st.integers(1, 4_000), focal, focal,
+    Camera, st.integers(1, 4_000), st.integers(1, 4_000), focal, focal,
     st.floats(-100, 4_000), st.floats(-100, 4_000),
 )  # fmt: skip
 units = st.floats(1, 1e5)
@@ -32,7 +33,7 @@ def test_project_then_deproject_gives_the_point_back(camera, seed):
 
 
 def test_pinhole_by_hand():
-    camera = Intrinsics(640, 480, 600, 300, 320, 240)
+    camera = Camera(640, 480, 600, 300, 320, 240)
     np.testing.assert_allclose(project(camera, [[0.5, 0.5, 2.0], [0, 0, 1]]), [[470, 315], [320, 240]])
     np.testing.assert_allclose(deproject(camera, [470, 315], 2.0), [0.5, 0.5, 2.0])
 

@@ -14,7 +14,7 @@ from hicp_lib.core.extras import MissingPartError, needs, require
 # `hicp` where one package is not installed.
 WITHOUT = """import sys
 sys.modules[sys.argv[1]] = None
-from hicp_lib import cli
+from hicp_lib.cli import main as cli
 sys.exit(cli.run(sys.argv[2:]))"""
 
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from made_people import make_annotations, make_detections
 
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS
 from hicp_lib.datasets.visibility import (
@@ -13,11 +12,12 @@ from hicp_lib.datasets.visibility import (
     NONE,
     RULES,
     class_counts,
-    compare_classes,
     people_classes,
     visibility_class,
     visible_parts,
 )
+from hicp_lib.evaluation.failures.by_visibility import compare_classes
+from tests.evaluation.made_people import make_annotations, make_detections
 
 HEAD = ["nose", "left_eye"]
 SHOULDERS, HIPS = ["left_shoulder", "right_shoulder"], ["left_hip", "right_hip"]

@@ -10,14 +10,13 @@ import pytest
 
 import hicp_lib
 from hicp_lib.core.images import write_png
-
-from .plain_people import render_person
+from tests.detectors.plain_people import render_person
 
 N_PEOPLE = 8
 
 # The detector "slow", and the code under test wherever it is.
-_SOURCES = [str(Path(__file__).parent), str(Path(hicp_lib.__file__).parents[1])]
-_HICP = "import sys, slow_detector; from hicp_lib import cli; sys.exit(cli.run(sys.argv[1:]))"
+_SOURCES = [str(Path(__file__).parent / "preloaded"), str(Path(hicp_lib.__file__).parents[1])]
+_HICP = "import sys, slow_detector; from hicp_lib.cli import main as cli; sys.exit(cli.run(sys.argv[1:]))"
 
 
 class Slow:

@@ -6,7 +6,7 @@ import numpy as np
 import open3d
 
 from hicp_lib.simulation.body.model import REGIONS, load_body, pose_body
-from hicp_lib.simulation.rendering.camera import Camera, look_at, pixel_rays, project
+from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at, pixel_rays, project_world
 
 _WALL = (190.0, 190.0, 180.0)
 _SKIN = (206.0, 160.0, 134.0)
@@ -36,11 +36,11 @@ def render_person(seed: int, distance_m: float = 2.2) -> tuple[np.ndarray, np.nd
     posed = pose_body(body, int(rng.integers(len(body.shape_names))), pose)
     target = posed.keypoints_m[18] - (0, 0, 0.1)
     eye = target + (distance_m, rng.uniform(-0.4, 0.4), rng.uniform(-0.2, 0.2))
-    camera = Camera(480, 480, 600.0, 600.0, 239.5, 239.5, look_at(eye, target))
-    return _shade(body, posed, camera), project(camera, posed.keypoints_m)[0]
+    camera = PlacedCamera(480, 480, 600.0, 600.0, 239.5, 239.5, look_at(eye, target))
+    return _shade(body, posed, camera), project_world(camera, posed.keypoints_m)[0]
 
 
-def _shade(body, posed, camera: Camera) -> np.ndarray:
+def _shade(body, posed, camera: PlacedCamera) -> np.ndarray:
     scene = open3d.t.geometry.RaycastingScene(nthreads=1)
     scene.add_triangles(posed.vertices_m.astype(np.float32), body.triangles.astype(np.uint32))
     hits = scene.cast_rays(open3d.core.Tensor(pixel_rays(camera)))

@@ -1,7 +1,8 @@
 """Fixtures of the evaluation's tests: the makers of `made_people`, by the names tests ask for."""
 
 import pytest
-from made_people import make_annotations, make_detections, make_scene, make_world
+
+from tests.evaluation.made_people import make_annotations, make_detections, make_scene, make_world
 
 
 @pytest.fixture

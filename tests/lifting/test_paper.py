@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hicp_lib.core.camera import Intrinsics, deproject, project
+from hicp_lib.core.camera import Camera, deproject, project
 from hicp_lib.core.keypoints import BODY, FACE, HANDS, INDEX
 from hicp_lib.lifting.paper import LIFTED, NO_DEPTH, NOT_DETECTED, OUTSIDE_IMAGE, REASONS, lift
 
-CAMERA = Intrinsics(160, 120, 300.0, 290.0, 81.3, 58.9)
+CAMERA = Camera(160, 120, 300.0, 290.0, 81.3, 58.9)
 WRIST = INDEX["left_wrist"]
 FINGER = INDEX["left_index_4"]
 

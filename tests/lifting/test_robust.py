@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hicp_lib.core.camera import Intrinsics, deproject
+from hicp_lib.core.camera import Camera, deproject
 from hicp_lib.core.keypoints import HANDS, INDEX
 from hicp_lib.lifting.body_measures import load_measures
 from hicp_lib.lifting.limb_lengths import choose_along_limbs, limbs_outwards
@@ -15,11 +15,10 @@ from hicp_lib.lifting.paper import LIFTED, NO_DEPTH, NOT_DETECTED, OUTSIDE_IMAGE
 from hicp_lib.lifting.robust import STEPS, lift_in_steps, lift_robust
 from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
-from hicp_lib.simulation.rendering.camera import Camera, look_at, pixel_rays
-from hicp_lib.simulation.rendering.camera import project as project_world
+from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at, pixel_rays, project_world
 from hicp_lib.simulation.sensors.markers import body_scene
 
-CAMERA = Intrinsics(320, 240, 300.0, 300.0, 160.0, 120.0)
+CAMERA = Camera(320, 240, 300.0, 300.0, 160.0, 120.0)
 ARM = ("left_shoulder", "left_elbow", "left_wrist")
 
 
@@ -129,7 +128,7 @@ def test_joints_of_people_are_found_closer_than_by_the_paper():
         person = pose_body(body, shape, sample_pose(rng, body, kind, shape))
         middle = person.keypoints_m[INDEX["neck"]] - [0, 0, 0.25]
         pose = look_at(middle + [1.0, 0.1, 0.1], middle)
-        camera = Camera(320, 240, 300.0, 300.0, 160.0, 120.0, pose)
+        camera = PlacedCamera(320, 240, 300.0, 300.0, 160.0, 120.0, pose)
         depth_m = body_scene(person).trace(pixel_rays(camera)).depth_m.reshape(240, 320)
         depth_m = np.where(np.isfinite(depth_m), depth_m, 2.5)
         pixels_px, z = project_world(camera, person.keypoints_m)

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.core.camera import Intrinsics, deproject
+from hicp_lib.core.camera import Camera, deproject
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX
@@ -12,7 +12,7 @@ from hicp_lib.lifting.table import lift_found, lift_recording
 from hicp_lib.recordings.recording import open_recording
 from hicp_lib.recordings.writer import RecordingWriter
 
-CAMERA = Intrinsics(64, 48, 60.0, 60.0, 31.5, 23.5)
+CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
 
 
 @pytest.fixture

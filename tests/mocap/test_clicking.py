@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from hicp_lib.core.camera import Intrinsics
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.mocap.clicking import CLICKS_FILE, read_clicks, record_click, show_frame
 from hicp_lib.recordings.recording import open_recording, read_rgb
@@ -17,7 +17,7 @@ MARKERS = ("elbow_left_1", "wrist_right_2")
 
 @pytest.fixture
 def recording(tmp_path):
-    writer = RecordingWriter(tmp_path / "room", Intrinsics(32, 24, 30.0, 30.0, 15.5, 11.5))
+    writer = RecordingWriter(tmp_path / "room", Camera(32, 24, 30.0, 30.0, 15.5, 11.5))
     picture = np.random.default_rng(0).integers(0, 255, (24, 32, 3), dtype=np.uint8)
     for k in range(3):
         writer.add(float(k), picture, np.ones((24, 32)), np.eye(4))

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hicp_lib.core.camera import Intrinsics, project, transform
+from hicp_lib.core.camera import Camera, project, transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.mocap.registration import (
     REGISTRATION_FILE,
@@ -24,7 +24,7 @@ from hicp_lib.recordings.recording import open_recording
 from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.simulation.sensors.clicks import simulate_clicks
 
-INTRINSICS = Intrinsics(320, 240, 300.0, 300.0, 159.5, 119.5)
+INTRINSICS = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 NAMES = (*(f"m{k}" for k in range(9)), "camera")
 MARKERS_CAM = np.array(
     [[-0.4, -0.3, 1.2], [0.1, -0.28, 1.0], [0.5, -0.25, 1.4], [-0.3, 0.05, 0.9], [0.15, 0.1, 1.5],

@@ -9,14 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from hicp_lib.core.camera import Intrinsics, project, transform
+from hicp_lib.core.camera import Camera, project, transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.mocap.registration import Registration
 from hicp_lib.mocap.reprojection import by_reprojection
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import Recording
 
-CAMERA = Intrinsics(640, 480, 615.0, 615.0, 320.0, 240.0)
+CAMERA = Camera(640, 480, 615.0, 615.0, 320.0, 240.0)
 NAMES = tuple(f"m{k}" for k in range(12))
 N_IMAGES = 4
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hicp_lib.core.camera import Intrinsics
+from hicp_lib.core.camera import Camera
 from hicp_lib.recordings.writer import RecordingWriter
 
-SMALL = Intrinsics(width_px=32, height_px=24, fx_px=30.0, fy_px=31.0, cx_px=15.5, cy_px=11.5)
+SMALL = Camera(width_px=32, height_px=24, fx_px=30.0, fy_px=31.0, cx_px=15.5, cy_px=11.5)
 
 
 def write_small(folder: Path, n: int = 4) -> Path:

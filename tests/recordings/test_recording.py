@@ -17,7 +17,7 @@ from hicp_lib.recordings.recording import (
     read_truth,
 )
 from hicp_lib.recordings.writer import RecordingWriter
-from tests.rgbd.conftest import SMALL, write_small
+from tests.recordings.conftest import SMALL, write_small
 
 
 def test_what_was_written_is_read(small):

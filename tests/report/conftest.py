@@ -6,18 +6,22 @@ import shutil
 from pathlib import Path
 
 import pytest
-from tiny_study import FINISH, MEASURE, START, write_notebook
 
+from hicp_lib.core import cache
 from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.study import provenance
+from tests.report.tiny_study import FINISH, MEASURE, START, write_notebook
 
 
 @pytest.fixture(autouse=True)
 def library(tmp_path_factory, monkeypatch) -> Path:
     """Stands for the library in keys: somebody may be editing the real one while the tests run."""
     folder = tmp_path_factory.mktemp("library")
-    (folder / "module.py").write_text("a = 1")
-    monkeypatch.setattr(provenance, "LIBRARY_DIR", folder)
+    (folder / "study").mkdir()
+    for name in ("__init__", "study/__init__", "study/page", "other"):
+        (folder / f"{name}.py").write_text("a = 1")
+    for module in (provenance, cache):
+        monkeypatch.setattr(module, "LIBRARY_DIR", folder)
     return folder
 
 

@@ -14,19 +14,20 @@ from pathlib import Path
 
 import psutil
 import pytest
-from tiny_study import FINISH, MEASURE, START, pretend_to_execute, tiny_run
 
 from hicp_lib.core.files import sha256_file
 from hicp_lib.report import runs
 from hicp_lib.report.runs import Folders, Run, run_all, run_key, why_stale
+from tests.report.tiny_study import FINISH, MEASURE, START, pretend_to_execute, tiny_run
 
 _REPORT = """
 import sys
 from pathlib import Path
-from tiny_study import FINISH, MEASURE, START, tiny_run
-from hicp_lib import provenance
+from tests.report.tiny_study import FINISH, MEASURE, START, tiny_run
+from hicp_lib.core import cache
 from hicp_lib.report.runs import run_all
-provenance.LIBRARY_DIR = Path(sys.argv[2])
+from hicp_lib.study import provenance
+provenance.LIBRARY_DIR = cache.LIBRARY_DIR = Path(sys.argv[2])
 run, folders = tiny_run(Path(sys.argv[1]), START, MEASURE, FINISH)
 run_all([run], folders, print)
 """
@@ -53,7 +54,7 @@ def test_killed_at_any_moment_the_next_run_completes(tmp_path, library):
 
 def _run_and_kill(arguments: list[str], delay_s: float) -> None:
     command = [sys.executable, "-c", _REPORT, *arguments]
-    process = subprocess.Popen(command, cwd=Path(__file__).parent, stdout=subprocess.DEVNULL)
+    process = subprocess.Popen(command, cwd=Path(__file__).parents[2], stdout=subprocess.DEVNULL)
     time.sleep(delay_s)
     try:
         family = psutil.Process(process.pid).children(recursive=True)
@@ -71,7 +72,7 @@ def test_what_the_kernel_started_ends_with_the_reports_process_group(tmp_path, l
     cell = f"import subprocess; subprocess.run(['sh', '-c', 'touch {begun}; exec sleep 300'])"
     code = _REPORT.replace("START, MEASURE, FINISH)\nrun_all", "START, sys.argv[3], FINISH)\nrun_all")
     command = [sys.executable, "-c", code, str(tmp_path / "study"), str(library), cell]
-    process = subprocess.Popen(command, cwd=Path(__file__).parent, start_new_session=True)
+    process = subprocess.Popen(command, cwd=Path(__file__).parents[2], start_new_session=True)
     while not begun.exists():
         assert process.poll() is None
         time.sleep(0.05)

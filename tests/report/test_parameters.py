@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from tiny_study import write_notebook
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.report.notebooks import (
@@ -15,6 +14,7 @@ from hicp_lib.report.notebooks import (
     read_notebooks,
     read_profile,
 )
+from tests.report.tiny_study import write_notebook
 
 
 def test_declared_parameters_are_read_without_running_them(study):

@@ -6,13 +6,14 @@ import json
 import os
 
 import pytest
-from tiny_study import FINISH, MEASURE, START, pretend_to_execute, tiny_run, write_notebook
 
+from hicp_lib.core import cache
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_file
 from hicp_lib.report.notebooks import read_notebook
 from hicp_lib.report.runs import Run, RunError, _Children, run_all, run_key, why_stale
 from hicp_lib.study import provenance
+from tests.report.tiny_study import FINISH, MEASURE, START, pretend_to_execute, tiny_run, write_notebook
 
 
 def test_a_run_leaves_its_results_and_is_not_repeated(tmp_path):
@@ -97,7 +98,10 @@ def test_every_dependency_is_in_the_key(tmp_path, monkeypatch, library):
     (tmp_path / "data" / "detectors.json").write_text('{"weights": {}}')
     lock = tmp_path / "environment.lock"
     lock.write_text("numpy==1")
-    monkeypatch.setattr(provenance, "DATA_DIR", tmp_path / "data")
+    for module in (provenance, cache):
+        monkeypatch.setattr(module, "DATA_DIR", tmp_path / "data")
+    used = library / "study" / "page.py"
+    used.write_text('from hicp_lib.core.datafiles import DATA_DIR\npaper = DATA_DIR / "paper.json"\n')
     monkeypatch.setattr(provenance, "LOCK_PATH", lock)
     key = run_key(run, ["x"])
     assert run_key(run, ["x"]) == key
@@ -105,12 +109,16 @@ def test_every_dependency_is_in_the_key(tmp_path, monkeypatch, library):
     def changed(run: Run = run, before: tuple[str, ...] = ("x",)) -> list[str]:
         return [part for part, value in run_key(run, list(before)).items() if value != key[part]]
 
-    (library / "module.py").write_text("a = 2")
+    (library / "other.py").write_text("a = 2")  # no part of what the notebook imports
+    (tmp_path / "data" / "other.json").write_text("{}")
+    assert changed() == []
+    source = used.read_text()
+    used.write_text(source + "\n")
     assert changed() == ["library"]
-    (library / "module.py").write_text("a = 1")
-    (tmp_path / "data" / "weights.json").write_text("{}")
+    used.write_text(source)
+    (tmp_path / "data" / "paper.json").write_text("[]")
     assert changed() == ["data"]
-    (tmp_path / "data" / "weights.json").unlink()
+    (tmp_path / "data" / "paper.json").write_text("{}")
     lock.write_text("numpy==2")
     assert changed() == ["lock"]
     lock.write_text("numpy==1")
@@ -131,7 +139,7 @@ def test_a_library_edited_during_the_run_is_not_stamped(tmp_path, monkeypatch, l
     run, folders = tiny_run(tmp_path, START, FINISH)
 
     def edit(*arguments):
-        (library / "module.py").write_text("a = 2")
+        (library / "study" / "page.py").write_text("a = 2")
         return pretend_to_execute(*arguments)
 
     monkeypatch.setattr(_Children, "execute", edit)

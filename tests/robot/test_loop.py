@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from keypoint_streams import first_violation
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.robot.controller import PUBLISHED, Controller, Settings
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.loop import AVOIDING, FREE, STOPPED, AvoidanceLoop, Perception
+from tests.robot.keypoint_streams import first_violation
 
 PERIOD_S = 0.02
 POST = np.array(HOME_M["left"])

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from itertools import islice
 
 import numpy as np
-from contents import content
 
 from hicp_lib.experiments.avoidance.closed_loop import Trial, TrueKeypoints, simulate, start_posture
 from hicp_lib.experiments.avoidance.head_camera import photograph
@@ -17,6 +16,7 @@ from hicp_lib.experiments.recordings.frames import record_frame
 from hicp_lib.experiments.recordings.scenarios import scenario
 from hicp_lib.simulation.world.scenes import render_scene
 from hicp_lib.simulation.world.staging import random_stage
+from tests.simulation.contents import content
 
 
 def dressed(number: int) -> str:

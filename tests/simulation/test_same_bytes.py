@@ -7,29 +7,33 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from contents import content
-from made_results import dressed
 from scipy import sparse
 
 from hicp_lib.core.memo import memoised
 from hicp_lib.experiments.minimum_jerk import Posture, between
 from hicp_lib.simulation.appearance import clothing
 from hicp_lib.simulation.appearance.clothing import Garment
+from tests.simulation.contents import content
+from tests.simulation.made_results import dressed
 
-HERE = Path(__file__).parent
+ROOT = Path(__file__).parents[2]
 
 
-def python(*arguments: object, **environment: str) -> list[str]:
-    """Lines that a process of its own prints."""
+def python(module: str, *arguments: object, **environment: str) -> list[str]:
+    """Lines that a module of this folder prints in a process of its own."""
     done = subprocess.run(
-        [sys.executable, *map(str, arguments)], capture_output=True, text=True, env=os.environ | environment
+        [sys.executable, "-m", f"tests.simulation.{module}", *map(str, arguments)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        env=os.environ | environment,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
 
 
 def test_what_a_process_keeps_follows_from_its_key():
-    counted, *problems = python(HERE / "watch_caches.py")
+    counted, *problems = python("watch_caches")
     assert not problems
     results, functions = (int(word) for word in counted.split() if word.isdigit())
     assert results > 300 and functions > 30
@@ -49,9 +53,9 @@ def test_results_are_the_same_in_every_process():
     threads = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
     alone = {"PYTHONHASHSEED": "1"} | dict.fromkeys(threads, "1")
     free = {"PYTHONHASHSEED": "2"} | dict.fromkeys(threads, "3")
-    first = python(HERE / "made_results.py", *asked, **alone)
+    first = python("made_results", *asked, **alone)
     assert len(first) == len(asked)
-    assert sorted(first) == sorted(python(HERE / "made_results.py", *reversed(asked), **free))
+    assert sorted(first) == sorted(python("made_results", *reversed(asked), **free))
 
 
 def test_a_garment_is_cut_alike_of_whatever_numbers():

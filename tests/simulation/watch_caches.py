@@ -1,6 +1,6 @@
 """Stage, render and lift in a process of its own; prints what is wrong with the results it kept."""
 
-from contents import watch_caches
+from tests.simulation.contents import watch_caches
 
 kept = watch_caches()
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.core.camera import Intrinsics, project, transform
+from hicp_lib.core.camera import Camera, project, transform
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX
@@ -17,7 +17,7 @@ from hicp_lib.recordings.recording import TRUTH_FILE, Recording, first_frames, o
 from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.study.mocap import ablation, find_clock, lift_frames, medians_under, open_mocap, register
 
-CAMERA = Intrinsics(320, 240, 300.0, 300.0, 159.5, 119.5)
+CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 T_BASE_CAM = np.array([[0.0, 0, -1, 0.1], [1, 0, 0, 0], [0, -1, 0, 0.4], [0, 0, 0, 1]])
 T_BASE_MOCAP = np.array([[0.0, -1, 0, 0.7], [1, 0, 0, -0.3], [0, 0, 1, 0.5], [0, 0, 0, 1]])
 NAMES = (*(name for joint in JOINTS for name in MARKERS[joint]), "camera")

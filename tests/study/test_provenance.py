@@ -8,6 +8,7 @@ import subprocess
 
 import pytest
 
+from hicp_lib.core.cache import input_sha256
 from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.core.errors import InputError
 from hicp_lib.study import provenance
@@ -56,8 +57,8 @@ def test_without_git_or_a_checkout_the_commit_is_unknown(tmp_path, monkeypatch):
 
 def test_an_input_folder_is_known_by_names_sizes_and_times(tmp_path):
     (tmp_path / "a").write_bytes(b"1")
-    before = provenance.input_sha256(tmp_path)
-    assert provenance.input_sha256(tmp_path) == before
+    before = input_sha256(tmp_path)
+    assert input_sha256(tmp_path) == before
     (tmp_path / "b").write_bytes(b"")
-    assert provenance.input_sha256(tmp_path) != before
-    assert provenance.input_sha256(tmp_path / "a") != provenance.input_sha256(tmp_path / "b")
+    assert input_sha256(tmp_path) != before
+    assert input_sha256(tmp_path / "a") != input_sha256(tmp_path / "b")

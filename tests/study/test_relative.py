@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.core.camera import Intrinsics
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX
@@ -16,7 +16,7 @@ from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.robot.kinematics import HEAD_JOINTS
 from hicp_lib.study import relative as relative_views
 
-CAMERA = Intrinsics(width_px=64, height_px=48, fx_px=50, fy_px=50, cx_px=31.5, cy_px=23.5)
+CAMERA = Camera(width_px=64, height_px=48, fx_px=50, fy_px=50, cx_px=31.5, cy_px=23.5)
 
 
 @pytest.fixture

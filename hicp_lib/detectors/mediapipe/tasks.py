@@ -28,8 +28,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.core.keypoints import COCO_17, to_halpe
 from hicp_lib.detectors.combined.arbitration import Hands, give_hands, in_pairs, nearest_first
-from hicp_lib.detectors.mediapipe import bundle as mediapipe_bundle
-from hicp_lib.detectors.mediapipe import child as mediapipe_child
+from hicp_lib.detectors.mediapipe import bundles, child
 from hicp_lib.detectors.mediapipe.program import program_folder, program_version
 from hicp_lib.detectors.runtime.isolation import NativeProcess
 
@@ -88,7 +87,7 @@ class MediaPipeHands:
         hands = self._process.ask(image)
         if not len(hands):
             return Detections.none()
-        scores = np.repeat(np.minimum(hands[:, :1, 1], 1.0), mediapipe_child.N_HAND, axis=1)
+        scores = np.repeat(np.minimum(hands[:, :1, 1], 1.0), child.N_HAND, axis=1)
         return in_pairs(Hands(_positions_px(hands[:, 1:], image), scores, hands[:, 0, 0].astype(int)))
 
 
@@ -155,9 +154,9 @@ def _process(
         raise InputError(
             f"{name}: finds {n} at scores from {min_score}; expected 1 or more, and a score from 0 to 1"
         )
-    bundle = mediapipe_bundle.read_bundle(task, model) if model else mediapipe_bundle.assemble(task)
+    bundle = bundles.read_bundle(task, model) if model else bundles.assemble(task)
     process = NativeProcess(
-        [mediapipe_child.__file__, str(program_folder().parent)],
+        [child.__file__, str(program_folder().parent)],
         {"task": task, "n": n, "min_score": min_score},
         bundle,
         name=f"{model}: cannot be used by {name}" if model else name,

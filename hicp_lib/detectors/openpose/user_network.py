@@ -55,7 +55,8 @@ class OpenPose:
     model : ONNX conversion of a body network
     hand_model : ONNX conversion of the hand network; without it no hands are given
     net_height_px : height images are scaled to, a multiple of 16, where the file leaves it open
-    as_released : read the maps as OpenPose's program does; else the cheaper way of `hicp_lib.detectors.openpose.paf`
+    as_released : read the maps as OpenPose's program does; else the cheaper way of
+        `hicp_lib.detectors.openpose.paf`
     provider, threads : see `hicp_lib.detectors.onnx.session.open_model`
     """
 

@@ -43,7 +43,7 @@ class NativeProcess:
 
     Parameters
     ----------
-    program : script that speaks as `mediapipe_child` says, and its first arguments
+    program : script that speaks as `hicp_lib.detectors.mediapipe.child` says, and its first arguments
     head, body : the first message to it
     name : what messages to the user begin with
     remedy : what they end with if the program cannot start

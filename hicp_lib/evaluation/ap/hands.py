@@ -16,13 +16,12 @@ from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND, SIGMAS
 from hicp_lib.core.oks import oks
 from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals
 from hicp_lib.evaluation.ap.evaluate import check_detections, evaluate
-from hicp_lib.evaluation.ap.metric_table import source_images
 from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
-from hicp_lib.formats.annotations import Annotations
+from hicp_lib.formats.annotations import Annotations, source_images
 
 FOUND_OKS = 0.5
 
-# Parts of a combination, as options of `hicp_lib.detectors.combined.detector.Combined`; the last is its default.
+# Parts of a combination, as options of `combined.detector.Combined`; the last is its default.
 INGREDIENTS: dict[str, dict] = {
     "whole image": {"looks": "image", "arbitrate": False},
     "wrist squares": {"looks": "wrists", "arbitrate": False},

@@ -7,7 +7,6 @@ detections by image id. Crops of one source image are drawn together in the boot
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -17,10 +16,8 @@ from hicp_lib.core.keypoints import GROUPS, N_KEYPOINTS
 from hicp_lib.detectors.registry import DETECTORS
 from hicp_lib.detectors.runtime.results import Timed
 from hicp_lib.evaluation.ap.bootstrap import bootstrap_difference, difference, intervals, resample
-from hicp_lib.evaluation.ap.cocoeval import METRICS
 from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate, person_oks
-from hicp_lib.formats.annotations import Annotations
-from hicp_lib.study.table_format import bounds_of, wide
+from hicp_lib.formats.annotations import Annotations, source_images
 
 Found = Mapping[tuple[str, str], Mapping[int, Detections]]
 # (subset, detector, group) -> its evaluation, and its figures on draws that all detectors share
@@ -106,7 +103,7 @@ def head_loss(
     is the change's
     """
     shared = truth["basic"].images.keys() & truth["headless"].images.keys()
-    same = {subset: only_images(truth[subset], shared) for subset in ("basic", "headless")}
+    same = {subset: truth[subset].of_images(shared) for subset in ("basic", "headless")}
     rows = []
     for subset, detector, group in _cases(found):
         if subset != "basic":
@@ -140,14 +137,6 @@ def people_oks(truth: Mapping[str, Annotations], found: Found) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def metrics_text(table: pd.DataFrame, group: str) -> pd.DataFrame:
-    """One group of a `compare` table for reading: "0.71 [0.65, 0.77]" per subset, detector and metric."""
-    rows = table[table["group"] == group]
-    rows = rows.assign(text=bounds_of(rows))
-    table = wide(rows, ["subset", "detector", "n_people"], "metric", METRICS)
-    return table.rename(columns={"n_people": "people"})
-
-
 def detection_times(runs: Mapping[tuple[str, str], Mapping[int, Timed]]) -> pd.DataFrame:
     """Time per image: columns `subset, detector, image_id, time_ms, workers`."""
     rows = [
@@ -156,23 +145,6 @@ def detection_times(runs: Mapping[tuple[str, str], Mapping[int, Timed]]) -> pd.D
         for image_id, result in run.items()
     ]
     return pd.DataFrame(rows, columns=["subset", "detector", "image_id", "time_ms", "workers"])
-
-
-def source_images(annotations: Annotations) -> dict[int, int]:
-    """Image id -> the image it was cropped from (itself where the annotations do not say)."""
-    source = {i: i for i in annotations.images}
-    for image_id, extra in zip(annotations.image_ids.tolist(), annotations.extras, strict=True):
-        source[image_id] = extra.get("source_image_id", source[image_id])
-    return source
-
-
-def only_images(annotations: Annotations, image_ids) -> Annotations:
-    """The annotations of some images."""
-    chosen = np.array([i in image_ids for i in annotations.image_ids.tolist()], dtype=bool)
-    return replace(
-        annotations.take(chosen),
-        images={i: image for i, image in annotations.images.items() if i in image_ids},
-    )
 
 
 def groups_of(found: Found, detector: str) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
-from hicp_lib.evaluation.ap.metric_table import compare, only_images
+from hicp_lib.evaluation.ap.metric_table import compare
 from hicp_lib.evaluation.failures.error_kinds import all_errors
 from hicp_lib.evaluation.statistics.proportions import shares
 from hicp_lib.formats.annotations import Annotations
@@ -38,7 +38,7 @@ def by_level(annotations: Annotations) -> dict[tuple[str, float], Annotations]:
     images: dict[tuple[str, float], set[int]] = {}
     for image_id, extra in zip(annotations.image_ids.tolist(), annotations.extras, strict=True):
         images.setdefault((extra["dose"], extra["level"]), set()).add(image_id)
-    return {level: only_images(annotations, chosen) for level, chosen in images.items()}
+    return {level: annotations.of_images(chosen) for level, chosen in images.items()}
 
 
 def dose_curves(

@@ -27,8 +27,8 @@ from hicp_lib.core.keypoints import GROUPS, SIGMAS, mirror
 from hicp_lib.core.oks import oks, oks_terms
 from hicp_lib.datasets.visibility import MIN_PEOPLE
 from hicp_lib.evaluation.ap.evaluate import check_detections
-from hicp_lib.evaluation.ap.metric_table import groups_of, source_images
-from hicp_lib.formats.annotations import Annotations
+from hicp_lib.evaluation.ap.metric_table import groups_of
+from hicp_lib.formats.annotations import Annotations, source_images
 
 KINDS = ("good", "jitter", "inversion", "swap", "miss", "not given", "not found")
 HITS = ("good", "jitter")

@@ -20,11 +20,11 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import INDEX, LEFT_HAND, RIGHT_HAND
-from hicp_lib.evaluation.ap.metric_table import groups_of, source_images
+from hicp_lib.evaluation.ap.metric_table import groups_of
 from hicp_lib.evaluation.failures.placed_keypoints import landed
 from hicp_lib.evaluation.statistics.proportions import mean_with_interval, shares
 from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
-from hicp_lib.formats.annotations import Annotations
+from hicp_lib.formats.annotations import Annotations, source_images
 
 SURE = 0.3  # the paper's threshold
 N_BINS = 5

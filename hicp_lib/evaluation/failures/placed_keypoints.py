@@ -15,10 +15,9 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import COCO_17, SIGMAS
 from hicp_lib.core.oks import oks_terms
-from hicp_lib.evaluation.ap.metric_table import source_images
 from hicp_lib.evaluation.calibration.keypoint_hits import HIT_TERM
 from hicp_lib.evaluation.failures.error_kinds import matched_people
-from hicp_lib.formats.annotations import Annotations
+from hicp_lib.formats.annotations import Annotations, source_images
 
 # Where a keypoint truly is: in the picture and visible, in the picture but hidden, outside the picture, or
 # nowhere known (not labelled in the source image).

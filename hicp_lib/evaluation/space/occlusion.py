@@ -48,11 +48,11 @@ def lines_of_sight(recording: Recording, positions: pd.DataFrame) -> pd.DataFram
 
 def _sights(points_m: np.ndarray, margins_m: np.ndarray, recording: Recording, frame: int) -> list[str]:
     depth_m = read_depth_m(recording, frame)
-    height, width = depth_m.shape
     pixels_px = project(recording.intrinsics, points_m)
     sights = []
-    for (u, v), furthest_m in zip(pixels_px, points_m[:, 2] - margins_m, strict=True):
-        if not (-0.5 <= u <= width - 0.5 and -0.5 <= v <= height - 0.5):  # also NaN: behind the camera
+    in_image = recording.intrinsics.contains(pixels_px)  # not where NaN: behind the camera
+    for (u, v), there, furthest_m in zip(pixels_px, in_image, points_m[:, 2] - margins_m, strict=True):
+        if not there:
             sights.append("outside")
             continue
         row, column, half = round(v), round(u), _HALF_WINDOW_PX

@@ -24,7 +24,6 @@ from hicp_lib.evaluation.space.stability import MIN_SCORE, PARTS, counted, posit
 from hicp_lib.lifting.table import lift_found, steps_of
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, JOINTS_FILE, Recording, read_joints, read_truth
 from hicp_lib.robot.kinematics import HEAD_JOINTS, ICub, load_icub
-from hicp_lib.study.relative import found_in
 
 JOINT_ERROR_RAD = float(np.deg2rad(0.5))
 N_DRAWS = 20
@@ -200,3 +199,10 @@ def _spread(positions_m: np.ndarray, true_m: np.ndarray, shared: np.ndarray) -> 
         numbers.append([*np.percentile(distances, (50, 90), axis=1).mean(axis=1), bias.mean()])
     spread, p90, bias = np.mean(numbers, axis=0)
     return float(spread), float(p90), float(bias)
+
+
+def found_in(
+    found: Mapping[tuple[str, str], Sequence[Detections]], view: str
+) -> dict[str, Sequence[Detections]]:
+    """Detector -> detections of a view's frames."""
+    return {detector: detections for (of_view, detector), detections in found.items() if of_view == view}

@@ -1,6 +1,7 @@
 """Moving block bootstrap: frames of a recording are alike for a while, so stretches of them are drawn.
 
-Künsch (Annals of Statistics 1989). The draws are weights per frame, for `hicp_lib.evaluation.statistics.resampling`.
+Künsch (Annals of Statistics 1989). The draws are weights per frame, for
+`hicp_lib.evaluation.statistics.resampling`.
 """
 
 from __future__ import annotations

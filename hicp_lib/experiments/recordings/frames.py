@@ -9,7 +9,7 @@ from hicp_lib.core.memo import memoised
 from hicp_lib.experiments.laboratory import COLOUR, PHOTOGRAPHIC, T_WORLD_ROOT, robot_camera
 from hicp_lib.experiments.recordings.scenarios import Scenario, Stage, scenario
 from hicp_lib.robot.kinematics import load_icub
-from hicp_lib.simulation.rendering.camera import Camera
+from hicp_lib.simulation.rendering.camera import PlacedCamera
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import render
 from hicp_lib.simulation.sensors.depth_camera import D435, simulate_depth
@@ -44,7 +44,7 @@ def stage(name: str, seed: int) -> Stage:
     return scenario(name).stage(seed)
 
 
-def camera_at(plan: Scenario, k: int) -> Camera:
+def camera_at(plan: Scenario, k: int) -> PlacedCamera:
     """The colour camera as frame `k` is taken."""
     (T_root_camera,) = load_icub().T_root_camera(plan.head_rad(k + 1)[k:], plan.mount)
     return robot_camera(COLOUR, T_root_camera)

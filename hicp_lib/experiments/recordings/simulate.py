@@ -61,7 +61,7 @@ def simulate_recording(
     out, plan = Path(out), scenario(name)
     n = plan.n_frames if n_frames is None else n_frames
     _check(out, plan, n, seed, workers)
-    stamp = {"key": key([simulate_recording], scenario=name, seed=int(seed))}
+    stamp = {"scenario": name, "seed": int(seed), "version": key([simulate_recording])}
     _prepare(out, stamp)
     todo = [partial(record_one, out, name, int(seed), k) for k in range(n) if not part_path(out, k).exists()]
     if plan.capture is not None:

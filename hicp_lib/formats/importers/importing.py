@@ -14,6 +14,7 @@ import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.images import inside
 from hicp_lib.formats.annotations import Annotations, write_detections
 from hicp_lib.formats.importers.matching import match_images
 from hicp_lib.formats.importers.mmpose import read_mmpose
@@ -164,8 +165,7 @@ def _summary(
 ) -> Summary:  # fmt: skip
     points, raw = people.keypoints_px[rows], people.raw_scores[rows]
     given = np.isfinite(points).all(axis=-1)
-    # Pixel centres are at integers: an image reaches from -0.5 to width - 0.5.
-    outside = given & ((points < -0.5) | (points > sizes_px[:, None] - 0.5)).any(axis=-1)
+    outside = given & ~inside(points, (0, 0, *sizes_px.T[..., None]))
     n_mentioned = sum(image is not None for image in matched)
     n_with = len(set(people.source_of[rows].tolist()))
     return Summary(

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hicp_lib.simulation.rendering.camera import Camera, join_rays, ray_parts
+from hicp_lib.simulation.rendering.camera import PlacedCamera, join_rays, ray_parts
 from hicp_lib.simulation.rendering.raycast import RayScene, Trace
 
 _SHIFT_PX = 0.17  # along the border, from its middle
@@ -35,7 +35,7 @@ def edge_pixels(trace: Trace, sharp: np.ndarray) -> np.ndarray:
 
 
 def smooth_edges(
-    image: np.ndarray, edges: np.ndarray, trace: Trace, scene: RayScene, camera: Camera
+    image: np.ndarray, edges: np.ndarray, trace: Trace, scene: RayScene, camera: PlacedCamera
 ) -> np.ndarray:
     """The image (height, width, 3) with its edge pixels replaced by the mean of five samples."""
     if len(edges) == 0:
@@ -70,7 +70,7 @@ def _borders(pixels: np.ndarray, height: int, width: int) -> list[np.ndarray]:
     return [left, left + 1, upper, upper + width]
 
 
-def _alike(borders: np.ndarray, trace: Trace, scene: RayScene, camera: Camera) -> np.ndarray:
+def _alike(borders: np.ndarray, trace: Trace, scene: RayScene, camera: PlacedCamera) -> np.ndarray:
     """Which of the two pixels at each border shows what a ray through the border meets, (n,)."""
     height, width = camera.height_px, camera.width_px
     n_upright = height * (width + 1)

@@ -6,25 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hicp_lib.core.camera import Camera, project
+
 
 @dataclass(frozen=True)
-class Camera:
-    """A pinhole camera without distortion. Pixel centres lie at integers.
+class PlacedCamera(Camera):
+    """A pinhole camera somewhere in the world.
 
     Attributes
     ----------
-    width_px, height_px : image size
-    fx_px, fy_px, cx_px, cy_px : focal lengths and principal point
     T_world_camera : array, shape (4, 4)
         Camera coordinates (x right, y down, z forward, metres) to world coordinates.
     """
 
-    width_px: int
-    height_px: int
-    fx_px: float
-    fy_px: float
-    cx_px: float
-    cy_px: float
     T_world_camera: np.ndarray
 
     @property
@@ -49,7 +43,7 @@ def look_at(
     return T_world_camera
 
 
-def pixel_rays(camera: Camera, pixels_px: np.ndarray | None = None) -> np.ndarray:
+def pixel_rays(camera: PlacedCamera, pixels_px: np.ndarray | None = None) -> np.ndarray:
     """Rays in the world whose parameter is the depth along the camera's z axis.
 
     Parameters
@@ -70,13 +64,13 @@ def pixel_rays(camera: Camera, pixels_px: np.ndarray | None = None) -> np.ndarra
     return join_rays(camera.centre_m, directions)
 
 
-def image_directions(camera: Camera) -> np.ndarray:
+def image_directions(camera: PlacedCamera) -> np.ndarray:
     """Directions of the rays through all pixel centres, shape (3, height, width), as in `pixel_rays`."""
     across, down = ray_parts(camera, np.arange(camera.width_px), np.arange(camera.height_px))
     return across[:, None, :] + down[:, :, None]
 
 
-def ray_parts(camera: Camera, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def ray_parts(camera: PlacedCamera, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """What columns u (n,) and rows v (m,) add to a ray's direction: (3, n) and (3, m), float32."""
     x = (u.astype(np.float32) - np.float32(camera.cx_px)) / np.float32(camera.fx_px)
     y = (v.astype(np.float32) - np.float32(camera.cy_px)) / np.float32(camera.fy_px)
@@ -91,12 +85,12 @@ def join_rays(origins_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
     return rays
 
 
-def to_camera(camera: Camera, points_m: np.ndarray) -> np.ndarray:
+def to_camera(camera: PlacedCamera, points_m: np.ndarray) -> np.ndarray:
     """World points (..., 3) in camera coordinates."""
     return (points_m - camera.centre_m) @ camera.T_world_camera[:3, :3]
 
 
-def project(camera: Camera, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def project_world(camera: PlacedCamera, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Project world points.
 
     Returns
@@ -104,18 +98,8 @@ def project(camera: Camera, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarra
     pixels_px : array, shape (..., 2); NaN for points not in front of the camera
     depths_m : array, shape (...), along the camera's z axis
     """
-    x, y, z = np.moveaxis(to_camera(camera, np.asarray(points_m, float)), -1, 0)
-    safe = np.where(z > 1e-6, z, np.nan)
-    pixels_px = np.stack(
-        [x / safe * camera.fx_px + camera.cx_px, y / safe * camera.fy_px + camera.cy_px], axis=-1
-    )
-    return pixels_px, z
-
-
-def inside_image(camera: Camera, pixels_px: np.ndarray) -> np.ndarray:
-    """Whether pixels (..., 2) lie on the image's pixels, [-0.5, size - 0.5); NaN does not."""
-    u, v = pixels_px[..., 0], pixels_px[..., 1]
-    return (u >= -0.5) & (u < camera.width_px - 0.5) & (v >= -0.5) & (v < camera.height_px - 0.5)
+    in_camera_m = to_camera(camera, np.asarray(points_m, float))
+    return project(camera, in_camera_m), in_camera_m[..., 2]
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hicp_lib.simulation.rendering import lights
 from hicp_lib.simulation.rendering.antialias import edge_pixels, smooth_edges
-from hicp_lib.simulation.rendering.camera import Camera, image_directions
+from hicp_lib.simulation.rendering.camera import PlacedCamera, image_directions
 from hicp_lib.simulation.rendering.filters import View, tilt_by_height
 from hicp_lib.simulation.rendering.gbuffer import Looks, gather_looks
 from hicp_lib.simulation.rendering.raycast import RayScene, dot, doubled, place, trace_image
@@ -55,7 +55,7 @@ class Frame:
     rays: RayScene
 
 
-def render(world: World, camera: Camera, rng: np.random.Generator) -> Frame:
+def render(world: World, camera: PlacedCamera, rng: np.random.Generator) -> Frame:
     """Render one frame; the random generator scatters the shadow rays.
 
     Depth and people are exact at every pixel, but only people are shaded there: they are in focus.
@@ -81,7 +81,7 @@ def render(world: World, camera: Camera, rng: np.random.Generator) -> Frame:
     return Frame(image, trace.depth_m.reshape(shape), person, part, scene)
 
 
-def _paint(world: World, scene: RayScene, view: View, camera: Camera, sharp: bool, rng) -> np.ndarray:
+def _paint(world: World, scene: RayScene, view: View, camera: PlacedCamera, sharp: bool, rng) -> np.ndarray:
     """Linear RGB of a view's pixels, (3, n)."""
     looks = gather_looks(scene, view, 1 / camera.fx_px)
     normals = view.on_grid(looks.normals)

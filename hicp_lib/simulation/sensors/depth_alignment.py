@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from hicp_lib.simulation.rendering.camera import Camera
+from hicp_lib.simulation.rendering.camera import PlacedCamera
 
 
-def align_to_colour(depth_m: np.ndarray, left: Camera, colour: Camera) -> np.ndarray:
+def align_to_colour(depth_m: np.ndarray, left: PlacedCamera, colour: PlacedCamera) -> np.ndarray:
     """Depth of the left imager, moved to where the colour camera sees it.
 
     As librealsense does: each depth pixel fills the rectangle of colour pixels from the one that holds
@@ -36,7 +36,7 @@ def align_to_colour(depth_m: np.ndarray, left: Camera, colour: Camera) -> np.nda
     return _stretch_rows(wide[:, 1:-1], left, colour)
 
 
-def _stretch_rows(wide: np.ndarray, left: Camera, colour: Camera) -> np.ndarray:
+def _stretch_rows(wide: np.ndarray, left: PlacedCamera, colour: PlacedCamera) -> np.ndarray:
     """Rows of depth (infinite: none) as rows of the colour image, NaN for none."""
     scale = colour.fy_px / left.fy_px
     middle = scale * (np.arange(left.height_px) - left.cy_px) + colour.cy_px

@@ -16,7 +16,7 @@ import numpy as np
 
 from hicp_lib.simulation.appearance.people import RIGHT
 from hicp_lib.simulation.body.model import REGIONS
-from hicp_lib.simulation.rendering.camera import Camera, pixel_rays
+from hicp_lib.simulation.rendering.camera import PlacedCamera, pixel_rays
 from hicp_lib.simulation.rendering.raycast import RayScene, doubled
 from hicp_lib.simulation.sensors.depth_alignment import align_to_colour
 from hicp_lib.simulation.sensors.depth_noise import correlated_noise, patches
@@ -90,7 +90,7 @@ def without_errors(settings: DepthCamera) -> DepthCamera:
     )  # fmt: skip
 
 
-def simulate_depth(scene: RayScene, colour: Camera, settings: DepthCamera, rng: Rng) -> np.ndarray:
+def simulate_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCamera, rng: Rng) -> np.ndarray:
     """Depth aligned to the colour image.
 
     Parameters
@@ -108,22 +108,22 @@ def simulate_depth(scene: RayScene, colour: Camera, settings: DepthCamera, rng: 
     return align_to_colour(_measure(scene, view, first_column, settings, rng), view, colour)
 
 
-def simulate_raw_depth(scene: RayScene, colour: Camera, settings: DepthCamera, rng: Rng) -> np.ndarray:
+def simulate_raw_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCamera, rng: Rng) -> np.ndarray:
     """Depth as the left imager sees it, (settings.height_px, settings.width_px), else as `simulate_depth`."""
     return _measure(scene, left_imager(colour, settings), 0, settings, rng)
 
 
-def left_imager(colour: Camera, settings: DepthCamera) -> Camera:
+def left_imager(colour: PlacedCamera, settings: DepthCamera) -> PlacedCamera:
     """The left imager as a camera: beside the colour camera, to its right."""
     T_colour_left = np.eye(4)
     T_colour_left[0, 3] = settings.colour_offset_m
     centre = (settings.width_px - 1) / 2, (settings.height_px - 1) / 2
     focal = settings.focal_px, settings.focal_px
     pose = colour.T_world_camera @ T_colour_left
-    return Camera(settings.width_px, settings.height_px, *focal, *centre, pose)
+    return PlacedCamera(settings.width_px, settings.height_px, *focal, *centre, pose)
 
 
-def _crop(left: Camera, colour: Camera, settings: DepthCamera) -> tuple[int, Camera]:
+def _crop(left: PlacedCamera, colour: PlacedCamera, settings: DepthCamera) -> tuple[int, PlacedCamera]:
     """The part of the left imager's view that alignment and shadows need: its first column, a camera."""
     nearest_m = settings.focal_baseline / (settings.searched_px or settings.width_px)
     reach = colour.width_px - 1 - colour.cx_px
@@ -137,7 +137,9 @@ def _crop(left: Camera, colour: Camera, settings: DepthCamera) -> tuple[int, Cam
     return u0, cropped
 
 
-def _measure(scene: RayScene, view: Camera, first_column: int, settings: DepthCamera, rng: Rng) -> np.ndarray:
+def _measure(
+    scene: RayScene, view: PlacedCamera, first_column: int, settings: DepthCamera, rng: Rng
+) -> np.ndarray:
     """What the left imager measures, (view.height_px, view.width_px), float32, NaN for none."""
     true_px, hair = _true_disparity(scene, view, settings.focal_baseline)
     valid = true_px > 0
@@ -174,7 +176,9 @@ def _to_depth(disparity_px: np.ndarray, valid: np.ndarray, settings: DepthCamera
     return depth_m
 
 
-def _true_disparity(scene: RayScene, view: Camera, focal_baseline: float) -> tuple[np.ndarray, np.ndarray]:
+def _true_disparity(
+    scene: RayScene, view: PlacedCamera, focal_baseline: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Disparity (0 where nothing is) and where there is hair, both (height, width).
 
     Disparity is linear over a plane's image. So every second row and column is cast, and where
@@ -202,7 +206,7 @@ def _true_disparity(scene: RayScene, view: Camera, focal_baseline: float) -> tup
     return full, doubled(hair, shape)
 
 
-def _every_second(view: Camera) -> Camera:
+def _every_second(view: PlacedCamera) -> PlacedCamera:
     """The camera whose pixels are those of every second row and column."""
     halves = {name: getattr(view, name) / 2 for name in ("fx_px", "fy_px", "cx_px", "cy_px")}
     return replace(view, width_px=-(-view.width_px // 2), height_px=-(-view.height_px // 2), **halves)

@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 from tqdm import tqdm
 
+from hicp_lib.core.cache import key
 from hicp_lib.core.environment import with_variables
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_bytes, write_json
@@ -55,7 +56,7 @@ def render_dataset(
     """
     out = Path(out)
     _check(out, n, seed, workers)
-    stamp = {"key": key([render_dataset], seed=int(seed))}
+    stamp = {"renderer": key([render_dataset]), "seed": int(seed)}
     _prepare(out, stamp)
     todo = [(str(out), seed, index) for index in range(n) if not _is_done(out, index)]
     bar = tqdm(

@@ -11,7 +11,7 @@ from hicp_lib.simulation.appearance.people import dress, random_appearance
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
 from hicp_lib.simulation.rendering import lights
-from hicp_lib.simulation.rendering.camera import Camera, look_at, project
+from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at, project_world
 from hicp_lib.simulation.rendering.colour_sensor import Sensor
 from hicp_lib.simulation.rendering.render import World
 from hicp_lib.simulation.rendering.surfaces import Surface
@@ -26,7 +26,7 @@ class Stage:
     """A scene ready to be photographed; `people` in the order of the surfaces' person numbers."""
 
     world: World
-    camera: Camera
+    camera: PlacedCamera
     sensor: Sensor
     people: list[PosedBody]
 
@@ -89,7 +89,7 @@ _POSES = {
 }  # fmt: skip
 
 
-def _camera(rng: Rng, person: PosedBody) -> Camera:
+def _camera(rng: Rng, person: PosedBody) -> PlacedCamera:
     """A hand-held camera that frames the first person: all of them, to the knees, or closer."""
     upright = rng.random() < 0.35
     width, height = (480, 640) if upright else (640, 480)
@@ -109,7 +109,7 @@ def _camera(rng: Rng, person: PosedBody) -> Camera:
     )
     target = middle + np.array([rng.normal(0, 0.10) * distance * width / focal, 0, 0])
     pose = look_at(eye, target, roll_rad=rng.normal(0, 0.02))
-    return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, pose)
+    return PlacedCamera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, pose)
 
 
 def _lighting(
@@ -169,6 +169,6 @@ def _sensor(rng: Rng) -> Sensor:
     )
 
 
-def distance_m(camera: Camera, person: PosedBody) -> float:
+def distance_m(camera: PlacedCamera, person: PosedBody) -> float:
     """Depth of the middle of a person's keypoints."""
-    return float(np.median(project(camera, person.keypoints_m)[1]))
+    return float(np.median(project_world(camera, person.keypoints_m)[1]))

@@ -7,7 +7,7 @@ import numpy as np
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS
 from hicp_lib.simulation.appearance.people import N_PARTS, RIGHT
 from hicp_lib.simulation.body.model import REGIONS
-from hicp_lib.simulation.rendering.camera import Camera, inside_image, pixel_rays, project
+from hicp_lib.simulation.rendering.camera import PlacedCamera, pixel_rays, project_world
 from hicp_lib.simulation.rendering.raycast import RayScene
 
 _HEAD = ("face", "eyebrow", "lips", "mouth", "eye", "neck")
@@ -62,7 +62,7 @@ _ALLOWED, _DEPTH_M = _tables()
 
 
 def keypoint_visibility(
-    scene: RayScene, camera: Camera, keypoints_m: np.ndarray, person: int
+    scene: RayScene, camera: PlacedCamera, keypoints_m: np.ndarray, person: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where a person's keypoints appear, and whether they are seen.
 
@@ -82,8 +82,8 @@ def keypoint_visibility(
     pixels_px : array, shape (136, 2)
     visibility : array, shape (136,), int: 2 visible, 1 occluded, 0 outside the image
     """
-    pixels_px, depths_m = project(camera, keypoints_m)
-    inside = inside_image(camera, pixels_px)
+    pixels_px, depths_m = project_world(camera, keypoints_m)
+    inside = camera.contains(pixels_px)
     rays = pixel_rays(camera, np.where(inside[:, None], pixels_px, 0))
     trace = scene.trace(rays)
     stretch = np.linalg.norm(rays[:, 3:], axis=1)

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from hicp_lib.core.camera import Intrinsics, deproject, transform
+from hicp_lib.core.camera import Camera, deproject, transform
 from hicp_lib.evaluation.space.stability import POSITION
 from hicp_lib.recordings.recording import Recording, read_depth_m, read_rgb
 from hicp_lib.robot.segments import Segment
@@ -39,8 +39,8 @@ def scene(
     Parameters
     ----------
     recordings : view -> recording; all camera poses are drawn, and what the first saw in its first frame
-    medians : table of `hicp_lib.evaluation.space.stability.median_positions`, one method; one skeleton per view
-        and detector
+    medians : table of `hicp_lib.evaluation.space.stability.median_positions`, one method; one skeleton per
+        view and detector
     robot : body segments in the base frame; empty where the joints are not known
     truth : view -> table with `keypoint, x_m, y_m, z_m`, the first view's is drawn; None where not known
     """
@@ -98,7 +98,7 @@ def _robot(segments: Sequence[Segment]) -> go.Scatter3d:
     return _line(np.concatenate(ends), "robot", ROBOT_COLOUR, 14)
 
 
-def _frusta(intrinsics: Intrinsics, T_base_cam: np.ndarray) -> np.ndarray:
+def _frusta(intrinsics: Camera, T_base_cam: np.ndarray) -> np.ndarray:
     """Lines of a small pyramid per camera pose, shape (n, 3)."""
     right, bottom = intrinsics.width_px - 0.5, intrinsics.height_px - 0.5
     pixels_px = np.array([(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom)])

@@ -16,8 +16,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.isolation import child_environment
-
-from .conftest import N_PEOPLE
+from tests.detectors.conftest import N_PEOPLE
 
 
 def hand_errors(positions_px: np.ndarray, truth_px: np.ndarray) -> tuple[float, float]:
@@ -144,11 +143,11 @@ def test_an_empty_image_has_nobody(weights):
 
 
 def test_bundles_are_equal_every_time_and_a_bundle_can_be_given(weights, tmp_path, photograph):
-    from hicp_lib.detectors.mediapipe import bundle as mediapipe_bundle
+    from hicp_lib.detectors.mediapipe import bundles
 
-    bundle = mediapipe_bundle.assemble("pose")
-    mediapipe_bundle._with_scaling.cache_clear()
-    assert mediapipe_bundle.assemble("pose") == bundle
+    bundle = bundles.assemble("pose")
+    bundles._with_scaling.cache_clear()
+    assert bundles.assemble("pose") == bundle
     path = tmp_path / "pose.task"
     path.write_bytes(bundle)
     given, own = make_detector("mediapipe-pose", model=path), make_detector("mediapipe-pose")
@@ -160,13 +159,13 @@ def test_bundles_are_equal_every_time_and_a_bundle_can_be_given(weights, tmp_pat
 
 def test_every_model_declares_once_how_pixels_are_scaled(weights):
     """The pose detector takes [-1, 1], the others [0, 1], as MediaPipe's own graphs feed them."""
-    from hicp_lib.detectors.mediapipe import bundle as mediapipe_bundle
+    from hicp_lib.detectors.mediapipe import bundles
 
     generated = "tasks/metadata/{}schema_py_generated.py"
-    tflite, metadata = (mediapipe_bundle._of_mediapipe(generated.format(kind)) for kind in ("", "metadata_"))
+    tflite, metadata = (bundles._of_mediapipe(generated.format(kind)) for kind in ("", "metadata_"))
     ranges = {}
     for task in ("pose", "hand"):
-        with zipfile.ZipFile(io.BytesIO(mediapipe_bundle.assemble(task))) as bundle:
+        with zipfile.ZipFile(io.BytesIO(bundles.assemble(task))) as bundle:
             models = {
                 name: tflite.ModelT.InitFromPackedBuf(bundle.read(name), 0) for name in bundle.namelist()
             }
@@ -263,8 +262,8 @@ time.sleep(1)
 # What the library's own process does, and then what it never does: close the task.
 _CLOSE = """
 import time
-from hicp_lib.detectors import mediapipe_bundle, mediapipe_child
-task = mediapipe_child.landmarker(mediapipe_bundle.assemble("hand"), "hand", 2, 0.5)
+from hicp_lib.detectors.mediapipe import bundles, child
+task = child.landmarker(bundles.assemble("hand"), "hand", 2, 0.5)
 task.close()
 time.sleep(1)
 """

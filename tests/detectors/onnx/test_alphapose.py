@@ -6,9 +6,13 @@ import pytest
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import COCO_17
 from hicp_lib.detectors.onnx.alphapose import AlphaPose
-
-from .onnx_models import ALPHAPOSE_PIXELS, colour_maps_model, colour_simcc_model, constant_model
-from .test_mmpose import back_to_image, dots, heat_maps
+from tests.detectors.onnx.onnx_models import (
+    ALPHAPOSE_PIXELS,
+    colour_maps_model,
+    colour_simcc_model,
+    constant_model,
+)
+from tests.detectors.onnx.test_mmpose import back_to_image, dots, heat_maps
 
 BLACK = np.zeros((160, 200, 3), np.uint8)
 BOX = (20.0, 30.0, 60.0, 80.0)

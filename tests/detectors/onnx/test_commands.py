@@ -11,9 +11,8 @@ from hicp_lib.core.images import write_png
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.weights.user import keep_own, own_options, own_path
 from hicp_lib.study.provenance import weights_sha256
-
-from .onnx_models import colour_maps_model, constant_model
-from .test_mmpose import dots
+from tests.detectors.onnx.onnx_models import colour_maps_model, constant_model
+from tests.detectors.onnx.test_mmpose import dots
 
 
 @pytest.fixture

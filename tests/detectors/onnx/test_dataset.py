@@ -8,9 +8,8 @@ from hicp_lib.core.images import write_png
 from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS
 from hicp_lib.detectors.runtime.run import detect_dataset, detect_images
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
-
-from .onnx_models import colour_maps_model
-from .test_mmpose import dots
+from tests.detectors.onnx.onnx_models import colour_maps_model
+from tests.detectors.onnx.test_mmpose import dots
 
 POSITIONS = [
     np.array([[60.0, 70.0], [75.5, 60.25], [66.0, 88.0]]),

@@ -9,8 +9,7 @@ from onnx import TensorProto, helper
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import COCO_17
 from hicp_lib.detectors.onnx.keypoint_rcnn import KeypointRcnn, logistic_score
-
-from .onnx_models import constant_model, save
+from tests.detectors.onnx.onnx_models import constant_model, save
 
 RNG = np.random.default_rng(0)
 POINTS = RNG.uniform(5, 70, (2, 17, 2)).astype(np.float32)

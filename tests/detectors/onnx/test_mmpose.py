@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import COCO_17, LEFT_HAND, RIGHT_HAND, TO_HALPE
 from hicp_lib.detectors.onnx.mmpose import MMPose
-
-from .onnx_models import colour_maps_model, colour_simcc_model, constant_model
+from tests.detectors.onnx.onnx_models import colour_maps_model, colour_simcc_model, constant_model
 
 SIZE = (48, 64)
 BOXES = [(20.0, 30.0, 60.0, 80.0), (10.5, 7.25, 200.0, 33.0), (-20, -10, 70.5, 90), (150.5, 100, 49.5, 60.0)]
@@ -209,7 +208,7 @@ def test_outputs_of_any_shape_are_used_or_refused_in_one_line(data, tmp_path):
 def test_inputs_that_are_not_crops_are_refused(tmp_path, shape):
     from onnx import helper
 
-    from .onnx_models import save
+    from tests.detectors.onnx.onnx_models import save
 
     path = save(tmp_path / "m.onnx", [helper.make_node("Identity", ["image"], ["o"])], {"image": list(shape)},
                 {"o": list(shape)}, {})  # fmt: skip

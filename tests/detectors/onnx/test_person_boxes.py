@@ -6,8 +6,7 @@ from onnx import helper
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.person_boxes import PersonBoxes
-
-from .onnx_models import constant_model, save
+from tests.detectors.onnx.onnx_models import constant_model, save
 
 IMAGE = np.zeros((120, 200, 3), np.uint8)  # into 64 x 64: scale 0.32, 64 x 38 pixels (38.4 cut off)
 SCALE = np.array([64 / 200, 38 / 120])

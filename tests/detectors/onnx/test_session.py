@@ -11,8 +11,7 @@ from onnx import TensorProto, helper
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_file
 from hicp_lib.detectors.onnx.session import available_providers, open_model
-
-from .onnx_models import colour_maps_model, constant_model, save
+from tests.detectors.onnx.onnx_models import colour_maps_model, constant_model, save
 
 
 @pytest.fixture

@@ -8,8 +8,7 @@ from hicp_lib.detectors.openpose import released as paf_released
 from hicp_lib.detectors.openpose.joining import join_as_released
 from hicp_lib.detectors.openpose.mobilenet import COCO_18
 from hicp_lib.detectors.openpose.user_network import BODY_25
-
-from .test_paf import STANDING, draw, without
+from tests.detectors.openpose.test_paf import STANDING, draw, without
 
 NOBODY_LEFT_OUT = paf.PafOptions(min_parts=1, min_score=0.0)
 CHAIN = paf.PartModel("x", 4, np.array([(0, 1), (1, 2), (2, 3)]), np.zeros((3, 2), int))

@@ -7,8 +7,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import COCO_17, INDEX
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.weights import default as zoo
-
-from .plain_people import render_person
+from tests.detectors.plain_people import render_person
 
 
 def test_rendered_people_are_found_to_a_few_pixels(weights):

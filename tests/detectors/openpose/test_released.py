@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from hicp_lib.detectors.openpose import paf
 from hicp_lib.detectors.openpose import released as paf_released
 from hicp_lib.detectors.openpose.mobilenet import COCO_18
-
-from .test_paf import STANDING, draw
+from tests.detectors.openpose.test_paf import STANDING, draw
 
 OPTIONS = paf.PafOptions()
 

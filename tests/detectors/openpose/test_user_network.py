@@ -8,9 +8,8 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND, TO_HALPE
 from hicp_lib.detectors.openpose.mobilenet import COCO_18
 from hicp_lib.detectors.openpose.user_network import BODY_25, OpenPose, hand_square
-
-from ..test_paf import STANDING, draw
-from .onnx_models import constant_model, save
+from tests.detectors.onnx.onnx_models import constant_model, save
+from tests.detectors.openpose.test_paf import STANDING, draw
 
 IMAGE = np.zeros((184, 216, 3), np.uint8)  # half the size of the network's 368 x 432
 

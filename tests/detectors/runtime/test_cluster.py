@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -56,7 +57,7 @@ PRELOAD = ("--preload", "slow_detector")
 @pytest.fixture
 def registered(slow, monkeypatch):
     """This process knows the detector too."""
-    monkeypatch.syspath_prepend(os.path.dirname(__file__))
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "preloaded")
     monkeypatch.setenv("SLOW_CALLS", str(slow.calls))
     monkeypatch.setenv("HICP_CACHE", str(slow.folder / "cache"))
     monkeypatch.setattr(registry, "DETECTORS", dict(registry.DETECTORS))

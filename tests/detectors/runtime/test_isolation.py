@@ -173,11 +173,11 @@ def test_the_caller_is_as_before(weights, name):
 _IN_PROCESS = """
 import sys, numpy as np, mediapipe
 from mediapipe.tasks.python import BaseOptions, vision
-from hicp_lib.detectors import mediapipe_bundle
+from hicp_lib.detectors.mediapipe import bundles
 images = np.load(sys.argv[1])
-options = {"base_options": BaseOptions(model_asset_buffer=mediapipe_bundle.assemble("pose"))}
+options = {"base_options": BaseOptions(model_asset_buffer=bundles.assemble("pose"))}
 pose = vision.PoseLandmarker.create_from_options(vision.PoseLandmarkerOptions(**options))
-options = {"base_options": BaseOptions(model_asset_buffer=mediapipe_bundle.assemble("hand")), "num_hands": 2}
+options = {"base_options": BaseOptions(model_asset_buffer=bundles.assemble("hand")), "num_hands": 2}
 hand = vision.HandLandmarker.create_from_options(vision.HandLandmarkerOptions(**options))
 rows = {}
 for name in images:

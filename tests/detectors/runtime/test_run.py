@@ -123,14 +123,17 @@ def test_what_is_read_is_what_was_written(tmp_path, n):
 
 def test_the_key_knows_code_and_libraries(counting, monkeypatch):
     folders = {cache.cache_folder(Counting())}
-    with monkeypatch.context() as changed:
-        changed.setattr(cache, "code_sha256", lambda: "0")
-        folders.add(cache.cache_folder(Counting()))
-    with monkeypatch.context() as changed:
-        changed.setattr(cache.cv2, "__version__", "0")
-        folders.add(cache.cache_folder(Counting()))
+    known = cache._code
+    for place in range(3):
+        with monkeypatch.context() as changed:
+            changed.setattr(
+                cache,
+                "_code",
+                lambda names, place=place: [*known(names)[:place], "other", *known(names)[place + 1 :]],
+            )
+            folders.add(cache.cache_folder(Counting()))
     folders.add(cache.cache_folder(Counting(version=2)))
-    assert len(folders) == 4
+    assert len(folders) == 5
 
 
 def test_an_image_that_cannot_be_read_is_named(counting, images, tmp_path):

@@ -153,8 +153,8 @@ def test_unknown_names_are_refused(one_weight):
 def test_a_killed_fetch_leaves_nothing_that_counts_as_fetched(one_weight):
     """Killed between the writing and the renaming of the file."""
     program = (
-        "import os, signal, sys; from pathlib import Path; from hicp_lib import files; "
-        "from hicp_lib.detectors import zoo; zoo.REGISTRY_PATH = Path(sys.argv[1]); "
+        "import os, signal, sys; from pathlib import Path; from hicp_lib.core import files; "
+        "from hicp_lib.detectors.weights import default as zoo; zoo.REGISTRY_PATH = Path(sys.argv[1]); "
         "files.os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL); zoo.fetch()"
     )
     killed = subprocess.run([sys.executable, "-c", program, str(zoo.REGISTRY_PATH)], capture_output=True)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from made_people import make_annotations, make_detections
 
 from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND
 from hicp_lib.evaluation.ap.evaluate import evaluate
 from hicp_lib.evaluation.ap.hands import INGREDIENTS, compare_hands, hand_oks
+from tests.evaluation.made_people import make_annotations, make_detections
 
 N = 12
 POINTS = np.random.default_rng(1).uniform(50, 400, (N, 136, 2))

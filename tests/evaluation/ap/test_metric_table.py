@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_people import make_annotations, make_detections
 
 from hicp_lib.evaluation.ap import metric_table as module
 from hicp_lib.evaluation.ap.evaluate import evaluate
@@ -13,12 +12,12 @@ from hicp_lib.evaluation.ap.metric_table import (
     draw_cases,
     figures,
     head_loss,
-    metrics_text,
-    only_images,
     pairs,
     people_oks,
-    source_images,
 )
+from hicp_lib.formats.annotations import source_images
+from hicp_lib.study.table_format import metrics_text
+from tests.evaluation.made_people import make_annotations, make_detections
 
 N = 60
 
@@ -30,7 +29,7 @@ def study():
     points = rng.uniform(50, 400, (N, 136, 2))
     extras = [{"source_image_id": i // 3} for i in range(N)]
     basic = make_annotations(points, range(N), extras=extras)
-    headless = only_images(basic, range(40))
+    headless = basic.of_images(range(40))
     exact = {i: make_detections(points[i]) for i in range(N)}
     lost = {i: make_detections(points[i] + 200.0 * (i % 2), [1.0 - i % 2 / 2]) for i in range(40)}
     found = {("basic", "mediapipe"): exact, ("headless", "mediapipe"): lost}

@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_people import make_detections
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.calibration.curves import (
@@ -17,6 +16,7 @@ from hicp_lib.evaluation.calibration.curves import (
     reliability,
     split_half,
 )
+from tests.evaluation.made_people import make_detections
 
 POINTS = np.random.default_rng(0).uniform(50, 400, (1, 136, 2))
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from made_people import make_annotations, make_detections
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import COCO_17, SIGMAS
 from hicp_lib.evaluation.calibration.keypoint_hits import all_hits, keypoint_hits
+from tests.evaluation.made_people import make_annotations, make_detections
 
 AREA = 20_000.0
 POINTS = np.random.default_rng(0).uniform(50, 400, (3, 136, 2))

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from made_people import make_annotations, make_detections
 
 from hicp_lib.core.images import write_png
 from hicp_lib.evaluation.failures.dose_curves import OBSERVED, dose_curves, observed_curves, observed_doses
 from hicp_lib.evaluation.failures.error_kinds import all_errors
+from tests.evaluation.made_people import make_annotations, make_detections
 
 POINTS = np.random.default_rng(5).uniform(50, 400, (136, 2))
 

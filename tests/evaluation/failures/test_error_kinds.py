@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from made_people import make_annotations, make_detections
 
 from hicp_lib.core.keypoints import COCO_17, INDEX, SIGMAS
 from hicp_lib.evaluation.failures.error_kinds import KINDS, all_errors, keypoint_errors, kind_shares
+from tests.evaluation.made_people import make_annotations, make_detections
 
 AREA = 20_000.0
 # Keypoints far from one another: no error can be taken for another keypoint by chance.

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from made_people import HIDDEN
 
 from hicp_lib.evaluation.failures.error_kinds import all_errors
 from hicp_lib.evaluation.failures.false_confidence import MEASURES, paper_remarks, scores_by_state
 from hicp_lib.evaluation.failures.placed_keypoints import placed_keypoints
+from tests.evaluation.made_people import HIDDEN
 
 
 def test_scores_are_set_against_hits_apart_for_every_state(world):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from made_people import HIDDEN, UNKNOWN
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import INDEX
@@ -11,6 +10,7 @@ from hicp_lib.evaluation.failures.false_confidence import MEASURES, paper_remark
 from hicp_lib.evaluation.failures.placed_keypoints import from_the_cut, landed, placed_keypoints
 from hicp_lib.evaluation.failures.without_head import invented_heads, invented_shares
 from hicp_lib.study.plots import failures as draw
+from tests.evaluation.made_people import HIDDEN, UNKNOWN
 
 
 def by_keypoint(table, column):

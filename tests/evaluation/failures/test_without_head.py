@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from made_people import POINTS, make_annotations, make_detections
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.evaluation.failures.error_kinds import all_errors
 from hicp_lib.evaluation.failures.placed_keypoints import placed_keypoints
 from hicp_lib.evaluation.failures.without_head import change_per_keypoint, invented_heads, invented_shares
+from tests.evaluation.made_people import POINTS, make_annotations, make_detections
 
 
 def test_heads_made_up_are_counted_and_placed(world):

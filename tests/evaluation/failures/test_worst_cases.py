@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from made_people import POINTS, make_annotations, make_detections
 
 from hicp_lib.evaluation.failures.error_kinds import all_errors
 from hicp_lib.evaluation.failures.worst_cases import worst_cases
+from tests.evaluation.made_people import POINTS, make_annotations, make_detections
 
 
 def test_worst_cases_are_the_surest_mistakes_and_the_overlooked():

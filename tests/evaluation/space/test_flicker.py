@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from made_people import make_detections
 
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.evaluation.space.flicker import best_person, causal_filter, flicker, latency_s
+from tests.evaluation.made_people import make_detections
 
 RATE_HZ = 20.0
 TIMES_S = np.arange(100) / RATE_HZ

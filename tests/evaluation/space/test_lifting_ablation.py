@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.core.camera import Intrinsics, deproject
+from hicp_lib.core.camera import Camera, deproject
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import INDEX, NAMES
 from hicp_lib.evaluation.space.lifting_ablation import (
@@ -19,7 +19,7 @@ from hicp_lib.lifting.table import lift_found
 from hicp_lib.recordings.recording import open_recording
 from hicp_lib.recordings.writer import RecordingWriter
 
-CAMERA = Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
+CAMERA = Camera(64, 48, 60.0, 60.0, 32.0, 24.0)
 WRIST, THUMB = INDEX["left_wrist"], INDEX["left_thumb_2"]
 
 

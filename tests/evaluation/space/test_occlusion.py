@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.core.camera import Intrinsics, transform
+from hicp_lib.core.camera import Camera, transform
 from hicp_lib.evaluation.space.occlusion import SIGHTS, lines_of_sight
 from hicp_lib.recordings.recording import open_recording
 from hicp_lib.recordings.writer import RecordingWriter
@@ -26,7 +26,7 @@ def recording(tmp_path):
     depth = np.full((48, 64), 2.0)
     depth[:, 28:37] = 1.0
     depth[:, :20] = 0
-    writer = RecordingWriter(tmp_path / "post", Intrinsics(64, 48, 50.0, 50.0, 31.5, 23.5))
+    writer = RecordingWriter(tmp_path / "post", Camera(64, 48, 50.0, 50.0, 31.5, 23.5))
     for k in range(2):
         writer.add(float(k), np.zeros((48, 64, 3), np.uint8), depth, T_BASE_CAM)
     writer.finish()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hicp_lib.core.camera import Intrinsics, project, transform
+from hicp_lib.core.camera import Camera, project, transform
 from hicp_lib.evaluation.space.registration_error import compare_registrations, marker_pixels
 from hicp_lib.mocap.registration import Registration
 from hicp_lib.recordings.qualisys import MotionCapture
@@ -53,7 +53,7 @@ def test_without_the_truth_nothing_is_said_of_it(mocap):
 
 
 def test_measured_markers_are_put_where_the_camera_would_see_them(mocap):
-    camera = Intrinsics(64, 48, 50.0, 50.0, 31.5, 23.5)
+    camera = Camera(64, 48, 50.0, 50.0, 31.5, 23.5)
     T_base_cam = np.stack([np.eye(4), shifted(0.1)])
     recording = Recording(Path("."), camera, 1e3, np.array([5.0, 5.5]), [], [], T_base_cam, None)
     pixels = marker_pixels(recording, mocap, [Registration("exact", EXACT)], [0, 1], offset_s=5.0)

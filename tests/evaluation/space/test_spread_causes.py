@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.core.camera import Intrinsics, project, transform
+from hicp_lib.core.camera import Camera, project, transform
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.space import spread_causes as module
@@ -25,7 +25,7 @@ from hicp_lib.recordings.writer import RecordingWriter, write_depth
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
 from hicp_lib.study.relative import lift_views
 
-CAMERA = Intrinsics(width_px=320, height_px=240, fx_px=300, fy_px=300, cx_px=159.5, cy_px=119.5)
+CAMERA = Camera(width_px=320, height_px=240, fx_px=300, fy_px=300, cx_px=159.5, cy_px=119.5)
 WALL_M = -1.2  # x of the wall, in front of the robot
 POINTS_M = {
     "left_wrist": (WALL_M, -0.15, 0.3),

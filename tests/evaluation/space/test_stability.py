@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from still_person import KEYPOINTS, TRUE_M, make_points, make_truth
 
 from hicp_lib.evaluation.space.stability import (
     PARTS,
@@ -12,6 +11,7 @@ from hicp_lib.evaluation.space.stability import (
     spread_and_bias,
     within_distance,
 )
+from tests.evaluation.still_person import KEYPOINTS, TRUE_M, make_points, make_truth
 
 FAR = [9.0, 0, 0]
 NONE = [np.nan] * 3

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -203,21 +201,3 @@ def test_a_given_recording_is_opened_instead(lower):
         open_experiment("relative-lower", recording="/no/recording")
     with pytest.raises(InputError, match="no scenario"):
         open_experiment("sideways")
-
-
-# What these do to a recording shows in no number or pixel of it.
-UNDECIDED = {"hicp_lib.rgbd", "hicp_lib.recordings.recording", "hicp_lib.robot", "hicp_lib.simulation.experiments",
-             "hicp_lib.simulation.sensors"}  # fmt: skip
-
-
-def test_the_version_covers_all_code_that_takes_part():
-    code = (
-        "import sys, hicp_lib.experiments.recordings.simulate\n"
-        "for name, module in sorted(sys.modules.items()):\n"
-        "    if name.startswith(('hicp_lib.simulation', 'hicp_lib.rgbd', 'hicp_lib.robot')):\n"
-        "        print(name, module.__file__)"
-    )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded = dict(line.split(" ", 1) for line in run.stdout.splitlines())
-    covered = {str(path) for path in simulate.deciding_files()}
-    assert {name for name, path in loaded.items() if path not in covered} == UNDECIDED

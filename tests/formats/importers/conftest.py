@@ -2,7 +2,7 @@
 
 import pytest
 
-from .native_people import NAMES, annotated, make_person
+from tests.formats.importers.native_people import NAMES, annotated, make_person
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import numpy as np
 
 from hicp_lib.formats.annotations import Annotations, ImageInfo
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "tools"))
+sys.path.insert(0, str(Path(__file__).parents[3] / "tools"))
 
 from native_files import Person, standing_person  # noqa: E402
 

@@ -7,7 +7,7 @@ import pytest
 
 from hicp_lib.cli import main as cli
 
-EXAMPLES = Path(__file__).parents[2] / "data" / "examples" / "native"
+EXAMPLES = Path(__file__).parents[3] / "data" / "examples" / "native"
 ANNOTATIONS = ["--annotations", str(EXAMPLES / "annotations.json")]
 
 

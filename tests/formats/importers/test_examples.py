@@ -10,7 +10,7 @@ from hicp_lib.evaluation.ap.evaluate import evaluate
 from hicp_lib.formats.annotations import read_annotations, read_detections
 from hicp_lib.formats.importers.importing import READERS, import_predictions, write_imported
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "data" / "examples" / "native"
 
 

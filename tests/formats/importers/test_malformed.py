@@ -20,8 +20,7 @@ from native_files import (
 from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.ap.evaluate import check_detections
 from hicp_lib.formats.importers.importing import import_predictions, write_imported
-
-from .native_people import NAMES, annotated, make_person
+from tests.formats.importers.native_people import NAMES, annotated, make_person
 
 IDS = {name: i for i, name in NAMES.items()}
 FOUND = {NAMES[785]: [make_person(1), make_person(2)]}

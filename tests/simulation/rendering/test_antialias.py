@@ -5,11 +5,11 @@ import numpy as np
 from hicp_lib.simulation.appearance import materials
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.antialias import edge_pixels, smooth_edges
-from hicp_lib.simulation.rendering.camera import Camera, image_directions, look_at
+from hicp_lib.simulation.rendering.camera import PlacedCamera, image_directions, look_at
 from hicp_lib.simulation.rendering.raycast import RayScene, trace_image
 from hicp_lib.simulation.rendering.surfaces import Surface
 
-CAMERA = Camera(80, 60, 70.0, 70.0, 39.5, 29.5, look_at([0, -3, 0], [0, 0, 0]))
+CAMERA = PlacedCamera(80, 60, 70.0, 70.0, 39.5, 29.5, look_at([0, -3, 0], [0, 0, 0]))
 SLOPE = 0.3  # of the edge, in the image as in the world
 FAINT = 1e-3  # so little light that compression does not bend the mean
 

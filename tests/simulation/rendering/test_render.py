@@ -9,7 +9,7 @@ from hicp_lib.simulation.appearance.people import part_of_vertices
 from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.simulation.rendering import lights
 from hicp_lib.simulation.rendering import mesh as g
-from hicp_lib.simulation.rendering.camera import Camera, image_directions, look_at
+from hicp_lib.simulation.rendering.camera import PlacedCamera, image_directions, look_at
 from hicp_lib.simulation.rendering.filters import View
 from hicp_lib.simulation.rendering.gbuffer import gather_looks
 from hicp_lib.simulation.rendering.raycast import RayScene, trace_image
@@ -19,7 +19,7 @@ from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
 GREY = materials.plain(np.full(3, 0.5))
-CAMERA = Camera(80, 60, 70.0, 70.0, 39.5, 29.5, look_at([0, -3, 1], [0, 0, 1]))
+CAMERA = PlacedCamera(80, 60, 70.0, 70.0, 39.5, 29.5, look_at([0, -3, 1], [0, 0, 1]))
 
 
 def _sphere(centre, radius):
@@ -61,7 +61,7 @@ def test_a_tilted_plane_has_exact_depth_where_nothing_was_traced():
 def test_shadows_are_dark_and_light_is_not_below_zero():
     floor = Surface(g.quad([-5, -5, 0], [10, 0, 0], [0, 10, 0]), GREY, person=0)
     roof = Surface(g.box([-0.6, -0.9, 1.2], [0.6, 0.6, 1.25]), GREY)
-    camera = Camera(80, 60, 60.0, 60.0, 39.5, 29.5, look_at([0, -3, 1.0], [0, 0, 0]))
+    camera = PlacedCamera(80, 60, 60.0, 60.0, 39.5, 29.5, look_at([0, -3, 1.0], [0, 0, 0]))
     lamp = lights.Light(
         np.array([0.0, -0.1, 3]), np.array([0.1, 0, 0]), np.array([0, 0.1, 0]), np.full(3, 9.0)
     )
@@ -79,7 +79,7 @@ def test_frames_of_one_world_are_those_of_worlds_made_anew():
     ball = Surface(_sphere([0, 0, 1], 0.5), GREY, person=0)
     kept = _world([ball])
     for eye in ([0, -3, 1], [1, -3, 1.5]):
-        camera = Camera(80, 60, 70.0, 70.0, 39.5, 29.5, look_at(eye, [0, 0, 1]))
+        camera = PlacedCamera(80, 60, 70.0, 70.0, 39.5, 29.5, look_at(eye, [0, 0, 1]))
         again = render(kept, camera, np.random.default_rng(1))
         fresh = render(_world([ball]), camera, np.random.default_rng(1))
         assert (again.radiance == fresh.radiance).all() and (again.depth_m == fresh.depth_m).all()
@@ -111,7 +111,7 @@ def person():
 
 
 def _seen(person, surfaces, eye, target=(0, 0, 0.9)):
-    camera = Camera(480, 640, 600.0, 600.0, 239.5, 319.5, look_at(eye, target))
+    camera = PlacedCamera(480, 640, 600.0, 600.0, 239.5, 319.5, look_at(eye, target))
     scene = RayScene([person[1], *surfaces])
     pixels, seen = keypoint_visibility(scene, camera, person[0].keypoints_m, 0)
     return pixels, {name: int(seen[index]) for name, index in INDEX.items()}

@@ -8,7 +8,7 @@ import pytest
 from hicp_lib.simulation.appearance import materials
 from hicp_lib.simulation.body.model import REGIONS
 from hicp_lib.simulation.rendering import mesh as g
-from hicp_lib.simulation.rendering.camera import Camera, look_at, pixel_rays
+from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at, pixel_rays
 from hicp_lib.simulation.rendering.raycast import RayScene
 from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.sensors.depth_alignment import align_to_colour
@@ -23,7 +23,7 @@ from hicp_lib.simulation.sensors.depth_camera import (
 
 GREY = materials.plain(np.full(3, 0.5))
 # In the world as in the camera: x right, y down, z forward.
-COLOUR = Camera(640, 480, 615.0, 615.0, 319.5, 239.5, np.eye(4))
+COLOUR = PlacedCamera(640, 480, 615.0, 615.0, 319.5, 239.5, np.eye(4))
 EXACT = without_errors(D435)
 
 

@@ -97,7 +97,7 @@ def test_another_seed_reuses_nothing(tmp_path, monkeypatch):
     assert calls[2:] == [(2, 0), (2, 1)]
     render_dataset(out, 1, 2, workers=1, progress=False)
     assert [p.name for p in (out / "images").iterdir()] == ["000000.jpg"]
-    monkeypatch.setattr(scenes, "renderer_version", lambda: "another")
+    monkeypatch.setattr(scenes, "key", lambda *_, **__: "of another renderer")
     render_dataset(out, 1, 2, workers=1, progress=False)
     assert calls[4:] == [(2, 0)]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.core.camera import Intrinsics
+from hicp_lib.core.camera import Camera
 from hicp_lib.recordings.recording import open_recording
 from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.study.plots.registration import registration
@@ -14,7 +14,7 @@ METHODS = ["paper: eight clicks, camera marker", "all clicks"]
 
 @pytest.fixture
 def recording(tmp_path):
-    writer = RecordingWriter(tmp_path / "room", Intrinsics(160, 120, 150.0, 150.0, 79.5, 59.5))
+    writer = RecordingWriter(tmp_path / "room", Camera(160, 120, 150.0, 150.0, 79.5, 59.5))
     for k in range(3):
         writer.add(float(k), np.full((120, 160, 3), 90, np.uint8), np.ones((120, 160)), np.eye(4))
     writer.finish()

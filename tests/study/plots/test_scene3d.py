@@ -4,14 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.core.camera import Intrinsics
+from hicp_lib.core.camera import Camera
 from hicp_lib.recordings.recording import open_recording
 from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.segments import body_segments
 from hicp_lib.study.plots import scene3d
 
-CAMERA = Intrinsics(width_px=64, height_px=48, fx_px=50, fy_px=50, cx_px=31.5, cy_px=23.5)
+CAMERA = Camera(width_px=64, height_px=48, fx_px=50, fy_px=50, cx_px=31.5, cy_px=23.5)
 T_BASE_CAM = np.array([[0, 0, -1, -0.05], [1, 0, 0, 0], [0, -1, 0, 0.5], [0, 0, 0, 1.0]])
 SKELETON = pd.DataFrame(
     [("left_elbow", -0.8, -0.2, 0.3), ("left_wrist", -0.6, -0.1, 0.3), ("nose", -0.9, 0, 0.8)],

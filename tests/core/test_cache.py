@@ -1,0 +1,211 @@
+"""A cached result is found again only if nothing it follows from changed: code, data, libraries, inputs."""
+
+from __future__ import annotations
+
+import ast
+import json
+import random
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hicp_lib.core import cache
+from hicp_lib.core.cache import LIBRARY_DIR, code, imports_of, key
+from hicp_lib.core.checkout import CHECKOUT
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.report.notebooks import read_notebooks
+from hicp_lib.report.runs import Run, run_key
+
+# What makes each kind of cached result, and the modules where its code ends.
+KINDS = {
+    "scenes": (["hicp_lib.simulation.world.scenes"], ()),
+    "crops": (["hicp_lib.datasets.subsets"], ()),
+    "close": (["hicp_lib.datasets.close"], ()),
+    "doses": (["hicp_lib.experiments.doses"], ()),
+    "recordings": (["hicp_lib.experiments.recordings.simulate"], ()),
+    "avoidance": (["hicp_lib.experiments.avoidance.runs"], ("hicp_lib.detectors.registry",)),
+    "detections of mediapipe": (["hicp_lib.detectors.mediapipe.tasks"], ()),
+    "detections of openpose": (["hicp_lib.detectors.openpose.user_network"], ()),
+    "detections of mmpose": (["hicp_lib.detectors.onnx.mmpose"], ()),
+    "tables": (["hicp_lib.lifting.table", "hicp_lib.core.cached_tables"], ()),
+}
+
+
+@pytest.fixture
+def copy(tmp_path) -> Path:
+    """A copy of the library and its data."""
+    shutil.copytree(LIBRARY_DIR, tmp_path / "hicp_lib", ignore=shutil.ignore_patterns("__pycache__", "data"))
+    shutil.copytree(DATA_DIR, tmp_path / "data")
+    return tmp_path
+
+
+def change_one_byte(path: Path, rng: random.Random) -> bytes:
+    """Change a file; what it held before."""
+    content = path.read_bytes()
+    place = rng.randrange(len(content) + 1)
+    new = bytes([content[place] ^ 1]) if place < len(content) else b"\n"
+    path.write_bytes(content[:place] + new + content[place + 1 :])
+    return content
+
+
+def module_files(names, library: Path) -> list[Path]:
+    paths = [cache._path(name, library) for name in names]
+    return [path for path in paths if path.stat().st_size]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_byte_of_the_code_or_the_data_changes_the_key_and_none_outside_does(kind, copy):
+    names, without = KINDS[kind]
+
+    def found():
+        return code(names, without=without, library=copy / "hicp_lib", data=copy / "data")
+
+    before, rng = found(), random.Random(kind)
+    assert before == code(names, without=without)
+    inside = module_files(before.modules, copy / "hicp_lib") + [copy / "data" / name for name in before.data]
+    for path in rng.sample(inside, min(12, len(inside))):
+        if path.suffix == ".py":  # a comment: the code stays code
+            content = path.read_bytes()
+            path.write_bytes(content + b"#")
+        else:
+            content = change_one_byte(path, rng)
+        assert found() != before, path
+        path.write_bytes(content)
+    outside = [p for p in (copy / "hicp_lib").rglob("*.py") if p not in inside and p.stat().st_size]
+    for path in rng.sample(outside, min(12, len(outside))):
+        change_one_byte(path, rng)
+    assert found() == before
+
+
+def test_another_detector_makes_nobody_look_again():
+    of_mediapipe = code(["hicp_lib.detectors.mediapipe.tasks"]).modules
+    of_mmpose = code(["hicp_lib.detectors.onnx.mmpose"]).modules
+    assert "hicp_lib.detectors.onnx.mmpose" not in of_mediapipe
+    assert not any("mediapipe" in name or "openpose" in name for name in of_mmpose)
+    names, without = KINDS["avoidance"]
+    assert "hicp_lib.detectors.onnx.mmpose" not in code(names, without=without).modules
+    assert "hicp_lib.detectors.onnx.mmpose" in code(names).modules
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_all_that_python_loads_is_in_the_closure(kind):
+    names, without = KINDS[kind]
+    script = f"import sys, {', '.join(names)}\nprint(*(n for n in sys.modules if n.startswith('hicp_lib')))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    known = set(code(names).modules)
+    assert set(done.stdout.split()) <= known
+
+
+def test_whoever_imports_by_name_names_the_whole_module():
+    """`import_module` of a text that is put together would hide code from the keys."""
+    for path in LIBRARY_DIR.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_bytes())):
+            if isinstance(node, ast.JoinedStr):
+                parts = [part.value for part in node.values if isinstance(part, ast.Constant)]
+                assert not any(part.startswith("hicp_lib.") and "`" not in part for part in parts), path
+            if isinstance(node, ast.Name):
+                assert node.id != "__import__", path
+
+
+def test_every_library_that_is_called_has_a_version():
+    everything = [cache_name(path) for path in LIBRARY_DIR.rglob("*.py")]
+    versions = code(everything).libraries
+    unknown = {name for name, version in versions.items() if version == "absent"}
+    assert unknown == set() and {"numpy", "cv2", "open3d", "pinocchio"} <= set(versions)
+
+
+def cache_name(path: Path) -> str:
+    parts = path.relative_to(LIBRARY_DIR.parent).with_suffix("").parts
+    return ".".join(parts).removesuffix(".__init__")
+
+
+def test_200_random_changes_leave_no_stale_page(copy, monkeypatch):
+    """Library, data, lock and notebooks; what a page uses is found here by what its kernel loaded."""
+    shutil.copytree(CHECKOUT / "notebooks", copy / "notebooks")
+    shutil.copy(CHECKOUT / "environment.lock", copy)
+    from hicp_lib.study import provenance
+
+    monkeypatch.setattr(cache, "LIBRARY_DIR", copy / "hicp_lib")
+    monkeypatch.setattr(cache, "DATA_DIR", copy / "data")
+    monkeypatch.setattr(provenance, "LOCK_PATH", copy / "environment.lock")
+    loaded = {n.name: loaded_by(n.imports) for n in read_notebooks(copy / "notebooks")}
+
+    def keys():
+        return {n.name: run_key(Run(n, n.defaults)) for n in read_notebooks(copy / "notebooks")}
+
+    before, rng = keys(), random.Random(0)
+    files = [p for p in copy.rglob("*") if p.is_file() and p.stat().st_size]
+    code_files = [p for p in files if p.suffix == ".py"]
+    for path in [*rng.sample(code_files, 140), *rng.choices([p for p in files if p not in code_files], k=60)]:
+        content = path.read_bytes()
+        if path.suffix in (".py", ".ipynb", ".toml"):
+            path.write_bytes(changed_text(path, content))
+        else:
+            change_one_byte(path, rng)
+        stale = {name for name, new in keys().items() if new != before[name]}
+        path.write_bytes(content)
+        if path.parent.name == "notebooks":
+            must = {path.stem} & set(before)
+        elif path.suffix == ".py":
+            module = ".".join(path.relative_to(copy).with_suffix("").parts).removesuffix(".__init__")
+            must = {name for name, modules in loaded.items() if module in modules}
+        else:
+            must = set(before)  # every page prints the hashes of data and lock
+        assert must <= stale, path
+
+
+def changed_text(path: Path, content: bytes) -> bytes:
+    if path.suffix != ".ipynb":
+        return content + b"#"
+    notebook = json.loads(content)
+    notebook["cells"][0]["source"] = [*notebook["cells"][0]["source"], " "]
+    return json.dumps(notebook).encode()
+
+
+def loaded_by(names: frozenset[str]) -> set[str]:
+    """Modules of the library that a process has loaded after it imported these."""
+    script = (
+        "import sys, importlib\n"
+        "for name in sys.argv[1:]:\n"
+        "    try:\n        importlib.import_module(name)\n"
+        "    except ModuleNotFoundError:\n        pass\n"  # something within a module
+        "print(*(n for n in sys.modules if n.startswith('hicp_lib')))"
+    )
+    done = subprocess.run([sys.executable, "-c", script, *names], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_inputs_and_entry_points_are_in_the_key(tmp_path):
+    first, second = tmp_path / "a", tmp_path / "b"
+    first.write_bytes(b"1")
+    second.write_bytes(b"1")
+    keys = [
+        key([Path]),
+        key([code]),
+        key([code], n=1),
+        key([code], n=1.0),
+        key([code], n=True),
+        key([code], n="1"),
+        key([code], m=1),
+        key([code], n=np.ones(2)),
+        key([code], n=np.ones(2, np.float32)),
+        key([code], n=first),
+        key([code], n=second),
+    ]
+    assert len(set(keys)) == len(keys)
+    with pytest.raises(TypeError, match="the content of object is not known"):
+        key([code], n=object())
+
+
+def test_what_is_imported_for_type_checks_alone_is_no_part():
+    source = (
+        "from typing import TYPE_CHECKING\n"
+        "import a.b as c\n"
+        "if TYPE_CHECKING:\n    import d\nelse:\n    import e\n"
+        "def f():\n    from g import h\n"
+    )
+    assert imports_of(source) == {"typing", "typing.TYPE_CHECKING", "a.b", "e", "g", "g.h"}
