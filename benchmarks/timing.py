@@ -81,9 +81,10 @@ def run(measure: Callable[[argparse.Namespace], Iterator[Comparison]], about: st
         "python": platform.python_version(),
         "numpy": np.__version__,
     }
-    print(*(f"{key.replace('_', ' ')} {value}" for key, value in machine.items()), sep=", ", flush=True)
+    used = {name: getattr(options, name) for name in sizes}
+    for told in (used, machine):
+        print(*(f"{key.replace('_', ' ')} {value}" for key, value in told.items()), sep=", ", flush=True)
     if options.json:
-        used = {name: getattr(options, name) for name in sizes}
         result = {"machine": machine, "sizes": used, "rows": rows, "left_out": left_out}
         options.json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
 
