@@ -23,7 +23,7 @@ def smallest(name: str, out, **environment: str) -> tuple[dict, str]:
         [sys.executable, FOLDER / name, "--smallest", "--json", out],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         env=os.environ | environment,
     )
     assert done.returncode == 0, done.stdout + done.stderr
