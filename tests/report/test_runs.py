@@ -66,7 +66,7 @@ def test_a_failed_run_keeps_the_last_one_but_not_as_fresh(tmp_path):
     run, folders = tiny_run(tmp_path, START, MEASURE, FINISH)
     run_all([run], folders, print)
     before = sha256_file(folders.results / "05_tiny" / "t.parquet")
-    worse, _ = tiny_run(tmp_path, "1 / 0", FINISH)
+    worse, _ = tiny_run(tmp_path, START, "1 / 0", FINISH)
     with pytest.raises(RunError, match="ZeroDivisionError"):
         run_all([worse], folders, print)
     assert sha256_file(folders.results / "05_tiny" / "t.parquet") == before
