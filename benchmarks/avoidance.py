@@ -1,29 +1,23 @@
 """What one cycle from image to joint velocities costs, stage by stage.
 
-    python benchmarks/avoidance.py [--detector mediapipe] [--frames 8] [--cycles 200] [--json OUT]
-
 Rendered people in front of the robot's camera (colour, and depth by the sensor's model) go through the
-detector, the lifting, the tracking, the skin's activation and the controller. Without the detector's
-weights that stage is left out, and keypoints are the true ones. Two baselines in the same run: activations
-one keypoint at a time in plain numpy (double precision), and the controller's period of 20 ms. The
-project's floors: activation and controller 2 ms together, the whole cycle 50 ms (median) and 80 ms (95th
-percentile) on two cores. Wall time, and processor time of the calling thread (a detector's own threads are
-not in it), which tells more on a machine that is busy otherwise.
+detector, the lifting, the tracking, the skin's activation and the controller; once with the true keypoints,
+then with a detector's. Two baselines: activations one keypoint at a time in plain numpy (double precision),
+and the controller's period of 20 ms. The project's floors: activation and controller 2 ms together, the whole
+cycle 50 ms (median) and 80 ms (95th percentile) on two cores. Processor time of the calling thread, which
+tells more on a machine that is busy otherwise; wall time where a detector's own threads work, too.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
 
 import numpy as np
+from timing import Comparison, run
 
 from hicp_lib.core.camera import Camera, transform
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.lifting.paper import lift
 from hicp_lib.robot.controller import Controller
@@ -38,7 +32,7 @@ from hicp_lib.simulation.sensors.depth_camera import D435, simulate_depth
 from hicp_lib.simulation.world.staging import random_stage
 
 SEED = 20220
-PERIOD_S = 0.02
+PERIOD, PERIOD_S = "the period of the controller", 0.02
 N_SKIN = 300  # taxels of the benchmark of activations, more than the robot's
 
 
@@ -55,16 +49,9 @@ class Clock:
         self.times_s.setdefault(stage, []).append(passed)
         return result
 
-    def summary(self) -> dict[str, dict[str, float]]:
-        """Milliseconds by stage: median and 95th percentile of wall time, median of processor time."""
-        return {
-            stage: {
-                "median_ms": 1e3 * float(np.median([wall for wall, _ in times])),
-                "p95_ms": 1e3 * float(np.percentile([wall for wall, _ in times], 95)),
-                "cpu_median_ms": 1e3 * float(np.median([cpu for _, cpu in times])),
-            }
-            for stage, times in self.times_s.items()
-        }
+    def median_s(self, stage: str) -> float:
+        """Of the processor time."""
+        return float(np.median([cpu for _, cpu in self.times_s[stage]]))
 
 
 def make_frames(n: int) -> list[tuple[np.ndarray, np.ndarray, Camera, Detections]]:
@@ -129,7 +116,7 @@ def one_keypoint_at_a_time(field: ReceptiveField, positions, normals, points, fa
     return highest
 
 
-def compare_activations(n_people: int, repeats: int = 20) -> dict[str, float]:
+def compare_activations(n_people: int, repeats: int) -> Comparison:
     """Activations of `N_SKIN` taxels by everyone's keypoints, ours and the baseline's; the best times."""
     rng, field, clock = np.random.default_rng(SEED), ReceptiveField(), Clock()
     positions, normals = rng.uniform(-0.2, 0.2, (N_SKIN, 3)), rng.normal(size=(N_SKIN, 3))
@@ -140,65 +127,41 @@ def compare_activations(n_people: int, repeats: int = 20) -> dict[str, float]:
         plain = clock.measure("plain", one_keypoint_at_a_time, field, positions, normals, points, factors)
     if np.mean(np.abs(ours - plain) < 5e-3) < 0.99:
         raise SystemExit("activations differ from the baseline's")
-    best = {name: 1e3 * min(cpu for _, cpu in times) for name, times in clock.times_s.items()}
-    return {
-        "people": n_people,
-        **{f"{name}_ms": ms for name, ms in best.items()},
-        "ratio": best["plain"] / best["ours"],
-    }
+    ours_s, plain_s = (min(cpu for _, cpu in clock.times_s[name]) for name in ("ours", "plain"))
+    return Comparison(
+        f"activation of {N_SKIN} taxels, people: {n_people}", ours_s, "one keypoint at a time", plain_s
+    )
 
 
-def detector_or_none(name: str):
-    try:
-        return make_detector(name, **({"side_by_side": True} if name == "mediapipe" else {}))
-    except InputError as error:
-        print(f"without the detector: {error}")
-        return None
+def compare_detector(detector, frames: list, n_cycles: int) -> Iterator[Comparison]:
+    """Wall times of the detector and of whole cycles."""
+    times_s = run_cycles(detector, frames, n_cycles).times_s
+    found_s = np.array([wall for wall, _ in times_s["detector"]])
+    whole_s = np.sum([times for times in times_s.values()], axis=0)[:, 0]
+    yield Comparison("the detector, median wall time", float(np.median(found_s)), PERIOD, PERIOD_S)
+    for name, percent, most_s in (("median", 50, 0.05), ("95th percentile", 95, 0.08)):
+        passed_s = float(np.percentile(whole_s, percent))
+        yield Comparison(f"the whole cycle, {name}, wall time", passed_s, PERIOD, PERIOD_S, most_s=most_s)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--detector", default="mediapipe")
-    parser.add_argument("--frames", type=int, default=8)
-    parser.add_argument("--cycles", type=int, default=200)
-    parser.add_argument("--json", type=Path)
-    arguments = parser.parse_args()
-    detector = detector_or_none(arguments.detector)
-    clock = run_cycles(detector, make_frames(arguments.frames), arguments.cycles)
-    whole = np.sum([times for times in clock.times_s.values()], axis=0)
-    clock.times_s["whole cycle"] = [tuple(row) for row in whole]
-    result = {
-        "detector": arguments.detector if detector else None,
-        "cycles": arguments.cycles,
-        "stages": clock.summary(),
-        "everyone_near": {n: near_cycles(arguments.cycles, n).summary()["cycle"] for n in (1, 2, 5)},
-        "activations": [compare_activations(n) for n in (1, 3)],
-    }
-    report(result)
-    if arguments.json:
-        arguments.json.write_text(json.dumps(result, indent=1))
-
-
-def report(result: dict) -> None:
-    """Print what was measured."""
-    print(f"{'stage':14}{'median':>10}{'95th':>10}{'processor':>11}{'of 20 ms':>10}")
-    for stage, times in result["stages"].items():
-        share = times["cpu_median_ms"] / (1e3 * PERIOD_S)
-        print(
-            f"{stage:14}{times['median_ms']:8.2f}ms{times['p95_ms']:8.2f}ms"
-            f"{times['cpu_median_ms']:9.2f}ms{share:10.2f}"
-        )
-    for people, times in result["everyone_near"].items():
-        print(
-            f"all but detector and lifting, {people} people about the arm: {times['median_ms']:.2f} ms, "
-            f"processor {times['cpu_median_ms']:.2f} ms"
-        )
-    for row in result["activations"]:
-        print(
-            f"{N_SKIN} taxels, {row['people']} people: {row['ours_ms']:.2f} ms, one keypoint at a time "
-            f"{row['plain_ms']:.1f} ms: {row['ratio']:.0f} times faster"
-        )
+def measure(options) -> Iterator[Comparison]:
+    for n in (1, 3):
+        yield compare_activations(n, options.repeats)
+    for n in (1, 2, 5):
+        near_s = near_cycles(options.cycles, n).median_s("cycle")
+        yield Comparison(f"tracking to controller, people about the arm: {n}", near_s, PERIOD, PERIOD_S)
+    frames = make_frames(options.frames)
+    clock = run_cycles(None, frames, options.cycles)
+    for stage in clock.times_s:
+        yield Comparison(stage, clock.median_s(stage), PERIOD, PERIOD_S)
+    both_s = clock.median_s("activation") + clock.median_s("controller")
+    yield Comparison("activation and controller", both_s, PERIOD, PERIOD_S, most_s=0.002)
+    side_by_side = {"side_by_side": True} if options.detector == "mediapipe" else {}
+    yield from compare_detector(make_detector(options.detector, **side_by_side), frames, options.cycles)
 
 
 if __name__ == "__main__":
-    main()
+    run(
+        measure, __doc__,
+        frames=(8, 1), cycles=(200, 2), repeats=(20, 1), detector=("mediapipe", "mediapipe"),
+    )  # fmt: skip

@@ -1,7 +1,5 @@
 """What the detector pipeline costs on top of the bare model calls.
 
-    python benchmarks/detectors.py [--images 100] [--repeats 3] [--json OUT]
-
 The same image files, threads and models twice: in the shortest loop that can be written (read
 the image, call the model, throw the output away), and through `detect_images` with an empty
 cache (hashing, conversion to Halpe, for OpenPose peaks and assembly, results written). The two
@@ -16,21 +14,20 @@ MobileNet-thin's network alone, on one thread, against OpenCV running the same f
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import cv2
 import matplotlib
 import numpy as np
-import psutil
+from timing import Comparison, processor_s
+from timing import run as run_benchmark
 
 from hicp_lib.core.images import read_image, write_png
 from hicp_lib.detectors import registry
@@ -41,6 +38,7 @@ from hicp_lib.detectors.runtime import run
 from hicp_lib.detectors.weights import default as zoo
 
 NAMES = ("mediapipe-pose", "mediapipe-hands", "openpose-mobilenet")
+FLOOR_PIPELINE, FLOOR_PROCESS = 1.10, 1.05
 PROCESS_CASES = [
     *(("mediapipe-pose", size_px) for size_px in ((640, 480), (256, 256))),
     *(("mediapipe-hands", size_px) for size_px in ((640, 480), (256, 256), (100, 100))),
@@ -95,57 +93,37 @@ def stopwatch(work: Callable, *arguments: object) -> tuple[float, float]:
     return time.perf_counter() - wall, processor_s() - cpu
 
 
-def processor_s() -> float:
-    """Processor time of this process and of its children, running or ended."""
-    running = [other.cpu_times() for other in psutil.Process().children()]
-    return sum(os.times()[:4]) + sum(times.user + times.system for times in running)
-
-
-def measure(name: str, paths: dict[int, Path], workers: int, repeats: int) -> dict:
-    """Best times of both and their ratio."""
+def compare(name: str, paths: dict[int, Path], workers: int, repeats: int) -> Iterator[Comparison]:
+    """The pipeline beside the bare calls, per image."""
     # Axes: repeat, (bare, pipeline), (wall, processor).
     times = [
         [stopwatch(work, name, paths, workers) for work in (run_bare, run_pipeline)] for _ in range(repeats)
     ]
-    (bare_s, bare_cpu_s), (pipeline_s, pipeline_cpu_s) = np.min(times, axis=0)
-    n = len(paths)
-    return {
-        "detector": name,
-        "workers": workers,
-        "images": n,
-        "bare_ms_per_image": 1e3 * bare_s / n,
-        "pipeline_ms_per_image": 1e3 * pipeline_s / n,
-        "ratio": pipeline_s / bare_s,
-        "cpu_ratio": pipeline_cpu_s / bare_cpu_s,
-    }
+    bare_s, pipeline_s = (np.min(times, axis=0) / len(paths)).tolist()
+    for k, (clock, most) in enumerate((("wall", FLOOR_PIPELINE), ("processor", None))):
+        what = f"{name}, threads: {workers}, {clock} time of an image"
+        yield Comparison(what, pipeline_s[k], "bare model calls", bare_s[k], most)
 
 
-def measure_process(name: str, size_px: tuple[int, int], calls: int) -> dict:
+def compare_process(name: str, size_px: tuple[int, int], calls: int) -> Comparison:
     """A call in this process and in one of its own, on the same image of (width, height), in turn."""
     photograph = read_image(Path(matplotlib.get_data_path()) / "sample_data" / "grace_hopper.jpg")
     image = cv2.resize(photograph, size_px, interpolation=cv2.INTER_AREA)
     task, n = {"mediapipe-pose": ("pose", 1), "mediapipe-hands": ("hand", 2)}[name]
     here = child.detection(bundles.assemble(task), task, n=n, min_score=0.5)
     process = registry.make_detector(name)._process
-    start_s, start_cpu_s = stopwatch(process.start)
+    process.start()
     own = process.ask
     if not np.array_equal(here(image), own(image)):
         raise SystemExit(f"{name}: answers differ")
     times_s = [[stopwatch(call, image)[0] for call in (here, own)] for _ in range(calls)]
     here_s, own_s = np.percentile(times_s, 25, axis=0).tolist()
-    return {
-        "detector": name,
-        "image": size_px,
-        "here_ms": 1e3 * here_s,
-        "own_process_ms": 1e3 * own_s,
-        "ratio": own_s / here_s,
-        "start_s": start_s,
-        "start_cpu_s": start_cpu_s,
-    }
+    what = f"{name}, {size_px[0]} x {size_px[1]}, its own process"
+    return Comparison(what, own_s, "a call in this process", here_s, FLOOR_PROCESS)
 
 
-def measure_network(paths: dict[int, Path], repeats: int) -> dict:
-    """Best processor times of MobileNet-thin's network, run by OpenCV and here, and their ratio."""
+def compare_network(paths: dict[int, Path], repeats: int) -> Comparison:
+    """MobileNet-thin's network run here and by OpenCV, per image."""
     detector = registry.make_detector("openpose-mobilenet")
     network = cv2.dnn.readNetFromTensorflow(np.frombuffer(zoo.load(openpose_net.WEIGHTS), np.uint8))
     inputs = [openpose_net.fit(read_image(path), 368) for path in paths.values()]
@@ -161,60 +139,32 @@ def measure_network(paths: dict[int, Path], repeats: int) -> dict:
 
     cv2.setNumThreads(1)
     times = [[stopwatch(work)[1] for work in (run_opencv, run_here)] for _ in range(repeats)]
-    opencv_s, here_s = np.min(times, axis=0).tolist()
-    return {
-        "network": openpose_net.WEIGHTS,
-        "images": len(inputs),
-        "opencv_ms_per_image": 1e3 * opencv_s / len(inputs),
-        "here_ms_per_image": 1e3 * here_s / len(inputs),
-        "ratio": here_s / opencv_s,
-    }
+    opencv_s, here_s = (np.min(times, axis=0) / len(inputs)).tolist()
+    return Comparison(f"{openpose_net.WEIGHTS}, an image", here_s, "OpenCV running the same file", opencv_s)
 
 
-def main() -> None:
-    """Measure all detectors on one thread and on all cores; print a table, write JSON if asked."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--images", type=int, default=100)
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--json", type=Path)
-    arguments = parser.parse_args()
+def measure(options) -> Iterator[Comparison]:
+    """All detectors on one thread and on all cores."""
+    weights = zoo.weights_dir()
     # What runs in this process, here only, would send usage metrics.
     os.environ.update(native.child_environment())
-    rows = []
-    weights = zoo.weights_dir()
     with tempfile.TemporaryDirectory() as folder:
         os.environ["HICP_CACHE"] = folder
-        shutil.copytree(weights, Path(folder) / "weights")
+        (Path(folder) / "weights").symlink_to(weights)
         (Path(folder) / "images").mkdir()
-        paths = make_images(Path(folder) / "images", arguments.images)
-        for name in NAMES:
-            for workers in sorted({1, run.n_cores()}):
-                row = measure(name, paths, workers, arguments.repeats)
-                rows.append(row)
-                print(
-                    f"{name:20} workers {workers}: bare {row['bare_ms_per_image']:6.1f} ms, "
-                    f"pipeline {row['pipeline_ms_per_image']:6.1f} ms per image, "
-                    f"ratio {row['ratio']:.3f} (processor time {row['cpu_ratio']:.3f})"
-                )
-        for name, size_px in PROCESS_CASES:
-            row = measure_process(name, size_px, arguments.images)
-            rows.append(row)
-            print(
-                f"{name:20} {size_px}: {row['here_ms']:.2f} ms in this process, in its own "
-                f"{row['own_process_ms']:.2f} ms, ratio {row['ratio']:.3f}; started in "
-                f"{row['start_s']:.2f} s (processor time {row['start_cpu_s']:.2f} s)"
-            )
-        row = measure_network(paths, arguments.repeats)
-        rows.append(row)
-        print(
-            f"{row['network']}: OpenCV {row['opencv_ms_per_image']:.1f} ms, here "
-            f"{row['here_ms_per_image']:.1f} ms of processor time per image, ratio {row['ratio']:.3f}"
-        )
-    if arguments.json:
-        arguments.json.write_text(json.dumps(rows, indent=2) + "\n")
-    sys.stdout.flush()
-    os._exit(0)  # tasks of MediaPipe are not closed well when an interpreter ends
+        paths = make_images(Path(folder) / "images", options.images)
+        for name in NAMES[: options.detectors]:
+            for workers in sorted({1, min(options.workers or run.n_cores(), run.n_cores())}):
+                yield from compare(name, paths, workers, options.repeats)
+        for name, size_px in PROCESS_CASES[: options.processes]:
+            yield compare_process(name, size_px, options.images)
+        yield compare_network(paths, options.repeats)
 
 
 if __name__ == "__main__":
-    main()
+    run_benchmark(
+        measure, __doc__,
+        images=(100, 1), repeats=(3, 1), detectors=(3, 1), workers=(0, 1), processes=(5, 1),
+    )  # fmt: skip
+    sys.stdout.flush()
+    os._exit(0)  # tasks of MediaPipe are not closed well when an interpreter ends

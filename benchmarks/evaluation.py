@@ -1,7 +1,5 @@
 """What checking files, OKS and bootstrapping cost beside the obvious ways to have them.
 
-    python benchmarks/evaluation.py [--images 500] [--json OUT]
-
 Three comparisons, each against a baseline of the same run: reading annotations, checked and as
 arrays, against `json.load` alone; OKS of all pairs against pycocotools' loop; a bootstrap from matches
 against pycocotools evaluating each draw anew (timed on a few draws).
@@ -9,19 +7,17 @@ against pycocotools evaluating each draw anew (timed on a few draws).
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import json
-import platform
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
-from timing import best_seconds
+from timing import Comparison, best_seconds, run
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import COCO_17, SIGMAS
@@ -49,15 +45,15 @@ def make_people(n: int) -> tuple[Annotations, dict[int, Detections]]:
     return people, {i: Detections(found[i], np.ones((N_FOUND, 136)), scores[i]) for i in range(n)}
 
 
-def reading(people: Annotations) -> dict:
+def reading(people: Annotations) -> Comparison:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "annotations.json"
         write_annotations(path, people)
         ours, base = best_seconds(lambda: read_annotations(path), lambda: json.loads(path.read_bytes()))
-    return {"what": "read annotations / json.loads", "ours_s": ours, "baseline_s": base}
+    return Comparison("read annotations", ours, "`json.loads` of the file", base)
 
 
-def similarity(people: Annotations, found: dict[int, Detections]) -> dict:
+def similarity(people: Annotations, found: dict[int, Detections]) -> Comparison:
     sigmas = SIGMAS["halpe"][COCO_17]
     truth, labelled = people.keypoints_px[:, None, COCO_17], people.visibility[:, None, COCO_17] > 0
     points = np.stack([found[i].keypoints_px[:, COCO_17] for i in people.images])
@@ -65,7 +61,7 @@ def similarity(people: Annotations, found: dict[int, Detections]) -> dict:
         lambda: oks(truth, labelled, people.boxes_px[:, None], people.areas_px2[:, None], points, sigmas),
         _pycocotools_oks(people, found, sigmas),
     )
-    return {"what": "OKS of all pairs / COCOeval.computeOks", "ours_s": ours, "baseline_s": base}
+    return Comparison("OKS of all pairs", ours, "`COCOeval.computeOks` of each image", base)
 
 
 def _pycocotools_oks(
@@ -88,32 +84,22 @@ def _pycocotools_oks(
     return lambda: [run.computeOks(i, 1) for i in people.images]
 
 
-def bootstrapping(people: Annotations, found: dict[int, Detections], n_draws: int = 3) -> dict:
+def bootstrapping(people: Annotations, found: dict[int, Detections], n_draws: int) -> Comparison:
     evaluation = evaluate(people, found)
     (ours,) = best_seconds(lambda: bootstrap_intervals(evaluation, N_RESAMPLES), turns=1)
     # A draw costs pycocotools what the whole set costs.
     (draw,) = best_seconds(lambda: evaluate(people, found), turns=n_draws)
-    return {
-        "what": f"{N_RESAMPLES} draws from matches / pycocotools anew",
-        "ours_s": ours,
-        "baseline_s": draw * N_RESAMPLES,
-    }
+    return Comparison(
+        f"{N_RESAMPLES} bootstrap draws from matches", ours, "pycocotools anew for each", draw * N_RESAMPLES
+    )
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--images", type=int, default=500)
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args()
+def measure(options) -> Iterator[Comparison]:
     people, found = make_people(options.images)
-    rows = [reading(people), similarity(people, found), bootstrapping(people, found)]
-    for row in rows:
-        row["ratio"] = row["ours_s"] / row["baseline_s"]
-        print(f"{row['what']:50} {row['ours_s']:9.4f} s / {row['baseline_s']:9.4f} s = {row['ratio']:.4f}")
-    if options.json:
-        about = {"images": options.images, "python": platform.python_version(), "numpy": np.__version__}
-        options.json.write_text(json.dumps({**about, "rows": rows}, indent=2) + "\n")
+    yield reading(people)
+    yield similarity(people, found)
+    yield bootstrapping(people, found, options.draws)
 
 
 if __name__ == "__main__":
-    main()
+    run(measure, __doc__, images=(500, 4), draws=(3, 1))

@@ -1,25 +1,21 @@
 """What importing other tools' predictions costs beside parsing their JSON alone.
 
-    python benchmarks/importers.py [--people 10000] [--json OUT]
-
 Two people an image, with all the keypoints the tool can write, random coordinates in full length. The
-baseline reads the same files with `json.loads` and does nothing with them. `write` is the time to write
-what was imported, with the tool's own scores beside it. All is done by one thread and timed as processor
-time, which other work on the machine hardly lengthens.
+baseline reads the same files with `json.loads` and does nothing with them. Writing what was imported, with
+the tool's own scores beside it, is compared with `json.dumps` of the file's content. All is done by one
+thread and timed as processor time, which other work on the machine hardly lengthens.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
-import platform
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from timing import best_seconds
+from timing import Comparison, best_seconds, run
 
 from hicp_lib.formats.annotations import Annotations, ImageInfo
 from hicp_lib.formats.importers.importing import import_predictions, write_imported
@@ -60,11 +56,7 @@ def parse(path: Path) -> None:
         json.loads(file.read_bytes())
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--people", type=int, default=10_000)
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args()
+def measure(options) -> Iterator[Comparison]:
     annotations, found = make_people(options.people)
     ids = {image.file_name: image.id for image in annotations.images.values()}
     writers: dict[str, Callable[[Path], None]] = {
@@ -74,27 +66,23 @@ def main() -> None:
         "detectron2": lambda path: write_detectron2(path, found, ids),
         "coco": lambda path: write_coco(path, found, ids),
     }
-    rows = []
     for format, write in writers.items():
         with tempfile.TemporaryDirectory() as folder:
             path, out = Path(folder) / "native", Path(folder) / "detections.json"
             write(path)
-            ours, base = best_seconds(
-                lambda: import_predictions(format, path, annotations),  # noqa: B023
-                lambda: parse(path),  # noqa: B023
-            )
-            imported = import_predictions(format, path, annotations)
-            (writing,) = best_seconds(lambda: write_imported(out, imported), turns=1)  # noqa: B023
-        row = {"format": format, "ours_s": ours, "baseline_s": base}
-        rows.append(row | {"ratio": ours / base, "write_s": writing})
-        print(
-            f"{format:11} {options.people} people: {ours:6.2f} s / {base:6.2f} s = {ours / base:.2f}; "
-            f"write {writing:.2f} s"
-        )
-    if options.json:
-        about = {"people": options.people, "python": platform.python_version(), "numpy": np.__version__}
-        options.json.write_text(json.dumps({**about, "rows": rows}, indent=2) + "\n")
+            yield from compare(format, path, out, annotations)
+
+
+def compare(format: str, path: Path, out: Path, annotations: Annotations) -> Iterator[Comparison]:
+    """Import from `path`, write to `out`."""
+    ours_s, base_s = best_seconds(lambda: import_predictions(format, path, annotations), lambda: parse(path))
+    yield Comparison(f"import from {format}", ours_s, "`json.loads` of the same files", base_s)
+    imported = import_predictions(format, path, annotations)
+    (ours_s,) = best_seconds(lambda: write_imported(out, imported))
+    content = json.loads(out.read_bytes())
+    (base_s,) = best_seconds(lambda: json.dumps(content))
+    yield Comparison(f"write what {format} found", ours_s, "`json.dumps` of its content", base_s)
 
 
 if __name__ == "__main__":
-    main()
+    run(measure, __doc__, people=(10_000, 4))

@@ -1,7 +1,5 @@
 """What the adapters of users' ONNX models cost on top of the network.
 
-    python benchmarks/onnx_adapters.py [--repeats 5] [--json OUT]
-
 Networks of the real ones' size and shape with random weights are built here (chains of 3 x 3
 convolutions; only the amount of arithmetic matters), and `detect` is timed with the time inside
 the network taken apart. The project's floors: all but the network at most 15 % of the network's
@@ -11,21 +9,21 @@ repeats counts; processor time of this one thread, which tells more than wall ti
 
 from __future__ import annotations
 
-import argparse
-import json
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
 import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
+from timing import Comparison, run
 
 from hicp_lib.detectors.onnx import session
 from hicp_lib.detectors.registry import make_detector
 
-FLOOR_RATIO, FLOOR_MS = 0.15, 3.0
+FLOOR_RATIO, FLOOR_S = 0.15, 3e-3
 
 
 def chain(nodes: list, constants: dict, channels: int, n_layers: int, stride: int, rng) -> str:
@@ -104,36 +102,29 @@ class Stopwatch:
         session.OnnxModel.run = run
 
 
-def measure(name: str, model: Path, stopwatch: Stopwatch, repeats: int, **options) -> dict:
-    """Median times per image of one person, in milliseconds."""
+def detect_s(name: str, model: Path, stopwatch: Stopwatch, repeats: int, **options) -> list[float]:
+    """Median times of an image of one person, in the network and in all else."""
     detector = make_detector(name, model=model, **options)
     image = np.random.default_rng(1).integers(0, 256, (480, 400, 3), dtype=np.uint8)
     detector.detect(image)
-    times = []
+    times_s = []
     for _ in range(repeats):
         stopwatch.seconds = 0.0
         start = time.thread_time()
         detector.detect(image)
-        total = time.thread_time() - start
-        times.append((1e3 * stopwatch.seconds, 1e3 * (total - stopwatch.seconds)))
-    network_ms, adapter_ms = np.median(times, axis=0)
-    return {"network_ms": network_ms, "adapter_ms": adapter_ms, "ratio": adapter_ms / network_ms}
+        times_s.append((stopwatch.seconds, time.thread_time() - start - stopwatch.seconds))
+    return np.median(times_s, axis=0).tolist()
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--json", type=Path)
-    arguments = parser.parse_args()
+def measure(arguments) -> Iterator[Comparison]:
     cv2.setNumThreads(1)
-    stopwatch = Stopwatch()
-    results = {}
+    stopwatch, depth = Stopwatch(), arguments.depth
     with tempfile.TemporaryDirectory() as folder:
         # 33 thousand million multiplications as HRNet-W48 at 288 x 384; 2.4 as RTMPose-m at 192 x 256;
         # 3 as FastPose (ResNet-50) at 192 x 256.
-        hrnet = heat_map_network(Path(folder) / "hrnet.onnx", (288, 384), 133, 96, 57)
-        rtmpose = simcc_network(Path(folder) / "rtmpose.onnx", (192, 256), 133, 384, 9)
-        fastpose = heat_map_network(Path(folder) / "fastpose.onnx", (192, 256), 136, 96, 12)
+        hrnet = heat_map_network(Path(folder) / "hrnet.onnx", (288, 384), 133, 96, round(57 * depth))
+        rtmpose = simcc_network(Path(folder) / "rtmpose.onnx", (192, 256), 133, 384, round(9 * depth))
+        fastpose = heat_map_network(Path(folder) / "fastpose.onnx", (192, 256), 136, 96, round(12 * depth))
         cases = {
             "HRNet-W48 size, DARK": ("mmpose", hrnet, {}),
             "HRNet-W48 size, DARK, flip test": ("mmpose", hrnet, {"flip_test": True}),
@@ -142,17 +133,10 @@ def main() -> None:
             "FastPose size, integral": ("alphapose", fastpose, {"decoding": "integral"}),
         }
         for title, (name, model, options) in cases.items():
-            row = measure(name, model, stopwatch, arguments.repeats, **options)
-            is_fine = row["ratio"] <= FLOOR_RATIO if model == hrnet else row["adapter_ms"] <= FLOOR_MS
-            row["is_within_floor"] = bool(is_fine)
-            results[title] = row
-            print(
-                f"{title:<34} network {row['network_ms']:7.1f} ms  adapter {row['adapter_ms']:5.2f} ms  "
-                f"ratio {row['ratio']:.3f}  {'ok' if row['is_within_floor'] else 'ABOVE THE FLOOR'}"
-            )
-    if arguments.json:
-        arguments.json.write_text(json.dumps(results, indent=2) + "\n")
+            network_s, adapter_s = detect_s(name, model, stopwatch, arguments.repeats, **options)
+            floor = {"most": FLOOR_RATIO} if model == hrnet else {"most_s": FLOOR_S}
+            yield Comparison(f"all but the network, {title}", adapter_s, "the network", network_s, **floor)
 
 
 if __name__ == "__main__":
-    main()
+    run(measure, __doc__, repeats=(5, 1), depth=(1.0, 0.0))

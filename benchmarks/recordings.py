@@ -1,7 +1,5 @@
 """How long simulating the study's recordings takes, and what a frame of them costs.
 
-    python benchmarks/recordings.py [--share 0.2] [--workers 2] [--json OUT]
-
 Whole recordings, as `hicp record simulate` writes them: images and depth drawn, measured and
 written, truth, joints and motion capture; `--share 1` times them whole, less the first part of them
 (reading the library and the scene in every process counts in full). The floors of the project are 40
@@ -13,13 +11,13 @@ person) is told apart. Processor time tells more than wall time on a machine tha
 
 from __future__ import annotations
 
-import argparse
-import json
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from timing import Comparison, run
 
 from hicp_lib.experiments.recordings.frames import camera_at, record_frame, stage
 from hicp_lib.experiments.recordings.scenarios import SCENARIOS, Scenario
@@ -28,18 +26,17 @@ from hicp_lib.simulation.rendering.render import render
 from hicp_lib.simulation.world.scenes import worker_pool
 
 FLOORS_S = {"relative-upper": 40.0, "relative-lower": 40.0, "mocap": 180.0}
-N_TIMED = 8  # frames whose processor time is measured
 
 
-def frame_cost(name: str) -> dict[str, float]:
-    """Mean processor seconds of a frame, and of drawing it alone."""
+def frame_cost(name: str, n_timed: int) -> dict[str, float]:
+    """Mean processor seconds of `n_timed` frames, and of drawing them alone."""
     plan = SCENARIOS[name]
     last = plan.n_frames - 1
     record_frame(name, 0, last)  # the scene is made with all movements, textures too
     once_s = time.process_time()
     drawn_s, frame_s = [], []
     with tempfile.TemporaryDirectory() as folder:
-        for k in np.linspace(0, last - 1, N_TIMED).astype(int).tolist():
+        for k in np.linspace(0, last - 1, n_timed).astype(int).tolist():
             drawn_s.append(_draw(plan, k))
             start_s = time.process_time()
             record_one(Path(folder), name, 0, k)
@@ -78,52 +75,33 @@ def whole_s(name: str, n: int, workers: int) -> float:
         return time.perf_counter() - start_s
 
 
-def measure(name: str, share: float, workers: int, cost: dict[str, float]) -> dict[str, float]:
+def compare(name: str, options) -> Iterator[Comparison]:
     """One scenario's figures."""
-    n = max(2, round(share * SCENARIOS[name].n_frames))
-    wall_s = whole_s(name, n, workers)
-    return {
-        "frames": n,
-        "wall_s": wall_s,
-        "frames_per_second": n / wall_s,
-        "floor_s": FLOORS_S[name],
-        "cpu_s_per_frame": cost["frame_s"],
-        "cpu_s_once_per_worker": cost["once_s"],
-        "cpu_s_capture": cost["capture_s"],
-        "cpu_s_whole_per_worker": cost["once_s"]
-        + (cost["frame_s"] * SCENARIOS[name].n_frames + cost["capture_s"]) / workers,
-        "ratio_to_drawing_alone": cost["frame_s"] / cost["drawn_s"],
-    }
+    with worker_pool(1) as pool:  # one thread, as when recordings are made
+        cost = pool.apply(frame_cost, (name, options.timed))
+    n_all, workers, drawn_s = SCENARIOS[name].n_frames, options.workers, cost["drawn_s"]
+    n = max(2, round(options.share * n_all))
+    yield Comparison(f"{name}: a frame", cost["frame_s"], "drawing it alone", drawn_s)
+    yield Comparison(
+        f"{name}: {n} frames, processes: {workers}, wall time",
+        whole_s(name, n, workers),
+        "drawing them alone, by as many",
+        drawn_s * n / workers,
+    )
+    yield Comparison(f"{name}: what every process does once", cost["once_s"], "drawing a frame", drawn_s)
+    yield Comparison(
+        f"{name}: all {n_all} frames, each process of {workers}",
+        cost["once_s"] + (cost["frame_s"] * n_all + cost["capture_s"]) / workers,
+        "drawing them alone, by as many",
+        drawn_s * n_all / workers,
+        most_s=FLOORS_S[name],
+    )
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--share", type=float, default=0.2)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--json")
-    options = parser.parse_args()
-    result = {}
-    for name in FLOORS_S:
-        with worker_pool(1) as pool:  # one thread, as when recordings are made
-            cost = pool.apply(frame_cost, (name,))
-        result[name] = measure(name, options.share, options.workers, cost)
-    for name, row in result.items():
-        print(f"{name}: {row['frames']} frames in {row['wall_s']:.1f} s ({row['frames_per_second']:.2f}/s)")
-        print(
-            f"  {row['cpu_s_per_frame'] * 1e3:.0f} ms of processor time per frame, "
-            f"{row['ratio_to_drawing_alone']:.2f} times the baseline: drawing alone"
-        )
-        print(
-            f"  once: {row['cpu_s_once_per_worker']:.1f} s in every process, "
-            f"{row['cpu_s_capture']:.1f} s for motion capture"
-        )
-        print(
-            f"  the whole recording takes {row['cpu_s_whole_per_worker']:.0f} s of each of {options.workers} "
-            f"processors; floor {row['floor_s']:.0f} s"
-        )
-    if options.json:
-        Path(options.json).write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+def measure(options) -> Iterator[Comparison]:
+    for name in list(FLOORS_S)[: options.scenarios]:
+        yield from compare(name, options)
 
 
 if __name__ == "__main__":
-    main()
+    run(measure, __doc__, share=(0.2, 0.0), workers=(2, 1), timed=(8, 1), scenarios=(3, 1))

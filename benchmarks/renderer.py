@@ -1,7 +1,5 @@
 """How many frames a second the scene renderer makes at 640 x 480.
 
-    python benchmarks/renderer.py [--frames 40] [--workers 2] [--json OUT]
-
 Whole scenes as `hicp scenes render` makes them: people drawn and dressed, a furnished room,
 colour, depth, segments, the visibility of all keypoints, and the finished 8-bit image; without
 writing files. The baseline, in the same run, is what no renderer on Open3D can go below: the bare
@@ -12,12 +10,12 @@ that is busy otherwise.
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
+from collections.abc import Iterator
 
 import numpy as np
 import open3d as o3d
+from timing import Comparison, run
 
 from hicp_lib.simulation.rendering.camera import pixel_rays
 from hicp_lib.simulation.rendering.colour_sensor import expose
@@ -26,9 +24,10 @@ from hicp_lib.simulation.world.scenes import annotate, render_scene, worker_pool
 from hicp_lib.simulation.world.staging import random_stage
 
 SEED = 20220
+FLOOR_FRAMES_PER_S = 8  # on two processors
 
 
-def measure(index: int) -> dict[str, float]:
+def frame_steps(index: int) -> dict[str, float]:
     """Processor seconds of the steps of one frame, and of the bare ray casting."""
     rng = np.random.default_rng(np.random.SeedSequence([SEED, index]))
     clock = [time.process_time()]
@@ -51,37 +50,22 @@ def _whole(index: int) -> float:
     return time.process_time() - start
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--frames", type=int, default=40)
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--json")
-    options = parser.parse_args()
+def measure(options) -> Iterator[Comparison]:
     with worker_pool(options.workers) as pool:
         # Workers keep the textures and patterns of clothes they have made.
-        pool.map(_whole, range(1000, 1000 + 12 * options.workers), chunksize=1)
+        pool.map(_whole, range(1000, 1000 + options.first * options.workers), chunksize=1)
         start = time.perf_counter()
         cpu_s = pool.map(_whole, range(options.frames), chunksize=1)
-        wall_s = time.perf_counter() - start
-        steps = pool.map(measure, range(options.frames), chunksize=1)
-    means = {name: float(np.mean([step[name] for step in steps])) for name in steps[0]}
-    result = {
-        "frames": options.frames,
-        "workers": options.workers,
-        "frames_per_second": options.frames / wall_s,
-        "cpu_s_per_frame": float(np.mean(cpu_s)),
-        "cpu_s_by_step": means,
-        "ratio_to_bare_rays": float(np.mean(cpu_s)) / means["bare_rays"],
-    }
-    print(f"{result['frames_per_second']:.2f} frames/s with {options.workers} workers; floor 8 with 2")
-    print(f"{result['cpu_s_per_frame'] * 1e3:.0f} ms of processor time per frame:")
-    for name, value in means.items():
-        print(f"  {name:10} {value * 1e3:6.1f} ms")
-    print(f"{result['ratio_to_bare_rays']:.1f} times the baseline: the bare ray casting, one ray per pixel")
-    if options.json:
-        with open(options.json, "w", encoding="utf-8") as file:
-            json.dump(result, file, indent=2)
+        wall_s = (time.perf_counter() - start) / options.frames
+        steps = pool.map(frame_steps, range(options.frames), chunksize=1)
+    means_s = {name: float(np.mean([step[name] for step in steps])) for name in steps[0]}
+    rays, rays_s = "bare ray casting, one ray a pixel", means_s.pop("bare_rays")
+    what = f"a frame, processes: {options.workers}, wall time"
+    yield Comparison(what, wall_s, rays, rays_s, most_s=1 / FLOOR_FRAMES_PER_S)
+    yield Comparison("a frame", float(np.mean(cpu_s)), rays, rays_s)
+    for name, step_s in means_s.items():
+        yield Comparison(f"its {name}", step_s, rays, rays_s)
 
 
 if __name__ == "__main__":
-    main()
+    run(measure, __doc__, frames=(40, 1), workers=(2, 1), first=(12, 1))

@@ -17,6 +17,25 @@ settings.register_profile("hicp", derandomize=True, deadline=None)
 settings.load_profile("hicp")
 
 
+# What needs the book.
+OF_THE_BOOK = {"test_jupyterlab.py", "test_links.py", "test_notebooks.py"}
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """One worker makes the book and looks at it; with `--dist loadfile` the others would wait for it."""
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class Scheduling(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = super()._split_scope(nodeid)
+            return "the book" if Path(file).name in OF_THE_BOOK else file
+
+    return Scheduling(config, log)
+
+
 @pytest.fixture(scope="session")
 def weights() -> Path:
     """Folder of the fetched weights; `hicp models fetch` comes before the tests."""

@@ -37,12 +37,12 @@ def test_a_run_leaves_its_results_and_is_not_repeated(tmp_path):
     ("cells", "expected"),
     [
         (
-            (START, "raise ValueError('no\\nluck')", FINISH),
-            r"05_tiny: In \[3\] failed: ValueError: no luck; see ",
+            ("raise ValueError('no\\nluck')", FINISH),
+            r"05_tiny: In \[2\] failed: ValueError: no luck; see ",
         ),
         (
-            (START, "import warnings; warnings.warn('odd')", FINISH),
-            r"05_tiny: In \[3\] wrote to stderr: .*odd",
+            ("import warnings; warnings.warn('odd')",),
+            r"05_tiny: In \[2\] wrote to stderr: .*odd",
         ),
         ((START, MEASURE), r"05_tiny: ended without results; its last line must be"),
         (
@@ -79,7 +79,7 @@ def test_what_libraries_write_to_the_terminal_is_no_fault(tmp_path):
 
 
 def test_a_notebook_waits_for_those_before_it_and_is_skipped_when_they_fail(tmp_path):
-    first, folders = tiny_run(tmp_path, START, "1 / 0", FINISH)
+    first, folders = tiny_run(tmp_path, "1 / 0", FINISH)
     path = write_notebook(tmp_path / "notebooks" / "06_next.ipynb", START, FINISH)
     second = Run(read_notebook(path), first.parameters, after=("05_tiny",))
     lines: list[str] = []
