@@ -13,9 +13,8 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from hicp_lib.core.checkout import CHECKOUT
+from hicp_lib.core.checkout import CHECKOUT, EARLIER_RESULTS_VARIABLE, RESULTS_VARIABLE
 from hicp_lib.core.files import sha256_file
-from hicp_lib.report import EARLIER_RESULTS_VARIABLE, RESULTS_VARIABLE
 from hicp_lib.report.checks import book_problems
 from hicp_lib.report.notebooks import (
     PARAMETERS_TAG,
