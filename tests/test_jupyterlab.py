@@ -40,7 +40,7 @@ FLAGS = (
     "--no-first-run --disable-background-networking --disable-component-update --disable-quic --disable-sync"
 )
 SET_BY_A_REPORT = {"OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MPLBACKEND", "MATPLOTLIBRC", "PYTHONHASHSEED"}
-RAW_MARKUP = re.compile(r"\{[a-z:-]+\}|```|:::")
+RAW_MARKUP = re.compile(r"\{[a-z:-]+\}|```|:::|\$\$|\\frac")
 ASKS = ".jp-Dialog, .Toastify__toast"
 
 CALL = """

@@ -140,9 +140,10 @@ def code(
             others.add(name.partition(".")[0])
     patterns = frozenset().union(*(module.data for module in modules.values()))
     return Code(
-        {name: module.sha256 for name, module in modules.items()},
+        # In order: as inputs of keys their order counts, and that of a set differs from process to process.
+        {name: modules[name].sha256 for name in sorted(modules)},
         _data_sha256(patterns, data or DATA_DIR),
-        {name: _version(name) for name in others - sys.stdlib_module_names},
+        {name: _version(name) for name in sorted(others - sys.stdlib_module_names)},
     )
 
 
@@ -265,7 +266,7 @@ def _imported(statement: ast.Import | ast.ImportFrom) -> Iterator[str]:
 
 def _data_sha256(patterns: Iterable[str], data: Path) -> dict[str, str]:
     paths = {path for pattern in patterns for path in data.glob(pattern) if path.is_file()}
-    return {path.relative_to(data).as_posix(): sha256_file(path) for path in paths}
+    return {path.relative_to(data).as_posix(): sha256_file(path) for path in sorted(paths)}
 
 
 @cache

@@ -91,21 +91,30 @@ def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> d
     }
 
 
-def measured_times(runs: Iterable[Run]) -> pd.DataFrame:
-    """What detector and lifting took per image when a run was first simulated, beside the stated delay.
+def error_quantiles(errors: pd.DataFrame) -> pd.DataFrame:
+    """Of `keypoint_errors` near the hand: columns `script, detector, n_keypoints, median_m, p95_m`."""
+    by = errors[errors["near"]].groupby(["script", "detector"], sort=False)["error_m"]
+    columns = {"n_keypoints": by.size(), "median_m": by.median(), "p95_m": by.quantile(0.95)}
+    return pd.DataFrame(columns).reset_index()
 
-    Columns: `script`, `detector`, `t_s`, `delay_s`, `time_ms`. The first image of a run is left out: the
-    detector is made ready with it.
+
+def measured_times(runs: Iterable[Run]) -> pd.DataFrame:
+    """What detector and lifting took per image when the runs were first simulated, beside the stated delay.
+
+    Columns: `detector`, `delay_s`, `median_ms`, `within_share` (of the images, those that took no longer than
+    the delay). The first image of a run is left out: the detector is made ready with it.
     """
-    runs = [run for run in runs if len(run.frames)]
     parts = [
-        run.frames[["t_s", "time_ms"]]
-        .iloc[1:]
-        .assign(script=run.job.trial.script, detector=run.job.condition, delay_s=run.job.delay_s)
+        run.frames[["time_ms"]].iloc[1:].assign(detector=run.job.condition, delay_s=run.job.delay_s)
         for run in runs
+        if len(run.frames)
     ]
-    columns = ["script", "detector", "t_s", "delay_s", "time_ms"]
-    return pd.concat(parts, ignore_index=True)[columns] if parts else pd.DataFrame(columns=columns)
+    empty = pd.DataFrame({"time_ms": [], "detector": [], "delay_s": []})
+    times = pd.concat(parts) if parts else empty
+    times = times.assign(within=times["time_ms"] <= 1e3 * times["delay_s"])
+    by = times.groupby("detector", sort=False)
+    columns = {"median_ms": by["time_ms"].median(), "within_share": by["within"].mean()}
+    return pd.DataFrame({"delay_s": by["delay_s"].first()} | columns).reset_index()
 
 
 def _metrics(run: Run) -> dict:

@@ -1,52 +1,116 @@
-"""What the tables of several tests have in common when they are made for reading."""
+"""Tables for people to read: columns in their units, values with their intervals, a column per case."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
+import numpy as np
 import pandas as pd
 
-from hicp_lib.evaluation.ap.cocoeval import METRICS
+# (suffix of a column, unit in its title) -> factor; unit -> decimals as text
+_FACTORS = {
+    ("m", "cm"): 100.0, ("m", "mm"): 1000.0, ("s", "s"): 1.0, ("s", "ms"): 1000.0, ("ms", "ms"): 1.0,
+    ("share", "%"): 100.0, ("rad", "°"): float(np.degrees(1.0)),
+}  # fmt: skip
+_DECIMALS = {"cm": 1, "mm": 0, "s": 2, "ms": 0, "%": 0, "°": 1}
+
+
+def in_units(table: pd.DataFrame, titles: Mapping[str, str], text: bool = False) -> pd.DataFrame:
+    """Columns under titles, in the unit a title names.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Units are the suffixes of its columns: `_m`, `_s`, `_ms`, `_rad`, `_share`.
+    titles : Mapping[str, str]
+        Column -> its title; ``"retreat [cm]"`` for `retreat_m`. A title without a unit leaves the column as
+        it is.
+    text : bool
+        Numbers that have a unit as text with its usual decimals, a dash where they are NaN.
+
+    Returns
+    -------
+    DataFrame
+        The columns of `titles`, in their order.
+
+    Raises
+    ------
+    KeyError
+        If a column is not in the table, or its suffix cannot be brought to the unit.
+
+    Examples
+    --------
+    >>> runs = pd.DataFrame({"script": ["a"], "retreat_m": [0.123], "back_s": [np.nan]})
+    >>> in_units(runs, {"script": "script", "retreat_m": "retreat [cm]"}).values.tolist()
+    [['a', 12.3]]
+    >>> in_units(runs, {"retreat_m": "retreat [cm]", "back_s": "back after [s]"}, text=True).values.tolist()
+    [['12.3', '–']]
+    """
+    shown = {}
+    for name, title in titles.items():
+        shown[title] = table[name]
+        if title.endswith("]"):
+            unit = title.rpartition("[")[2][:-1]
+            shown[title] = table[name] * _FACTORS[name.rpartition("_")[2], unit]
+            if text:
+                shown[title] = [_number(value, _DECIMALS[unit]) for value in shown[title]]
+    return pd.DataFrame(shown, index=table.index)
 
 
 def with_bounds(value: float, low: float, high: float, digits: int = 2) -> str:
     """A value with its interval as "0.71 [0.65, 0.77]", alone where it has none; a dash where it is NaN."""
-    if value != value:
-        return "–"
-    return f"{value:.{digits}f}" + (f" [{low:.{digits}f}, {high:.{digits}f}]" if low == low else "")
+    interval = f" [{low:.{digits}f}, {high:.{digits}f}]" if value == value and low == low else ""
+    return _number(value, digits) + interval
 
 
-def bounds_of(rows: pd.DataFrame) -> list[str]:
-    """`with_bounds` of each row's `value, low, high`."""
-    return [with_bounds(*row) for row in rows[["value", "low", "high"]].itertuples(index=False, name=None)]
+def bounds_of(
+    rows: pd.DataFrame, columns: Sequence[str] = ("value", "low", "high"), factor: float = 1, digits: int = 2
+) -> list[str]:
+    """`with_bounds` of each row's value and the two ends of its interval, multiplied by `factor`."""
+    numbers = factor * rows[list(columns)]
+    return [with_bounds(*row, digits=digits) for row in numbers.itertuples(index=False, name=None)]
 
 
-def in_cm(length_m: float) -> str:
-    """A length in metres as centimetres, "1.2"; a dash where it is NaN."""
-    return f"{100 * length_m:.1f}" if math.isfinite(length_m) else "–"
+def in_cm(*lengths_m: Iterable[float]) -> list[str]:
+    """Lengths in metres as "4.0", in centimetres; of several, row by row, "4.0 / 2.1"; a dash for NaN."""
+    rows = zip(*lengths_m, strict=True)
+    return [" / ".join(_number(100 * length_m, 1) for length_m in row) for row in rows]
 
 
 def wide(
-    rows: pd.DataFrame, index: Sequence[str], columns: str, order: Sequence[str] | None = None
+    rows: pd.DataFrame,
+    index: Sequence[str],
+    columns: str,
+    text: Sequence[str] | None = None,
+    order: Sequence[str] | None = None,
 ) -> pd.DataFrame:
-    """The column `text` with a column per value of `columns`, rows in the order they come in.
+    """A text for each row, with a column per value of `columns`, rows in the order they come in.
 
     Parameters
     ----------
-    index : columns that name a row of the result
-    order : of the new columns, those that occur; the order they come in when left out
+    rows : DataFrame
+    index : Sequence[str]
+        Columns that name a row of the result.
+    columns : str
+        The column whose values become columns; their underscores become spaces.
+    text : Sequence[str], optional
+        One per row; `bounds_of` the rows when left out.
+    order : Sequence[str], optional
+        Of the new columns, those that occur; the order they come in when left out.
     """
     index = list(index)
-    table = rows.pivot(index=index, columns=columns, values="text")
-    table = table.reindex(list(dict.fromkeys(rows[index].itertuples(index=False, name=None))))
+    table = rows.assign(text=bounds_of(rows) if text is None else text)
+    table = table.pivot(index=index, columns=columns, values="text")
     table = table[[name for name in order or dict.fromkeys(rows[columns]) if name in table]]
-    return table.rename_axis(columns=None).reset_index()
+    table = table.rename(columns=lambda name: name.replace("_", " ")).rename_axis(columns=None)
+    return rows[index].drop_duplicates(ignore_index=True).join(table, on=index)
 
 
-def metrics_text(table: pd.DataFrame, group: str) -> pd.DataFrame:
-    """One group of a `compare` table for reading: "0.71 [0.65, 0.77]" per subset, detector and metric."""
-    rows = table[table["group"] == group]
-    rows = rows.assign(text=bounds_of(rows))
-    table = wide(rows, ["subset", "detector", "n_people"], "metric", METRICS)
-    return table.rename(columns={"n_people": "people"})
+def not_available(needed: str) -> pd.DataFrame:
+    """What stands in the place of a table that a recording has not got the material for."""
+    return pd.DataFrame({"needs": [needed], "here": "not available for this recording"})
+
+
+def _number(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if math.isfinite(value) else "–"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import json
+import os
 import random
 import shutil
 import subprocess
@@ -209,3 +210,21 @@ def test_what_is_imported_for_type_checks_alone_is_no_part():
         "def f():\n    from g import h\n"
     )
     assert imports_of(source) == {"typing", "typing.TYPE_CHECKING", "a.b", "e", "g", "g.h"}
+
+
+def test_a_key_is_the_same_in_every_process():
+    program = (
+        "from hicp_lib.core.cache import code, key\n"
+        "print(key([key], made_by=code(['hicp_lib.detectors.mediapipe.tasks'])))"
+    )
+    keys = {
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env=os.environ | {"PYTHONHASHSEED": seed},
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+        for seed in ("0", "1", "2")
+    }
+    assert len(keys) == 1

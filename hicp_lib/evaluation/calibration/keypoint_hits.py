@@ -1,6 +1,6 @@
 """Keypoints that are right: found ones whose truth is known, and whether they hit it.
 
-A keypoint is a *hit* when its term of OKS is at least .5 (see `oks`).
+A keypoint is a *hit* when its term of OKS is at least `HIT_TERM`, if nothing else is said (see `oks`).
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ def all_hits(
     found: Mapping[tuple[str, str], Mapping[int, Detections]],
     groups: Mapping[str, tuple[str, ...]],
     sources: Mapping[str, Mapping[int, Hashable]],
+    min_term: float = HIT_TERM,
 ) -> pd.DataFrame:
     """`keypoint_hits` of every case: columns `subset, detector, group, source_image` and its own.
 
@@ -33,11 +34,12 @@ def all_hits(
     found : (subset, detector) -> detections by image id
     groups : detector -> its groups of keypoints
     sources : subset -> image id -> source image
+    min_term : a hit's least term of OKS
     """
     tables = []
     for subset, detector in found:
         for group in groups[detector]:
-            table = keypoint_hits(truth[subset], found[subset, detector], group)
+            table = keypoint_hits(truth[subset], found[subset, detector], group, min_term=min_term)
             labels = {"subset": subset, "detector": detector, "group": group}
             source = table["image_id"].map(sources[subset])
             tables.append(
@@ -47,7 +49,11 @@ def all_hits(
 
 
 def keypoint_hits(
-    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body", sigmas: str = "halpe"
+    annotations: Annotations,
+    detections: Mapping[int, Detections],
+    group: str = "body",
+    sigmas: str = "halpe",
+    min_term: float = HIT_TERM,
 ) -> pd.DataFrame:
     """Which found keypoints are hits, for those whose truth is known.
 
@@ -71,11 +77,12 @@ def keypoint_hits(
     for image_id, found in detections.items():
         people = annotations.take(annotations.image_ids == image_id)
         for row, person in _pairs(people, found, keypoints, constants):
-            known, hits = _hits(people, person, found.keypoints_px[row, keypoints], keypoints, constants)
+            points_px = found.keypoints_px[row, keypoints]
+            known, terms = _terms(people, person, points_px, keypoints, constants)
             columns["image_id"] += [image_id] * int(known.sum())
             columns["keypoint"] += keypoints[known].tolist()
             columns["score"] += found.scores[row, keypoints[known]].tolist()
-            columns["hit"] += hits[known].tolist()
+            columns["hit"] += (terms[known] >= min_term).tolist()
     return pd.DataFrame(columns).astype({"image_id": int, "keypoint": int, "score": float, "hit": bool})
 
 
@@ -100,16 +107,16 @@ def _pairs(
             yield int(row), person
 
 
-def _hits(
+def _terms(
     people: Annotations, person: int | None, points: np.ndarray, keypoints: np.ndarray, sigmas: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which keypoints (k,) of a detection have a known truth, and which are hits."""
+    """Which keypoints (k,) of a detection have a known truth, and their terms of OKS."""
     given = np.isfinite(points).all(axis=-1)
     if person is None:
-        return given, np.zeros(len(points), dtype=bool)
+        return given, np.zeros(len(points))
     labelled = (people.visibility[person, keypoints] > 0) & (not _is_ignored(people, person))
     terms = oks_terms(people.keypoints_px[person, keypoints], points, people.areas_px2[person], sigmas)
-    return given & labelled, terms >= HIT_TERM
+    return given & labelled, terms
 
 
 def _is_ignored(people: Annotations, person: int) -> bool:

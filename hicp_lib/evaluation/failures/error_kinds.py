@@ -23,6 +23,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import GROUPS, SIGMAS, mirror
 from hicp_lib.core.oks import oks, oks_terms
 from hicp_lib.datasets.visibility import MIN_PEOPLE
@@ -177,7 +178,14 @@ def kind_shares(errors: pd.DataFrame, by: str) -> pd.DataFrame:
     Returns
     -------
     DataFrame, columns `detector, group, BY, kind, share, n_keypoints, n_people`
+
+    Raises
+    ------
+    InputError
+        If the errors have no column of that name.
     """
+    if by not in errors:
+        raise InputError(f"kinds of error by {by!r}: expected one of {', '.join(errors.columns)}")
     keys = ["detector", "group", by]
     counts = errors.groupby([*keys, "kind"], sort=False, observed=True).size().unstack("kind", fill_value=0)
     counts = counts.reindex(columns=KINDS, fill_value=0)

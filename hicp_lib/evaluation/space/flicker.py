@@ -1,6 +1,6 @@
 """Temporal stability: keypoints that come and go, and jump, from one frame of a recording to the next.
 
-- A keypoint is *given* in a frame when its score is at least `MIN_SCORE`.
+- A keypoint is *given* in a frame when its score is at least a threshold.
 - The *flicker rate* is the share of keypoints that are given in one of two consecutive frames only, of those
   given in either.
 - The *jitter* is the length of the second difference of a keypoint's places in three consecutive frames,
@@ -38,13 +38,13 @@ MAX_GAP_S = 0.5  # over which frames still count as consecutive
 _BLOCK_S = 1.0  # stretches of time that are drawn together in the bootstrap
 
 
-def best_person(found: Sequence[Detections]) -> np.ndarray:
+def best_person(found: Sequence[Detections], min_score: float = MIN_SCORE) -> np.ndarray:
     """The given body keypoints of the best-scored person of every frame: (n, 17, 2), NaN where not given."""
     tracks = np.full((len(found), len(COCO_17), 2), np.nan)
     for frame, people in enumerate(found):
         if len(people):
             best = int(people.person_scores.argmax())
-            given = people.scores[best, COCO_17] >= MIN_SCORE
+            given = people.scores[best, COCO_17] >= min_score
             tracks[frame] = np.where(given[:, None], people.keypoints_px[best, COCO_17], np.nan)
     return tracks
 
@@ -84,7 +84,11 @@ def latency_s(tracks_px: np.ndarray, filtered_px: np.ndarray, times_s: np.ndarra
 
 
 def flicker(
-    found: Mapping[str, Sequence[Detections]], times_s: np.ndarray, n_resamples: int = 1000, seed: int = 0
+    found: Mapping[str, Sequence[Detections]],
+    times_s: np.ndarray,
+    n_resamples: int = 1000,
+    seed: int = 0,
+    min_score: float = MIN_SCORE,
 ) -> pd.DataFrame:
     """Flicker and jitter of every detector, as detected and through the causal filter.
 
@@ -92,6 +96,7 @@ def flicker(
     ----------
     found : detector -> detections of each frame
     times_s : array, shape (n,), rising
+    min_score : from which a keypoint is given
 
     Returns
     -------
@@ -101,7 +106,7 @@ def flicker(
     """
     rows = []
     for detector, run in found.items():
-        raw = best_person(run)
+        raw = best_person(run, min_score)
         filtered = causal_filter(raw, times_s)
         for kind, tracks in (("as detected", raw), ("filtered", filtered)):
             for measure, (values, at_s) in _measures(tracks, times_s).items():

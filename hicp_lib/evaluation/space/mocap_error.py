@@ -15,9 +15,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.camera import transform
-from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_json
 from hicp_lib.evaluation.space.stability import THRESHOLDS_M
 from hicp_lib.evaluation.statistics.resampling import weighted_median, with_interval
 from hicp_lib.evaluation.statistics.time_blocks import block_length, draw_blocks
@@ -195,13 +193,6 @@ def error_dependence(errors: pd.DataFrame, min_score: float = 0.1) -> pd.DataFra
     `errors` with the columns `distance_m, sight` of `hicp_lib.evaluation.space.occlusion.lines_of_sight`.
     """
     return pd.concat([errors_by(errors, column, edges, min_score) for column, edges in _BINS.items()])
-
-
-def paper_medians() -> pd.DataFrame:
-    """The paper's Tables III and IV: columns `detector, keypoint, min_score, count, median_m`."""
-    table = read_json(DATA_DIR / "paper.json")["mocap"]
-    frame = pd.DataFrame(table["rows"], columns=table["columns"])
-    return frame.assign(median_m=frame.pop("median_cm") / 100)
 
 
 def _block_length(errors: pd.DataFrame) -> int:

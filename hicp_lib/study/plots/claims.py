@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from hicp_lib.core.errors import InputError
 from hicp_lib.study.claims.verdicts import (
     NOT_REPRODUCED,
     NOT_TESTABLE,
@@ -25,7 +26,15 @@ _LOOKS = {
 
 @in_style
 def verdicts(table: pd.DataFrame) -> Figure:
-    """Claims by section of the paper and verdict; `table` from `verdict_table`."""
+    """Claims by section of the paper and verdict; `table` from `verdict_table`.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    if table.empty:
+        raise InputError('no claims of this section; expected "all" or a section with claims, such as "IV-A"')
     sections = list(dict.fromkeys(table["section"]))
     counts = table.groupby(["section", "verdict"], sort=False).size().unstack(fill_value=0)
     counts = counts.reindex(index=sections, columns=VERDICTS, fill_value=0)

@@ -39,7 +39,7 @@ def ingredients(table: pd.DataFrame, note: str) -> Figure:
 
 
 @in_style
-def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, note: str) -> Figure:
+def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, min_term: float, note: str) -> Figure:
     """Hit rate against score, raw and calibrated, over the number of keypoints per bin of the score.
 
     `curves` and `errors` from `calibration_study`.
@@ -64,7 +64,7 @@ def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, note: str) ->
         for row in errors.itertuples()
     ]
     caption = (
-        "Reliability of keypoint scores: share of hits (OKS term of at least .5) per bin of the score, and "
+        f"Reliability of keypoint scores: share of hits (OKS term of at least {min_term:g}) per bin, and "
         "how many keypoints have it; dashed: a score that says what it is worth. Raw scores, and scores "
         f"calibrated on other images, with 95 % bootstrap intervals over source images: {note}."
     )

@@ -162,7 +162,7 @@ def crop_sizes(table: pd.DataFrame, min_pixels: int, note: str) -> Figure:
     axis.set(xscale="log", xlabel="pixels of the crop", ylabel="people")
     axis.legend(loc="best")
     share = float((sizes >= min_pixels).mean())
-    caption = f"Sizes of the crops and the paper's limit of {min_pixels:,} pixels (dashed): {note}."
+    caption = f"Sizes of the crops and the limit of {min_pixels:,} pixels (dashed): {note}."
     alt = (
         f"Histogram of crop sizes; {share:.0%} reach the limit, the median is {np.median(sizes):,.0f} pixels."
     )

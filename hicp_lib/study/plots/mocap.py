@@ -55,7 +55,7 @@ def fraction_curves(errors: pd.DataFrame, min_score: float, note: str) -> Figure
 def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: float, note: str) -> Figure:
     """Distances from the markers per joint and detector, beside the medians the paper reports.
 
-    `paper` from `hicp_lib.evaluation.space.mocap_error.paper_medians`.
+    `paper` from `hicp_lib.study.paper_tables.paper_medians`.
     """
     found = errors[(errors["score"] > min_score) & errors["error_m"].notna()]
     joints = [joint for joint in TABLE_JOINTS if joint in set(errors["keypoint"])]

@@ -16,7 +16,6 @@ from hicp_lib.evaluation.ap.metric_table import (
     people_oks,
 )
 from hicp_lib.formats.annotations import source_images
-from hicp_lib.study.table_format import metrics_text
 from tests.evaluation.made_people import make_annotations, make_detections
 
 N = 60
@@ -95,12 +94,3 @@ def test_images_without_a_source_stand_for_themselves(study):
     truth, _ = study
     without = replace(truth["basic"], extras=[{} for _ in range(N)])
     assert source_images(without) == {i: i for i in range(N)}
-
-
-def test_text_shows_intervals_and_a_dash_where_there_is_nothing(study):
-    truth, found = study
-    table = compare(truth, found, n_resamples=5)
-    table.loc[(table["metric"] == "AP") & (table["subset"] == "headless"), "value"] = np.nan
-    text = metrics_text(table, "body").set_index("subset")
-    assert text.loc["headless", "AP"] == "–"
-    assert text.loc["basic", "AP50"] == "1.00 [1.00, 1.00]"

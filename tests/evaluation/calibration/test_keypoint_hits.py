@@ -12,16 +12,17 @@ AREA = 20_000.0
 POINTS = np.random.default_rng(0).uniform(50, 400, (3, 136, 2))
 
 
-def hit_radius_px(keypoint: int) -> float:
-    """Distance at which the OKS term is one half: 2 sigma sqrt(2 A ln 2)."""
-    return 2 * SIGMAS["halpe"][keypoint] * np.sqrt(2 * AREA * np.log(2))
+def hit_radius_px(keypoint: int, term: float) -> float:
+    """Distance at which the OKS term has a value t: 2 sigma sqrt(-2 A ln t)."""
+    return 2 * SIGMAS["halpe"][keypoint] * np.sqrt(-2 * AREA * np.log(term))
 
 
+@pytest.mark.parametrize("min_term", [0.5, 0.85])
 @pytest.mark.parametrize("share, hit", [(0.99, True), (1.01, False)])
-def test_a_hit_lies_within_the_distance_at_which_the_term_is_one_half(share, hit):
+def test_a_hit_lies_within_the_distance_at_which_the_term_is_the_least(share, hit, min_term):
     found = POINTS[:1].copy()
-    found[0, COCO_17, 0] += [share * hit_radius_px(k) for k in COCO_17]
-    hits = keypoint_hits(make_annotations(POINTS[:1], [0]), {0: make_detections(found)})
+    found[0, COCO_17, 0] += [share * hit_radius_px(k, min_term) for k in COCO_17]
+    hits = keypoint_hits(make_annotations(POINTS[:1], [0]), {0: make_detections(found)}, min_term=min_term)
     assert hits["keypoint"].tolist() == COCO_17.tolist()
     assert (hits["hit"] == hit).all() and (hits["score"] == 0.5).all()
 

@@ -1,8 +1,10 @@
 """Kinds of error, on hand-made skeletons whose kinds are known."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
+from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import COCO_17, INDEX, SIGMAS
 from hicp_lib.evaluation.failures.error_kinds import KINDS, all_errors, keypoint_errors, kind_shares
 from tests.evaluation.made_people import make_annotations, make_detections
@@ -128,3 +130,8 @@ def test_a_detection_goes_to_whom_it_fits_and_not_to_those_nothing_is_known_of()
     )  # fmt: skip
     surer = make_detections(np.stack([GRID + 5_000, GRID]), [0.9, 0.5])
     assert (keypoint_errors(people, {0: surer})["kind"] == "good").all()
+
+
+def test_shares_by_what_is_no_column_are_refused():
+    with pytest.raises(InputError, match="by 'classes': expected one of"):
+        kind_shares(pd.DataFrame({"detector": [], "group": [], "kind": []}), "classes")

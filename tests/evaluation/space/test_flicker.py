@@ -1,5 +1,7 @@
 """Flicker, jitter and latency, on tracks whose values are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -85,3 +87,13 @@ def test_only_sure_keypoints_of_the_best_person_count():
     track = best_person([people])
     assert np.isnan(track[0, 3]).all()
     np.testing.assert_array_equal(track[0, 4], POINTS[4] + 1000)
+
+
+def test_a_threshold_decides_which_keypoints_are_given():
+    person = make_detections(POINTS[None])
+    found = [replace(person, scores=person.scores * (1.0 + 0.4 * (i % 2))) for i in range(100)]
+    rates = {
+        min_score: flicker({"d": found}, TIMES_S, n_resamples=2, min_score=min_score)["value"].iloc[0]
+        for min_score in (0.4, 0.6)
+    }
+    assert rates == {0.4: 0.0, 0.6: 1.0}

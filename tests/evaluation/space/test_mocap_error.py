@@ -131,11 +131,3 @@ def test_errors_are_grouped_by_labels(reference):
     table = me.errors_by(errors, "sight").query("part == 'elbow'").set_index("bin")
     assert table.loc["clear", ["n", "median_m"]].tolist() == pytest.approx([100, 0.01])
     assert table.loc["hidden", ["n", "median_m"]].tolist() == pytest.approx([20, 0.11])
-
-
-def test_the_papers_tables_are_whole():
-    paper = me.paper_medians()
-    assert len(paper) == 4 * 4 * 2 and paper["median_m"].between(0.02, 0.2).all()
-    first = paper.query("detector == 'mmpose' and keypoint == 'left_elbow' and min_score == 0.3").iloc[0]
-    assert (first["count"], first["median_m"]) == (419, 0.034)
-    assert not paper.duplicated(["detector", "keypoint", "min_score"]).any()

@@ -33,7 +33,7 @@ def test_reliability_is_drawn_for_raw_and_calibrated_scores():
          "source_image": rng.integers(0, 20, 400), "score": score, "hit": rng.random(400) < score**2}
     )  # fmt: skip
     errors, curves, _ = calibration_study(hits, n_resamples=20)
-    figure = combination.reliability_curves(curves, errors, "made up")
+    figure = combination.reliability_curves(curves, errors, 0.85, "made up")
     _, lower = figure.figure.axes
     assert [text.get_text() for text in figure.figure.legends[0].get_texts()] == ["raw", "calibrated"]
     assert sum(bar.get_height() for bar in lower.patches) == 2 * errors["n_keypoints"].iloc[0]

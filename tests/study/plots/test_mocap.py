@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.evaluation.space.mocap_error import JOINTS, TABLE_JOINTS, error_dependence, paper_medians
+from hicp_lib.evaluation.space.mocap_error import JOINTS, TABLE_JOINTS, error_dependence
+from hicp_lib.study.paper_tables import paper_medians
 from hicp_lib.study.plots import mocap as draw
 from hicp_lib.study.plots.style import detector_colour
 

@@ -1,0 +1,39 @@
+"""The paper's Tables III and IV (section IV-C), beside what was measured here."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import read_json
+from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS
+from hicp_lib.study.table_format import bounds_of, wide
+
+
+def paper_medians() -> pd.DataFrame:
+    """The paper's Tables III and IV: columns `detector, keypoint, min_score, count, median_m`."""
+    table = read_json(DATA_DIR / "paper.json")["mocap"]
+    frame = pd.DataFrame(table["rows"], columns=table["columns"])
+    return frame.assign(median_m=frame.pop("median_cm") / 100)
+
+
+def beside_paper(medians: pd.DataFrame, paper: pd.DataFrame, min_score: float) -> pd.DataFrame:
+    """One of the paper's two tables, what was measured here above the paper's own rows.
+
+    Parameters
+    ----------
+    medians, paper : DataFrame
+        As from `median_errors` and `paper_medians`.
+    min_score : float
+        Whose table: one of `MIN_SCORES`.
+
+    Returns
+    -------
+    DataFrame
+        Columns `detector, lifting` and one per joint: "count / median [cm]", here with the 95 % interval.
+    """
+    rows = pd.concat([medians, paper.assign(detector=paper["detector"] + " (paper)", method="paper")])
+    rows = rows[(rows["min_score"] == min_score) & rows["keypoint"].isin(TABLE_JOINTS)]
+    texts = zip(rows["count"], bounds_of(rows, ("median_m", "low_m", "high_m"), 100, 1), strict=True)
+    cells = [f"{count:.0f} / {text}" if count else "0" for count, text in texts]
+    return wide(rows, ["detector", "method"], "keypoint", cells).rename(columns={"method": "lifting"})
