@@ -70,11 +70,6 @@ _HANDS_WITHIN: dict[str, dict] = {"mediapipe-hands": {"num_hands": 4, "min_score
 DETECTORS: dict[str, Entry] = {entry.name: entry for entry in _ENTRIES}
 
 
-def detector_names() -> list[str]:
-    """Names `make_detector` knows."""
-    return list(DETECTORS)
-
-
 def default_detector_names() -> list[str]:
     """Names of the detectors that run on weights that are fetched, without a file of the user's own."""
     return [entry.name for entry in DETECTORS.values() if not entry.needs_model]

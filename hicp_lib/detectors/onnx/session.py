@@ -16,8 +16,9 @@ import numpy as np
 from google.protobuf.message import DecodeError, Message
 
 from hicp_lib.core.environment import with_variables
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.files import sha256_bytes
+from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.protobuf import Messages, message_class
 from hicp_lib.detectors.weights.published import check_use
 
@@ -77,6 +78,13 @@ class OnnxModel:
         """What identifies the model's results."""
         return {"sha256": self.sha256, "provider": self.provider, "onnxruntime": onnxruntime.__version__}
 
+    def describe(self) -> list[Fact]:
+        """What it is and where it runs."""
+        return [
+            Fact("model", self.path.name, f"SHA-256 {self.sha256}"),
+            Fact("runs on", self.provider, "option provider"),
+        ]
+
     def run(self, pixels: np.ndarray) -> list[np.ndarray]:
         """The outputs for one input array, in the model's order.
 
@@ -92,7 +100,7 @@ class OnnxModel:
         except Exception as error:  # ONNX Runtime's errors share no base class of their own
             raise InputError(
                 f"{self.path}: the network failed on an input of shape {pixels.shape} "
-                f"({_one_line(error)}); export it again for this input"
+                f"({one_line(error)}); export it again for this input"
             ) from None
         return [np.asarray(output) for output in outputs]
 
@@ -171,7 +179,7 @@ def _start(path: Path, content: bytes, provider: str, threads: int) -> onnxrunti
         session = onnxruntime.InferenceSession(content, options, providers=[full_names[provider]])
     except Exception as error:  # ONNX Runtime's errors share no base class of their own
         raise InputError(
-            f"{path}: ONNX Runtime cannot run it ({_one_line(error)}); export it again, in one file"
+            f"{path}: ONNX Runtime cannot run it ({one_line(error)}); export it again, in one file"
         ) from None
     got = session.get_providers()[0]
     if got != full_names[provider]:
@@ -205,7 +213,3 @@ def _first_convolution_channels(graph: Message) -> int | None:
 def _port(node: onnxruntime.NodeArg) -> Port:
     shape = tuple(size if isinstance(size, int) and size > 0 else None for size in node.shape or ())
     return Port(node.name, shape, node.type)
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())[:300]

@@ -107,8 +107,7 @@ class OpenPose:
         size = f"{width or 'any'} wide, {height} high"
         hands = "by the hand model" if self._hands else "none; option hand_model"
         return [
-            Fact("model", self._model.path.name, f"SHA-256 {self._model.sha256}"),
-            Fact("runs on", self._model.provider, "option provider"),
+            *self._model.describe(),
             Fact("input", size, "read from the file" if width else "option net_height_px"),
             Fact("pixels", "BGR / 256 - 0.5, aspect kept, padded right and below", "as OpenPose"),
             Fact("keypoints", " or ".join(part_model.convention for part_model in _PART_MODELS.values()),

@@ -28,10 +28,7 @@ class Distribution:
 
     requirement: str
     file: str
-    size_bytes: int
     sha256: str
-    licence: str
-    homepage: str
     pip_options: list[str]
 
 

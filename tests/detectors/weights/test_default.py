@@ -23,10 +23,7 @@ def make_registry(folder: Path, archive: Path, member: str, name: str = "net.bin
     source = {
         "requirement": "net==1.0",
         "file": archive.name,
-        "size_bytes": archive.stat().st_size,
         "sha256": sha256_bytes(archive.read_bytes()),
-        "licence": "MIT",
-        "homepage": "",
         "pip_options": [],
     }
     weight = {
