@@ -141,11 +141,9 @@ class KeypointRcnn:
             has_points = keypoints is not None and logits is not None
         n_people = {len(role) for role in roles if role is not None}
         if boxes is None or scores is None or not has_points or len(n_people) != 1:
-            raise InputError(
-                f"{self._model.path}: gives outputs of shape {', '.join(str(o.shape) for o in outputs)}; "
-                f"expected {self._family}'s boxes (n, 4), scores (n), keypoints (n, 17, 3)"
-                + (" and keypoint scores (n, 17)" if self._family == "torchvision" else "")
-            )
+            expected = f"{self._family}'s boxes (n, 4), scores (n), keypoints (n, 17, 3)"
+            scored = " and keypoint scores (n, 17)" if self._family == "torchvision" else ""
+            raise self._model.unexpected(outputs, expected + scored)
         return roles
 
     def _keypoints(

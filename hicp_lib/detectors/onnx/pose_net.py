@@ -155,7 +155,7 @@ class PoseNet:
                 return vectors
             if vectors[1].shape[2] * height == vectors[0].shape[2] * width:
                 return vectors[::-1]
-        raise InputError(
-            f"{self.model.path}: gives outputs of shape {', '.join(str(o.shape) for o in outputs)}; expected "
+        expected = (
             f"heat maps ({n}, keypoints, h, w), or SimCC of {width}s and {height}s, ({n}, keypoints, bins)"
         )
+        raise self.model.unexpected(outputs, expected)

@@ -78,6 +78,27 @@ class OnnxModel:
         """What identifies the model's results."""
         return {"sha256": self.sha256, "provider": self.provider, "onnxruntime": onnxruntime.__version__}
 
+    @property
+    def image_size_px(self) -> tuple[int | None, int | None]:
+        """Height and width of the one image it takes; None where the model leaves them open.
+
+        Raises
+        ------
+        InputError
+            If it takes something else.
+        """
+        shape = self.inputs[0].shape
+        if len(shape) != 4 or shape[0] not in (None, 1) or shape[1] not in (None, 3):
+            raise InputError(
+                f"{self.path}: takes an input of shape {shape}; expected one image, (1, 3, h, w)"
+            )
+        return shape[2], shape[3]
+
+    def unexpected(self, outputs: list[np.ndarray], expected: str) -> InputError:
+        """What to raise where the outputs are not those `expected`."""
+        shapes = ", ".join(str(output.shape) for output in outputs)
+        return InputError(f"{self.path}: gives outputs of shape {shapes}; expected {expected}")
+
     def describe(self) -> list[Fact]:
         """What it is and where it runs."""
         return [
@@ -160,10 +181,13 @@ def open_content(content: bytes, path: Path, provider: str = "cpu", threads: int
         return model
 
 
-def available_providers() -> list[str]:
-    """Short names of the execution providers of this onnxruntime that compute on this machine."""
-    names = [name.removesuffix("ExecutionProvider").lower() for name in onnxruntime.get_available_providers()]
-    return [name for name in names if name != "azure"]
+def available_providers() -> dict[str, str]:
+    """Execution providers of this onnxruntime that compute on this machine, full names by short ones."""
+    names = {
+        name.removesuffix("ExecutionProvider").lower(): name for name in onnxruntime.get_available_providers()
+    }
+    names.pop("azure", None)
+    return names
 
 
 def _start(path: Path, content: bytes, provider: str, threads: int) -> onnxruntime.InferenceSession:
@@ -172,17 +196,15 @@ def _start(path: Path, content: bytes, provider: str, threads: int) -> onnxrunti
     options.log_severity_level = _FATAL_ONLY
     # Threads that wait by spinning would take the cores from the other images.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    full_names = {
-        name.removesuffix("ExecutionProvider").lower(): name for name in onnxruntime.get_available_providers()
-    }
+    full_name = available_providers()[provider]
     try:
-        session = onnxruntime.InferenceSession(content, options, providers=[full_names[provider]])
+        session = onnxruntime.InferenceSession(content, options, providers=[full_name])
     except Exception as error:  # ONNX Runtime's errors share no base class of their own
         raise InputError(
             f"{path}: ONNX Runtime cannot run it ({one_line(error)}); export it again, in one file"
         ) from None
     got = session.get_providers()[0]
-    if got != full_names[provider]:
+    if got != full_name:
         raise InputError(
             f"{path}: {provider} was asked for, but its libraries did not load and {got} would run; "
             "install them, or ask for cpu"

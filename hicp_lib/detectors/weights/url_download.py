@@ -7,7 +7,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import Request, build_opener
 
-from hicp_lib.errors import one_line
+from hicp_lib.core.errors import one_line
 
 # Without an answer for so long, the server is given up.
 TIMEOUT_S = 30.0
