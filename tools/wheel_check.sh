@@ -7,7 +7,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 checkout=$PWD
 parts=${1:-all}
-max_mb=400
+max_mb=405  # 394 of them are what it stands on and code; 8 the network of openpose-mobilenet
 work=$(mktemp -d "${TMPDIR:-/tmp}/hicp-wheel-XXXXXX")
 trap 'rm -rf "$work"' EXIT
 unset PYTHONPATH
