@@ -13,13 +13,14 @@ from dataclasses import asdict
 import cv2
 import numpy as np
 
+from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.onnx.letterbox import Letterbox
 from hicp_lib.detectors.onnx.session import open_content
 from hicp_lib.detectors.openpose.paf import PafOptions, PartModel, assemble
-from hicp_lib.detectors.weights.default import find, load
+from hicp_lib.detectors.weights.default import load
 
-WEIGHTS = "openpose-mobilenet.onnx"
+WEIGHTS = DATA_DIR / "weights/openpose-mobilenet.onnx"
 STRIDE = 8
 
 _COCO_18_LIMBS = {
@@ -80,7 +81,7 @@ class OpenPoseMobileNet:
     ) -> None:
         if net_height_px <= 0 or net_height_px % 16:
             raise ValueError(f"net_height_px must be a positive multiple of 16, not {net_height_px}")
-        self._model = open_content(load(WEIGHTS), find(WEIGHTS).path, provider, threads)
+        self._model = open_content(load(WEIGHTS.name), WEIGHTS, provider, threads)
         self._height_px = net_height_px
         self._options = options or PafOptions()
         self.settings = {

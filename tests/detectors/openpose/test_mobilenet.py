@@ -88,7 +88,7 @@ def test_its_maps_are_those_of_the_reference_implementation(photograph):
     """On a small part of the photograph: the reference is slow."""
     detector = mobilenet.OpenPoseMobileNet(net_height_px=96)
     net_input = mobilenet.fit(photograph, 96)
-    model = ReferenceEvaluator(onnx.load_from_string(zoo.load(mobilenet.WEIGHTS)))
+    model = ReferenceEvaluator(onnx.load_from_string(zoo.load(mobilenet.WEIGHTS.name)))
     blob = cv2.dnn.blobFromImage(net_input.pixels, swapRB=True)
     expected = model.run(None, {model.input_names[0]: blob})[0][0]
     assert expected.max() > 0.5
@@ -97,9 +97,9 @@ def test_its_maps_are_those_of_the_reference_implementation(photograph):
 
 @pytest.mark.parametrize("position", [0, 1000, -1])
 def test_a_damaged_weight_is_refused(tmp_path, monkeypatch, position):
-    path = tmp_path / "weights" / mobilenet.WEIGHTS
+    path = tmp_path / "weights" / mobilenet.WEIGHTS.name
     path.parent.mkdir()
-    content = bytearray(zoo.load(mobilenet.WEIGHTS))
+    content = bytearray(zoo.load(mobilenet.WEIGHTS.name))
     content[position] ^= 1
     path.write_bytes(content)
     shutil.copy(zoo.REGISTRY_PATH, tmp_path / "detectors.json")
