@@ -8,8 +8,7 @@ Processor time is given too, child processes' included: it tells more than wall 
 otherwise.
 
 Then a call of MediaPipe in its own process against the same task in this one, in turn; the floor is 1.05.
-The first quartile counts: a machine that is busy otherwise takes its time to wake a process. Last
-MobileNet-thin's network alone, on one thread, against OpenCV running the same file.
+The first quartile counts: a machine that is busy otherwise takes its time to wake a process.
 """
 
 from __future__ import annotations
@@ -122,27 +121,6 @@ def compare_process(name: str, size_px: tuple[int, int], calls: int) -> Comparis
     return Comparison(what, own_s, "a call in this process", here_s, FLOOR_PROCESS)
 
 
-def compare_network(paths: dict[int, Path], repeats: int) -> Comparison:
-    """MobileNet-thin's network run here and by OpenCV, per image."""
-    detector = registry.make_detector("openpose-mobilenet")
-    network = cv2.dnn.readNetFromTensorflow(np.frombuffer(zoo.load(openpose_net.WEIGHTS), np.uint8))
-    inputs = [openpose_net.fit(read_image(path), 368) for path in paths.values()]
-
-    def run_opencv() -> None:
-        for net_input in inputs:
-            network.setInput(cv2.dnn.blobFromImage(net_input.pixels, swapRB=True))
-            network.forward()
-
-    def run_here() -> None:
-        for net_input in inputs:
-            detector.maps(net_input)
-
-    cv2.setNumThreads(1)
-    times = [[stopwatch(work)[1] for work in (run_opencv, run_here)] for _ in range(repeats)]
-    opencv_s, here_s = (np.min(times, axis=0) / len(inputs)).tolist()
-    return Comparison(f"{openpose_net.WEIGHTS}, an image", here_s, "OpenCV running the same file", opencv_s)
-
-
 def measure(options) -> Iterator[Comparison]:
     """All detectors on one thread and on all cores."""
     weights = zoo.weights_dir()
@@ -158,7 +136,6 @@ def measure(options) -> Iterator[Comparison]:
                 yield from compare(name, paths, workers, options.repeats)
         for name, size_px in PROCESS_CASES[: options.processes]:
             yield compare_process(name, size_px, options.images)
-        yield compare_network(paths, options.repeats)
 
 
 if __name__ == "__main__":

@@ -39,7 +39,7 @@ def pytest_xdist_make_scheduler(config, log):
 @pytest.fixture(scope="session")
 def weights() -> Path:
     """Folder of the fetched weights; `hicp models fetch` comes before the tests."""
-    absent = [row["name"] for row in zoo.list_weights() if row["status"] != "present"]
+    absent = [weight.name for weight in zoo.registry().values() if zoo.status(weight) != "present"]
     if absent and os.environ.get("HICP_TESTS_WITHOUT_WEIGHTS"):
         pytest.skip(f"weights are absent: {', '.join(absent)}")
     assert not absent, f"weights are absent: {', '.join(absent)}; run: hicp models fetch"

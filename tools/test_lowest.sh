@@ -10,16 +10,16 @@ if ! command -v "$uv" > /dev/null; then
   python3 -m venv "$work/uv" && "$work/uv/bin/python" -m pip install -q uv
   uv=$work/uv/bin/uv
 fi
-extras=(--extra analysis --extra mediapipe --extra openpose-mobilenet --extra render --extra robot)
+extras=(--extra analysis --extra mediapipe --extra render --extra robot)
 "$uv" pip compile -q --no-header --no-build --resolution lowest-direct --python-version 3.11 "${extras[@]}" \
   pyproject.toml -o "$work/lowest.txt"
 grep -E '^[a-z]' "$work/lowest.txt"
 "$uv" venv -q --python "${PYTHON:-3.11}" "$work/env"
-# pip, since a test downloads through it; matplotlib for its photograph of a person
-"$uv" pip install -q --python "$work/env/bin/python" -r "$work/lowest.txt" hypothesis matplotlib pip pytest
+# pip, since a test downloads through it; matplotlib for its photograph of a person; onnx to make networks
+"$uv" pip install -q --python "$work/env/bin/python" -r "$work/lowest.txt" hypothesis matplotlib onnx pip pytest
 PYTHONPATH=$PWD HICP_TESTS_WITHOUT_WEIGHTS=1 "$work/env/bin/python" -m pytest -q -p no:cacheprovider \
   --override-ini addopts= \
   tests/test_annotations.py tests/test_exporters.py tests/test_hicp_dataset.py tests/test_keypoints.py \
   tests/importers tests/evaluation/test_{bootstrap,coco,oks}.py \
-  tests/detectors/onnx tests/detectors/test_{frozen_graph,zoo}.py \
+  tests/detectors/onnx tests/detectors/openpose/test_mobilenet.py tests/detectors/weights/test_default.py \
   tests/rgbd/test_{keypoints3d,lifting,recording,robust_lifting,tum}.py tests/test_quaternions.py

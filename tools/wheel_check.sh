@@ -7,7 +7,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 checkout=$PWD
 parts=${1:-all}
-max_mb=400
+max_mb=405  # 394 of them are what it stands on and code; 8 the network of openpose-mobilenet
 work=$(mktemp -d "${TMPDIR:-/tmp}/hicp-wheel-XXXXXX")
 trap 'rm -rf "$work"' EXIT
 unset PYTHONPATH
@@ -23,7 +23,7 @@ python=$work/env/bin/python
 "$python" -m pip wheel -q --no-deps --wheel-dir "$work/dist" "$work/source"
 wheel=$(echo "$work"/dist/hicp-*.whl)
 "$python" -m zipfile -l "$wheel" > "$work/names"
-for name in hicp_lib/data/detectors.json hicp_lib/data/examples/native/annotations.json hicp_lib/py.typed; do
+for name in hicp_lib/data/detectors.json hicp_lib/data/weights/openpose-mobilenet.onnx hicp_lib/data/examples/native/annotations.json hicp_lib/py.typed; do
   grep -q "^$name " "$work/names" || fail "$wheel lacks $name"
 done
 ! grep -E "^(tests|notebooks|book|data|build)/" "$work/names" || fail "$wheel brings what is not the package"
@@ -51,6 +51,7 @@ hicp --version
 hicp dataset create --annotations native/annotations.json --images images --out hicp --min-pixels 1 > counts.json
 hicp detect --detector mmpose --model net.onnx --boxes gt --dataset hicp/basic --out found.json
 hicp evaluate --annotations hicp/basic/annotations.json --detections found.json
+hicp detect --detector openpose-mobilenet --dataset hicp/basic --out bodies.json
 hicp import --format alphapose --predictions native/alphapose --annotations native/annotations.json --out alphapose.json
 hicp evaluate --annotations native/annotations.json --detections alphapose.json | grep -q "AP50  *1.000" \
   || fail "the imported example is not found again"
@@ -65,7 +66,6 @@ refused() { # EXTRA COMMAND...: one line that names the extra
 refused analysis hicp lift --recording rec --detector mmpose --model net.onnx --out lifted.parquet
 refused render hicp scenes render scenes
 refused mediapipe hicp models show --detector mediapipe
-refused openpose-mobilenet hicp models show --detector openpose-mobilenet
 refused report hicp report
 
 if [ "$parts" = all ]; then

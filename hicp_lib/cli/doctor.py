@@ -184,16 +184,14 @@ def check_opencv() -> Check:
 
 def check_weights() -> Check:
     """That every weight file is here and is the one the registry names."""
-    from hicp_lib.detectors.weights.default import list_weights
+    from hicp_lib.detectors.weights.default import registry, status
 
     try:
-        weights = list_weights()
+        found = {weight.name: status(weight) for weight in registry().values()}
     except InputError as error:
         return Check.of("weights", False, str(error), "git restore data/detectors.json")
-    wrong = [f"{row['name']} {row['status']}" for row in weights if row["status"] != "present"]
-    return Check.of(
-        "weights", not wrong, ", ".join(wrong) or f"{len(weights)} present and sound", "hicp models fetch"
-    )
+    wrong = ", ".join(f"{name} {state}" for name, state in found.items() if state != "present")
+    return Check.of("weights", not wrong, wrong or f"{len(found)} present and sound", "hicp models fetch")
 
 
 def check_folder(name: str, folder: Path, remedy: str) -> list[Check]:

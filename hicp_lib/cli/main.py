@@ -127,7 +127,7 @@ def detect(
     if workers and dask:
         raise click.UsageError("Give either --workers N or --dask ADDRESS.", click.get_current_context())
     if dataset_dir is not None:
-        found = detect_dataset(detector, dataset_dir, workers, dask=dask, **given(**chosen))
+        found = detect_dataset(detector, dataset_dir, workers=workers, dask=dask, **given(**chosen))
     else:
         paths = _numbered_images(images_dir)
         results = detect_images(detector, paths, workers, dask=dask, **given(**chosen))

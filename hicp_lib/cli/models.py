@@ -16,13 +16,14 @@ def models() -> None:
 @models.command("list")
 def models_list() -> None:
     """List the weight files, their licences, and whether they are here."""
-    from hicp_lib.detectors.weights.default import list_weights
+    from hicp_lib.detectors.weights import default
     from hicp_lib.detectors.weights.published import published, status
     from hicp_lib.detectors.weights.user import all_own_options
 
-    for row in list_weights():
-        size = f"{row['size_bytes'] / 1e6:5.1f} MB"
-        say(f"{row['name']:<32} {row['status']:<8} {size}  {row['licence']:<12} {', '.join(row['used_by'])}")
+    for weight in default.registry().values():
+        size = f"{weight.size_bytes / 1e6:5.1f} MB"
+        row = f"{weight.name:<32} {default.status(weight):<8} {size}  {weight.licence:<12}"
+        say(f"{row} {', '.join(weight.used_by)}")
     say("\npublished, fetched by name:")
     for model in published().values():
         size = "     ? MB" if model.size_bytes is None else f"{model.size_bytes / 1e6:6.1f} MB"

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hicp_lib.core.errors import one_line
 from hicp_lib.core.extras import MissingPartError
 from hicp_lib.core.images import read_image
 from hicp_lib.detectors.registry import DETECTORS, default_detector_names, make_detector
@@ -73,7 +74,7 @@ def main(name: str) -> int:
         print(error)
         return EXIT_ABSENT
     except Exception as error:  # a broken library may raise anything
-        print(" ".join(str(error).split()) or type(error).__name__)
+        print(one_line(error))
         return EXIT_FAILED
     return 0
 

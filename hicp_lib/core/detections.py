@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from hicp_lib.core.keypoints import N_KEYPOINTS
+from hicp_lib.core.keypoints import N_KEYPOINTS, to_halpe
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,29 @@ class Detections:
     def none(cls) -> Detections:
         """Nobody found."""
         return cls(np.full((0, N_KEYPOINTS, 2), np.nan), np.zeros((0, N_KEYPOINTS)), np.zeros(0))
+
+    @classmethod
+    def of_parts(
+        cls, positions_px: np.ndarray, scores: np.ndarray, person_scores: np.ndarray, convention: str
+    ) -> Detections:
+        """People from the keypoints a network gives.
+
+        Parameters
+        ----------
+        positions_px : array, shape (n, k, 2)
+            NaN where not given; the score is then 0, whatever it was.
+        scores : array, shape (n, k)
+            In [0, 1].
+        person_scores : array, shape (n,)
+        convention : str
+            A key of `hicp_lib.core.keypoints.TO_HALPE`.
+        """
+        scores = np.where(np.isnan(positions_px).any(axis=-1), 0.0, scores)
+        return cls(
+            to_halpe(positions_px, convention, axis=-2),
+            to_halpe(scores, convention, axis=-1, fill=0.0),
+            person_scores,
+        )
 
     def and_also(self, more: Detections) -> Detections:
         """These people, then others in the same image."""

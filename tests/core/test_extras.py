@@ -43,7 +43,6 @@ def test_a_fault_within_a_package_is_not_called_a_missing_one():
             ["lift", "--recording", "x", "--detector", "mediapipe", "--out", "OUT.parquet"],
             "analysis",
         ),
-        ("onnx", ["models", "show", "--detector", "openpose-mobilenet"], "openpose-mobilenet"),
     ],
 )
 def test_a_command_answers_in_one_line(tmp_path, package, arguments, extra):

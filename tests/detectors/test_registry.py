@@ -8,13 +8,12 @@ from hicp_lib.detectors.registry import (
     command_to_run,
     command_to_use,
     default_detector_names,
-    detector_names,
     make_detector,
 )
 
 
 def test_detectors_that_need_a_model_are_not_run_by_default():
-    absent = set(detector_names()) - set(default_detector_names())
+    absent = set(DETECTORS) - set(default_detector_names())
     assert absent == {name for name, entry in DETECTORS.items() if entry.needs_model}
     assert {"mmpose", "alphapose", "detectron2"} <= absent
 
@@ -29,7 +28,7 @@ def test_without_its_model_a_detector_says_the_commands(name, tmp_path, monkeypa
     assert "--model" in command_to_run(name)
 
 
-@pytest.mark.parametrize("name", detector_names())
+@pytest.mark.parametrize("name", DETECTORS)
 def test_an_unknown_option_is_refused(name):
     with pytest.raises(InputError, match="has no option 'colour'"):
         make_detector(name, colour="blue", model="m.onnx")

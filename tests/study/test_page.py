@@ -10,7 +10,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from hicp_lib.detectors.weights.default import list_weights
+from hicp_lib.detectors.weights.default import registry
 from hicp_lib.study.page import Study
 from hicp_lib.study.plots import Figure
 from hicp_lib.study.provenance import lock_sha256
@@ -89,7 +89,7 @@ def test_the_stamp_says_what_was_run(study, shown, tmp_path):
     assert stamp["notebook"] == "07_x"
     assert stamp["parameters"] == {"seed": 3, "images": str(tmp_path)}
     assert stamp["lock_sha256"] == lock_sha256()
-    assert stamp["weights_sha256"] == {row["name"]: row["sha256"] for row in list_weights()}
+    assert stamp["weights_sha256"] == {weight.name: weight.sha256 for weight in registry().values()}
     assert stamp["versions"]["numpy"] == np.__version__
     assert stamp["machine"]["cores"] >= 1
     assert 20 < stamp["peak_memory_mb"] < 100_000

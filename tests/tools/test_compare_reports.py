@@ -4,13 +4,10 @@ import json
 import sys
 from pathlib import Path
 
+import compare_reports
 import numpy as np
 import pandas as pd
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "tools"))
-
-import compare_reports  # noqa: E402
 
 
 def page(folder: Path, wall_s: float, **files: object) -> None:

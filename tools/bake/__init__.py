@@ -1,1 +1,1 @@
-"""Parts of `tools/bake_body.py`, which makes data/body.npz from the body model Anny."""
+"""Parts of `tools/bake_body.py` and `tools/bake_openpose.py`, which make files of data/."""

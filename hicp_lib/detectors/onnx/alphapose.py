@@ -15,7 +15,7 @@ from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.box_source import BoxSource
 from hicp_lib.detectors.onnx.decode import Decoded, decode_combined, decode_integral, decode_quarter
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.pose_net import PoseNet, Recipe, as_detections
+from hicp_lib.detectors.onnx.pose_net import PoseNet, Recipe
 from hicp_lib.detectors.onnx.session import open_model
 
 _N_FACE_AND_HANDS = 110
@@ -88,7 +88,7 @@ class AlphaPose:
         positions_px, scores = self._net.find(image, regions)
         rows, positions_px, scores = pose_nms.merge_poses(positions_px, scores, boxes, self._rules)
         person_scores = scores.mean(axis=1) + box_scores[rows] + 1.25 * scores.max(axis=1, initial=0)
-        return as_detections(positions_px, np.clip(scores, 0, 1), person_scores, self._net.convention)
+        return Detections.of_parts(positions_px, np.clip(scores, 0, 1), person_scores, self._net.convention)
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""

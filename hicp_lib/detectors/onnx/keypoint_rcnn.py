@@ -22,7 +22,6 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.decode import decode_roi_maps
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import Letterbox, letterbox, planes
-from hicp_lib.detectors.onnx.pose_net import as_detections
 from hicp_lib.detectors.onnx.session import Port, open_model
 
 _N_KEYPOINTS = 17
@@ -30,7 +29,7 @@ _LOGIT_MIDDLE = 2.0
 _SHORT_PX, _LONG_PX = 800, 1333
 _FAMILIES = ("detectron2", "torchvision")
 # What fills a fixed input beside the image: the mean colour, 0 once the network has normalised it.
-_FILLS = {"detectron2": (124, 116, 104), "torchvision": (124, 116, 104)}
+_FILL = (124, 116, 104)
 
 
 class KeypointRcnn:
@@ -87,7 +86,7 @@ class KeypointRcnn:
             positions_px = positions_px - 0.5
         is_given = np.isfinite(positions_px).all(axis=-1) & (scores > 0)
         positions_px = np.where(is_given[..., None], positions_px, np.nan)
-        return as_detections(positions_px, scores, person_scores[keep], "coco17")
+        return Detections.of_parts(positions_px, scores, person_scores[keep], "coco17")
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""
@@ -97,8 +96,7 @@ class KeypointRcnn:
         logit = f"logistic of (logit - {_LOGIT_MIDDLE:g}), 0.5 where Detectron draws points ({told})"
         height, width = self._model.inputs[0].shape[-2:]
         return [
-            Fact("model", self._model.path.name, f"SHA-256 {self._model.sha256}"),
-            Fact("runs on", self._model.provider, "option provider"),
+            *self._model.describe(),
             Fact("family", self._family, f"{told}; option family"),
             Fact("input", f"{width or 'any'} wide, {height or 'any'} high", "read from the file"),
             Fact("pixels", "BGR 0-255" if is_detectron else "RGB 0-1", "as the family exports"),
@@ -112,7 +110,7 @@ class KeypointRcnn:
         """The image at the size the network takes."""
         height, width = self._model.inputs[0].shape[-2:]
         if height and width:
-            return letterbox(image, (width, height), _FILLS[self._family])
+            return letterbox(image, (width, height), _FILL)
         if self._family == "torchvision":
             return Letterbox(image, np.ones(2))
         sides = image.shape[1], image.shape[0]
@@ -143,11 +141,9 @@ class KeypointRcnn:
             has_points = keypoints is not None and logits is not None
         n_people = {len(role) for role in roles if role is not None}
         if boxes is None or scores is None or not has_points or len(n_people) != 1:
-            raise InputError(
-                f"{self._model.path}: gives outputs of shape {', '.join(str(o.shape) for o in outputs)}; "
-                f"expected {self._family}'s boxes (n, 4), scores (n), keypoints (n, 17, 3)"
-                + (" and keypoint scores (n, 17)" if self._family == "torchvision" else "")
-            )
+            expected = f"{self._family}'s boxes (n, 4), scores (n), keypoints (n, 17, 3)"
+            scored = " and keypoint scores (n, 17)" if self._family == "torchvision" else ""
+            raise self._model.unexpected(outputs, expected + scored)
         return roles
 
     def _keypoints(

@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Letterbox:
-    """An image as a detector takes it.
+    """An image as a detector takes it, and the way back.
 
     Attributes
     ----------
@@ -20,6 +20,10 @@ class Letterbox:
 
     pixels: np.ndarray
     scale: np.ndarray
+
+    def to_image_px(self, positions_px: np.ndarray) -> np.ndarray:
+        """Positions (..., 2) in input pixels as image pixels; pixel centres at integers in both."""
+        return (positions_px + 0.5) / self.scale - 0.5
 
 
 def letterbox(image: np.ndarray, size_px: tuple[int, int], fill: tuple[int, int, int]) -> Letterbox:

@@ -13,7 +13,7 @@ from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.box_source import BoxSource
 from hicp_lib.detectors.onnx.decode import decode_dark, decode_quarter
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.pose_net import PoseNet, Recipe, as_detections
+from hicp_lib.detectors.onnx.pose_net import PoseNet, Recipe
 from hicp_lib.detectors.onnx.pose_nms import oks_nms
 from hicp_lib.detectors.onnx.session import open_model
 
@@ -87,7 +87,7 @@ class MMPose:
         person_scores = box_scores * _mean_above(raw_scores, 0.2)
         areas = regions.sizes_px.prod(axis=1)
         keep = oks_nms(positions_px, person_scores, areas, self._sigmas)
-        return as_detections(positions_px[keep], scores[keep], person_scores[keep], self._convention)
+        return Detections.of_parts(positions_px[keep], scores[keep], person_scores[keep], self._convention)
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""

@@ -62,12 +62,8 @@ class PersonBoxes:
             "max_overlap": max_overlap,
             **self._model.settings,
         }
-        shape = self._model.inputs[0].shape
-        if len(shape) != 4 or shape[0] not in (None, 1) or shape[1] not in (None, 3):
-            raise InputError(
-                f"{model}: takes an input of shape {shape}; expected one RGB image, (1, 3, h, w)"
-            )
-        self._size_px = shape[3] or _DEFAULT_SIDE_PX, shape[2] or _DEFAULT_SIDE_PX
+        height, width = self._model.image_size_px
+        self._size_px = width or _DEFAULT_SIDE_PX, height or _DEFAULT_SIDE_PX
 
     def find(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """People in an RGB image (height, width, 3): boxes (n, 4: x, y, width, height) and scores (n,)."""
@@ -98,11 +94,8 @@ class PersonBoxes:
             return _suppressed(rows[0], outputs)
         if rows is not None and rows.shape[2] > 5:
             return self._suppress(*_from_grid(rows[0], self._size_px, self._model.path))
-        shapes = ", ".join(str(output.shape) for output in outputs)
-        raise InputError(
-            f"{self._model.path}: gives outputs of shape {shapes}; expected (1, n, 5) boxes with scores, or "
-            "YOLOX's (1, cells, 5 + classes)"
-        )
+        expected = "(1, n, 5) boxes with scores, or YOLOX's (1, cells, 5 + classes)"
+        raise self._model.unexpected(outputs, expected)
 
     def _suppress(self, corners: np.ndarray, scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         corners, scores = corners[scores >= self._min_score], scores[scores >= self._min_score]

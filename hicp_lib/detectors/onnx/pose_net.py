@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.keypoints import mirror, to_halpe
+from hicp_lib.core.keypoints import mirror
 from hicp_lib.detectors.onnx.affine import PADDING, Regions
 from hicp_lib.detectors.onnx.decode import Decoded, decode_simcc
 from hicp_lib.detectors.onnx.facts import Fact
@@ -101,8 +100,7 @@ class PoseNet:
         """What the file tells, and how crops are made."""
         width, height = self.input_size_px
         return [
-            Fact("model", self.model.path.name, f"SHA-256 {self.model.sha256}"),
-            Fact("runs on", self.model.provider, "option provider"),
+            *self.model.describe(),
             Fact("input", f"{width} wide, {height} high", "read from the file"),
             Fact("batch", str(self.batch or "any"), "read from the file"),
             Fact("output", f"{'x'.join(map(str, self.grid_size))} {'bins' if self.is_simcc else 'cells'}",
@@ -157,19 +155,7 @@ class PoseNet:
                 return vectors
             if vectors[1].shape[2] * height == vectors[0].shape[2] * width:
                 return vectors[::-1]
-        raise InputError(
-            f"{self.model.path}: gives outputs of shape {', '.join(str(o.shape) for o in outputs)}; expected "
+        expected = (
             f"heat maps ({n}, keypoints, h, w), or SimCC of {width}s and {height}s, ({n}, keypoints, bins)"
         )
-
-
-def as_detections(
-    positions_px: np.ndarray, scores: np.ndarray, person_scores: np.ndarray, convention: str
-) -> Detections:
-    """People in the Halpe-136 layout from positions (n, k, 2; NaN not given) and scores (n, k) in [0, 1]."""
-    scores = np.where(np.isnan(positions_px).any(axis=-1), 0.0, scores)
-    return Detections(
-        to_halpe(positions_px, convention, axis=-2),
-        to_halpe(scores, convention, axis=-1, fill=0.0),
-        person_scores,
-    )
+        raise self.model.unexpected(outputs, expected)

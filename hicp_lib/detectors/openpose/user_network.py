@@ -74,7 +74,7 @@ class OpenPose:
         if net_height_px <= 0 or net_height_px % 16:
             raise InputError(f"net_height_px {net_height_px}: expected a positive multiple of 16")
         self._model = open_model(model, provider, threads)
-        height, width = _image_size(self._model)
+        height, width = self._model.image_size_px
         self._size_px = height or net_height_px, width if height else None
         self._hands = OpenPoseHands(hand_model, provider, threads) if hand_model is not None else None
         self._as_released = as_released
@@ -107,8 +107,7 @@ class OpenPose:
         size = f"{width or 'any'} wide, {height} high"
         hands = "by the hand model" if self._hands else "none; option hand_model"
         return [
-            Fact("model", self._model.path.name, f"SHA-256 {self._model.sha256}"),
-            Fact("runs on", self._model.provider, "option provider"),
+            *self._model.describe(),
             Fact("input", size, "read from the file" if width else "option net_height_px"),
             Fact("pixels", "BGR / 256 - 0.5, aspect kept, padded right and below", "as OpenPose"),
             Fact("keypoints", " or ".join(part_model.convention for part_model in _PART_MODELS.values()),
@@ -129,7 +128,7 @@ class OpenPoseHands:
 
     def __init__(self, model: str | Path, provider: str, threads: int) -> None:
         self._model = open_model(model, provider, threads)
-        height, width = _image_size(self._model)
+        height, width = self._model.image_size_px
         if height != width:
             raise InputError(f"{model}: takes images of {width} x {height}; expected squares")
         self._side_px = height or _HAND_SIDE_PX
@@ -188,13 +187,6 @@ def hand_square(keypoints_px: np.ndarray, scores: np.ndarray, side: str) -> tupl
     return (centre - side_px / 2, float(side_px)) if side_px**2 > 10 else None
 
 
-def _image_size(model: OnnxModel) -> tuple[int | None, int | None]:
-    shape = model.inputs[0].shape
-    if len(shape) != 4 or shape[0] not in (None, 1) or shape[1] not in (None, 3):
-        raise InputError(f"{model.path}: takes an input of shape {shape}; expected one image, (1, 3, h, w)")
-    return shape[2], shape[3]
-
-
 def _feed(pixels: np.ndarray) -> np.ndarray:
     feed = np.empty((1, 3, *pixels.shape[:2]), np.float32)
     planes(pixels[..., ::-1], (128.0,) * 3, (256.0,) * 3, feed[0])
@@ -217,8 +209,4 @@ def _split(
             return maps[: part_model.n_parts], maps[n_maps:], part_model
         if n_maps in by_channels and n_fields in by_channels:
             return by_channels[n_maps][: part_model.n_parts], by_channels[n_fields], part_model
-    shapes = ", ".join(str(output.shape) for output in outputs)
-    raise InputError(
-        f"{model.path}: gives outputs of shape {shapes}; expected 57 (COCO) or 78 (BODY_25) maps of "
-        f"{cells[1]} x {cells[0]}"
-    )
+    raise model.unexpected(outputs, f"57 (COCO) or 78 (BODY_25) maps of {cells[1]} x {cells[0]}")

@@ -26,7 +26,7 @@ import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detector
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.images import decode_image
 from hicp_lib.detectors.runtime.pool import DetectorPool, naming
 from hicp_lib.detectors.runtime.results import (
@@ -105,7 +105,7 @@ def _connected(address: str) -> Iterator[Client]:
             client = Client(address, timeout=PATIENCE_S)
         except (OSError, ValueError, RuntimeError, AssertionError) as error:  # its thread is late
             raise InputError(
-                f"{address}: no Dask scheduler answers ({_one_line(error)}); "
+                f"{address}: no Dask scheduler answers ({one_line(error)}); "
                 "give one's address, tcp://HOST:PORT"
             ) from None
         with _explained(address), client:
@@ -173,7 +173,7 @@ def _told(error: Exception, path: str) -> Exception:
         return InputError(f"{path}: every worker that took this image died, lately {_last(error)}")
     if isinstance(error, (ImportError, AttributeError, RuntimeError)):
         return InputError(
-            f"the Dask cluster cannot run this detector ({_one_line(error)}); "
+            f"the Dask cluster cannot run this detector ({one_line(error)}); "
             "install the same environment and weights on scheduler and workers"
         )
     return error
@@ -200,16 +200,12 @@ def _explained(address: str) -> Iterator[None]:
         if getattr(error, "filename", None):  # an image here, not the connection
             raise
         raise InputError(
-            f"{address}: the Dask cluster is gone ({_one_line(error)}); run the same command again to go on"
+            f"{address}: the Dask cluster is gone ({one_line(error)}); run the same command again to go on"
         ) from None
 
 
 def _last(error: Exception) -> str:
     return str(getattr(getattr(error, "last_worker", None), "address", "an unknown one"))
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())[:200] or type(error).__name__
 
 
 # What follows runs on the workers.
@@ -227,7 +223,7 @@ def _detect_here(
         with _making:
             pool = _pool(name, tuple(sorted(options.items())), worker.state.nthreads)
     except (InputError, OSError) as error:
-        raise InputError(f"worker {worker.address}: {_one_line(error)}") from None
+        raise InputError(f"worker {worker.address}: {one_line(error)}") from None
     differing = _differences(expected, identity(pool.first))
     if differing:
         raise InputError(

@@ -41,20 +41,16 @@ class DetectorPool:
         self, image: np.ndarray, boxes_px: np.ndarray | None, image_sha256: str | None = None
     ) -> Timed:
         """As `Runner.detect`, by one that is idle."""
-        with self._borrow() as runner:
-            return runner.detect(image, boxes_px, image_sha256)
-
-    def _make(self) -> Runner:
-        return Runner(make_detector(self._name, **self._options), self._workers)
-
-    @contextmanager
-    def _borrow(self) -> Iterator[Runner]:
         try:
             runner = self._idle.get_nowait()
         except queue.Empty:
             runner = self._make()
-        yield runner
+        result = runner.detect(image, boxes_px, image_sha256)
         self._idle.put(runner)
+        return result
+
+    def _make(self) -> Runner:
+        return Runner(make_detector(self._name, **self._options), self._workers)
 
 
 @contextmanager

@@ -34,31 +34,17 @@ from hicp_lib.formats.annotations import read_annotations
 Key = TypeVar("Key", bound=Hashable)
 
 
-def detect_dataset(
-    name: str,
-    dataset_dir: str | Path,
-    workers: int | None = None,
-    progress: bool = True,
-    dask: str | None = None,
-    **options,
-) -> dict[int, Detections]:
-    """People in every image of a dataset folder (`images/`, `annotations.json`), by image id.
-
-    Parameters as in `detect_images`; the annotated boxes go to detectors that take them.
-    """
-    results = time_dataset(name, dataset_dir, workers, progress, dask, **options)
+def detect_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Detections]:
+    """As `time_dataset`, without the times."""
+    results = time_dataset(name, dataset_dir, **options)
     return {image_id: result.detections for image_id, result in results.items()}
 
 
-def time_dataset(
-    name: str,
-    dataset_dir: str | Path,
-    workers: int | None = None,
-    progress: bool = True,
-    dask: str | None = None,
-    **options,
-) -> dict[int, Timed]:
-    """As `detect_dataset`, each with the time it took."""
+def time_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Timed]:
+    """People in every image of a dataset folder (`images/`, `annotations.json`), by image id.
+
+    `name` and `options` are those of `detect_images`; the annotated boxes go to detectors that take them.
+    """
     annotations = read_annotations(Path(dataset_dir) / "annotations.json")
     paths = {
         image_id: Path(dataset_dir) / "images" / image.file_name
@@ -66,7 +52,7 @@ def time_dataset(
     }
     people = annotations.take(~annotations.is_crowd)
     boxes_px = {image_id: people.boxes_px[people.image_ids == image_id] for image_id in paths}
-    return detect_images(name, paths, workers, progress, boxes_px, dask, **options)
+    return detect_images(name, paths, boxes_px=boxes_px, **options)
 
 
 def detect_images(

@@ -7,6 +7,8 @@ from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import Request, build_opener
 
+from hicp_lib.core.errors import one_line
+
 # Without an answer for so long, the server is given up.
 TIMEOUT_S = 30.0
 
@@ -33,5 +35,5 @@ def download(url: str, target: Path, max_bytes: int) -> str | None:
             if file.tell() != announced:
                 return f"broke off after {file.tell()} of {announced} bytes"
     except (OSError, HTTPException, ValueError) as error:
-        return " ".join(str(error).split()).strip("<>") or type(error).__name__
+        return one_line(error).strip("<>")
     return None

@@ -44,4 +44,4 @@ class Slow:
         )
 
 
-ENTRY = DETECTORS["slow"] = Entry("slow", "Slow", "a person", ("body",), __name__, "Slow")
+ENTRY = DETECTORS["slow"] = Entry("slow", "Slow", ("body",), __name__, "Slow")

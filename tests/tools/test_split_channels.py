@@ -3,11 +3,10 @@
 import numpy as np
 import onnxruntime
 import pytest
+from bake.split_channels import split_channels
 from hypothesis import given
 from hypothesis import strategies as st
 from onnx import TensorProto, helper, numpy_helper
-
-from hicp_lib.detectors.openpose.split_channels import split_channels
 
 
 def network(sizes, n_out=4, side=3, each=1, bias=False, keep=False):

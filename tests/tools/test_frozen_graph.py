@@ -1,17 +1,13 @@
 """Frozen graphs: what ONNX Runtime makes of the translation is what TensorFlow defines."""
 
-import cv2
 import numpy as np
 import onnxruntime
 import pytest
+from bake.frozen_graph import graph_class, to_onnx
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.detectors.openpose import mobilenet as openpose_net
-from hicp_lib.detectors.openpose.frozen_graph import graph_class, to_onnx
-from hicp_lib.detectors.openpose.paf import PafOptions, assemble
-from hicp_lib.detectors.weights.default import load
 
 FLOAT, INT32 = 1, 3
 
@@ -162,19 +158,3 @@ def test_what_is_no_graph_is_refused():
     for content in (b"no graph", Graph().bytes()[:-1]):
         with pytest.raises(InputError, match="net.pb: is not a frozen graph"):
             to_onnx(content, "net.pb")
-
-
-def test_the_real_network_gives_what_it_gives_in_opencv(weights, photograph):
-    detector = openpose_net.OpenPoseMobileNet()
-    net_input = openpose_net.fit(photograph, 368)
-    network = cv2.dnn.readNetFromTensorflow(np.frombuffer(load(openpose_net.WEIGHTS), np.uint8))
-    network.setInput(cv2.dnn.blobFromImage(net_input.pixels, swapRB=True))
-    maps, expected = detector.maps(net_input), network.forward()[0]
-    assert expected.max() > 0.5
-    np.testing.assert_allclose(maps, expected, atol=1e-4)
-    people, of_opencv = (
-        assemble(m[:18], m[19:], openpose_net.COCO_18, openpose_net.STRIDE, PafOptions())[0]
-        for m in (maps, expected)
-    )
-    assert len(people) > 0
-    np.testing.assert_allclose(people, of_opencv, atol=0.01)
