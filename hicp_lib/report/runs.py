@@ -27,7 +27,7 @@ import nbformat
 from hicp_lib.core.cache import code, digest, input_sha256
 from hicp_lib.core.checkout import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import sha256_file, write_json
+from hicp_lib.core.files import read_json, sha256_file, write_json
 from hicp_lib.report.notebooks import Notebook, is_path
 from hicp_lib.report.schedule import run_when_ready
 from hicp_lib.study import provenance
@@ -74,13 +74,13 @@ class Run:
     after: tuple[str, ...] = ()
 
 
-def run_all(runs: list[Run], folders: Folders, say: Callable[[str], None]) -> None:
+def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None]) -> None:
     """Bring every run up to date, two at a time where they do not depend on each other.
 
     Parameters
     ----------
     runs : those they name in `after` run before them; what is not among them is left out
-    say : takes one line per notebook
+    log : takes one line per notebook
 
     Raises
     ------
@@ -94,16 +94,15 @@ def run_all(runs: list[Run], folders: Folders, say: Callable[[str], None]) -> No
     folders.executed.mkdir(parents=True, exist_ok=True)
     for left_behind in folders.executed.glob(".run-*"):
         shutil.rmtree(left_behind, ignore_errors=True)
-    kept = {run.notebook.name for run in runs}
-    for stamp in folders.executed.glob("*.json"):
-        if stamp.stem not in kept:
-            _discard(stamp.stem, folders)
     named = {run.notebook.name: run for run in runs}
+    for stamp in folders.executed.glob("*.json"):
+        if stamp.stem not in named:
+            _discard(stamp.stem, folders)
     after = {name: [other for other in run.after if other in named] for name, run in named.items()}
     with ThreadPoolExecutor(N_PARALLEL) as pool, _Children() as children:
 
         def job(name: str, before: list[Future]) -> str:
-            return _bring_up_to_date(named[name], before, folders, children, say)
+            return _bring_up_to_date(named[name], before, folders, children, log)
 
         done = run_when_ready(after, job, pool, N_PARALLEL)
     for error in (done[name].exception() for name in named):
@@ -115,19 +114,19 @@ class _SkippedError(Exception):
     """A notebook that was not run because one before it failed."""
 
 
-def _bring_up_to_date(run: Run, before: list[Future], folders: Folders, children: _Children, say) -> str:
+def _bring_up_to_date(run: Run, before: list[Future], folders: Folders, children: _Children, log) -> str:
     """Run the notebook unless it is fresh; its key's digest."""
     if any(future.exception() for future in before):
         raise _SkippedError
-    key = run_key(run, [future.result() for future in before])
-    reason = why_stale(run.notebook.name, key, folders)
+    name, key = run.notebook.name, run_key(run, [future.result() for future in before])
+    reason = why_stale(name, key, folders)
     if reason is None:
-        say(f"{run.notebook.name}: unchanged")
-        return digest(key)
-    say(f"{run.notebook.name}: running ({reason}) ...")
-    start_s = time.perf_counter()
-    run_notebook(run, key, folders, children)
-    say(f"{run.notebook.name}: done in {time.perf_counter() - start_s:.1f} s")
+        log(f"{name}: unchanged")
+    else:
+        log(f"{name}: running ({reason}) ...")
+        start_s = time.perf_counter()
+        run_notebook(run, key, folders, children)
+        log(f"{name}: done in {time.perf_counter() - start_s:.1f} s")
     return digest(key)
 
 
@@ -194,23 +193,25 @@ def run_notebook(run: Run, key: dict[str, Any], folders: Folders, children: _Chi
         If a cell failed, wrote to stderr or took too long, or the results are not those of this run.
     """
     name = run.notebook.name
-    staging = Path(tempfile.mkdtemp(prefix=f".run-{name}-", dir=folders.executed))
-    copy = staging / f"{name}.ipynb"
-    try:
-        status = children.execute(run, copy, staging, folders)
-        _check(run, status, copy, staging)
-        if run_key(run)["library"] != key["library"]:
-            raise RunError(f"{name}: hicp_lib was changed while it ran; run the report again")
+    prefix = f".run-{name}-"
+    with tempfile.TemporaryDirectory(
+        prefix=prefix, dir=folders.executed, ignore_cleanup_errors=True
+    ) as temporary:
+        staging = Path(temporary)
+        copy = staging / f"{name}.ipynb"
+        try:
+            status = children.execute(run, copy, staging, folders)
+            _check(run, status, copy, staging)
+            if run_key(run)["library"] != key["library"]:
+                raise RunError("hicp_lib was changed while it ran; run the report again")
+        except RunError as error:
+            raise RunError(f"{name}: {error}{_keep_failed(copy, staging, folders)}") from None
         _discard(name, folders)
         folders.results.mkdir(parents=True, exist_ok=True)
         os.replace(staging / "results" / name, folders.results / name)
         os.replace(copy, folders.executed / copy.name)
-        stamp = {"key": key, "parameters": run.parameters, "outputs": _outputs(name, folders)}
-        write_json(folders.executed / f"{name}.json", stamp, indent=2)
-    except RunError as error:
-        raise RunError(f"{error}{_keep_failed(copy, staging, folders)}") from None
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+    stamp = {"key": key, "parameters": run.parameters, "outputs": _outputs(name, folders)}
+    write_json(folders.executed / f"{name}.json", stamp, indent=2)
 
 
 def _discard(name: str, folders: Folders) -> None:
@@ -234,29 +235,28 @@ def _keep_failed(copy: Path, staging: Path, folders: Folders) -> str:
 
 def _check(run: Run, status: int | None, copy: Path, staging: Path) -> None:
     """Raise RunError unless the executed copy and its results are whole."""
-    name = run.notebook.name
     if status is None:
-        raise RunError(f"{name}: took longer than {WALL_LIMIT_S} s and was stopped")
+        raise RunError(f"took longer than {WALL_LIMIT_S} s and was stopped")
     if not copy.is_file():
-        log = (staging / "log.txt").read_text(errors="replace").strip().splitlines()
-        raise RunError(f"{name}: did not run: {log[-1] if log else f'exit code {status}'}")
-    problem = first_problem(copy)
-    if problem is None and status != 0:
-        problem = f"exit code {status}"
+        lines = (staging / "log.txt").read_text(errors="replace").strip().splitlines()
+        raise RunError(f"did not run: {lines[-1] if lines else f'exit code {status}'}")
+    problem = first_problem(copy) or (f"exit code {status}" if status else None)
     if problem is not None:
-        raise RunError(f"{name}: {problem}")
+        raise RunError(problem)
     try:
-        stamp = json.loads((staging / "results" / name / "provenance.json").read_text())
-    except (OSError, ValueError):
-        raise RunError(f"{name}: ended without results; its last line must be `study.finish()`") from None
+        stamp = read_json(staging / "results" / run.notebook.name / "provenance.json")
+    except InputError:
+        raise RunError("ended without results; its last line must be `study.finish()`") from None
     if stamp["parameters"] != json.loads(json.dumps(run.parameters)):
-        raise RunError(f"{name}: its results state other parameters than it ran with; pass all to `Study`")
+        raise RunError("its results state other parameters than it ran with; pass all to `Study`")
 
 
 def first_problem(executed: Path) -> str | None:
     """The first cell of an executed notebook that did not complete or wrote to stderr, in words."""
     cells = nbformat.read(executed, as_version=4).cells
-    for cell in (cell for cell in cells if cell.cell_type == "code"):
+    for cell in cells:
+        if cell.cell_type != "code":
+            continue
         place = f"In [{cell.execution_count or ' '}]"
         for output in cell.outputs:
             if output.output_type == "error":
@@ -286,7 +286,7 @@ class _Children:
     def execute(self, run: Run, copy: Path, staging: Path, folders: Folders) -> int | None:
         """Run the notebook into `copy`; the exit code, or None when it hit the wall limit."""
         if self._ended:
-            raise RunError(f"{run.notebook.name}: was not run, the report was stopped")
+            raise RunError("was not run, the report was stopped")
         folder = run.notebook.path.parent.resolve()
         defaults = run.notebook.defaults
         changed = {name: value for name, value in run.parameters.items() if value != defaults[name]}
@@ -294,16 +294,11 @@ class _Children:
         write_json(staging / "job.json", job | {"parameters": changed})
         command = [sys.executable, "-m", "hicp_lib.report.execute", str(staging / "job.json")]
         with open(staging / "log.txt", "wb") as log, tempfile.TemporaryDirectory(prefix="hicp-") as private:
-            process = subprocess.Popen(
-                command,
-                stdin=subprocess.PIPE,
-                stdout=log,
-                stderr=log,
-                env=_environment(staging, folders, private),
-                # What ends the report's whole process group must not end this one before it has
-                # ended the kernel's workers.
-                start_new_session=True,
-            )
+            streams = {"stdin": subprocess.PIPE, "stdout": log, "stderr": log}
+            environment = _environment(staging, folders, private)
+            # In a session of its own: what ends the report's whole process group must not end this one
+            # before it has ended the kernel's workers.
+            process = subprocess.Popen(command, **streams, env=environment, start_new_session=True)
             self._running.add(process)
             try:
                 return process.wait(WALL_LIMIT_S)

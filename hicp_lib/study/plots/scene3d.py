@@ -18,10 +18,9 @@ from hicp_lib.evaluation.space.stability import POSITION
 from hicp_lib.recordings.recording import Recording, read_depth_m, read_rgb
 from hicp_lib.robot.segments import Segment
 from hicp_lib.study.plots.skeleton import limb_lines
-from hicp_lib.study.plots.style import detector_colour, in_words
+from hicp_lib.study.plots.style import TRUTH_COLOUR, detector_colour, in_words
 
 ROBOT_COLOUR = "#5F6B7A"
-TRUTH_COLOUR = "#111111"
 VIEW_STYLES = (("#E377C2", "solid"), ("#17BECF", "dash"))  # of its cameras, and of its skeletons' lines
 _FRUSTUM_DEPTH_M = 0.05
 _EYE = {"x": 0.6, "y": 1.4, "z": 0.6}  # from in front of the robot, to its right
@@ -47,7 +46,8 @@ def scene(
     first = next(iter(recordings))
     traces = [point_cloud(recordings[first], 0)]
     if robot:
-        traces.append(_robot(robot))
+        ends = [np.concatenate([[segment.start_m, segment.end_m], _PEN_UP]) for segment in robot]
+        traces.append(_line(np.concatenate(ends), "robot", ROBOT_COLOUR, 14))
     styles = dict(zip(recordings, itertools.cycle(VIEW_STYLES), strict=False))
     for view, recording in recordings.items():
         lines = _frusta(recording.intrinsics, recording.T_base_cam)
@@ -88,24 +88,17 @@ def _line(points_m: np.ndarray, name: str, colour: str, width: float, dash: str 
     """A line through points (n, 3), interrupted where they are NaN."""
     x, y, z = points_m.astype(np.float32).T
     line = {"color": colour, "width": width, "dash": dash}
-    return go.Scatter3d(
-        x=x, y=y, z=z, mode="lines", line=line, name=name, hoverinfo="name", connectgaps=False
-    )
-
-
-def _robot(segments: Sequence[Segment]) -> go.Scatter3d:
-    ends = [np.concatenate([[segment.start_m, segment.end_m], _PEN_UP]) for segment in segments]
-    return _line(np.concatenate(ends), "robot", ROBOT_COLOUR, 14)
+    said = {"name": name, "hoverinfo": "name"}
+    return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=line, connectgaps=False, **said)
 
 
 def _frusta(intrinsics: Camera, T_base_cam: np.ndarray) -> np.ndarray:
     """Lines of a small pyramid per camera pose, shape (n, 3)."""
     right, bottom = intrinsics.width_px - 0.5, intrinsics.height_px - 0.5
     pixels_px = np.array([(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom)])
-    corners = deproject(intrinsics, pixels_px, np.full(4, _FRUSTUM_DEPTH_M))
+    a, b, c, d = deproject(intrinsics, pixels_px, np.full(4, _FRUSTUM_DEPTH_M))
     apex = np.zeros(3)
-    outline = [*corners, corners[0], apex, corners[1], corners[2], apex, corners[3]]
-    lines = np.concatenate([outline, _PEN_UP])
+    lines = np.array([a, b, c, d, a, apex, b, c, apex, d, *_PEN_UP])
     return transform(T_base_cam, lines).reshape(-1, 3)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import matplotlib.figure
@@ -23,6 +23,7 @@ DETECTOR_COLOURS: dict[str, str] = {
     "combined": "#882255",
 }
 OTHER_COLOUR = "#595959"
+TRUTH_COLOUR = "#111111"
 
 # The two subsets of HiCP, and the two boxes of the paper's figure of how they are made.
 SUBSET_COLOURS = {"basic": "#0072B2", "headless": "#D55E00"}
@@ -101,15 +102,13 @@ def detector_colour(name: str) -> str:
     return DETECTOR_COLOURS[max(known, key=len)] if known else OTHER_COLOUR
 
 
-def legend_entries(axes) -> tuple[list, list[str]]:
-    """Handles and labels of all axes of an array, each label once: what `figure.legend` takes."""
-    found = {}
-    for axis in axes.flat:
-        found.update({label: handle for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)})
-    return list(found.values()), list(found)
-
-
-def in_words(items: Sequence[str]) -> str:
+def in_words(items: Iterable[str]) -> str:
     """'a', 'a and b', 'a, b and c'."""
-    items = list(items)
-    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}" if items else "nothing"
+    *others, last = list(items) or ["nothing"]
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def series_text(values: pd.Series, pattern: str = "{} {:.2f}") -> str:
+    """`in_words` of a series, each value put into a pattern after the labels of its index."""
+    keys = values.index.to_frame(index=False).itertuples(index=False, name=None)
+    return in_words([pattern.format(*key, value) for key, value in zip(keys, values, strict=True)])
