@@ -1,9 +1,8 @@
-"""What the `hicp` command's parts share: kinds of options, and how results are said."""
+"""Kinds of options that the `hicp` command's parts share."""
 
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,12 +11,6 @@ import click
 
 PATH = click.Path(path_type=Path)
 WORKERS = click.IntRange(min=1)
-
-
-def say(line: str) -> None:
-    """A line on standard output, at once."""
-    click.echo(line)
-    sys.stdout.flush()
 
 
 def detector_options(command: Callable) -> Callable:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.resources
-import json
 import os
 import re
 import shutil
@@ -15,7 +14,7 @@ from pathlib import Path
 from hicp_lib.core.files import sha256_file, write_json
 from hicp_lib.report.checks import book_problems
 from hicp_lib.report.prose import Results, render_page
-from hicp_lib.report.runs import Folders, RunError
+from hicp_lib.report.runs import Folders, RunError, read_stamp
 from hicp_lib.report.sphinx_extension import PLOTLY_PATH, SCRIPTS_DIR
 from hicp_lib.study import provenance
 
@@ -47,7 +46,7 @@ def build_book(folders: Folders) -> tuple[Path, bool]:
     book = folders.root / "_build" / "book" / folders.profile
     stamp = book.with_suffix(".json")
     key = _key(folders)
-    if _is_fresh(book, stamp, key):
+    if read_stamp(stamp) == {"key": key, "outputs": _hashes(book)}:
         return book / "index.html", False
     book.parent.mkdir(parents=True, exist_ok=True)
     prefix = f".build-{folders.profile}-"
@@ -63,7 +62,7 @@ def build_book(folders: Folders) -> tuple[Path, bool]:
         stamp.unlink(missing_ok=True)
         shutil.rmtree(book, ignore_errors=True)
         os.replace(built, book)
-        write_json(stamp, {"key": key, "pages": _hashes(book)})
+        write_json(stamp, {"key": key, "outputs": _hashes(book)})
     return book / "index.html", True
 
 
@@ -78,14 +77,6 @@ def _key(folders: Folders) -> str:
             "installed": provenance.installed_sha256(),
         }
     )
-
-
-def _is_fresh(book: Path, stamp: Path, key: str) -> bool:
-    try:
-        last = json.loads(stamp.read_text())
-        return last["key"] == key and last["pages"] == _hashes(book)
-    except (OSError, ValueError, KeyError):
-        return False
 
 
 def _hashes(folder: Path) -> dict[str, str]:

@@ -23,17 +23,19 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
+import psutil
 
 from hicp_lib.core.cache import code, digest, input_sha256
 from hicp_lib.core.checkout import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, sha256_file, write_json
 from hicp_lib.report.notebooks import Notebook, is_path
-from hicp_lib.report.schedule import run_when_ready
+from hicp_lib.report.schedule import needed, run_when_ready
 from hicp_lib.study import provenance
 
 WALL_LIMIT_S = 2 * 3600
-N_PARALLEL = 2
+MEMORY_PER_RUN_BYTES = 2 * 10**9
+"""What one notebook may need with its workers; the study's largest takes 0.7 GB without them."""
 
 
 class RunError(RuntimeError):
@@ -74,13 +76,18 @@ class Run:
     after: tuple[str, ...] = ()
 
 
-def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None]) -> None:
-    """Bring every run up to date, two at a time where they do not depend on each other.
+def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None], only: str | None = None) -> None:
+    """Bring every run up to date, some at a time where they do not depend on each other.
 
     Parameters
     ----------
-    runs : those they name in `after` run before them; what is not among them is left out
-    log : takes one line per notebook
+    runs : list of Run
+        Those they name in `after` run before them; what is not among them is left out.
+    folders : Folders
+    log : callable
+        Takes one line per notebook.
+    only : str, optional
+        Name of the notebook that is wanted: it and those it needs run; all are, where it is left out.
 
     Raises
     ------
@@ -89,25 +96,34 @@ def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None]) -> No
     InputError
         If a parameter names a file or folder that does not exist.
     """
-    for run in runs:
-        _input_paths(run)  # a mistake is told now, not when the notebook's turn comes
+    named = {run.notebook.name: run for run in runs}
+    after = {name: [other for other in run.after if other in named] for name, run in named.items()}
+    if only is not None:
+        after = {name: after[name] for name in named if name in needed(after, only)}
+    for name in after:
+        _input_paths(named[name])  # a mistake is told now, not when the notebook's turn comes
     folders.executed.mkdir(parents=True, exist_ok=True)
     for left_behind in folders.executed.glob(".run-*"):
         shutil.rmtree(left_behind, ignore_errors=True)
-    named = {run.notebook.name: run for run in runs}
     for stamp in folders.executed.glob("*.json"):
         if stamp.stem not in named:
             _discard(stamp.stem, folders)
-    after = {name: [other for other in run.after if other in named] for name, run in named.items()}
-    with ThreadPoolExecutor(N_PARALLEL) as pool, _Children() as children:
+    n_workers = n_parallel()
+    with ThreadPoolExecutor(n_workers) as pool, _Children() as children:
 
         def job(name: str, before: list[Future]) -> str:
             return _bring_up_to_date(named[name], before, folders, children, log)
 
-        done = run_when_ready(after, job, pool, N_PARALLEL)
-    for error in (done[name].exception() for name in named):
+        done = run_when_ready(after, job, pool, n_workers)
+    for error in (done[name].exception() for name in after):
         if error is not None and not isinstance(error, _SkippedError):
             raise error
+
+
+def n_parallel() -> int:
+    """Notebooks to run at a time: one per core this process may use, as far as there is memory for them."""
+    fitting = psutil.virtual_memory().available // MEMORY_PER_RUN_BYTES
+    return max(1, min(provenance.usable_cores(), fitting))
 
 
 class _SkippedError(Exception):
@@ -167,15 +183,21 @@ def _input_paths(run: Run) -> dict[str, Path]:
 
 def why_stale(name: str, key: dict[str, Any], folders: Folders) -> str | None:
     """What makes a new run necessary, in words; None when the last run still holds."""
-    try:
-        stamp = json.loads((folders.executed / f"{name}.json").read_text())
-        changed = [part for part in key if stamp["key"].get(part) != key[part]]
-        outputs = stamp["outputs"]
-    except (OSError, ValueError, KeyError, AttributeError):
+    stamp = read_stamp(folders.executed / f"{name}.json")
+    if stamp is None:
         return "no complete run yet"
-    if changed:
+    if changed := [part for part in key if stamp["key"].get(part) != key[part]]:
         return f"changed: {', '.join(changed)}"
-    return None if outputs == _outputs(name, folders) else "its outputs were changed"
+    return None if stamp["outputs"] == _outputs(name, folders) else "its outputs were changed"
+
+
+def read_stamp(path: Path) -> dict[str, Any] | None:
+    """The stamp of what was made last: its `key` and `outputs`; None where nothing was made whole."""
+    try:
+        stamp = json.loads(path.read_bytes())
+        return stamp if isinstance(stamp["outputs"], dict) and stamp["key"] else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def _outputs(name: str, folders: Folders) -> dict[str, str]:

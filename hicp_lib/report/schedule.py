@@ -8,6 +8,17 @@ from functools import cache
 from graphlib import TopologicalSorter
 
 
+def needed(after: Mapping[str, Sequence[str]], name: str) -> set[str]:
+    """A job and all that come before it, directly or through others.
+
+    Examples
+    --------
+    >>> sorted(needed({"a": [], "b": ["a"], "c": ["b"], "d": ["a"]}, "c"))
+    ['a', 'b', 'c']
+    """
+    return {name}.union(*(needed(after, other) for other in after[name]))
+
+
 def run_when_ready(
     after: Mapping[str, Sequence[str]],
     job: Callable[[str, list[Future]], object],

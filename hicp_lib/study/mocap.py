@@ -1,4 +1,4 @@
-"""The motion capture test's material: one recording, its clock offset, and its registration.
+"""The data of the motion capture test: one recording, its clock offset, and its registration.
 
 A simulated recording knows its exact transform and clock; clicks are simulated there. A laboratory's own
 holds `clicks.csv` (markers clicked in images, see `hicp_lib.mocap.clicking`), or `registration.json` when
@@ -18,15 +18,9 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.runtime.run import detect_images
 from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_ablation
-from hicp_lib.evaluation.space.mocap_error import (
-    MIN_SCORES,
-    POSITION,
-    TABLE_JOINTS,
-    marker_means,
-    mocap_errors,
-)
+from hicp_lib.evaluation.space.mocap_error import MIN_SCORES, TABLE_JOINTS, marker_means, mocap_errors
 from hicp_lib.evaluation.space.occlusion import lines_of_sight
-from hicp_lib.evaluation.space.stability import position_array
+from hicp_lib.evaluation.space.stability import POSITION, position_array
 from hicp_lib.lifting.robust import METHODS
 from hicp_lib.lifting.table import lift_found
 from hicp_lib.mocap.clicking import CLICKS_FILE, read_clicks

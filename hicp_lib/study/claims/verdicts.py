@@ -27,6 +27,7 @@ NOT_REPRODUCED = "not reproduced"
 NOT_TESTABLE = "not testable here"
 VERDICTS = (REPRODUCED, ON_RENDERED_DATA, NOT_REPRODUCED, NOT_TESTABLE)
 
+_TABLE_COLUMNS = ["section", "claim", "tested", "paper", "ours", "verdict", "why_not", "command"]
 _PHOTOGRAPHS = "hicp report -p source halpe -p annotations_path HALPE.json -p images_dir DIR"
 
 
@@ -66,7 +67,7 @@ class _MissingError(Exception):
         self.command = command
 
 
-def judge(claims: list[Claim], results: Path) -> list[Verdict]:
+def judge_claims(claims: list[Claim], results: Path) -> list[Verdict]:
     """The verdict on every claim.
 
     Parameters
@@ -78,25 +79,16 @@ def judge(claims: list[Claim], results: Path) -> list[Verdict]:
     InputError
         If a claim asks for a column that its table does not have.
     """
-    return [_judge(claim, results) for claim in claims]
+    return [_judge_claim(claim, results) for claim in claims]
 
 
 def verdict_table(verdicts: list[Verdict]) -> pd.DataFrame:
     """One row per claim: `section, claim, tested, paper, ours, verdict, why_not, command`."""
     rows = [
-        {
-            "section": v.claim.section,
-            "claim": v.claim.text,
-            "tested": v.claim.statement,
-            "paper": v.claim.paper or "–",
-            "ours": v.ours or "–",
-            "verdict": v.verdict,
-            "why_not": v.reason,
-            "command": v.command,
-        }
-        for v in verdicts
+        (c.section, c.text, c.statement, c.paper or "–", v.ours or "–", v.verdict, v.reason, v.command)
+        for c, v in ((verdict.claim, verdict) for verdict in verdicts)
     ]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=_TABLE_COLUMNS)
 
 
 def for_reading(table: pd.DataFrame, verdict: str) -> pd.DataFrame:
@@ -119,7 +111,7 @@ def verdict_counts(table: pd.DataFrame) -> dict[str, int]:
     return {verdict: int((table["verdict"] == verdict).sum()) for verdict in VERDICTS}
 
 
-def _judge(claim: Claim, results: Path) -> Verdict:
+def _judge_claim(claim: Claim, results: Path) -> Verdict:
     if not claim.tests:
         return Verdict(claim, NOT_TESTABLE, reason=claim.reason, command=claim.command)
     try:
@@ -149,15 +141,13 @@ def _notebooks(claim: Claim) -> set[str]:
 def _try(test: Comparison, results: Path) -> tuple[bool | None, list[str]]:
     """Whether a test holds (None: open), and the quantities it rests on in words."""
     left = select(test.left, results)
-    if isinstance(test.right, float):
-        right = [Quantity(test.right, test.right, test.right, {}, "")]
-    else:
-        right = select(test.right, results)
+    is_number = isinstance(test.right, float)
+    right = [Quantity(*[test.right] * 3, {}, "")] if is_number else select(test.right, results)
     pairs = [(a, b) for a in left for b in right if all(a.row.get(c) == b.row.get(c) for c in test.match)]
     if not pairs:
         reason = f"no two rows of {test.left.table} agree in {', '.join(test.match)}"
         raise _MissingError(reason, "hicp report")
-    shown = [a for a, _ in pairs] + ([b for _, b in pairs] if isinstance(test.right, Selection) else [])
+    shown = [a for a, _ in pairs] + [b for _, b in pairs if not is_number]
     return holds(test, pairs), [_in_words(quantity) for quantity in shown]
 
 
