@@ -23,19 +23,8 @@ from hicp_lib.evaluation.space.occlusion import lines_of_sight
 from hicp_lib.evaluation.space.stability import POSITION, position_array
 from hicp_lib.lifting.robust import METHODS
 from hicp_lib.lifting.table import lift_found
+from hicp_lib.mocap import registration
 from hicp_lib.mocap.clicking import CLICKS_FILE, read_clicks
-from hicp_lib.mocap.registration import (
-    CAMERA_MARKER,
-    N_PAPER_MARKERS,
-    REGISTRATION_FILE,
-    Registration,
-    all_clicks,
-    as_in_paper,
-    lift_clicks,
-    papers_choice,
-    read_registration,
-    same_clicks,
-)
 from hicp_lib.mocap.reprojection import by_reprojection
 from hicp_lib.mocap.synchronisation import ClockOffset, clock_offset
 from hicp_lib.recordings.qualisys import MotionCapture, read_mocap
@@ -53,7 +42,7 @@ class Registered:
     clicks : the clicks of the images the paper's registration rests on; empty where the transform was given
     """
 
-    fits: list[Registration]
+    fits: list[registration.Registration]
     exact: np.ndarray | None
     clicks: pd.DataFrame
 
@@ -140,25 +129,34 @@ def register(
     InputError
         If the recording has neither clicks nor a registration, or they are malformed.
     """
-    simulation = read_simulation(recording)
-    clicks_path, given = recording.folder / CLICKS_FILE, recording.folder / REGISTRATION_FILE
+    simulation, clicks_path = read_simulation(recording), recording.folder / CLICKS_FILE
     if simulation:
         from hicp_lib.simulation.sensors.clicks import simulate_clicks
 
-        exact = np.array(simulation["T_base_mocap"])
-        clicks = simulate_clicks(
-            recording, mocap, exact, n_images, noise_px, simulation["mocap_offset_s"], seed
-        )
-        return _from_clicks(recording, mocap, clicks, offset_s, exact)
-    if clicks_path.is_file():
+        exact, true_offset_s = np.array(simulation["T_base_mocap"]), simulation["mocap_offset_s"]
+        clicks = simulate_clicks(recording, mocap, exact, n_images, noise_px, true_offset_s, seed)
+    elif clicks_path.is_file():
+        exact = None
         clicks = read_clicks(clicks_path, open_recording(recording.folder), mocap.names)
         clicks = clicks[clicks["frame"] < len(recording)]
-        return _from_clicks(recording, mocap, clicks, offset_s, None)
-    if given.is_file():
-        return Registered([read_registration(given)], None, pd.DataFrame())
+    else:
+        return Registered([_given(recording)], None, pd.DataFrame())
+    matched = registration.lift_clicks(recording, clicks, mocap, offset_s)
+    eight = registration.papers_choice(matched)
+    fits = [registration.same_clicks(eight), registration.all_clicks(matched)]
+    fits.append(by_reprojection(recording, clicks, mocap, fits[-1], offset_s))
+    if registration.CAMERA_MARKER in mocap.names:
+        fits.insert(0, registration.as_in_paper(eight, recording, mocap, offset_s))
+    return Registered(fits, exact, clicks.merge(eight[["frame", "marker"]]))
+
+
+def _given(recording: Recording) -> registration.Registration:
+    file, n_clicks = registration.REGISTRATION_FILE, registration.N_PAPER_MARKERS
+    if (recording.folder / file).is_file():
+        return registration.read_registration(recording.folder / file)
     raise InputError(
-        f"{recording.folder}: has neither {CLICKS_FILE} (frame,marker,u_px,v_px) nor {REGISTRATION_FILE}; "
-        f"click {N_PAPER_MARKERS} or more markers with hicp_lib.mocap.clicking, or give T_base_mocap"
+        f"{recording.folder}: has neither {CLICKS_FILE} (frame,marker,u_px,v_px) nor {file}; click {n_clicks}"
+        " or more markers with hicp_lib.mocap.clicking, or give T_base_mocap"
     )
 
 
@@ -173,8 +171,7 @@ def medians_under(
     0.1); the exact transform, where it is known, comes last
     """
     fits = {fit.method: fit.T_base_mocap for fit in registered.fits}
-    if registered.exact is not None:
-        fits["exact"] = registered.exact
+    fits |= {} if registered.exact is None else {"exact": registered.exact}
     tables = []
     for name, T_base_mocap in fits.items():
         reference = marker_means(mocap, recording.times_s - offset_s, T_base_mocap, TABLE_JOINTS)
@@ -200,19 +197,3 @@ def ablation(recording: Recording, stepwise: pd.DataFrame) -> pd.DataFrame | Non
     """`lifting_ablation` of the second of `lift_frames`; None where no true positions are known."""
     truth = read_truth(recording)
     return None if truth is None else lifting_ablation(stepwise, truth)
-
-
-def _from_clicks(
-    recording: Recording,
-    mocap: MotionCapture,
-    clicks: pd.DataFrame,
-    offset_s: float,
-    exact: np.ndarray | None,
-) -> Registered:
-    matched = lift_clicks(recording, clicks, mocap, offset_s)
-    eight = papers_choice(matched)
-    fits = [same_clicks(eight), all_clicks(matched)]
-    fits.append(by_reprojection(recording, clicks, mocap, fits[-1], offset_s))
-    if CAMERA_MARKER in mocap.names:
-        fits.insert(0, as_in_paper(eight, recording, mocap, offset_s))
-    return Registered(fits, exact, clicks.merge(eight[["frame", "marker"]]))

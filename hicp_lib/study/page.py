@@ -25,12 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.checkout import (
-    EARLIER_RESULTS_VARIABLE,
-    PROFILE_VARIABLE,
-    RESULTS_VARIABLE,
-    working_folder,
-)
+from hicp_lib.core import checkout
 from hicp_lib.core.extras import needs
 from hicp_lib.core.files import atomic_path, write_bytes, write_json
 from hicp_lib.study.provenance import peak_memory_mb, provenance, provenance_html
@@ -73,13 +68,13 @@ class Study:
     """
 
     def __init__(self, name: str, /, **parameters: Any):
-        profile = os.environ.get(PROFILE_VARIABLE, "interactive")
-        kept = working_folder() / "results"
-        results = Path(os.environ.get(RESULTS_VARIABLE) or kept / profile)
+        profile = os.environ.get(checkout.PROFILE_VARIABLE, "interactive")
+        kept = checkout.working_folder() / "results"
+        results = Path(os.environ.get(checkout.RESULTS_VARIABLE) or kept / profile)
         self.name = name
         self.parameters = _plain(parameters)
         self.folder = results / name
-        self.results = Path(os.environ.get(EARLIER_RESULTS_VARIABLE) or kept / "full")
+        self.results = Path(os.environ.get(checkout.EARLIER_RESULTS_VARIABLE) or kept / "full")
         self._link = f"../results/{profile}/{name}"
         self._values: dict[str, Any] = {}
         self._captions: dict[str, dict[str, str]] = {}

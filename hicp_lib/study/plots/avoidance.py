@@ -14,7 +14,8 @@ from hicp_lib.robot.kinematics import ARM_JOINTS
 from hicp_lib.robot.separation import Separation, separation_table
 from hicp_lib.study.avoidance import FIELD_M, WITHIN_M
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.style import Figure, detector_colour, in_style, in_words, new_figure
+from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 
 _STYLES = {NO_AVOIDANCE: ":", PUBLISHED_GAINS: "--"}
 _ROWS = {"distance_m": "distance (cm)", "activation": "activation", "hand_error_m": "hand from post (cm)"}

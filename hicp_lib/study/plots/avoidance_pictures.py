@@ -18,12 +18,12 @@ from PIL import Image
 from hicp_lib.core.keypoints import LIMBS
 from hicp_lib.experiments.avoidance.closed_loop import start_posture
 from hicp_lib.experiments.avoidance.reaching import in_root, script
-from hicp_lib.experiments.avoidance.runs import Run, image, keypoints_m
+from hicp_lib.experiments.avoidance.runs import Run, image
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.segments import body_segments
 from hicp_lib.robot.skin import read_skin
-from hicp_lib.study.avoidance import SURE
+from hicp_lib.study.avoidance import SURE, sure_keypoints
 from hicp_lib.study.plots.avoidance import condition_colour
 from hicp_lib.study.plots.people import draw_people
 from hicp_lib.study.plots.style import Figure, in_style, new_figure
@@ -102,8 +102,8 @@ def _draw_space(axis, run: Run, cycle: pd.Series, frame: pd.Series | None) -> No
     u, v = _project(positions)
     axis.scatter(u, v, c=np.asarray(cycle["activations"]), s=9, cmap="Reds", vmin=0, vmax=0.5, lw=0, zorder=3)
     if frame is not None:
-        points, scores, _ = keypoints_m(frame)
-        u, v = _project(points[(scores > SURE) & np.isfinite(points[..., 0])])
+        points_m, is_sure, _ = sure_keypoints(frame)
+        u, v = _project(points_m[is_sure])
         axis.scatter(u, v, s=8, color=condition_colour(run.job.condition), zorder=4)
     axis.set(xlim=_LIMITS_M[0], ylim=_LIMITS_M[1], aspect="equal")
     axis.axis("off")

@@ -6,15 +6,8 @@ import pandas as pd
 
 from hicp_lib.evaluation.calibration.curves import N_BINS
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.style import (
-    SUBSET_COLOURS,
-    Figure,
-    detector_colour,
-    in_style,
-    in_words,
-    new_figure,
-    series_text,
-)
+from hicp_lib.study.plots.palette import SUBSET_COLOURS, detector_colour
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _MEASURES = {"AP": "average precision of hands", "share": "share of labelled hands found"}
 _GROUPS = {"body": "body", "hand": "hands"}

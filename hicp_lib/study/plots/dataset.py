@@ -13,17 +13,9 @@ from hicp_lib.core.images import read_image
 from hicp_lib.core.keypoints import COCO_17, FACE, LEFT_HAND, NAMES, RIGHT_HAND
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.palette import BODY_COLOUR, HEAD_COLOUR, SUBSET_COLOURS
 from hicp_lib.study.plots.people import draw_truth, picture_grid
-from hicp_lib.study.plots.style import (
-    BODY_COLOUR,
-    HEAD_COLOUR,
-    SUBSET_COLOURS,
-    Figure,
-    in_style,
-    in_words,
-    new_figure,
-    series_text,
-)
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _TRUTH_COLOUR = "#F0E442"
 _EDGES = ("left", "top", "right", "bottom")

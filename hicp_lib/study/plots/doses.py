@@ -10,8 +10,9 @@ import pandas as pd
 from hicp_lib.core.images import read_image
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.palette import detector_colour
 from hicp_lib.study.plots.people import picture_grid
-from hicp_lib.study.plots.style import Figure, detector_colour, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _LABELS = {
     "distance": "distance [m]",

@@ -10,16 +10,9 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
 from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.palette import THRESHOLD_MARKERS, detector_colour
 from hicp_lib.study.plots.people import detections_grid
-from hicp_lib.study.plots.style import (
-    THRESHOLD_MARKERS,
-    Figure,
-    detector_colour,
-    in_style,
-    in_words,
-    new_figure,
-    series_text,
-)
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 GROUP_TITLES = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
 _THRESHOLDS = {".5": ("AP50", "AR50"), ".75": ("AP75", "AR75"), ".5:.95": ("AP", "AR")}

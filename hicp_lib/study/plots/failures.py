@@ -15,8 +15,9 @@ from hicp_lib.evaluation.failures.placed_keypoints import STATES
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.evaluation import GROUP_TITLES
-from hicp_lib.study.plots.people import draw_people, draw_truth, picture_grid
-from hicp_lib.study.plots.style import Figure, detector_colour, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _TRUTH_COLOUR = "#39D353"
 _ONE_CROP = ["subset", "image_id", "annotation_id"]
@@ -87,10 +88,9 @@ def _say_too_few(axis, names: list[str], few: set[str]) -> None:
 
 def _dots(axis, rows: pd.DataFrame, y, detector: str, filled: bool = True, label: str = "") -> None:
     colour = detector_colour(detector)
-    axis.errorbar(
-        rows["value"].astype(float), y, xerr=marks.whiskers(rows), fmt="o", color=colour, capsize=2, ms=5,
-        mfc=colour if filled else "white", label=label or detector,
-    )  # fmt: skip
+    pen = {"color": colour, "mfc": colour if filled else "white", "label": label or detector}
+    value = rows["value"].astype(float)
+    axis.errorbar(value, y, xerr=marks.whiskers(rows), fmt="o", capsize=2, ms=5, **pen)
 
 
 def _detector_panels(table: pd.DataFrame, width_in: float, height_in: float, **shared):
@@ -211,8 +211,7 @@ def gallery(
             of_image = (people.image_ids == image_id) & ~people.is_crowd
             image = draw_truth(people, images_dir, image_id, of_image, _TRUTH_COLOUR, n_keypoints=26)
             found_in = found[subset, detector].get(image_id, Detections.none())
-            colour = detector_colour(detector)
-            pictures.append(draw_people(image, found_in.keypoints_px, found_in.scores, colour))
+            pictures.append(draw_detections(image, found_in, detector))
         rows.append(pictures)
         titles.append(f"{detector}\n{case}")
     return picture_grid(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hicp_lib.study.plots.style import detector_colour
+from hicp_lib.study.plots.palette import detector_colour
 
 _NO_DETECTOR = "#444444"  # what stands in a legend for all detectors
 

@@ -10,15 +10,8 @@ import pandas as pd
 
 from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS, THRESHOLDS_M
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.style import (
-    TRUTH_COLOUR,
-    Figure,
-    detector_colour,
-    in_style,
-    in_words,
-    new_figure,
-    series_text,
-)
+from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _MIN_N = 5  # fewer say little of a median
 _LIMITS_M = np.arange(0, 0.2001, 0.0025)  # of the curves of fractions

@@ -13,7 +13,8 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
 from hicp_lib.core.keypoints import FACE, HANDS, LIMBS, N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations
-from hicp_lib.study.plots.style import Figure, detector_colour, in_style, in_words, new_figure
+from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 
 _SHIFT = 4  # fractional bits of OpenCV's drawing coordinates
 _MAX_PX = 1e5  # points farther off would overflow them
@@ -50,6 +51,13 @@ def draw_people(
         for rim_px, pen in ((_RIM_PX, _RIM_COLOUR), (0.0, rgb)):
             _draw_person(canvas, points, shown, pen, width_px, rim_px)
     return canvas
+
+
+def draw_detections(
+    image: np.ndarray, found: Detections, detector: str, min_score: float = 0.1
+) -> np.ndarray:
+    """Draw what a detector found onto a copy of an image, in the detector's colour; see `draw_people`."""
+    return draw_people(image, found.keypoints_px, found.scores, detector_colour(detector), min_score)
 
 
 def draw_truth(
@@ -143,10 +151,7 @@ def detections_grid(
     """
     detectors = list(next(iter(pictures.values()))[1])
     rows = [
-        [
-            draw_people(image, found[d].keypoints_px, found[d].scores, detector_colour(d), min_score)
-            for d in detectors
-        ]
+        [draw_detections(image, found[d], d, min_score) for d in detectors]
         for image, found in pictures.values()
     ]
     seen = [f"{d} {sum(len(found[d]) > 0 for _, found in pictures.values())}" for d in detectors]

@@ -11,17 +11,10 @@ from matplotlib.ticker import LogLocator, NullLocator
 from hicp_lib.core.detections import Detections
 from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.people import draw_people, picture_grid
+from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
+from hicp_lib.study.plots.people import draw_detections, picture_grid
 from hicp_lib.study.plots.skeleton import BODY_LIMBS, HAND_LIMBS, limb_lines
-from hicp_lib.study.plots.style import (
-    TRUTH_COLOUR,
-    Figure,
-    detector_colour,
-    in_style,
-    in_words,
-    new_figure,
-    series_text,
-)
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _AXES = ("x_m", "y_m", "z_m")
 # Seen by the robot, which looks along -x; the axis that is not drawn is the one looked along.
@@ -54,12 +47,9 @@ def camera_views(
     frames : numbers of frames that every view has
     """
     rows = []
-    for frame in frames:
-        cells = [
-            (read_rgb(recordings[view], frame), detections[frame], detector_colour(detector))
-            for (view, detector), detections in found.items()
-        ]
-        rows.append([draw_people(i, f.keypoints_px, f.scores, c, min_score) for i, f, c in cells])
+    for k in frames:
+        cells = [(read_rgb(recordings[view], k), of[k], name) for (view, name), of in found.items()]
+        rows.append([draw_detections(*cell, min_score) for cell in cells])
     seen = [
         f"{detector} {sum(len(detections[frame]) > 0 for frame in frames)} ({view})"
         for (view, detector), detections in found.items()

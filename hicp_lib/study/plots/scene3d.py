@@ -17,8 +17,9 @@ from hicp_lib.core.camera import Camera, deproject, transform
 from hicp_lib.evaluation.space.stability import POSITION
 from hicp_lib.recordings.recording import Recording, read_depth_m, read_rgb
 from hicp_lib.robot.segments import Segment
+from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
 from hicp_lib.study.plots.skeleton import limb_lines
-from hicp_lib.study.plots.style import TRUTH_COLOUR, detector_colour, in_words
+from hicp_lib.study.plots.style import in_words
 
 ROBOT_COLOUR = "#5F6B7A"
 VIEW_STYLES = (("#E377C2", "solid"), ("#17BECF", "dash"))  # of its cameras, and of its skeletons' lines

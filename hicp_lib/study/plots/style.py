@@ -1,4 +1,4 @@
-"""One style for all figures: the palette, a fixed colour per detector, and what a figure carries."""
+"""One style for all figures, what a figure carries, and its numbers in words."""
 
 from __future__ import annotations
 
@@ -9,29 +9,6 @@ from dataclasses import dataclass
 import matplotlib.figure
 import matplotlib.pyplot as plt
 import pandas as pd
-
-# Okabe and Ito's colour-blind-safe palette; a detector keeps its colour on every page.
-DETECTOR_COLOURS: dict[str, str] = {
-    "mediapipe": "#0072B2",
-    "mediapipe-pose": "#56B4E9",
-    "mediapipe-hands": "#CC79A7",
-    "openpose-mobilenet": "#E69F00",
-    "openpose": "#D55E00",
-    "mmpose": "#009E73",
-    "alphapose": "#7F5FA8",
-    "detectron2": "#8C6D31",
-    "combined": "#882255",
-}
-OTHER_COLOUR = "#595959"
-TRUTH_COLOUR = "#111111"
-
-# The two subsets of HiCP, and the two boxes of the paper's figure of how they are made.
-SUBSET_COLOURS = {"basic": "#0072B2", "headless": "#D55E00"}
-HEAD_COLOUR = "#D5272D"
-BODY_COLOUR = "#1B9E4B"
-
-# The paper's marker shapes for the OKS thresholds.
-THRESHOLD_MARKERS = {".5": "s", ".75": "o", ".5:.95": "^"}
 
 _RC = {
     "figure.dpi": 110,
@@ -90,16 +67,6 @@ def new_figure(n_rows: int = 1, n_columns: int = 1, width_in: float = 8.0, heigh
     figure, axes = plt.subplots(n_rows, n_columns, figsize=(width_in, height_in), **kwargs)
     plt.close(figure)
     return figure, axes
-
-
-def detector_colour(name: str) -> str:
-    """The colour of a detector, also of variants such as "mmpose-imported"; others take the neutral grey.
-
-    All combinations ("combined:BODY+HANDS") share one.
-    """
-    kind = name.partition(":")[0]
-    known = [detector for detector in DETECTOR_COLOURS if f"{kind}-".startswith(f"{detector}-")]
-    return DETECTOR_COLOURS[max(known, key=len)] if known else OTHER_COLOUR
 
 
 def in_words(items: Iterable[str]) -> str:

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 import pandas as pd
 
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.style import Figure, detector_colour, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _REFERENCES = {"median": "its median position", "truth": "its true position"}
 _METHOD_LINES = {"robust": "-", "paper": ":"}

@@ -281,7 +281,8 @@ def test_a_malformed_claim_is_named(tmp_path, row, message):
 
 def test_for_reading_every_claim_appears_once(write):
     results = write(rows(a=(-0.4, -0.5, -0.3)))
-    table = v.verdict_table(v.judge_claims([claim(LOSES), claim(reason="no robot", command="buy one")], results))
+    claims = [claim(LOSES), claim(reason="no robot", command="buy one")]
+    table = v.verdict_table(v.judge_claims(claims, results))
     parts = {verdict: v.for_reading(table, verdict) for verdict in v.VERDICTS}
     assert {verdict: len(part) for verdict, part in parts.items() if len(part)} == {
         v.REPRODUCED: 1, v.NOT_TESTABLE: 1,
