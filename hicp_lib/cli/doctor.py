@@ -16,6 +16,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from hicp_lib.cli.opencv_files import WANTED, overwritten
 from hicp_lib.cli.probes import EXIT_ABSENT, EXIT_FAILED, probes
@@ -128,10 +129,9 @@ def check_probe(name: str, command: tuple[str, ...] = PROBE, limit_s: float = PR
     command : what runs the trial; its name is appended
     limit_s : after this the trial and all its processes are ended
     """
-    streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    process = subprocess.Popen(
-        [*command, name], **streams, text=True, errors="replace", start_new_session=True
-    )
+    pipe = subprocess.PIPE
+    streams: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": pipe, "stderr": pipe, "text": True}
+    process = subprocess.Popen([*command, name], **streams, errors="replace", start_new_session=True)
     try:
         said, murmured = process.communicate(timeout=limit_s)
     except subprocess.TimeoutExpired:

@@ -129,7 +129,7 @@ def detect(
         raise click.UsageError("Give either --workers N or --dask ADDRESS.", click.get_current_context())
     if dataset_dir is not None:
         found = detect_dataset(detector, dataset_dir, workers=workers, dask=dask, **given(**chosen))
-    else:
+    elif images_dir is not None:
         paths = _numbered_images(images_dir)
         results = detect_images(detector, paths, workers, dask=dask, **given(**chosen))
         found = {key: result.detections for key, result in results.items()}

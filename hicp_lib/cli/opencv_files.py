@@ -18,7 +18,8 @@ def overwritten() -> tuple[str, str] | None:
     others = " ".join(name for name in _OTHERS if _installed(name))
     if wanted is None:
         return f"{others or 'OpenCV'} in the place of {WANTED}", _remedy(others, WANTED)
-    changed = [name for name, sha256 in _recorded(wanted) if _sha256(wanted.locate_file(name)) != sha256]
+    folder = Path(str(wanted.locate_file("")))
+    changed = [name for name, sha256 in _recorded(wanted) if _sha256(folder / name) != sha256]
     if not changed:
         return None
     cause = f"overwritten by {others}" if others else "damaged"

@@ -75,7 +75,10 @@ def import_(out: Path, bag: Path | None, folder: Path | None, poses: Path | None
     if (bag is None) == (folder is None):
         raise click.UsageError("Give either --bag FILE or --open3d DIR.", click.get_current_context())
     source = read_pose_source(poses, mount)
-    n = import_bag(bag, out, source) if folder is None else import_open3d(folder, out, source, rate)
+    if bag is not None:
+        n = import_bag(bag, out, source)
+    elif folder is not None:
+        n = import_open3d(folder, out, source, rate)
     click.echo(f"{out}: {n} frames; check them with: hicp record check {out}")
 
 

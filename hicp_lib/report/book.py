@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from hicp_lib.core.files import sha256_file, write_json
 from hicp_lib.report.checks import book_problems
@@ -119,7 +120,7 @@ def _run_sphinx(staging: Path, log: Path) -> Path:
     command += ["build", str(staging / "source"), "--path-output", str(staging), "-W", "--keep-going", "-q"]
     environment = os.environ | {"PYTHONNOUSERSITE": "1"}
     with open(log, "wb") as output:
-        streams = {"stdin": subprocess.DEVNULL, "stdout": output, "stderr": subprocess.STDOUT}
+        streams: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": output, "stderr": subprocess.STDOUT}
         done = subprocess.run(command, **streams, timeout=BUILD_LIMIT_S, env=environment)
     built = staging / "_build" / "html"
     if done.returncode != 0 or not (built / "index.html").is_file():

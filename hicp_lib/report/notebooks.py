@@ -99,10 +99,13 @@ def _assignments(source: str, path: Path) -> dict[str, Any]:
     """Name -> value of `name = literal` lines. The text is parsed, never run."""
     values = {}
     try:
-        for line in ast.parse(source).body:
-            target = line.targets[0] if isinstance(line, ast.Assign) else line.target
-            values[target.id] = ast.literal_eval(line.value)
-    except (SyntaxError, AttributeError, ValueError, TypeError):
+        for statement in ast.parse(source).body:
+            match statement:
+                case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
+                    values[name] = ast.literal_eval(statement.value or "")
+                case _:
+                    raise ValueError(ast.unparse(statement))
+    except (SyntaxError, ValueError, TypeError):
         raise InputError(
             f"{path}: its parameters cell is not `name = value` lines with literal values; rewrite it so"
         ) from None

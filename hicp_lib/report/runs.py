@@ -18,9 +18,8 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, cast
 
 import nbformat
 import psutil
@@ -294,7 +293,7 @@ class _Children:
     """The running processes; leaving the context for any reason ends them all."""
 
     def __init__(self) -> None:
-        self._running: set[subprocess.Popen] = set()
+        self._pipes: set[IO[bytes]] = set()
         self._ended = False
 
     def __enter__(self) -> _Children:
@@ -302,8 +301,8 @@ class _Children:
 
     def __exit__(self, *_: object) -> None:
         self._ended = True
-        for process in list(self._running):
-            process.stdin.close()
+        for pipe in list(self._pipes):
+            pipe.close()
 
     def execute(self, run: Run, copy: Path, staging: Path, folders: Folders) -> int | None:
         """Run the notebook into `copy`; the exit code, or None when it hit the wall limit."""
@@ -316,25 +315,27 @@ class _Children:
         write_json(staging / "job.json", job | {"parameters": changed})
         command = [sys.executable, "-m", "hicp_lib.report.execute", str(staging / "job.json")]
         with open(staging / "log.txt", "wb") as log, tempfile.TemporaryDirectory(prefix="hicp-") as private:
-            streams = {"stdin": subprocess.PIPE, "stdout": log, "stderr": log}
+            streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": log, "stderr": log}
             environment = _environment(staging, folders, private)
             # In a session of its own: what ends the report's whole process group must not end this one
             # before it has ended the kernel's workers.
             process = subprocess.Popen(command, **streams, env=environment, start_new_session=True)
-            self._running.add(process)
+            pipe = cast(IO[bytes], process.stdin)
+            self._pipes.add(pipe)
             try:
                 return process.wait(WALL_LIMIT_S)
             except subprocess.TimeoutExpired:
                 return None
             finally:
-                process.stdin.close()
+                pipe.close()
                 process.wait()
-                self._running.discard(process)
+                self._pipes.discard(pipe)
 
 
 def _environment(staging: Path, folders: Folders, private: str) -> dict[str, str]:
     """A kernel's environment: nothing of the user's own set-up may move a number or a pixel."""
-    matplotlib = find_spec("matplotlib")
+    import matplotlib
+
     return os.environ | {
         RESULTS_VARIABLE: str(staging / "results"),
         EARLIER_RESULTS_VARIABLE: str(folders.results.resolve()),
@@ -342,7 +343,7 @@ def _environment(staging: Path, folders: Folders, private: str) -> dict[str, str
         "IPYTHONDIR": private,
         "JUPYTER_RUNTIME_DIR": private,
         "JUPYTER_PREFER_ENV_PATH": "1",
-        "MATPLOTLIBRC": str(Path(matplotlib.origin).parent / "mpl-data" / "matplotlibrc"),
+        "MATPLOTLIBRC": str(Path(matplotlib.get_data_path(), "matplotlibrc")),
         "MPLBACKEND": "module://matplotlib_inline.backend_inline",
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 SCHEMA_VERSION = 1
 PLOTLY_MIME = "application/vnd.plotly.v1+json"
-_SVG_STYLE = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
+_SVG_STYLE: dict[Any, Any] = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
 _SAVE_OPTIONS: dict[str, dict[str, Any]] = {
     "png": {},
     "svg": {"metadata": {"Date": None}},

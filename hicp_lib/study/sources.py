@@ -93,8 +93,9 @@ def _crops(annotations: Path, images: Path, min_pixels: int) -> Path:
         raise InputError(f"{annotations}: is not there; give the path of the annotation file")
     if not images.is_dir():
         raise InputError(f"{images}: is not there; give the folder that holds the annotated images")
-    people = {"annotations": sha256_file(annotations), "folder": str(images.resolve()), "images": images}
-    folder = cache_dir() / "hicp" / key([create_hicp], **people, min_pixels=min_pixels)[:16]
+    sha256, resolved = sha256_file(annotations), str(images.resolve())
+    crops = key([create_hicp], annotations=sha256, folder=resolved, images=images, min_pixels=min_pixels)
+    folder = cache_dir() / "hicp" / crops[:16]
     if not (folder / "summary.json").is_file():
         create_hicp(annotations, images, folder, min_pixels=min_pixels, progress=sys.stderr.isatty())
     return folder

@@ -69,7 +69,8 @@ def bounds_of(
 ) -> list[str]:
     """`with_bounds` of each row's value and the two ends of its interval, multiplied by `factor`."""
     numbers = factor * rows[list(columns)]
-    return [with_bounds(*row, digits=digits) for row in numbers.itertuples(index=False, name=None)]
+    rows_of_three = numbers.itertuples(index=False, name=None)
+    return [with_bounds(value, low, high, digits) for value, low, high in rows_of_three]
 
 
 def in_cm(*lengths_m: Iterable[float]) -> list[str]:

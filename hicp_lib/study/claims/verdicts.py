@@ -141,13 +141,15 @@ def _notebooks(claim: Claim) -> set[str]:
 def _try(test: Comparison, results: Path) -> tuple[bool | None, list[str]]:
     """Whether a test holds (None: open), and the quantities it rests on in words."""
     left = select(test.left, results)
-    is_number = isinstance(test.right, float)
-    right = [Quantity(*[test.right] * 3, {}, "")] if is_number else select(test.right, results)
+    if isinstance(test.right, float):
+        right, shown_right = [Quantity(test.right, test.right, test.right, {}, "")], False
+    else:
+        right, shown_right = select(test.right, results), True
     pairs = [(a, b) for a in left for b in right if all(a.row.get(c) == b.row.get(c) for c in test.match)]
     if not pairs:
         reason = f"no two rows of {test.left.table} agree in {', '.join(test.match)}"
         raise _MissingError(reason, "hicp report")
-    shown = [a for a, _ in pairs] + [b for _, b in pairs if not is_number]
+    shown = [a for a, _ in pairs] + [b for _, b in pairs if shown_right]
     return holds(test, pairs), [_in_words(quantity) for quantity in shown]
 
 
@@ -226,7 +228,8 @@ def _quantity(selection: Selection, row: dict[str, Any]) -> Quantity:
         for column in (selection.value, selection.low, selection.high)
     )
     name = " ".join(_plain(row[column]) for column in selection.name)
-    return Quantity(value, *sorted((low, high)), row, name)
+    low, high = sorted((low, high))
+    return Quantity(value, low, high, row, name)
 
 
 def _plain(label: Any) -> str:

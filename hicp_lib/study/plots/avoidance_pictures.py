@@ -55,16 +55,16 @@ def animation(run: Run, rate_hz: float = 6.0, dpi: int = 64) -> bytes:
     """The same as an animated WebP in real time."""
     pictures, times_s = [], np.arange(0, run.cycles["t_s"].iloc[-1], 1 / rate_hz).tolist()
     with mpl.rc_context({"figure.constrained_layout.use": True, "font.size": 10}):
-        figure, axes = new_figure(1, 2, 10.4, 4.0, width_ratios=[1.15, 1])
+        figure, (camera, space) = new_figure(1, 2, 10.4, 4.0, width_ratios=[1.15, 1])
         canvas = FigureCanvasAgg(figure)
         figure.set_dpi(dpi)
-        _draw_moment(*axes, run, times_s[0])
+        _draw_moment(camera, space, run, times_s[0])
         canvas.draw()
         figure.set_layout_engine("none")  # all pictures are laid out like the first
         for time_s in times_s:
-            for drawn in [artist for axis in axes for artist in (*axis.images, *axis.collections)]:
+            for drawn in [artist for axis in (camera, space) for artist in (*axis.images, *axis.collections)]:
                 drawn.remove()
-            _draw_moment(*axes, run, time_s)
+            _draw_moment(camera, space, run, time_s)
             canvas.draw()
             pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]))
     content, period_ms = io.BytesIO(), round(1000 / rate_hz)
@@ -97,7 +97,7 @@ def _draw_space(axis, run: Run, cycle: pd.Series, frame: pd.Series | None) -> No
     posture = start_posture().moved("left", np.array([cycle[f"{joint}_rad"] for joint in ARM_JOINTS]))
     _draw_robot(axis, posture)
     limbs = np.stack(_project(truth_m[np.array(LIMBS)]), axis=-1)
-    axis.add_collection(LineCollection(limbs, linewidths=1.2, colors=_PERSON_COLOUR, zorder=2))
+    axis.add_collection(LineCollection(list(limbs), linewidths=1.2, colors=_PERSON_COLOUR, zorder=2))
     positions, _ = read_skin().in_root(load_icub(), posture)
     u, v = _project(positions)
     axis.scatter(u, v, c=np.asarray(cycle["activations"]), s=9, cmap="Reds", vmin=0, vmax=0.5, lw=0, zorder=3)
@@ -115,7 +115,8 @@ def _draw_robot(axis, posture: Posture) -> None:
     segments = body_segments(load_icub(), *chains)
     ends = np.stack(_project(np.stack([(s.start_m, s.end_m) for s in segments])), axis=-1)
     widths = [2 * segment.radius_m * points_per_m for segment in segments]
-    axis.add_collection(LineCollection(ends, linewidths=widths, colors="#C9CED6", capstyle="round", zorder=0))
+    pen = {"colors": "#C9CED6", "capstyle": "round", "zorder": 0}
+    axis.add_collection(LineCollection(list(ends), linewidths=widths, **pen))
 
 
 def _project(points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -105,7 +105,8 @@ def _draw_person(canvas, points, shown, pen, width_px: float, rim_px: float) -> 
 
 
 def _fixed(point) -> tuple[int, int]:
-    return tuple(int(round(value * (1 << _SHIFT))) for value in point)
+    u, v = (int(round(value * (1 << _SHIFT))) for value in point)
+    return u, v
 
 
 @in_style
