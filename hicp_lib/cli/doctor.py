@@ -38,7 +38,24 @@ _REINSTALL = "rm .venv/.installed; make report"
 
 @dataclass(frozen=True)
 class Check:
-    """One line of the doctor: what was looked at, what was found, and what to do if it is not well."""
+    """One line of the doctor.
+
+    Attributes
+    ----------
+    name : str
+        What was looked at.
+    status : str
+        `OK`, `ABSENT` or `FAIL`.
+    finding : str
+        What was found.
+    remedy : str
+        What to do about it; told where it failed.
+
+    Examples
+    --------
+    >>> print(Check.of("results disk", False, "0.1 GB free", "free space"))
+    FAIL results disk: 0.1 GB free; remedy: free space
+    """
 
     name: str
     status: str
@@ -47,7 +64,14 @@ class Check:
 
     @classmethod
     def of(cls, name: str, is_ok: bool, finding: str, remedy: str) -> Check:
-        """A check that is well or not."""
+        """A check that is well or not.
+
+        Parameters
+        ----------
+        name : str
+        is_ok : bool
+        finding, remedy : str
+        """
         return cls(name, OK if is_ok else FAIL, finding, remedy)
 
     def __str__(self) -> str:
@@ -99,7 +123,14 @@ def check_locked_versions(lock_path: Path) -> Check:
 
 
 def locked_versions(lock: str) -> Iterator[tuple[str, str]]:
-    """(name, version) of each locked package that is meant for this Python and system."""
+    """(name, version) of each locked package that is meant for this Python and system.
+
+    Examples
+    --------
+    >>> lock = ["numpy==2.3.5", "winpty==1 ; sys_platform == 'nowhere'"]
+    >>> list(locked_versions("\\n".join(lock)))
+    [('numpy', '2.3.5')]
+    """
     from packaging.requirements import Requirement
 
     for line in re.findall(r"^[A-Za-z0-9][^\\\n]*==[^\\\n]+", lock, re.MULTILINE):
@@ -126,8 +157,12 @@ def check_probe(name: str, command: tuple[str, ...] = PROBE, limit_s: float = PR
 
     Parameters
     ----------
-    command : what runs the trial; its name is appended
-    limit_s : after this the trial and all its processes are ended
+    name : str
+        Of the trial.
+    command : tuple of str
+        What runs the trial; its name is appended.
+    limit_s : float
+        After this the trial and all its processes are ended.
     """
     pipe = subprocess.PIPE
     streams: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": pipe, "stderr": pipe, "text": True}
@@ -187,7 +222,17 @@ def check_weights() -> Check:
 
 
 def check_folder(name: str, folder: Path, remedy: str) -> list[Check]:
-    """That files can be written there, and that the disk has room."""
+    """That files can be written in a folder, and that its disk has room.
+
+    Parameters
+    ----------
+    name : str
+        What the folder is for.
+    folder : Path
+        It need not exist: then the nearest one above counts.
+    remedy : str
+        What to do where one may not write there.
+    """
     there = next(path for path in (folder, *folder.parents) if path.exists())
     finding = f"{folder} {'is' if (is_writable := _is_writable(there)) else 'is not'} writable"
     free_gb = shutil.disk_usage(there).free / 1e9

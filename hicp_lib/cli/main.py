@@ -34,7 +34,23 @@ def main() -> NoReturn:
 
 
 def run(arguments: list[str]) -> int:
-    """Run one command; its exit code. A user's mistake is told in one line on standard error."""
+    """Run one command; its exit code. A user's mistake is told in one line on standard error.
+
+    Parameters
+    ----------
+    arguments : list of str
+        What follows `hicp` on the command line.
+
+    Returns
+    -------
+    int
+        0 done, 1 a notebook or the book failed, 2 bad input or usage, 130 stopped.
+
+    Examples
+    --------
+    >>> run(["no-such-command"])
+    2
+    """
     try:
         return hicp(arguments, prog_name="hicp", standalone_mode=False) or 0
     except click.exceptions.NoArgsIsHelpError as error:

@@ -28,7 +28,20 @@ def detector_options(command: Callable) -> Callable:
 
 
 def given(model: Path | None, person_model: Path | None, boxes: str | None, pairs) -> dict[str, Any]:
-    """The detector's options out of the command line's."""
+    """The detector's options out of the command line's.
+
+    Parameters
+    ----------
+    model, person_model : Path or None
+    boxes : str or None
+    pairs : sequence of (str, str)
+        Further options, values as text: JSON's numbers, booleans and lists are read as such.
+
+    Examples
+    --------
+    >>> given(None, None, "gt", [("min_score", "0.5"), ("sides", "left")])
+    {'boxes': 'gt', 'min_score': 0.5, 'sides': 'left'}
+    """
     named = {"model": model, "person_model": person_model, "boxes": boxes}
     return {name: value for name, value in named.items() if value is not None} | {
         name: _value(text) for name, text in pairs

@@ -33,9 +33,17 @@ _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 def build_book(folders: Folders) -> tuple[Path, bool]:
     """Build the book of one profile, unless nothing it is made of changed.
 
+    Parameters
+    ----------
+    folders : Folders
+        The sources of its pages, and the profile's executed notebooks and results.
+
     Returns
     -------
-    Its first page, and whether it was built now.
+    Path
+        Its first page.
+    bool
+        Whether it was built now.
 
     Raises
     ------

@@ -57,7 +57,21 @@ def _says_nothing(alt: str) -> bool:
 
 
 def book_problems(folder: Path) -> list[str]:
-    """What in a built book needs a network or lacks words, one line each; empty when it is sound."""
+    """What in a built book needs a network or lacks words, one line each; empty when it is sound.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the built pages; all HTML and CSS files in it are read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "index.html").write_text('<img src="https://a.org/b.png" alt="A bird">')
+    ...     book_problems(Path(folder))
+    ['index.html: loads from the network: <img src=https://a.org/b.png>']
+    """
     problems = []
     for path in sorted(folder.rglob("*.html")):
         page = _Page()

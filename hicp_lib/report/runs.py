@@ -47,8 +47,12 @@ class Folders:
 
     Attributes
     ----------
-    sources : holds `notebooks` and `book`
-    root : results and the built book go below it
+    sources : Path
+        Holds `notebooks` and `book`.
+    root : Path
+        Results and the built book go below it.
+    profile : str
+        Its name.
     """
 
     sources: Path
@@ -68,7 +72,16 @@ class Folders:
 
 @dataclass(frozen=True)
 class Run:
-    """One notebook with every parameter it runs with, and the runs that come before it."""
+    """One notebook with everything it runs with.
+
+    Attributes
+    ----------
+    notebook : Notebook
+    parameters : dict of str to object
+        Every parameter's value by its name.
+    after : tuple of str
+        Names of the notebooks that come before it.
+    """
 
     notebook: Notebook
     parameters: dict[str, Any]
@@ -148,6 +161,16 @@ def _bring_up_to_date(run: Run, before: list[Future], folders: Folders, children
 def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
     """Hashes of everything the outcome of a run depends on, by what they stand for.
 
+    Parameters
+    ----------
+    run : Run
+    before : list of str, optional
+        Digests of the keys of the runs before it.
+
+    Returns
+    -------
+    dict of str to str
+
     Raises
     ------
     InputError
@@ -181,7 +204,16 @@ def _input_paths(run: Run) -> dict[str, Path]:
 
 
 def why_stale(name: str, key: dict[str, Any], folders: Folders) -> str | None:
-    """What makes a new run necessary, in words; None when the last run still holds."""
+    """What makes a new run necessary, in words; None when the last run still holds.
+
+    Parameters
+    ----------
+    name : str
+        The notebook's.
+    key : dict of str to str
+        As from `run_key`.
+    folders : Folders
+    """
     stamp = read_stamp(folders.executed / f"{name}.json")
     if stamp is None:
         return "no complete run yet"
@@ -207,6 +239,15 @@ def _outputs(name: str, folders: Folders) -> dict[str, str]:
 
 def run_notebook(run: Run, key: dict[str, Any], folders: Folders, children: _Children) -> None:
     """Run a notebook and put its outcome in place of the last one.
+
+    Parameters
+    ----------
+    run : Run
+    key : dict of str to str
+        As from `run_key`: what its stamp will say.
+    folders : Folders
+    children : _Children
+        Runs it, and ends it when the report ends.
 
     Raises
     ------
@@ -305,7 +346,22 @@ class _Children:
             pipe.close()
 
     def execute(self, run: Run, copy: Path, staging: Path, folders: Folders) -> int | None:
-        """Run the notebook into `copy`; the exit code, or None when it hit the wall limit."""
+        """Run the notebook into `copy`; the exit code, or None when it hit the wall limit.
+
+        Parameters
+        ----------
+        run : Run
+        copy : Path
+            The executed notebook to write.
+        staging : Path
+            An empty folder for its job, log and results.
+        folders : Folders
+
+        Raises
+        ------
+        RunError
+            If the report is being stopped.
+        """
         if self._ended:
             raise RunError("was not run, the report was stopped")
         folder = run.notebook.path.parent.resolve()

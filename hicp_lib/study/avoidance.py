@@ -42,7 +42,26 @@ def metrics(runs: Iterable[Run]) -> pd.DataFrame:
 def against_no_avoidance(table: pd.DataFrame, times: float = 2.0) -> pd.DataFrame:
     """How many times the least distance without avoidance each condition keeps, and whether that is enough.
 
-    Adds to `metrics`: `value` (the ratio), `enough` (at least `times`), and `why` in words where it is not.
+    Parameters
+    ----------
+    table : DataFrame
+        As from `metrics`.
+    times : float
+        What is enough.
+
+    Returns
+    -------
+    DataFrame
+        Columns `script, detector, min_distance_m, value` (the ratio), `enough` (at least `times`), and
+        `why` in words where it is not.
+
+    Examples
+    --------
+    >>> runs = pd.DataFrame(
+    ...     {"script": "a", "detector": [NO_AVOIDANCE, "mediapipe"], "min_distance_m": [0.04, 0.12]}
+    ... )
+    >>> against_no_avoidance(runs)[["detector", "value", "enough"]].values.tolist()
+    [['mediapipe', 3.0, True]]
     """
     base = table[table["detector"] == NO_AVOIDANCE].set_index("script")["min_distance_m"]
     rest = table[table["detector"] != NO_AVOIDANCE].copy()
@@ -93,6 +112,19 @@ def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> d
     The robot's speed is the fastest the hand was in any of the runs. It brakes within one control period,
     which is when its velocities can be zero: an assumption, real joints take longer. Detectors that gave
     no keypoint have no error, and no separation.
+
+    Parameters
+    ----------
+    runs : iterable of Run
+    errors : DataFrame
+        As from `keypoint_errors`.
+    period_s : float
+        Of the controller.
+
+    Returns
+    -------
+    dict of str to Separation
+        By detector; the terms of ISO/TS 15066.
     """
     runs = list(runs)
     robot_m_s = max(float(run.cycles["hand_error_m"].diff().abs().max()) for run in runs) / period_s

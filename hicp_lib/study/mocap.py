@@ -37,9 +37,12 @@ class Registered:
 
     Attributes
     ----------
-    fits : in the order of the module `hicp_lib.mocap.registration`, then by reprojection: the one to use
-    exact : the true transform T_base_mocap, (4, 4); None where it is not known
-    clicks : the clicks of the images the paper's registration rests on; empty where the transform was given
+    fits : list of Registration
+        In the order of the module `hicp_lib.mocap.registration`, then by reprojection: the one to use.
+    exact : array, shape (4, 4), or None
+        The true transform T_base_mocap; None where it is not known.
+    clicks : DataFrame
+        The clicks of the images the paper's registration rests on; empty where the transform was given.
     """
 
     fits: list[registration.Registration]
@@ -63,7 +66,18 @@ def open_mocap(recording: Recording) -> MotionCapture:
 
 
 def detect_frames(recording: Recording, detectors: Sequence[str]) -> dict[str, list[Detections]]:
-    """Detector -> detections of every frame; kept on disk."""
+    """What detectors find in every frame; kept on disk.
+
+    Parameters
+    ----------
+    recording : Recording
+    detectors : sequence of str
+
+    Returns
+    -------
+    dict of str to list of Detections
+        By detector, in the order of the frames.
+    """
     paths = dict(enumerate(recording.rgb_paths))
     return {
         detector: [result.detections for result in detect_images(detector, paths).values()]
@@ -74,12 +88,21 @@ def detect_frames(recording: Recording, detectors: Sequence[str]) -> dict[str, l
 def lift_frames(
     recording: Recording, found: Mapping[str, Sequence[Detections]]
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Everyone's keypoints in space, columns as of `hicp_lib.lifting.table.lift_found`; kept on disk.
+    """Everyone's keypoints in space; kept on disk.
+
+    Parameters
+    ----------
+    recording : Recording
+    found : mapping of str to sequence of Detections
+        As from `detect_frames`.
 
     Returns
     -------
-    Those by each of `METHODS`; and the first detector's also by every step between them, where true
-    positions are known (for `ablation`)
+    DataFrame
+        Columns as of `hicp_lib.lifting.table.lift_found`, by each of `METHODS`.
+    DataFrame
+        The first detector's, also by every step between the methods where true positions are known (for
+        `ablation`).
     """
     n_steps = METHODS if read_truth(recording) is None else METHODS | N_STEPS
     table = kept(lift_found, recording, found, n_steps)
@@ -91,7 +114,14 @@ def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame)
 
     Parameters
     ----------
-    points : the first of `lift_frames`; those of all detectors and methods are compared at once
+    recording : Recording
+    mocap : MotionCapture
+    points : DataFrame
+        The first of `lift_frames`; those of all detectors and methods are compared at once.
+
+    Returns
+    -------
+    ClockOffset
 
     Raises
     ------
@@ -121,8 +151,20 @@ def register(
 
     Parameters
     ----------
-    offset_s : of the motion capture's clock, as from `find_clock`
-    n_images, noise_px, seed : of the simulated clicks; not used on a laboratory's own recording
+    recording : Recording
+    mocap : MotionCapture
+    offset_s : float
+        Of the motion capture's clock, as from `find_clock`.
+    n_images : int
+        Images with simulated clicks; like the two below, not used on a laboratory's own recording.
+    noise_px : float
+        Standard deviation of a simulated click in each direction.
+    seed : int
+        Of the simulated clicks.
+
+    Returns
+    -------
+    Registered
 
     Raises
     ------
@@ -165,10 +207,21 @@ def medians_under(
 ) -> pd.DataFrame:
     """What the choice of the registration does to the median errors of elbows and wrists.
 
+    Parameters
+    ----------
+    registered : Registered
+    points : DataFrame
+        The first of `lift_frames`.
+    recording : Recording
+    mocap : MotionCapture
+    offset_s : float
+        Of the motion capture's clock.
+
     Returns
     -------
-    DataFrame, columns `registration, detector, method, part`, `median_m` (both sides together; score above
-    0.1); the exact transform, where it is known, comes last
+    DataFrame
+        Columns `registration, detector, method, part, median_m` (both sides together; score above 0.1); the
+        exact transform, where it is known, comes last.
     """
     fits = {fit.method: fit.T_base_mocap for fit in registered.fits}
     fits |= {} if registered.exact is None else {"exact": registered.exact}
@@ -186,7 +239,22 @@ def medians_under(
 def errors_at_joints(
     points: pd.DataFrame, registered: Registered, recording: Recording, mocap: MotionCapture, offset_s: float
 ) -> pd.DataFrame:
-    """`mocap_errors` under the best registration, with the lines of sight: columns `distance_m, sight`."""
+    """`mocap_errors` under the best registration, with the lines of sight: columns `distance_m, sight`.
+
+    Parameters
+    ----------
+    points : DataFrame
+        The first of `lift_frames`.
+    registered : Registered
+    recording : Recording
+    mocap : MotionCapture
+    offset_s : float
+        Of the motion capture's clock.
+
+    Returns
+    -------
+    DataFrame
+    """
     stamps_s, T_base_mocap = recording.times_s - offset_s, registered.fits[-1].T_base_mocap
     reference = marker_means(mocap, stamps_s, T_base_mocap)
     errors = mocap_errors(points, reference, read_truth(recording))

@@ -56,15 +56,29 @@ class Study:
 
     Parameters
     ----------
-    name : the notebook's file name without `.ipynb`
-    parameters : every parameter of the notebook's `parameters` cell, by its name; `hicp report`
-        refuses a run whose stamp differs from what it was given
+    name : str
+        The notebook's file name without `.ipynb`.
+    **parameters
+        Every parameter of the notebook's `parameters` cell, by its name; `hicp report` refuses a run whose
+        stamp differs from what it was given.
 
     Attributes
     ----------
-    folder : where this run's results are written
-    results : where the notebooks before this one left theirs, a folder each; in Jupyter, those of the
-        last full report
+    folder : Path
+        Where this run's results are written.
+    results : Path
+        Where the notebooks before this one left theirs, a folder each; in Jupyter, those of the last full
+        report.
+
+    Examples
+    --------
+    >>> study = Study("05_tiny", seed=3)
+    >>> study.folder.parts[-3:]
+    ('results', 'interactive', '05_tiny')
+    >>> study.value("ap", float("nan"))
+    Traceback (most recent call last):
+        ...
+    ValueError: a result is nan; record None for what was not measured
     """
 
     def __init__(self, name: str, /, **parameters: Any):
@@ -97,7 +111,15 @@ class Study:
         self._show_image(name, content, figure.alt, figure.caption, downloads)
 
     def animation(self, name: str, webp: bytes, caption: str, alt: str) -> None:
-        """Save an animated WebP and show it; it plays offline, on its own."""
+        """Save an animated WebP and show it; it plays offline, on its own.
+
+        Parameters
+        ----------
+        name : str
+        webp : bytes
+            The file's content.
+        caption, alt : str
+        """
         write_bytes(self.folder / f"{name}.webp", webp)
         self._show_image(name, webp, alt, caption, ["webp"])
 
@@ -105,6 +127,12 @@ class Study:
         """Save an interactive 3D scene (its data as JSON) and show it.
 
         JupyterLab and VS Code draw the data with the plotly.js they bring; the book's page loads it once.
+
+        Parameters
+        ----------
+        name : str
+        scene : plotly.graph_objects.Figure
+        caption, alt : str
         """
         data = scene.to_json()
         write_bytes(self.folder / f"{name}.json", data.encode())
@@ -115,7 +143,16 @@ class Study:
         self._show_figure(name, "", caption, ["json"])
 
     def table(self, name: str, table: pd.DataFrame, caption: str, digits: int = 3) -> None:
-        """Save a table (Parquet, CSV) and show it; NaN is shown as a dash, floats with `digits` decimals."""
+        """Save a table (Parquet, CSV) and show it; NaN is shown as a dash.
+
+        Parameters
+        ----------
+        name : str
+        table : DataFrame
+        caption : str
+        digits : int
+            Decimals of its floats, as shown.
+        """
         self._save_for_download(name, table)
         self._captions[name] = {"caption": caption}
         style = table.style.hide(axis="index").format(precision=digits, na_rep="–").set_uuid(name)

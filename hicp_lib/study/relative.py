@@ -27,12 +27,18 @@ Found = Mapping[tuple[str, str], Sequence[Detections]]
 def open_views(
     recording: str = "", recording_lower: str = "", n_frames: int = 100, seed: int = 0
 ) -> dict[str, Recording]:
-    """View -> recording: the folders given, or two simulated ones where none is.
+    """The recordings given by their views, or two simulated ones where none is.
 
     Parameters
     ----------
-    recording, recording_lower : a lab's own recordings of a person who sits still; the second is optional
-    n_frames, seed : of the simulated ones
+    recording, recording_lower : str
+        Folders of a lab's own recordings of a person who sits still; the second is optional.
+    n_frames, seed : int
+        Of the simulated ones.
+
+    Returns
+    -------
+    dict of str to Recording
 
     Raises
     ------
@@ -51,7 +57,18 @@ def open_views(
 def detect_views(
     views: Mapping[str, Recording], detectors: Sequence[str]
 ) -> dict[tuple[str, str], list[Detections]]:
-    """(view, detector) -> detections of every frame; kept on disk."""
+    """What detectors find in every frame of every view; kept on disk.
+
+    Parameters
+    ----------
+    views : mapping of str to Recording
+    detectors : sequence of str
+
+    Returns
+    -------
+    dict of (str, str) to list of Detections
+        By view and detector, in the order of the frames.
+    """
     return {
         (view, detector): detections
         for view, recording in views.items()
@@ -60,7 +77,18 @@ def detect_views(
 
 
 def lift_views(views: Mapping[str, Recording], found: Found) -> pd.DataFrame:
-    """Everything lifted by every method: columns `view` and those of `lift_found`.
+    """Everything lifted by every method.
+
+    Parameters
+    ----------
+    views : mapping of str to Recording
+    found : mapping of (str, str) to sequence of Detections
+        As from `detect_views`.
+
+    Returns
+    -------
+    DataFrame
+        Columns `view` and those of `hicp_lib.lifting.table.lift_found`.
 
     Raises
     ------

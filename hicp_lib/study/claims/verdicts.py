@@ -37,8 +37,13 @@ class Verdict:
 
     Attributes
     ----------
-    ours : the evidence as text
-    reason, command : why the claim was not tested, and what would test it
+    claim : Claim
+    verdict : str
+        One of `VERDICTS`.
+    ours : str
+        The evidence.
+    reason, command : str
+        Why the claim was not tested, and what would test it.
     """
 
     claim: Claim
@@ -50,7 +55,18 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number with its 95 % interval (the number itself where it has none), and the row it is from."""
+    """A number of a result table.
+
+    Attributes
+    ----------
+    value : float
+    low, high : float
+        Its 95 % interval; the number itself where it has none.
+    row : dict of str to object
+        The row it is from.
+    name : str
+        The row's, in the evidence.
+    """
 
     value: float
     low: float
@@ -72,7 +88,13 @@ def judge_claims(claims: list[Claim], results: Path) -> list[Verdict]:
 
     Parameters
     ----------
-    results : folder with one folder of result files per notebook
+    claims : list of Claim
+    results : Path
+        Folder with one folder of result files per notebook.
+
+    Returns
+    -------
+    list of Verdict
 
     Raises
     ------
@@ -154,7 +176,22 @@ def _try(test: Comparison, results: Path) -> tuple[bool | None, list[str]]:
 
 
 def holds(test: Comparison, pairs: list[tuple[Quantity, Quantity]]) -> bool | None:
-    """True when every pair's interval is on the claimed side, False when one is wholly off it, else None."""
+    """True when every pair's interval is on the claimed side, False when one is wholly off it, else None.
+
+    Parameters
+    ----------
+    test : Comparison
+    pairs : list of (Quantity, Quantity)
+        The left and the right side.
+
+    Examples
+    --------
+    >>> from hicp_lib.study.claims.statements import Selection
+    >>> test = Comparison(">", Selection("02_evaluation_2d", "ap", {}, "value"), 0.5)
+    >>> half, left = Quantity(0.5, 0.5, 0.5, {}, ""), Quantity(0.7, 0.6, 0.8, {}, "mmpose")
+    >>> holds(test, [(left, half)]), holds(test, [(half, left)]), holds(test, [(left, left)])
+    (True, False, None)
+    """
     outcomes = [_compare(test, a.low - b.high, a.high - b.low) for a, b in pairs]
     return False if False in outcomes else None if None in outcomes else True
 

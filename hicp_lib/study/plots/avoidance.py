@@ -31,7 +31,16 @@ def condition_colour(name: str) -> str:
 
 @in_style
 def over_time(runs: Sequence[Run], separations: Mapping[str, Separation], note: str) -> Figure:
-    """Distance, highest activation and the hand's way over time: a column per script."""
+    """Distance, highest activation and the hand's way over time: a column per script.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    separations : mapping of str to Separation
+        By detector; drawn as dotted levels.
+    note : str
+        What the data are, for the caption.
+    """
     by_script: dict[str, list[Run]] = {}
     for run in runs:
         by_script.setdefault(run.job.trial.script, []).append(run)

@@ -37,7 +37,16 @@ _WEBP = {"quality": 55, "method": 4}
 
 @in_style
 def filmstrip(run: Run, times_s: Sequence[float], note: str) -> Figure:
-    """Some moments of a run, one column each: the camera's picture, and robot and person in space."""
+    """Some moments of a run, one column each: the camera's picture, and robot and person in space.
+
+    Parameters
+    ----------
+    run : Run
+    times_s : sequence of float
+        Of the moments.
+    note : str
+        What the data are, for the caption.
+    """
     figure, axes = new_figure(2, len(times_s), 3.0 * len(times_s), 4.9, squeeze=False)
     for (above, below), time_s in zip(axes.T, times_s, strict=True):
         _draw_moment(above, below, run, time_s)
@@ -52,7 +61,20 @@ def filmstrip(run: Run, times_s: Sequence[float], note: str) -> Figure:
 
 
 def animation(run: Run, rate_hz: float = 6.0, dpi: int = 64) -> bytes:
-    """The same as an animated WebP in real time."""
+    """The same as an animated WebP in real time.
+
+    Parameters
+    ----------
+    run : Run
+    rate_hz : float
+        Pictures per second.
+    dpi : int
+
+    Returns
+    -------
+    bytes
+        The file's content.
+    """
     pictures, times_s = [], np.arange(0, run.cycles["t_s"].iloc[-1], 1 / rate_hz).tolist()
     with mpl.rc_context({"figure.constrained_layout.use": True, "font.size": 10}):
         figure, (camera, space) = new_figure(1, 2, 10.4, 4.0, width_ratios=[1.15, 1])
@@ -115,8 +137,8 @@ def _draw_robot(axis, posture: Posture) -> None:
     segments = body_segments(load_icub(), *chains)
     ends = np.stack(_project(np.stack([(s.start_m, s.end_m) for s in segments])), axis=-1)
     widths = [2 * segment.radius_m * points_per_m for segment in segments]
-    pen = {"colors": "#C9CED6", "capstyle": "round", "zorder": 0}
-    axis.add_collection(LineCollection(list(ends), linewidths=widths, **pen))
+    bars = LineCollection(list(ends), linewidths=widths, colors="#C9CED6", capstyle="round", zorder=0)
+    axis.add_collection(bars)
 
 
 def _project(points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -39,7 +39,14 @@ def ingredients(table: pd.DataFrame, note: str) -> Figure:
 def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, min_term: float, note: str) -> Figure:
     """Hit rate against score, raw and calibrated, over the number of keypoints per bin of the score.
 
-    `curves` and `errors` from `calibration_study`.
+    Parameters
+    ----------
+    curves, errors : DataFrame
+        As from `calibration_study`.
+    min_term : float
+        What counts as a hit: the OKS term from which on.
+    note : str
+        What the data are, for the caption.
     """
     cases = list(dict.fromkeys(zip(curves["detector"], curves["group"], strict=True)))
     figure, axes = new_figure(

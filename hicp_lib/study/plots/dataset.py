@@ -28,13 +28,35 @@ _PARTS = {
 
 
 def with_truth(annotations: Annotations, images_dir: str | Path, image_id: int) -> np.ndarray:
-    """An image with its annotated keypoints drawn, those of people marked as crowd left out."""
+    """An image with its annotated keypoints drawn, those of people marked as crowd left out.
+
+    Parameters
+    ----------
+    annotations : Annotations
+    images_dir : str or Path
+    image_id : int
+
+    Returns
+    -------
+    array, shape (height, width, 3)
+        RGB, uint8.
+    """
     rows = (annotations.image_ids == image_id) & ~annotations.is_crowd
     return draw_truth(annotations, images_dir, image_id, rows, _TRUTH_COLOUR)
 
 
 def scenes(annotations: Annotations, images_dir: str | Path, image_ids: Sequence[int], note: str) -> Figure:
-    """Whole images (upper row) and the same with their annotated keypoints (lower row)."""
+    """Whole images (upper row) and the same with their annotated keypoints (lower row).
+
+    Parameters
+    ----------
+    annotations : Annotations
+    images_dir : str or Path
+    image_ids : sequence of int
+        Those shown.
+    note : str
+        What the data are, for the caption.
+    """
     plain = [read_image(Path(images_dir) / annotations.images[i].file_name) for i in image_ids]
     marked = [with_truth(annotations, images_dir, i) for i in image_ids]
     n_people = [int((annotations.image_ids == i).sum()) for i in image_ids]
@@ -49,9 +71,18 @@ def scenes(annotations: Annotations, images_dir: str | Path, image_ids: Sequence
 
 @in_style
 def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
-    """How Headless is made, as in the paper's figure, for some rows of `hicp_dataset.plan`.
+    """How Headless is made, as in the paper's figure.
 
     Red: the box of the head's keypoints and their centre; green: the body's; dashed: the cut.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Rows of `hicp_lib.datasets.subsets.plan`.
+    images_dir : str or Path
+        Of the whole images.
+    note : str
+        What the data are, for the caption.
     """
     figure, axes = new_figure(1, len(table), 2.6 * len(table), 3.8, squeeze=False)
     for axis, (_, row) in zip(axes[0], table.iterrows(), strict=True):
@@ -92,7 +123,14 @@ def _draw_cut(axis, row: pd.Series) -> None:
 def pairs(subsets: Mapping[str, tuple[Annotations, Path]], image_ids: Sequence[int], note: str) -> Figure:
     """The same people in each subset, with their annotated keypoints.
 
-    `subsets` maps a name to its annotations and its folder of images.
+    Parameters
+    ----------
+    subsets : mapping of str to (Annotations, Path)
+        By name, its annotations and its folder of images.
+    image_ids : sequence of int
+        Those shown.
+    note : str
+        What the data are, for the caption.
     """
     rows = [
         [with_truth(annotations, images_dir, i) if i in annotations.images else None for i in image_ids]
@@ -133,7 +171,17 @@ def labelled_share(subsets: Mapping[str, Annotations], note: str) -> Figure:
 
 @in_style
 def crop_sizes(table: pd.DataFrame, min_pixels: int, note: str) -> Figure:
-    """Distribution of the crops' sizes before the smallest are dropped; `table` from `hicp_dataset.plan`."""
+    """Distribution of the crops' sizes before the smallest are dropped.
+
+    Parameters
+    ----------
+    table : DataFrame
+        As from `hicp_lib.datasets.subsets.plan`.
+    min_pixels : int
+        The limit.
+    note : str
+        What the data are, for the caption.
+    """
     left, top, right, bottom = (table[f"basic_crop_{edge}_px"] for edge in _EDGES)
     sizes = ((right - left) * (bottom - top)).to_numpy(float)
     sizes = sizes[sizes > 0]

@@ -33,7 +33,16 @@ _SUBSET_STYLES = {"basic": "-", "headless": "--", "close": ":"}
 
 
 def dose_pictures(annotations: Annotations, folder: Path, person: int = 0) -> Figure:
-    """Every picture of one person, a row for each dose."""
+    """Every picture of one person, a row for each dose.
+
+    Parameters
+    ----------
+    annotations : Annotations
+        Of the doses' pictures; they say person, dose and level.
+    folder : Path
+        Holds `images`.
+    person : int
+    """
     rows: dict[str, list] = {}
     for image_id, extra in zip(annotations.image_ids.tolist(), annotations.extras, strict=True):
         if extra["source_image_id"] == person:

@@ -24,9 +24,11 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
 
     Parameters
     ----------
-    table : one row per subset x group x detector x metric, columns
-        `subset, group, detector, metric, value, low, high` (interval bounds at 95 %)
-    data_note : on what data, e.g. "rendered people"; becomes part of the caption
+    table : DataFrame
+        One row per subset x group x detector x metric, columns `subset, group, detector, metric, value, low,
+        high` (interval bounds at 95 %).
+    data_note : str
+        On what data, e.g. "rendered people"; becomes part of the caption.
     """
     figure, axes = _panels(table, 4.0, "average recall", "average precision")
     for axis, rows, _, _ in marks.facets(axes, table, "group", "subset"):
@@ -135,8 +137,16 @@ def examples(folders, truth, found, n_people: int, note: str) -> Figure:
 
     Parameters
     ----------
-    folders : subset -> dataset folder
-    truth, found : as in `hicp_lib.evaluation.ap.metric_table`
+    folders : mapping of str to Path
+        Subset -> dataset folder.
+    truth : mapping of str to Annotations
+        By subset.
+    found : mapping of (str, str) to mapping of int to Detections
+        By subset and detector, then by image id.
+    n_people : int
+        How many are shown.
+    note : str
+        What the data are, for the caption.
     """
     shared = [i for i in list(truth.values())[-1].images if all(i in p.images for p in truth.values())]
     detectors = list(dict.fromkeys(detector for _, detector in found))

@@ -30,7 +30,19 @@ _STATE_STYLES = dict(zip(STATES, (("-", "o"), ("--", "s"), (":", "^"), (":", "x"
 def class_examples(
     classes: pd.DataFrame, truth: Mapping[str, Annotations], folders: Mapping[str, Path], note: str
 ) -> Figure:
-    """The first crop of every class, with the labelled keypoints; `classes` from `people_classes`."""
+    """The first crop of every class, with the labelled keypoints.
+
+    Parameters
+    ----------
+    classes : DataFrame
+        As from `people_classes`.
+    truth : mapping of str to Annotations
+        By subset.
+    folders : mapping of str to Path
+        The subsets' dataset folders.
+    note : str
+        What the data are, for the caption.
+    """
     first = classes.drop_duplicates("class").set_index("class")
     names = [name for name in CLASSES if name in first.index]
     pictures = []
@@ -105,7 +117,17 @@ def _detector_panels(table: pd.DataFrame, width_in: float, height_in: float, **s
 
 @in_style
 def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
-    """Stacked shares of the kinds of error; `table` from `kind_shares` of one group of keypoints."""
+    """Stacked shares of the kinds of error (Ronchi and Perona, ICCV 2017).
+
+    Parameters
+    ----------
+    table : DataFrame
+        As from `kind_shares`, of one group of keypoints.
+    by : str
+        Its column that names the bars.
+    note : str
+        What the data are, for the caption.
+    """
     order = [name for name in CLASSES if name in set(table[by])] or list(dict.fromkeys(table[by]))
     figure, axes, panels = _detector_panels(table, 4.2, 1.5 + 0.36 * len(order))
     for axis, _, rows in panels:
@@ -202,7 +224,21 @@ def gallery(
     found: Mapping[tuple[str, str], Mapping[int, Detections]],
     note: str,
 ) -> Figure:
-    """The worst cases, a row for each detector and kind of case; `cases` from `worst_cases`."""
+    """The worst cases, a row for each detector and kind of case.
+
+    Parameters
+    ----------
+    cases : DataFrame
+        As from `worst_cases`.
+    folders : mapping of str to Path
+        The subsets' dataset folders.
+    truth : mapping of str to Annotations
+        By subset.
+    found : mapping of (str, str) to mapping of int to Detections
+        By subset and detector, then by image id.
+    note : str
+        What the data are, for the caption.
+    """
     rows, titles = [], []
     for (detector, case), part in cases.groupby(["detector", "case"], sort=False):
         pictures = []

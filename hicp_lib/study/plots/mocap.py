@@ -24,7 +24,17 @@ _BY = {"distance_m": "distance from the camera [m]", "score": "score", "sight": 
 
 @in_style
 def fraction_curves(errors: pd.DataFrame, min_score: float, note: str) -> Figure:
-    """Fraction of the frames with motion capture in which a joint was found within a distance of it."""
+    """Fraction of the frames with motion capture in which a joint was found within a distance of it.
+
+    Parameters
+    ----------
+    errors : DataFrame
+        As from `hicp_lib.evaluation.space.mocap_error.mocap_errors`.
+    min_score : float
+        A keypoint counts as found above it.
+    note : str
+        What the data are, for the caption.
+    """
     errors = errors[errors["reference_x_m"].notna()]
     found_m = errors["error_m"].where(errors["score"] > min_score).to_numpy()
     within = pd.DataFrame(found_m[:, None] <= _LIMITS_M, columns=_LIMITS_M)
@@ -55,7 +65,16 @@ def fraction_curves(errors: pd.DataFrame, min_score: float, note: str) -> Figure
 def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: float, note: str) -> Figure:
     """Distances from the markers per joint and detector, beside the medians the paper reports.
 
-    `paper` from `hicp_lib.study.paper_tables.paper_medians`.
+    Parameters
+    ----------
+    errors : DataFrame
+        As from `hicp_lib.evaluation.space.mocap_error.mocap_errors`.
+    paper : DataFrame
+        As from `hicp_lib.study.paper_tables.paper_medians`.
+    min_score : float
+        A keypoint counts as found above it.
+    note : str
+        What the data are, for the caption.
     """
     found = errors[(errors["score"] > min_score) & errors["error_m"].notna()]
     joints = [joint for joint in TABLE_JOINTS if joint in set(errors["keypoint"])]
@@ -119,7 +138,16 @@ def trajectories(
 
     Parameters
     ----------
-    times_s : array, shape (n_frames,), of the recording; shown from 0
+    errors : DataFrame
+        As from `hicp_lib.evaluation.space.mocap_error.mocap_errors`.
+    times_s : array, shape (n_frames,)
+        Of the recording; shown from 0.
+    keypoint : str
+        The joint.
+    min_score : float
+        A keypoint counts as found above it.
+    note : str
+        What the data are, for the caption.
     """
     errors = errors[errors["keypoint"] == keypoint]
     found = errors[errors["score"] > min_score]

@@ -30,6 +30,11 @@ def detector_colour(name: str) -> str:
     """The colour of a detector, also of variants such as "mmpose-imported"; others take the neutral grey.
 
     All combinations ("combined:BODY+HANDS") share one.
+
+    Examples
+    --------
+    >>> detector_colour("mmpose-imported") == detector_colour("mmpose")
+    True
     """
     kind = name.partition(":")[0]
     known = [detector for detector in DETECTOR_COLOURS if f"{kind}-".startswith(f"{detector}-")]

@@ -36,11 +36,28 @@ def draw_people(
 
     Parameters
     ----------
-    image : array, shape (height, width, 3), RGB, uint8
-    keypoints_px : array, shape (n_persons, 136, 2), NaN where absent
-    scores : array, shape (n_persons, 136); points and limbs below `min_score` are left out
-    colour : any Matplotlib colour; every line gets a thin dark rim so that it shows on any background
-    thickness_px : width of a body limb; default a 260th of the image's diagonal
+    image : array, shape (height, width, 3)
+        RGB, uint8.
+    keypoints_px : array, shape (n_persons, 136, 2)
+        NaN where absent.
+    scores : array, shape (n_persons, 136)
+    colour : str
+        Any Matplotlib colour; every line gets a thin dark rim so that it shows on any background.
+    min_score : float
+        Points below it, and their limbs, are left out.
+    thickness_px : float, optional
+        Width of a body limb; a 260th of the image's diagonal where left out.
+
+    Returns
+    -------
+    array, shape (height, width, 3)
+
+    Examples
+    --------
+    >>> keypoints_px, scores = np.full((1, 136, 2), np.nan), np.zeros((1, 136))
+    >>> keypoints_px[0, 0], scores[0, 0] = (8, 4), 0.9
+    >>> draw_people(np.zeros((9, 16, 3), np.uint8), keypoints_px, scores, "#FF0000")[4, 8].tolist()
+    [255, 0, 0]
     """
     canvas = np.ascontiguousarray(image).copy()
     rgb = tuple(int(round(255 * channel)) for channel in matplotlib.colors.to_rgb(colour))
@@ -56,7 +73,22 @@ def draw_people(
 def draw_detections(
     image: np.ndarray, found: Detections, detector: str, min_score: float = 0.1
 ) -> np.ndarray:
-    """Draw what a detector found onto a copy of an image, in the detector's colour; see `draw_people`."""
+    """Draw what a detector found onto a copy of an image, in the detector's colour.
+
+    Parameters
+    ----------
+    image : array, shape (height, width, 3)
+        RGB, uint8.
+    found : Detections
+    detector : str
+        Its name.
+    min_score : float
+        Points below it, and their limbs, are left out.
+
+    Returns
+    -------
+    array, shape (height, width, 3)
+    """
     return draw_people(image, found.keypoints_px, found.scores, detector_colour(detector), min_score)
 
 
@@ -119,7 +151,21 @@ def picture_grid(
     alt: str,
     cell_in: float = 2.2,
 ) -> Figure:
-    """Pictures in rows and columns, each scaled into an equal cell; None leaves a cell empty."""
+    """Pictures in rows and columns, each scaled into an equal cell.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of array, shape (height, width, 3)
+        RGB, uint8; None leaves a cell empty.
+    row_titles, column_titles : sequence of str
+    caption, alt : str
+    cell_in : float
+        Width of a cell in inches.
+
+    Returns
+    -------
+    Figure
+    """
     n_columns = max(len(row) for row in rows)
     # Each row is as high as its highest picture needs, within limits; cells are equally wide.
     ratios = [[image.shape[0] / image.shape[1] for image in row if image is not None] for row in rows]
@@ -146,9 +192,16 @@ def detections_grid(
 
     Parameters
     ----------
-    pictures : title -> (RGB image, detector name -> its detections); all with the same detectors
-    min_score : keypoints below it are not drawn
-    note : what the pictures are, for the caption
+    pictures : mapping of str to (array, mapping of str to Detections)
+        Title -> RGB image, and detector name -> its detections; all with the same detectors.
+    min_score : float
+        Keypoints below it are not drawn.
+    note : str
+        What the pictures are, for the caption.
+
+    Returns
+    -------
+    Figure
     """
     detectors = list(next(iter(pictures.values()))[1])
     rows = [
@@ -167,6 +220,16 @@ def detections_grid(
 
 
 def visible_scores(visibility: np.ndarray) -> np.ndarray:
-    """Annotated visibility flags as drawing scores: visible 1, occluded 0.5, not labelled 0."""
+    """Annotated visibility flags as drawing scores: visible 1, occluded 0.5, not labelled 0.
+
+    Parameters
+    ----------
+    visibility : array, shape (n_persons, 136)
+        COCO's flags: 0, 1 or 2.
+
+    Returns
+    -------
+    array, shape (n_persons, 136)
+    """
     flags = np.asarray(visibility, dtype=float).reshape(-1, N_KEYPOINTS)
     return np.where(flags >= 2, 1.0, np.where(flags > 0, 0.5, 0.0))

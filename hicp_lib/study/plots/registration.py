@@ -26,9 +26,15 @@ def registration(
 
     Parameters
     ----------
-    clicks : those of the images shown, columns `frame, marker, u_px, v_px`
-    pixels : as from `marker_pixels`; only markers that were clicked are drawn
-    table : as from `compare_registrations`
+    recording : Recording
+    clicks : DataFrame
+        Those of the images shown, columns `frame, marker, u_px, v_px`.
+    pixels : DataFrame
+        As from `marker_pixels`; only markers that were clicked are drawn.
+    table : DataFrame
+        As from `compare_registrations`.
+    note : str
+        What the data are, for the caption.
     """
     frames, methods = sorted(set(clicks["frame"])), list(table["method"])
     figure, axes = new_figure(1, len(frames) + 1, 4.2 * len(frames) + 4.0, 4.4)

@@ -42,9 +42,16 @@ def camera_views(
 
     Parameters
     ----------
-    recordings : view -> recording
-    found : (view, detector) -> detections of each frame
-    frames : numbers of frames that every view has
+    recordings : mapping of str to Recording
+        By view.
+    found : mapping of (str, str) to sequence of Detections
+        By view and detector, one of each frame.
+    frames : sequence of int
+        Numbers of frames that every view has.
+    min_score : float
+        Keypoints below it are not drawn.
+    note : str
+        What the data are, for the caption.
     """
     rows = []
     for k in frames:
@@ -70,8 +77,12 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
 
     Parameters
     ----------
-    medians : table of `hicp_lib.evaluation.space.stability.median_positions`, one method
-    truth : view -> table with `keypoint, x_m, y_m, z_m`; None where it is not known
+    medians : DataFrame
+        As from `hicp_lib.evaluation.space.stability.median_positions`, one method.
+    truth : mapping of str to DataFrame, or None
+        By view, columns `keypoint, x_m, y_m, z_m`; None where it is not known.
+    note : str
+        What the data are, for the caption.
     """
     fewest = min(MIN_IMAGES, medians["n"].max())
     medians = medians[medians["n"] >= fewest]
@@ -111,7 +122,14 @@ def _draw_skeleton(axis, rows: pd.DataFrame, columns: tuple[str, str], colour, s
 def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
     """How far apart the views are against how far off their median is, per part, detector and view.
 
-    `table` from `hicp_lib.evaluation.space.stability.spread_and_bias` with truth, of which `method` is drawn.
+    Parameters
+    ----------
+    table : DataFrame
+        As from `hicp_lib.evaluation.space.stability.spread_and_bias`, with truth.
+    method : str
+        The lifting that is drawn.
+    note : str
+        What the data are, for the caption.
     """
     table = table[table["method"] == method]
     table = table[table["n_images"] >= min(MIN_IMAGES, table["n_images"].max())]

@@ -38,11 +38,19 @@ def scene(
 
     Parameters
     ----------
-    recordings : view -> recording; all camera poses are drawn, and what the first saw in its first frame
-    medians : table of `hicp_lib.evaluation.space.stability.median_positions`, one method; one skeleton per
-        view and detector
-    robot : body segments in the base frame; empty where the joints are not known
-    truth : view -> table with `keypoint, x_m, y_m, z_m`, the first view's is drawn; None where not known
+    recordings : mapping of str to Recording
+        By view; all camera poses are drawn, and what the first saw in its first frame.
+    medians : DataFrame
+        As from `hicp_lib.evaluation.space.stability.median_positions`, one method; one skeleton per view and
+        detector.
+    robot : sequence of Segment
+        The robot's body in the base frame; empty where the joints are not known.
+    truth : mapping of str to DataFrame, optional
+        By view, columns `keypoint, x_m, y_m, z_m`, of which the first is drawn; None where not known.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
     """
     first = next(iter(recordings))
     traces = [point_cloud(recordings[first], 0)]
@@ -71,7 +79,21 @@ def scene(
 def point_cloud(
     recording: Recording, frame: int, n_points: int = 15_000, max_depth_m: float = 1.7
 ) -> go.Scatter3d:
-    """What the camera saw in one frame nearer than `max_depth_m`, as about `n_points` coloured points."""
+    """What the camera saw in one frame, as coloured points in the base frame.
+
+    Parameters
+    ----------
+    recording : Recording
+    frame : int
+    n_points : int
+        About so many.
+    max_depth_m : float
+        What is farther is left out.
+
+    Returns
+    -------
+    plotly.graph_objects.Scatter3d
+    """
     depth_m, rgb = read_depth_m(recording, frame), read_rgb(recording, frame)
     n_near = int((depth_m < max_depth_m).sum())  # no depth is NaN: not near
     step = max(1, int(np.ceil(np.sqrt(n_near / n_points))))

@@ -37,10 +37,13 @@ class Figure:
 
     Attributes
     ----------
-    figure : the Matplotlib figure
-    caption : what is drawn, on what data, with what uncertainty; one or two sentences
-    alt : what a reader who cannot see it should know: the axes and the main finding
-    table : the numbers behind it, offered for download; None for pictures
+    figure : matplotlib.figure.Figure
+    caption : str
+        What is drawn, on what data, with what uncertainty; one or two sentences.
+    alt : str
+        What a reader who cannot see it should know: the axes and the main finding.
+    table : DataFrame or None
+        The numbers behind it, offered for download; None for pictures.
     """
 
     figure: matplotlib.figure.Figure
@@ -64,6 +67,15 @@ def new_figure(n_rows: int = 1, n_columns: int = 1, width_in: float = 8.0, heigh
     """`plt.subplots` with the size in inches, of a figure that pyplot forgets at once.
 
     A notebook then shows what it is given, not what pyplot remembers.
+
+    Parameters
+    ----------
+    n_rows, n_columns : int
+        Of axes.
+    width_in, height_in : float
+        The figure's size in inches.
+    **kwargs
+        Further ones of `plt.subplots`.
     """
     figure, axes = plt.subplots(n_rows, n_columns, figsize=(width_in, height_in), **kwargs)
     plt.close(figure)
@@ -71,12 +83,24 @@ def new_figure(n_rows: int = 1, n_columns: int = 1, width_in: float = 8.0, heigh
 
 
 def in_words(items: Iterable[str]) -> str:
-    """'a', 'a and b', 'a, b and c'."""
+    """Items as one enumerates them.
+
+    Examples
+    --------
+    >>> in_words(["a"]), in_words(["a", "b", "c"]), in_words([])
+    ('a', 'a, b and c', 'nothing')
+    """
     *others, last = list(items) or ["nothing"]
     return f"{', '.join(others)} and {last}" if others else last
 
 
 def series_text(values: pd.Series, pattern: str = "{} {:.2f}") -> str:
-    """`in_words` of a series, each value put into a pattern after the labels of its index."""
+    """`in_words` of a series, each value put into a pattern after the labels of its index.
+
+    Examples
+    --------
+    >>> series_text(pd.Series({"mediapipe": 0.514, "mmpose": 0.7}))
+    'mediapipe 0.51 and mmpose 0.70'
+    """
     keys = values.index.to_frame(index=False).itertuples(index=False, name=None)
     return in_words([pattern.format(*key, value) for key, value in zip(keys, values, strict=True)])

@@ -25,8 +25,12 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
 
     Parameters
     ----------
-    table : at many thresholds
-    marked_m : distances marked in grey; the alt text gives the shares at the middle one
+    table : DataFrame
+        At many thresholds.
+    marked_m : sequence of float
+        Distances marked in grey; the alt text gives the shares at the middle one.
+    note : str
+        What the data are, for the caption.
     """
     table = table.assign(kind=table["part"].str.split().str[1])
     shape = table["view"].nunique(), table["kind"].nunique()
