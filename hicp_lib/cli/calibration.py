@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from hicp_lib.cli.options import PATH, say
+from hicp_lib.cli.options import PATH
 
 
 @click.group()
@@ -27,7 +27,7 @@ def calibration_fit(annotations: Path, detections: Path, detector: str, out: Pat
     people = read_annotations(annotations)
     table, counts = fit_calibrations(people, read_detections(detections, people), detector)
     write_calibrations(out, table)
-    say(f"{out}: " + ", ".join(f"{group} fitted to {n} keypoints" for group, n in counts.items()))
+    click.echo(f"{out}: " + ", ".join(f"{group} fitted to {n} keypoints" for group, n in counts.items()))
 
 
 @calibration.command("apply")
@@ -40,4 +40,4 @@ def calibration_apply(calibrations: Path, detector: str, detections: Path, out: 
     from hicp_lib.evaluation.calibration.files import apply_calibrations, read_calibrations
 
     n = apply_calibrations(detections, read_calibrations(calibrations, detector), out)
-    say(f"{out}: {n} people")
+    click.echo(f"{out}: {n} people")

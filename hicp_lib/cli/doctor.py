@@ -12,10 +12,11 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from hicp_lib.cli.opencv_files import WANTED, overwritten
 from hicp_lib.cli.probes import EXIT_ABSENT, EXIT_FAILED, probes
@@ -31,12 +32,30 @@ PROBE_LIMIT_S = 120.0
 OK, ABSENT, FAIL = "ok", "--", "FAIL"
 """What a check came to; absent is a part that was not installed, which is no fault."""
 PROBE = (sys.executable, "-P", "-m", "hicp_lib.cli.probes")
+_LOCKED = "locked environment"
 _REINSTALL = "rm .venv/.installed; make report"
 
 
 @dataclass(frozen=True)
 class Check:
-    """One line of the doctor: what was looked at, what was found, and what to do if it is not well."""
+    """One line of the doctor.
+
+    Attributes
+    ----------
+    name : str
+        What was looked at.
+    status : str
+        `OK`, `ABSENT` or `FAIL`.
+    finding : str
+        What was found.
+    remedy : str
+        What to do about it; told where it failed.
+
+    Examples
+    --------
+    >>> print(Check.of("results disk", False, "0.1 GB free", "free space"))
+    FAIL results disk: 0.1 GB free; remedy: free space
+    """
 
     name: str
     status: str
@@ -45,7 +64,14 @@ class Check:
 
     @classmethod
     def of(cls, name: str, is_ok: bool, finding: str, remedy: str) -> Check:
-        """A check that is well or not."""
+        """A check that is well or not.
+
+        Parameters
+        ----------
+        name : str
+        is_ok : bool
+        finding, remedy : str
+        """
         return cls(name, OK if is_ok else FAIL, finding, remedy)
 
     def __str__(self) -> str:
@@ -85,21 +111,26 @@ def check_system_libraries() -> Check:
 def check_locked_versions(lock_path: Path) -> Check:
     """That what is installed is what the lock says."""
     if provenance.CHECKOUT is None:
-        return Check("locked environment", OK, "none: hicp was installed without a checkout")
+        return Check(_LOCKED, OK, "none: hicp was installed without a checkout")
     try:
         locked = dict(locked_versions(lock_path.read_text()))
     except OSError as error:
-        return Check.of(
-            "locked environment", False, f"{lock_path}: {error.strerror}", "git restore environment.lock"
-        )
-    wrong = [f"{name} {_installed(name)} instead of {version}" for name, version in locked.items()
-             if _installed(name) != version]  # fmt: skip
+        return Check(_LOCKED, FAIL, f"{lock_path}: {error.strerror}", "git restore environment.lock")
+    found = {name: _installed(name) for name in locked}
+    wrong = [f"{name} {found[name]} instead of {v}" for name, v in locked.items() if found[name] != v]
     finding = f"{len(wrong)} differ: {', '.join(wrong[:3])}" if wrong else f"{len(locked)} packages as locked"
-    return Check.of("locked environment", not wrong, finding, _REINSTALL)
+    return Check.of(_LOCKED, not wrong, finding, _REINSTALL)
 
 
 def locked_versions(lock: str) -> Iterator[tuple[str, str]]:
-    """(name, version) of each locked package that is meant for this Python and system."""
+    """(name, version) of each locked package that is meant for this Python and system.
+
+    Examples
+    --------
+    >>> lock = ["numpy==2.3.5", "winpty==1 ; sys_platform == 'nowhere'"]
+    >>> list(locked_versions("\\n".join(lock)))
+    [('numpy', '2.3.5')]
+    """
     from packaging.requirements import Requirement
 
     for line in re.findall(r"^[A-Za-z0-9][^\\\n]*==[^\\\n]+", lock, re.MULTILINE):
@@ -126,35 +157,31 @@ def check_probe(name: str, command: tuple[str, ...] = PROBE, limit_s: float = PR
 
     Parameters
     ----------
-    command : what runs the trial; its name is appended
-    limit_s : after this the trial and all its processes are ended
+    name : str
+        Of the trial.
+    command : tuple of str
+        What runs the trial; its name is appended.
+    limit_s : float
+        After this the trial and all its processes are ended.
     """
-    process = subprocess.Popen(
-        [*command, name], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        text=True, errors="replace", start_new_session=True,
-    )  # fmt: skip
+    pipe = subprocess.PIPE
+    streams: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": pipe, "stderr": pipe, "text": True}
+    process = subprocess.Popen([*command, name], **streams, errors="replace", start_new_session=True)
     try:
         said, murmured = process.communicate(timeout=limit_s)
     except subprocess.TimeoutExpired:
         return Check(name, FAIL, f"no answer within {limit_s:g} s, ended", _remedy(""))
     finally:
-        _end(process)
-    return _judge(name, process.returncode, _last_line(said), _last_line(murmured))
+        with contextlib.suppress(ProcessLookupError):  # itself, and what it started
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    return _outcome(name, process.returncode, _last_line(said), _last_line(murmured))
 
 
-def _end(process: subprocess.Popen) -> None:
-    """End what may be left of a trial: itself, and processes that it started."""
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-
-
-def _judge(name: str, code: int, said: str, murmured: str) -> Check:
+def _outcome(name: str, code: int, said: str, murmured: str) -> Check:
     """What the end of a trial means; `said` and `murmured` are its last words on the two outputs."""
-    if code == 0:
-        return Check(name, OK, said)
-    if code == EXIT_ABSENT:
-        return Check(name, ABSENT, said)
+    if code in (0, EXIT_ABSENT):
+        return Check(name, ABSENT if code else OK, said)
     if code == EXIT_FAILED and said:
         return Check(name, FAIL, said, _remedy(said))
     ending = signal.Signals(-code).name if code < 0 else f"exit code {code}"
@@ -189,37 +216,37 @@ def check_weights() -> Check:
     try:
         found = {weight.name: status(weight) for weight in registry().values()}
     except InputError as error:
-        return Check.of("weights", False, str(error), "git restore data/detectors.json")
+        return Check("weights", FAIL, str(error), "git restore data/detectors.json")
     wrong = ", ".join(f"{name} {state}" for name, state in found.items() if state != "present")
     return Check.of("weights", not wrong, wrong or f"{len(found)} present and sound", "hicp models fetch")
 
 
 def check_folder(name: str, folder: Path, remedy: str) -> list[Check]:
-    """That files can be written there, and that the disk has room."""
-    there = _nearest_existing(folder)
-    is_writable = _attempt(lambda: _write_there(there))
+    """That files can be written in a folder, and that its disk has room.
+
+    Parameters
+    ----------
+    name : str
+        What the folder is for.
+    folder : Path
+        It need not exist: then the nearest one above counts.
+    remedy : str
+        What to do where one may not write there.
+    """
+    there = next(path for path in (folder, *folder.parents) if path.exists())
+    finding = f"{folder} {'is' if (is_writable := _is_writable(there)) else 'is not'} writable"
     free_gb = shutil.disk_usage(there).free / 1e9
     room = f"{free_gb:.1f} GB free (at least {MIN_FREE_GB:.0f} wanted)"
     return [
-        Check.of(
-            f"{name} folder", is_writable, f"{folder} {'is' if is_writable else 'is not'} writable", remedy
-        ),
+        Check.of(f"{name} folder", is_writable, finding, remedy),
         Check.of(f"{name} disk", free_gb >= MIN_FREE_GB, room, f"free space on the disk of {there}"),
     ]
 
 
-def _nearest_existing(folder: Path) -> Path:
-    return next(path for path in (folder, *folder.parents) if path.exists())
-
-
-def _write_there(folder: Path) -> None:
-    with tempfile.NamedTemporaryFile(dir=folder) as file:
-        file.write(os.urandom(16))
-
-
-def _attempt(action: Callable[[], None]) -> bool:
+def _is_writable(folder: Path) -> bool:
     try:
-        action()
+        with tempfile.NamedTemporaryFile(dir=folder) as file:
+            file.write(b"hicp")
     except OSError:
         return False
     return True

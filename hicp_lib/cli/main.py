@@ -19,9 +19,12 @@ import click
 from hicp_lib import __version__
 from hicp_lib.cli.calibration import calibration
 from hicp_lib.cli.models import models
-from hicp_lib.cli.options import PATH, WORKERS, detector_options, given, say
+from hicp_lib.cli.options import PATH, WORKERS, detector_options, given
 from hicp_lib.cli.recordings import lift, record
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import write_json
+
+IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff")
 
 
 def main() -> NoReturn:
@@ -31,7 +34,23 @@ def main() -> NoReturn:
 
 
 def run(arguments: list[str]) -> int:
-    """Run one command; its exit code. A user's mistake is told in one line on standard error."""
+    """Run one command; its exit code. A user's mistake is told in one line on standard error.
+
+    Parameters
+    ----------
+    arguments : list of str
+        What follows `hicp` on the command line.
+
+    Returns
+    -------
+    int
+        0 done, 1 a notebook or the book failed, 2 bad input or usage, 130 stopped.
+
+    Examples
+    --------
+    >>> run(["no-such-command"])
+    2
+    """
     try:
         return hicp(arguments, prog_name="hicp", standalone_mode=False) or 0
     except click.exceptions.NoArgsIsHelpError as error:
@@ -63,10 +82,8 @@ def hicp() -> None:
     """Human keypoint detection at close range: data, detectors, evaluation, report."""
 
 
-hicp.add_command(record)
-hicp.add_command(lift)
-hicp.add_command(calibration)
-hicp.add_command(models)
+for _command in (record, lift, calibration, models):
+    hicp.add_command(_command)
 
 
 @hicp.group()
@@ -84,7 +101,7 @@ def scenes_render(out: Path, n: int, seed: int, workers: int | None) -> None:
     from hicp_lib.simulation.world.scenes import render_dataset
 
     render_dataset(out, n=n, seed=seed, workers=workers)
-    say(f"{out}: {n} images")
+    click.echo(f"{out}: {n} images")
 
 
 @hicp.group()
@@ -102,7 +119,7 @@ def dataset_create(annotations: Path, images: Path, out: Path, min_pixels: int) 
     from hicp_lib.datasets.subsets import create_hicp
 
     counts = create_hicp(annotations, images, out, min_pixels=min_pixels, progress=sys.stderr.isatty())
-    say(json.dumps(counts, indent=2))
+    click.echo(json.dumps(counts, indent=2))
 
 
 @hicp.command()
@@ -128,34 +145,27 @@ def detect(
         raise click.UsageError("Give either --workers N or --dask ADDRESS.", click.get_current_context())
     if dataset_dir is not None:
         found = detect_dataset(detector, dataset_dir, workers=workers, dask=dask, **given(**chosen))
-    else:
+    elif images_dir is not None:
         paths = _numbered_images(images_dir)
         results = detect_images(detector, paths, workers, dask=dask, **given(**chosen))
         found = {key: result.detections for key, result in results.items()}
-        _write_names(out, paths)
+        # COCO's result layout has no place for names: beside it, the image of each id.
+        names = [{"id": number, "file_name": path.name} for number, path in paths.items()]
+        write_json(out.with_suffix(".images.json"), names, indent=1)
     write_detections(out, found)
-    say(f"{out}: {sum(len(people) for people in found.values())} people in {len(found)} images")
+    click.echo(f"{out}: {sum(len(people) for people in found.values())} people in {len(found)} images")
 
 
 def _numbered_images(folder: Path) -> dict[int, Path]:
     """Image ids as COCO numbers its files (000000012345.jpg is 12345), else by the order of names."""
     if not folder.is_dir():
         raise InputError(f"{folder}: is not a folder; give the folder that holds the images")
-    kinds = {".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff"}
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in kinds)
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES)
     if not paths:
         raise InputError(f"{folder}: holds no images; expected files such as 000001.jpg or photo.png")
     numbers = [int(path.stem) for path in paths if path.stem.isascii() and path.stem.isdigit()]
-    is_numbered = len(set(numbers)) == len(paths)
-    return dict(zip(numbers if is_numbered else range(1, len(paths) + 1), paths, strict=True))
-
-
-def _write_names(out: Path, paths: dict[int, Path]) -> None:
-    """Beside the results, the image of each id: COCO's result layout has no place for names."""
-    from hicp_lib.core.files import write_json
-
-    names = [{"id": number, "file_name": path.name} for number, path in paths.items()]
-    write_json(out.with_suffix(".images.json"), names, indent=1)
+    ids = numbers if len(set(numbers)) == len(paths) else range(1, len(paths) + 1)
+    return dict(zip(ids, paths, strict=True))
 
 
 @hicp.command("import")
@@ -173,8 +183,7 @@ def import_(kind: str, predictions: Path, annotations: Path, out: Path, score_sc
     imported = import_predictions(kind, predictions, read_annotations(annotations), score_scale)
     write_imported(out, imported)
     summary = imported.summary
-    for line in [json.dumps(summary.as_dict(), indent=2)] if as_json else summary.lines():
-        say(line)
+    click.echo(json.dumps(summary.as_dict(), indent=2) if as_json else "\n".join(summary.lines()))
 
 
 @hicp.command("export")
@@ -190,7 +199,7 @@ def export(detections: Path, kind: str, layout: str, annotations: Path | None, o
 
     people = None if annotations is None else read_annotations(annotations)
     n = export_detections(kind, read_detections(detections, people), out, people, layout)
-    say(f"{out}: {n} people")
+    click.echo(f"{out}: {n} people")
 
 
 @hicp.command()
@@ -214,21 +223,21 @@ def evaluate(
     found = read_detections(detections, people)
     evaluation = evaluate_detections(people, found, group, sigmas=sigmas, area=area)
     clusters = source_images(people)  # crops of one image are drawn together
-    rows = bootstrap_intervals(evaluation, seed=seed, clusters=clusters).to_dict("records")
+    table = bootstrap_intervals(evaluation, seed=seed, clusters=clusters).set_index("metric")
+    rows = table[["value", "low", "high"]].to_dict("index")
     if as_json:
-        figures = {row["metric"]: _finite({k: row[k] for k in ("value", "low", "high")}) for row in rows}
-        say(json.dumps(_finite(evaluation.row()) | {"metrics": figures, "seed": seed}, indent=2))
+        metrics = {metric: _finite(row) for metric, row in rows.items()}
+        click.echo(json.dumps(_finite(evaluation.row()) | {"metrics": metrics, "seed": seed}, indent=2))
         return
-    say(
-        f"{group}: {evaluation.n_people} people in {evaluation.n_images} images; {sigmas} sigmas, {area} area"
-    )
+    people_in = f"{evaluation.n_people} people in {evaluation.n_images} images"
+    click.echo(f"{group}: {people_in}; {sigmas} sigmas, {area} area")
     if not any(map(len, found.values())):
-        say(f"{detections}: an empty list: nobody was found in any image")
-    if not any(row["low"] == row["low"] for row in rows):
-        say(f"no intervals: they ask for {MIN_DRAWN} source images at least")
-    for row in rows:
-        interval = f"  [{row['low']:.3f}, {row['high']:.3f}]" if row["low"] == row["low"] else ""
-        say(f"{row['metric']:<5} {row['value']:.3f}{interval}")
+        click.echo(f"{detections}: an empty list: nobody was found in any image")
+    if table["low"].isna().all():
+        click.echo(f"no intervals: they ask for {MIN_DRAWN} source images at least")
+    for metric, row in rows.items():
+        interval = "" if math.isnan(row["low"]) else f"  [{row['low']:.3f}, {row['high']:.3f}]"
+        click.echo(f"{metric:<5} {row['value']:.3f}{interval}")
 
 
 def _finite(row: dict[str, Any]) -> dict[str, Any]:
@@ -240,16 +249,17 @@ def _finite(row: dict[str, Any]) -> dict[str, Any]:
 @click.option("--profile", default="full", show_default=True, help="A profile of notebooks/profiles.toml.")
 @click.option("-p", "--parameter", "pairs", nargs=2, multiple=True, metavar="NAME VALUE",
               help="A notebook parameter; may be repeated.")  # fmt: skip
+@click.option("--only", metavar="NOTEBOOK", help="Run this one and those it needs; build no book.")
 @click.option("--results", "root", type=PATH,
               help="Where results/ and _build/ are written; the working folder if not given.")  # fmt: skip
-def report(profile: str, pairs: tuple[tuple[str, str], ...], root: Path | None) -> int:
+def report(profile: str, pairs: tuple[tuple[str, str], ...], only: str | None, root: Path | None) -> int:
     """Run the notebooks and build the book; what has not changed is not done again."""
     from hicp_lib.core.checkout import sources, working_folder
     from hicp_lib.report.build import make_report
     from hicp_lib.report.runs import RunError
 
     try:
-        make_report(profile, list(pairs), say, sources(), root or working_folder())
+        make_report(profile, list(pairs), click.echo, sources(), root or working_folder(), only)
     except RunError as error:
         return _fail(error, 1)
     return 0
@@ -261,6 +271,5 @@ def doctor() -> int:
     from hicp_lib.cli.doctor import FAIL, run_checks
 
     checks = run_checks()
-    for check in checks:
-        say(str(check))
+    click.echo("\n".join(map(str, checks)))
     return 2 if any(check.status == FAIL for check in checks) else 0

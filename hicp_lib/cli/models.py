@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from hicp_lib.cli.options import detector_options, given, say
+from hicp_lib.cli.options import detector_options, given
 from hicp_lib.core.errors import InputError
 
 
@@ -23,14 +23,14 @@ def models_list() -> None:
     for weight in default.registry().values():
         size = f"{weight.size_bytes / 1e6:5.1f} MB"
         row = f"{weight.name:<32} {default.status(weight):<8} {size}  {weight.licence:<12}"
-        say(f"{row} {', '.join(weight.used_by)}")
-    say("\npublished, fetched by name:")
+        click.echo(f"{row} {', '.join(weight.used_by)}")
+    click.echo("\npublished, fetched by name:")
     for model in published().values():
         size = "     ? MB" if model.size_bytes is None else f"{model.size_bytes / 1e6:6.1f} MB"
         row = f"{model.name:<32} {status(model):<10} {size}  {model.licence or 'licence ?':<12}"
-        say(f"{row} {model.use or 'not run here'}: {model.note}")
+        click.echo(f"{row} {model.use or 'not run here'}: {model.note}")
     for name, options in all_own_options().items():
-        say(f"yours: {name} with {', '.join(f'{key} {value}' for key, value in options.items())}")
+        click.echo(f"yours: {name} with {', '.join(f'{key} {value}' for key, value in options.items())}")
 
 
 @models.command("fetch")
@@ -49,13 +49,13 @@ def models_fetch(names: tuple[str, ...]) -> None:
     others = [name for name in names if name not in by_name]
     if others or not names:
         for name in fetch(others or None):
-            say(f"fetched {name}")
+            click.echo(f"fetched {name}")
         if is_wanted(others) and fetch_program():
-            say("fetched MediaPipe")
+            click.echo("fetched MediaPipe")
     for name in by_name:
         model = fetch_published(name)
         how = f"hicp detect --detector {model.use} {model.path} ..." if model.use else model.note
-        say(f"fetched {name}: {model.path} ({how})")
+        click.echo(f"fetched {name}: {model.path} ({how})")
 
 
 @models.command("show")
@@ -65,7 +65,7 @@ def models_show(detector: str, **chosen) -> None:
     from hicp_lib.detectors.registry import describe, make_detector
 
     for what, value, why in describe(make_detector(detector, **given(**chosen))):
-        say(f"{what:<16} {value}" + (f"  ({why})" if why else ""))
+        click.echo(f"{what:<16} {value}" + (f"  ({why})" if why else ""))
 
 
 @models.command("use")
@@ -82,4 +82,5 @@ def models_use(detector: str, **chosen) -> None:
     if "model" not in options:
         raise InputError(f"detector {detector!r}: no model is named; give it with --model FILE.onnx")
     keep_own(detector, options)
-    say(f"{detector}: {options['model']}; run it in the report with: hicp report -p detectors {detector}")
+    command = f"hicp report -p detectors {detector}"
+    click.echo(f"{detector}: {options['model']}; run it in the report with: {command}")

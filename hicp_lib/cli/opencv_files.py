@@ -15,16 +15,15 @@ _OTHERS = ("opencv-contrib-python", "opencv-contrib-python-headless", "opencv-py
 def overwritten() -> tuple[str, str] | None:
     """What is wrong with the files of `cv2`, and the command that mends it; None if they are as installed."""
     wanted = _installed(WANTED)
-    others = [name for name in _OTHERS if _installed(name)]
+    others = " ".join(name for name in _OTHERS if _installed(name))
     if wanted is None:
-        names = " ".join(others)
-        return f"{names or 'OpenCV'} in the place of {WANTED}", _remedy(names, WANTED)
-    changed = [name for name, sha256 in _recorded(wanted) if _sha256(wanted.locate_file(name)) != sha256]
+        return f"{others or 'OpenCV'} in the place of {WANTED}", _remedy(others, WANTED)
+    folder = Path(str(wanted.locate_file("")))
+    changed = [name for name, sha256 in _recorded(wanted) if _sha256(folder / name) != sha256]
     if not changed:
         return None
-    names = " ".join(others)
-    cause = f"overwritten by {names}" if others else "damaged"
-    return f"{WANTED} is {cause} ({changed[0]})", _remedy(names, f"{WANTED}=={wanted.version}")
+    cause = f"overwritten by {others}" if others else "damaged"
+    return f"{WANTED} is {cause} ({changed[0]})", _remedy(others, f"{WANTED}=={wanted.version}")
 
 
 def _remedy(others: str, requirement: str) -> str:
@@ -42,11 +41,8 @@ def _installed(name: str) -> Distribution | None:
 def _recorded(installed: Distribution) -> list[tuple[str, str]]:
     """Files of `cv2` and their hashes, those that are gone too: `Distribution.files` may leave these out."""
     rows = csv.reader((installed.read_text("RECORD") or "").splitlines())
-    return [
-        (name, stated.removeprefix("sha256="))
-        for name, stated, _ in rows
-        if name.startswith("cv2/") and stated
-    ]
+    listed = [(name, stated.removeprefix("sha256=")) for name, stated, _ in rows if stated]
+    return [(name, sha256) for name, sha256 in listed if name.startswith("cv2/")]
 
 
 def _sha256(path: Path) -> str | None:

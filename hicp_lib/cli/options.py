@@ -1,9 +1,8 @@
-"""What the `hicp` command's parts share: kinds of options, and how results are said."""
+"""Kinds of options that the `hicp` command's parts share."""
 
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,12 +11,6 @@ import click
 
 PATH = click.Path(path_type=Path)
 WORKERS = click.IntRange(min=1)
-
-
-def say(line: str) -> None:
-    """A line on standard output, at once."""
-    click.echo(line)
-    sys.stdout.flush()
 
 
 def detector_options(command: Callable) -> Callable:
@@ -35,7 +28,20 @@ def detector_options(command: Callable) -> Callable:
 
 
 def given(model: Path | None, person_model: Path | None, boxes: str | None, pairs) -> dict[str, Any]:
-    """The detector's options out of the command line's."""
+    """The detector's options out of the command line's.
+
+    Parameters
+    ----------
+    model, person_model : Path or None
+    boxes : str or None
+    pairs : sequence of (str, str)
+        Further options, values as text: JSON's numbers, booleans and lists are read as such.
+
+    Examples
+    --------
+    >>> given(None, None, "gt", [("min_score", "0.5"), ("sides", "left")])
+    {'boxes': 'gt', 'min_score': 0.5, 'sides': 'left'}
+    """
     named = {"model": model, "person_model": person_model, "boxes": boxes}
     return {name: value for name, value in named.items() if value is not None} | {
         name: _value(text) for name, text in pairs

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from hicp_lib.cli.options import PATH, WORKERS, detector_options, given, say
+from hicp_lib.cli.options import PATH, WORKERS, detector_options, given
 
 
 @click.group()
@@ -30,7 +30,7 @@ def simulate(scenario: str, out: Path, n_frames: int | None, seed: int, workers:
     from hicp_lib.experiments.recordings.simulate import simulate_recording
 
     recording = simulate_recording(out, scenario, n_frames, seed, workers, progress=sys.stderr.isatty())
-    say(f"{out}: {len(recording)} frames")
+    click.echo(f"{out}: {len(recording)} frames")
 
 
 @record.command("check")
@@ -45,12 +45,12 @@ def check(folder: Path) -> int:
 
     findings = check_recording(folder)
     for finding in findings:
-        say(f"{'FAIL' if finding.is_fatal else 'note'} {finding}")
+        click.echo(f"{'FAIL' if finding.is_fatal else 'note'} {finding}")
     if any(finding.is_fatal for finding in findings):
         return 2
     recording = open_recording(folder)
     duration_s = recording.times_s[-1] - recording.times_s[0]
-    say(f"ok   {folder}: {len(recording)} frames in {duration_s:.1f} s")
+    click.echo(f"ok   {folder}: {len(recording)} frames in {duration_s:.1f} s")
     return 0
 
 
@@ -75,8 +75,11 @@ def import_(out: Path, bag: Path | None, folder: Path | None, poses: Path | None
     if (bag is None) == (folder is None):
         raise click.UsageError("Give either --bag FILE or --open3d DIR.", click.get_current_context())
     source = read_pose_source(poses, mount)
-    n = import_bag(bag, out, source) if folder is None else import_open3d(folder, out, source, rate)
-    say(f"{out}: {n} frames; check them with: hicp record check {out}")
+    if bag is not None:
+        n = import_bag(bag, out, source)
+    elif folder is not None:
+        n = import_open3d(folder, out, source, rate)
+    click.echo(f"{out}: {n} frames; check them with: hicp record check {out}")
 
 
 @click.command()
@@ -102,4 +105,5 @@ def lift(folder: Path, detector: str, method: str, out: Path, workers: int | Non
     table = lift_recording(recording, [found[k].detections for k in range(len(recording))], method)
     with atomic_path(out) as temporary:
         table.to_csv(temporary, index=False) if is_csv else table.to_parquet(temporary, index=False)
-    say(f"{out}: {table['x_m'].notna().sum()} of {len(table)} keypoints in {len(recording)} frames lifted")
+    n_lifted = table["x_m"].notna().sum()
+    click.echo(f"{out}: {n_lifted} of {len(table)} keypoints in {len(recording)} frames lifted")

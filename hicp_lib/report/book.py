@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.resources
-import json
 import os
 import re
 import shutil
@@ -11,26 +10,40 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from hicp_lib.core.files import sha256_file, write_json
 from hicp_lib.report.checks import book_problems
 from hicp_lib.report.prose import Results, render_page
-from hicp_lib.report.runs import Folders, RunError
+from hicp_lib.report.runs import Folders, RunError, read_stamp
 from hicp_lib.report.sphinx_extension import PLOTLY_PATH, SCRIPTS_DIR
 from hicp_lib.study import provenance
 
 BUILD_LIMIT_S = 900
 # Links lead to files of the checkout. In the book, `book/` is the top and `notebooks/` lies in it.
 _LINK_TO_PAGE, _LINK_TO_NOTEBOOK = ("](../book/", "](../"), ("](../notebooks/", "](notebooks/")
+# MathJax in one file with its fonts inside: browsers refuse font files to pages that are read from disk.
+_SCRIPTS = (
+    ("sphinx-mathjax-offline", "static/mathjax/tex-svg.js", "mathjax.js"),
+    ("plotly", "package_data/plotly.min.js", PLOTLY_PATH),
+)
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 
 
 def build_book(folders: Folders) -> tuple[Path, bool]:
     """Build the book of one profile, unless nothing it is made of changed.
 
+    Parameters
+    ----------
+    folders : Folders
+        The sources of its pages, and the profile's executed notebooks and results.
+
     Returns
     -------
-    Its first page, and whether it was built now.
+    Path
+        Its first page.
+    bool
+        Whether it was built now.
 
     Raises
     ------
@@ -42,23 +55,23 @@ def build_book(folders: Folders) -> tuple[Path, bool]:
     book = folders.root / "_build" / "book" / folders.profile
     stamp = book.with_suffix(".json")
     key = _key(folders)
-    if _is_fresh(book, stamp, key):
+    if read_stamp(stamp) == {"key": key, "outputs": _hashes(book)}:
         return book / "index.html", False
     book.parent.mkdir(parents=True, exist_ok=True)
-    for left_behind in book.parent.glob(f".build-{folders.profile}-*"):
+    prefix = f".build-{folders.profile}-"
+    for left_behind in book.parent.glob(f"{prefix}*"):
         shutil.rmtree(left_behind, ignore_errors=True)
-    staging = Path(tempfile.mkdtemp(prefix=f".build-{folders.profile}-", dir=book.parent))
-    try:
+    with tempfile.TemporaryDirectory(prefix=prefix, dir=book.parent, ignore_cleanup_errors=True) as temporary:
+        staging = Path(temporary)
         _assemble(staging / "source", folders)
         built = _run_sphinx(staging, book.parent / f"{folders.profile}.log")
         shutil.copytree(folders.results, built / "results" / folders.profile)
-        _check(built)
+        if problems := book_problems(built):
+            raise RunError(f"book: {problems[0]} ({len(problems)} such problems in all)")
         stamp.unlink(missing_ok=True)
         shutil.rmtree(book, ignore_errors=True)
         os.replace(built, book)
-        write_json(stamp, {"key": key, "pages": _hashes(book)})
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+        write_json(stamp, {"key": key, "outputs": _hashes(book)})
     return book / "index.html", True
 
 
@@ -73,14 +86,6 @@ def _key(folders: Folders) -> str:
             "installed": provenance.installed_sha256(),
         }
     )
-
-
-def _is_fresh(book: Path, stamp: Path, key: str) -> bool:
-    try:
-        last = json.loads(stamp.read_text())
-        return last["key"] == key and last["pages"] == _hashes(book)
-    except (OSError, ValueError, KeyError):
-        return False
 
 
 def _hashes(folder: Path) -> dict[str, str]:
@@ -102,11 +107,8 @@ def _assemble(source: Path, folders: Folders) -> None:
         (notebooks / executed.name).write_text(executed.read_text().replace(*_LINK_TO_PAGE))
     scripts = source / SCRIPTS_DIR
     scripts.mkdir()
-    # One file with its fonts inside: browsers refuse font files to pages that are read from disk.
-    mathjax = importlib.resources.files("sphinx-mathjax-offline") / "static" / "mathjax" / "tex-svg.js"
-    shutil.copy(str(mathjax), scripts / "mathjax.js")
-    plotly = importlib.resources.files("plotly") / "package_data" / "plotly.min.js"
-    shutil.copy(str(plotly), scripts / PLOTLY_PATH)
+    for package, path, name in _SCRIPTS:
+        shutil.copy(str(importlib.resources.files(package) / path), scripts / name)
 
 
 def _book_stamp(folders: Folders) -> dict:
@@ -124,15 +126,10 @@ def _run_sphinx(staging: Path, log: Path) -> Path:
     """Build with every warning an error; the folder of the pages."""
     command = [sys.executable, "-c", "from jupyter_book.cli.main import main; main()"]
     command += ["build", str(staging / "source"), "--path-output", str(staging), "-W", "--keep-going", "-q"]
+    environment = os.environ | {"PYTHONNOUSERSITE": "1"}
     with open(log, "wb") as output:
-        done = subprocess.run(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            timeout=BUILD_LIMIT_S,
-            env=os.environ | {"PYTHONNOUSERSITE": "1"},
-        )
+        streams: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": output, "stderr": subprocess.STDOUT}
+        done = subprocess.run(command, **streams, timeout=BUILD_LIMIT_S, env=environment)
     built = staging / "_build" / "html"
     if done.returncode != 0 or not (built / "index.html").is_file():
         lines = _COLOURS.sub("", log.read_text(errors="replace")).splitlines()
@@ -140,9 +137,3 @@ def _run_sphinx(staging: Path, log: Path) -> Path:
         first = warnings[0].replace(str(staging / "source"), "book") if warnings else "no output"
         raise RunError(f"book: {first} ({len(warnings)} in all; see {log})")
     return built
-
-
-def _check(built: Path) -> None:
-    problems = book_problems(built)
-    if problems:
-        raise RunError(f"book: {problems[0]} ({len(problems)} such problems in all)")

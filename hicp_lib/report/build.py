@@ -15,33 +15,65 @@ from hicp_lib.report.runs import Folders, Run, run_all
 
 
 def make_report(
-    profile: str, pairs: list[tuple[str, str]], say: Callable[[str], None], sources: Path, root: Path
-) -> Path:
+    profile: str,
+    pairs: list[tuple[str, str]],
+    log: Callable[[str], None],
+    sources: Path,
+    root: Path,
+    only: str | None = None,
+) -> Path | None:
     """Run the notebooks of a study under a profile of its `notebooks/profiles.toml`, and build the book.
 
     Parameters
     ----------
-    pairs : parameter names and values, as text, that override the profile's
-    say : takes one line of progress
-    sources : holds `notebooks` and `book`
-    root : `results` and `_build` are written below it
+    profile : str
+    pairs : list of (str, str)
+        Names of parameters and their values as text, which override the profile's.
+    log : callable
+        Takes one line of progress.
+    sources : Path
+        Holds `notebooks` and `book`.
+    root : Path
+        `results` and `_build` are written below it.
+    only : str, optional
+        Name of a notebook: it runs, and those it needs by the profiles' `[after]`; no book is built.
 
     Returns
     -------
-    The first page of the book.
+    Path or None
+        The first page of the book; None where it was not asked for.
 
     Raises
     ------
     InputError
-        For an unknown profile or parameter, or when another report of this profile is being made.
+        For an unknown profile, parameter or notebook, or when another report of this profile is being made.
     RunError
         When a notebook fails, or the book has a fault.
     """
     start_s = time.perf_counter()
-    notebooks = read_notebooks(sources / "notebooks")
-    chosen = read_profile(sources / "notebooks" / "profiles.toml", profile, notebooks)
+    runs = _plan(profile, pairs, sources / "notebooks", only)
+    folders = Folders(sources, root.resolve(), profile)
+    with _alone(folders):
+        run_all(runs, folders, log, only)
+        page, is_new = build_book(folders) if only is None else (None, False)
+    took = f"({time.perf_counter() - start_s:.0f} s)"
+    if only is not None:
+        log(f"The results are in {folders.results / only}; no other notebook ran, no book was built {took}")
+        return None
+    log(f"book: {'built' if is_new else 'unchanged'}")
+    log(f"The report is {page} {took}")
+    return page
+
+
+def _plan(profile: str, pairs: list[tuple[str, str]], folder: Path, only: str | None) -> list[Run]:
+    """Every notebook with its parameters, of three sources the last one counts: cell, profile, `pairs`."""
+    notebooks = read_notebooks(folder)
+    names = [notebook.name for notebook in notebooks]
+    if only is not None and only not in names:
+        raise InputError(f"--only {only}: there is no such notebook; choose one of {', '.join(names)}")
+    chosen = read_profile(folder / "profiles.toml", profile, notebooks)
     overrides = parse_overrides(pairs, notebooks)
-    runs = [
+    return [
         Run(
             notebook,
             notebook.defaults | chosen.parameters.get(notebook.name, {}) | overrides[notebook.name],
@@ -49,13 +81,6 @@ def make_report(
         )
         for notebook in notebooks
     ]
-    folders = Folders(sources, root.resolve(), profile)
-    with _alone(folders):
-        run_all(runs, folders, say)
-        page, is_new = build_book(folders)
-    say(f"book: {'built' if is_new else 'unchanged'}")
-    say(f"The report is {page} ({time.perf_counter() - start_s:.0f} s)")
-    return page
 
 
 @contextmanager

@@ -6,30 +6,11 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
-# Attributes through which a page loads something by itself; links that a reader clicks are fine.
-_LOADING = {
-    "script": ("src",),
-    "img": ("src", "srcset"),
-    "iframe": ("src",),
-    "source": ("src", "srcset"),
-    "video": ("src", "poster"),
-    "audio": ("src",),
-    "object": ("data",),
-    "embed": ("src",),
-    "link": ("href",),
-}
+# Attributes through which an element loads something by itself; links that a reader clicks are fine.
+_LOADING = ("src", "srcset", "poster", "data")
 _HARMLESS_LINKS = {
-    "canonical",
-    "author",
-    "license",
-    "index",
-    "search",
-    "next",
-    "prev",
-    "top",
-    "copyright",
-    "help",
-}
+    "canonical", "author", "license", "index", "search", "next", "prev", "top", "copyright", "help",
+}  # fmt: skip
 _REMOTE = re.compile(r"\s*(https?:)?//", re.IGNORECASE)
 _REMOTE_IN_CSS = re.compile(r"(url\(\s*['\"]?|@import\s+['\"])\s*(https?:)?//", re.IGNORECASE)
 _LOADING_IN_SCRIPT = re.compile(
@@ -52,9 +33,9 @@ class _Page(HTMLParser):
             self.problems.append(f"image without alt text: {given.get('src', '')[:60]}")
         if "hicp-scene" in given.get("class", "") and not given.get("aria-label", "").strip():
             self.problems.append("3D scene without a description")
-        if tag == "link" and set(given.get("rel", "").lower().split()) & _HARMLESS_LINKS:
-            return
-        for name in _LOADING.get(tag, ()):
+        is_harmless = set(given.get("rel", "").lower().split()) & _HARMLESS_LINKS
+        loading = _LOADING if tag != "link" else () if is_harmless else ("href",)
+        for name in loading:
             if _REMOTE.match(given.get(name, "")):
                 self.problems.append(f"loads from the network: <{tag} {name}={given[name][:80]}>")
         if _REMOTE_IN_CSS.search(given.get("style", "")):
@@ -76,7 +57,21 @@ def _says_nothing(alt: str) -> bool:
 
 
 def book_problems(folder: Path) -> list[str]:
-    """What in a built book needs a network or lacks words, one line each; empty when it is sound."""
+    """What in a built book needs a network or lacks words, one line each; empty when it is sound.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the built pages; all HTML and CSS files in it are read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "index.html").write_text('<img src="https://a.org/b.png" alt="A bird">')
+    ...     book_problems(Path(folder))
+    ['index.html: loads from the network: <img src=https://a.org/b.png>']
+    """
     problems = []
     for path in sorted(folder.rglob("*.html")):
         page = _Page()

@@ -24,10 +24,14 @@ class Notebook:
 
     Attributes
     ----------
-    path : the file; `name` is its name without `.ipynb`
-    defaults : name -> value of every parameter, as its `parameters` cell assigns them
-    source_sha256 : hash of its cells' kinds, tags and text; outputs and other metadata do not count
-    imports : names of the modules it imports
+    path : Path
+        The file; `name` is its name without `.ipynb`.
+    defaults : dict of str to object
+        The value of every parameter by its name, as its `parameters` cell assigns them.
+    source_sha256 : str
+        Hash of its cells' kinds, tags and text; outputs and other metadata do not count.
+    imports : frozenset of str
+        Names of the modules it imports.
     """
 
     path: Path
@@ -42,9 +46,15 @@ class Notebook:
 
 @dataclass(frozen=True)
 class Profile:
-    """What one profile asks for: per notebook the parameters that differ from the defaults.
+    """What one profile asks for.
 
-    `after` names, per notebook, those whose results it reads or whose work it shares.
+    Attributes
+    ----------
+    name : str
+    parameters : dict of str to dict
+        Per notebook, the parameters that differ from the defaults.
+    after : dict of str to list of str
+        Per notebook, those whose results it reads or whose work it shares.
     """
 
     name: str
@@ -99,10 +109,13 @@ def _assignments(source: str, path: Path) -> dict[str, Any]:
     """Name -> value of `name = literal` lines. The text is parsed, never run."""
     values = {}
     try:
-        for line in ast.parse(source).body:
-            target = line.targets[0] if isinstance(line, ast.Assign) else line.target
-            values[target.id] = ast.literal_eval(line.value)
-    except (SyntaxError, AttributeError, ValueError, TypeError):
+        for statement in ast.parse(source).body:
+            match statement:
+                case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
+                    values[name] = ast.literal_eval(statement.value or "")
+                case _:
+                    raise ValueError(ast.unparse(statement))
+    except (SyntaxError, ValueError, TypeError):
         raise InputError(
             f"{path}: its parameters cell is not `name = value` lines with literal values; rewrite it so"
         ) from None
@@ -110,7 +123,20 @@ def _assignments(source: str, path: Path) -> dict[str, Any]:
 
 
 def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
-    """Read profile `name` from the file of profiles and check it against the notebooks.
+    """Read a profile from the file of profiles and check it against the notebooks.
+
+    Parameters
+    ----------
+    path : Path
+        The TOML file; `[PROFILE.NOTEBOOK]` sets parameters, `[after]` names those that
+        come before others.
+    name : str
+        Of the profile.
+    notebooks : list of Notebook
+
+    Returns
+    -------
+    Profile
 
     Raises
     ------
@@ -147,10 +173,28 @@ def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
 def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> dict[str, Any]:
     """`given` if the notebook declares every name with that type; int counts as float.
 
+    Parameters
+    ----------
+    notebook : Notebook
+    given : dict of str to object
+        Values by the parameters' names.
+    origin : str
+        Where they are from, in words: the message begins with it.
+
     Raises
     ------
     InputError
         Naming the unknown parameter and the known ones, or the type that was expected.
+
+    Examples
+    --------
+    >>> book = Notebook(Path("05_tiny.ipynb"), {"seed": 0, "share": 0.5}, "", frozenset())
+    >>> check_parameters(book, {"share": 1}, "-p share")
+    {'share': 1}
+    >>> check_parameters(book, {"seed": "one"}, "-p seed")
+    Traceback (most recent call last):
+        ...
+    hicp_lib.core.errors.InputError: -p seed: 05_tiny: 'seed' is "one"; expected an integer such as 0
     """
     for name, value in given.items():
         if name not in notebook.defaults:
@@ -179,7 +223,13 @@ def _article(kind: type) -> str:
 
 
 def is_path(name: str, default: Any) -> bool:
-    """Whether a parameter names a file or folder: text, empty by default or called `*_path` or `*_dir`."""
+    """Whether a parameter names a file or folder: text, empty by default or called `*_path` or `*_dir`.
+
+    Examples
+    --------
+    >>> is_path("images_dir", "data"), is_path("recording", ""), is_path("source", "rendered")
+    (True, True, False)
+    """
     return isinstance(default, str) and (default == "" or name.endswith(("_path", "_dir")))
 
 
@@ -189,10 +239,26 @@ def parse_overrides(pairs: list[tuple[str, str]], notebooks: list[Notebook]) -> 
     A value is read by the type of the notebook's default: `true`/`false`, numbers, lists as
     `a,b` or JSON. Paths are made absolute, since notebooks run in their own folder.
 
+    Parameters
+    ----------
+    pairs : list of (str, str)
+    notebooks : list of Notebook
+
+    Returns
+    -------
+    dict of str to dict
+        By every notebook's name, the values that were given for it.
+
     Raises
     ------
     InputError
         If no notebook declares the name, or the value does not fit.
+
+    Examples
+    --------
+    >>> tiny = Notebook(Path("05_tiny.ipynb"), {"seed": 0, "detectors": ["mediapipe"]}, "", frozenset())
+    >>> parse_overrides([("seed", "3"), ("detectors", "openpose,mmpose")], [tiny])
+    {'05_tiny': {'seed': 3, 'detectors': ['openpose', 'mmpose']}}
     """
     overrides: dict[str, dict[str, Any]] = {notebook.name: {} for notebook in notebooks}
     for name, text in pairs:

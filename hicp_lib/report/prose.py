@@ -31,7 +31,15 @@ NOT_RUN = "not run"
 
 
 class Results:
-    """The result files of one profile, as the pages see them."""
+    """The result files of one profile, as the pages see them.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds a folder of results per notebook.
+    profile : str
+        Its name, as in the book's links to files.
+    """
 
     def __init__(self, folder: Path, profile: str):
         self._folder = folder
@@ -42,7 +50,19 @@ class Results:
         return sorted(path.parent.name for path in self._folder.glob("*/values.json"))
 
     def value(self, notebook: str, name: str, digits: int | None = None) -> str:
-        """A recorded value as text; "not run" when the notebook recorded None."""
+        """A recorded value as text; "not run" when the notebook recorded None.
+
+        Parameters
+        ----------
+        notebook, name : str
+        digits : int, optional
+            Decimals; the number as it is where left out.
+
+        Raises
+        ------
+        InputError
+            If the notebook recorded no such value.
+        """
         value = self._entry(notebook, "values.json", name)
         if value is None:
             return NOT_RUN
@@ -53,7 +73,21 @@ class Results:
         return self._entry(notebook, "values.json", name)
 
     def table(self, notebook: str, name: str, columns: list[str] | None = None, digits: int = 2) -> str:
-        """A saved table in Markdown; what is missing is a dash."""
+        """A saved table in Markdown; what is missing is a dash.
+
+        Parameters
+        ----------
+        notebook, name : str
+        columns : list of str, optional
+            Those to show, in this order; all where left out.
+        digits : int
+            Decimals of its numbers.
+
+        Raises
+        ------
+        InputError
+            If the notebook saved no such table.
+        """
         path = self._folder / notebook / f"{name}.parquet"
         if not path.is_file():
             raise InputError(f"{path}: a page of the book needs this table; save it in the notebook")
@@ -84,7 +118,15 @@ class Results:
 
 
 def markdown_table(table: pd.DataFrame, digits: int = 2) -> str:
-    """A table in Markdown, numbers rounded to `digits` decimals; what is missing is a dash."""
+    """A table in Markdown, numbers rounded to `digits` decimals; what is missing is a dash.
+
+    Examples
+    --------
+    >>> print(markdown_table(pd.DataFrame({"detector": ["a|b"], "AP": [0.714]})))
+    | detector | AP |
+    |---|---|
+    | a\\|b | 0.71 |
+    """
 
     def cell(value: Any) -> str:
         if value is None or value is pd.NA or value != value:
@@ -99,6 +141,18 @@ def markdown_table(table: pd.DataFrame, digits: int = 2) -> str:
 
 def render_page(source: Path, results: Results, profile: str) -> str:
     """Fill one Markdown template.
+
+    Parameters
+    ----------
+    source : Path
+        The page, with the names of this module's list between double braces.
+    results : Results
+    profile : str
+
+    Returns
+    -------
+    str
+        The page in Markdown.
 
     Raises
     ------

@@ -18,22 +18,23 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import IO, Any, cast
 
 import nbformat
+import psutil
 
 from hicp_lib.core.cache import code, digest, input_sha256
 from hicp_lib.core.checkout import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import sha256_file, write_json
+from hicp_lib.core.files import read_json, sha256_file, write_json
 from hicp_lib.report.notebooks import Notebook, is_path
-from hicp_lib.report.schedule import run_when_ready
+from hicp_lib.report.schedule import needed, run_when_ready
 from hicp_lib.study import provenance
 
 WALL_LIMIT_S = 2 * 3600
-N_PARALLEL = 2
+MEMORY_PER_RUN_BYTES = 2 * 10**9
+"""What one notebook may need with its workers; the study's largest takes 0.7 GB without them."""
 
 
 class RunError(RuntimeError):
@@ -46,8 +47,12 @@ class Folders:
 
     Attributes
     ----------
-    sources : holds `notebooks` and `book`
-    root : results and the built book go below it
+    sources : Path
+        Holds `notebooks` and `book`.
+    root : Path
+        Results and the built book go below it.
+    profile : str
+        Its name.
     """
 
     sources: Path
@@ -67,20 +72,34 @@ class Folders:
 
 @dataclass(frozen=True)
 class Run:
-    """One notebook with every parameter it runs with, and the runs that come before it."""
+    """One notebook with everything it runs with.
+
+    Attributes
+    ----------
+    notebook : Notebook
+    parameters : dict of str to object
+        Every parameter's value by its name.
+    after : tuple of str
+        Names of the notebooks that come before it.
+    """
 
     notebook: Notebook
     parameters: dict[str, Any]
     after: tuple[str, ...] = ()
 
 
-def run_all(runs: list[Run], folders: Folders, say: Callable[[str], None]) -> None:
-    """Bring every run up to date, two at a time where they do not depend on each other.
+def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None], only: str | None = None) -> None:
+    """Bring every run up to date, some at a time where they do not depend on each other.
 
     Parameters
     ----------
-    runs : those they name in `after` run before them; what is not among them is left out
-    say : takes one line per notebook
+    runs : list of Run
+        Those they name in `after` run before them; what is not among them is left out.
+    folders : Folders
+    log : callable
+        Takes one line per notebook.
+    only : str, optional
+        Name of the notebook that is wanted: it and those it needs run; all are, where it is left out.
 
     Raises
     ------
@@ -89,50 +108,68 @@ def run_all(runs: list[Run], folders: Folders, say: Callable[[str], None]) -> No
     InputError
         If a parameter names a file or folder that does not exist.
     """
-    for run in runs:
-        _input_paths(run)  # a mistake is told now, not when the notebook's turn comes
+    named = {run.notebook.name: run for run in runs}
+    after = {name: [other for other in run.after if other in named] for name, run in named.items()}
+    if only is not None:
+        after = {name: after[name] for name in named if name in needed(after, only)}
+    for name in after:
+        _input_paths(named[name])  # a mistake is told now, not when the notebook's turn comes
     folders.executed.mkdir(parents=True, exist_ok=True)
     for left_behind in folders.executed.glob(".run-*"):
         shutil.rmtree(left_behind, ignore_errors=True)
-    kept = {run.notebook.name for run in runs}
     for stamp in folders.executed.glob("*.json"):
-        if stamp.stem not in kept:
+        if stamp.stem not in named:
             _discard(stamp.stem, folders)
-    named = {run.notebook.name: run for run in runs}
-    after = {name: [other for other in run.after if other in named] for name, run in named.items()}
-    with ThreadPoolExecutor(N_PARALLEL) as pool, _Children() as children:
+    n_workers = n_parallel()
+    with ThreadPoolExecutor(n_workers) as pool, _Children() as children:
 
         def job(name: str, before: list[Future]) -> str:
-            return _bring_up_to_date(named[name], before, folders, children, say)
+            return _bring_up_to_date(named[name], before, folders, children, log)
 
-        done = run_when_ready(after, job, pool, N_PARALLEL)
-    for error in (done[name].exception() for name in named):
+        done = run_when_ready(after, job, pool, n_workers)
+    for error in (done[name].exception() for name in after):
         if error is not None and not isinstance(error, _SkippedError):
             raise error
+
+
+def n_parallel() -> int:
+    """Notebooks to run at a time: one per core this process may use, as far as there is memory for them."""
+    fitting = psutil.virtual_memory().available // MEMORY_PER_RUN_BYTES
+    return max(1, min(provenance.usable_cores(), fitting))
 
 
 class _SkippedError(Exception):
     """A notebook that was not run because one before it failed."""
 
 
-def _bring_up_to_date(run: Run, before: list[Future], folders: Folders, children: _Children, say) -> str:
+def _bring_up_to_date(run: Run, before: list[Future], folders: Folders, children: _Children, log) -> str:
     """Run the notebook unless it is fresh; its key's digest."""
     if any(future.exception() for future in before):
         raise _SkippedError
-    key = run_key(run, [future.result() for future in before])
-    reason = why_stale(run.notebook.name, key, folders)
+    name, key = run.notebook.name, run_key(run, [future.result() for future in before])
+    reason = why_stale(name, key, folders)
     if reason is None:
-        say(f"{run.notebook.name}: unchanged")
-        return digest(key)
-    say(f"{run.notebook.name}: running ({reason}) ...")
-    start_s = time.perf_counter()
-    run_notebook(run, key, folders, children)
-    say(f"{run.notebook.name}: done in {time.perf_counter() - start_s:.1f} s")
+        log(f"{name}: unchanged")
+    else:
+        log(f"{name}: running ({reason}) ...")
+        start_s = time.perf_counter()
+        run_notebook(run, key, folders, children)
+        log(f"{name}: done in {time.perf_counter() - start_s:.1f} s")
     return digest(key)
 
 
 def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
     """Hashes of everything the outcome of a run depends on, by what they stand for.
+
+    Parameters
+    ----------
+    run : Run
+    before : list of str, optional
+        Digests of the keys of the runs before it.
+
+    Returns
+    -------
+    dict of str to str
 
     Raises
     ------
@@ -167,16 +204,31 @@ def _input_paths(run: Run) -> dict[str, Path]:
 
 
 def why_stale(name: str, key: dict[str, Any], folders: Folders) -> str | None:
-    """What makes a new run necessary, in words; None when the last run still holds."""
-    try:
-        stamp = json.loads((folders.executed / f"{name}.json").read_text())
-        changed = [part for part in key if stamp["key"].get(part) != key[part]]
-        outputs = stamp["outputs"]
-    except (OSError, ValueError, KeyError, AttributeError):
+    """What makes a new run necessary, in words; None when the last run still holds.
+
+    Parameters
+    ----------
+    name : str
+        The notebook's.
+    key : dict of str to str
+        As from `run_key`.
+    folders : Folders
+    """
+    stamp = read_stamp(folders.executed / f"{name}.json")
+    if stamp is None:
         return "no complete run yet"
-    if changed:
+    if changed := [part for part in key if stamp["key"].get(part) != key[part]]:
         return f"changed: {', '.join(changed)}"
-    return None if outputs == _outputs(name, folders) else "its outputs were changed"
+    return None if stamp["outputs"] == _outputs(name, folders) else "its outputs were changed"
+
+
+def read_stamp(path: Path) -> dict[str, Any] | None:
+    """The stamp of what was made last: its `key` and `outputs`; None where nothing was made whole."""
+    try:
+        stamp = json.loads(path.read_bytes())
+        return stamp if isinstance(stamp["outputs"], dict) and stamp["key"] else None
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
 
 
 def _outputs(name: str, folders: Folders) -> dict[str, str]:
@@ -188,29 +240,40 @@ def _outputs(name: str, folders: Folders) -> dict[str, str]:
 def run_notebook(run: Run, key: dict[str, Any], folders: Folders, children: _Children) -> None:
     """Run a notebook and put its outcome in place of the last one.
 
+    Parameters
+    ----------
+    run : Run
+    key : dict of str to str
+        As from `run_key`: what its stamp will say.
+    folders : Folders
+    children : _Children
+        Runs it, and ends it when the report ends.
+
     Raises
     ------
     RunError
         If a cell failed, wrote to stderr or took too long, or the results are not those of this run.
     """
     name = run.notebook.name
-    staging = Path(tempfile.mkdtemp(prefix=f".run-{name}-", dir=folders.executed))
-    copy = staging / f"{name}.ipynb"
-    try:
-        status = children.execute(run, copy, staging, folders)
-        _check(run, status, copy, staging)
-        if run_key(run)["library"] != key["library"]:
-            raise RunError(f"{name}: hicp_lib was changed while it ran; run the report again")
+    prefix = f".run-{name}-"
+    with tempfile.TemporaryDirectory(
+        prefix=prefix, dir=folders.executed, ignore_cleanup_errors=True
+    ) as temporary:
+        staging = Path(temporary)
+        copy = staging / f"{name}.ipynb"
+        try:
+            status = children.execute(run, copy, staging, folders)
+            _check(run, status, copy, staging)
+            if run_key(run)["library"] != key["library"]:
+                raise RunError("hicp_lib was changed while it ran; run the report again")
+        except RunError as error:
+            raise RunError(f"{name}: {error}{_keep_failed(copy, staging, folders)}") from None
         _discard(name, folders)
         folders.results.mkdir(parents=True, exist_ok=True)
         os.replace(staging / "results" / name, folders.results / name)
         os.replace(copy, folders.executed / copy.name)
-        stamp = {"key": key, "parameters": run.parameters, "outputs": _outputs(name, folders)}
-        write_json(folders.executed / f"{name}.json", stamp, indent=2)
-    except RunError as error:
-        raise RunError(f"{error}{_keep_failed(copy, staging, folders)}") from None
-    finally:
-        shutil.rmtree(staging, ignore_errors=True)
+    stamp = {"key": key, "parameters": run.parameters, "outputs": _outputs(name, folders)}
+    write_json(folders.executed / f"{name}.json", stamp, indent=2)
 
 
 def _discard(name: str, folders: Folders) -> None:
@@ -234,29 +297,28 @@ def _keep_failed(copy: Path, staging: Path, folders: Folders) -> str:
 
 def _check(run: Run, status: int | None, copy: Path, staging: Path) -> None:
     """Raise RunError unless the executed copy and its results are whole."""
-    name = run.notebook.name
     if status is None:
-        raise RunError(f"{name}: took longer than {WALL_LIMIT_S} s and was stopped")
+        raise RunError(f"took longer than {WALL_LIMIT_S} s and was stopped")
     if not copy.is_file():
-        log = (staging / "log.txt").read_text(errors="replace").strip().splitlines()
-        raise RunError(f"{name}: did not run: {log[-1] if log else f'exit code {status}'}")
-    problem = first_problem(copy)
-    if problem is None and status != 0:
-        problem = f"exit code {status}"
+        lines = (staging / "log.txt").read_text(errors="replace").strip().splitlines()
+        raise RunError(f"did not run: {lines[-1] if lines else f'exit code {status}'}")
+    problem = first_problem(copy) or (f"exit code {status}" if status else None)
     if problem is not None:
-        raise RunError(f"{name}: {problem}")
+        raise RunError(problem)
     try:
-        stamp = json.loads((staging / "results" / name / "provenance.json").read_text())
-    except (OSError, ValueError):
-        raise RunError(f"{name}: ended without results; its last line must be `study.finish()`") from None
+        stamp = read_json(staging / "results" / run.notebook.name / "provenance.json")
+    except InputError:
+        raise RunError("ended without results; its last line must be `study.finish()`") from None
     if stamp["parameters"] != json.loads(json.dumps(run.parameters)):
-        raise RunError(f"{name}: its results state other parameters than it ran with; pass all to `Study`")
+        raise RunError("its results state other parameters than it ran with; pass all to `Study`")
 
 
 def first_problem(executed: Path) -> str | None:
     """The first cell of an executed notebook that did not complete or wrote to stderr, in words."""
     cells = nbformat.read(executed, as_version=4).cells
-    for cell in (cell for cell in cells if cell.cell_type == "code"):
+    for cell in cells:
+        if cell.cell_type != "code":
+            continue
         place = f"In [{cell.execution_count or ' '}]"
         for output in cell.outputs:
             if output.output_type == "error":
@@ -272,7 +334,7 @@ class _Children:
     """The running processes; leaving the context for any reason ends them all."""
 
     def __init__(self) -> None:
-        self._running: set[subprocess.Popen] = set()
+        self._pipes: set[IO[bytes]] = set()
         self._ended = False
 
     def __enter__(self) -> _Children:
@@ -280,13 +342,28 @@ class _Children:
 
     def __exit__(self, *_: object) -> None:
         self._ended = True
-        for process in list(self._running):
-            process.stdin.close()
+        for pipe in list(self._pipes):
+            pipe.close()
 
     def execute(self, run: Run, copy: Path, staging: Path, folders: Folders) -> int | None:
-        """Run the notebook into `copy`; the exit code, or None when it hit the wall limit."""
+        """Run the notebook into `copy`; the exit code, or None when it hit the wall limit.
+
+        Parameters
+        ----------
+        run : Run
+        copy : Path
+            The executed notebook to write.
+        staging : Path
+            An empty folder for its job, log and results.
+        folders : Folders
+
+        Raises
+        ------
+        RunError
+            If the report is being stopped.
+        """
         if self._ended:
-            raise RunError(f"{run.notebook.name}: was not run, the report was stopped")
+            raise RunError("was not run, the report was stopped")
         folder = run.notebook.path.parent.resolve()
         defaults = run.notebook.defaults
         changed = {name: value for name, value in run.parameters.items() if value != defaults[name]}
@@ -294,30 +371,27 @@ class _Children:
         write_json(staging / "job.json", job | {"parameters": changed})
         command = [sys.executable, "-m", "hicp_lib.report.execute", str(staging / "job.json")]
         with open(staging / "log.txt", "wb") as log, tempfile.TemporaryDirectory(prefix="hicp-") as private:
-            process = subprocess.Popen(
-                command,
-                stdin=subprocess.PIPE,
-                stdout=log,
-                stderr=log,
-                env=_environment(staging, folders, private),
-                # What ends the report's whole process group must not end this one before it has
-                # ended the kernel's workers.
-                start_new_session=True,
-            )
-            self._running.add(process)
+            streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": log, "stderr": log}
+            environment = _environment(staging, folders, private)
+            # In a session of its own: what ends the report's whole process group must not end this one
+            # before it has ended the kernel's workers.
+            process = subprocess.Popen(command, **streams, env=environment, start_new_session=True)
+            pipe = cast(IO[bytes], process.stdin)
+            self._pipes.add(pipe)
             try:
                 return process.wait(WALL_LIMIT_S)
             except subprocess.TimeoutExpired:
                 return None
             finally:
-                process.stdin.close()
+                pipe.close()
                 process.wait()
-                self._running.discard(process)
+                self._pipes.discard(pipe)
 
 
 def _environment(staging: Path, folders: Folders, private: str) -> dict[str, str]:
     """A kernel's environment: nothing of the user's own set-up may move a number or a pixel."""
-    matplotlib = find_spec("matplotlib")
+    import matplotlib
+
     return os.environ | {
         RESULTS_VARIABLE: str(staging / "results"),
         EARLIER_RESULTS_VARIABLE: str(folders.results.resolve()),
@@ -325,7 +399,7 @@ def _environment(staging: Path, folders: Folders, private: str) -> dict[str, str
         "IPYTHONDIR": private,
         "JUPYTER_RUNTIME_DIR": private,
         "JUPYTER_PREFER_ENV_PATH": "1",
-        "MATPLOTLIBRC": str(Path(matplotlib.origin).parent / "mpl-data" / "matplotlibrc"),
+        "MATPLOTLIBRC": str(Path(matplotlib.get_data_path(), "matplotlibrc")),
         "MPLBACKEND": "module://matplotlib_inline.backend_inline",
         "OMP_NUM_THREADS": "1",
         "OPENBLAS_NUM_THREADS": "1",

@@ -8,6 +8,17 @@ from functools import cache
 from graphlib import TopologicalSorter
 
 
+def needed(after: Mapping[str, Sequence[str]], name: str) -> set[str]:
+    """A job and all that come before it, directly or through others.
+
+    Examples
+    --------
+    >>> sorted(needed({"a": [], "b": ["a"], "c": ["b"], "d": ["a"]}, "c"))
+    ['a', 'b', 'c']
+    """
+    return {name}.union(*(needed(after, other) for other in after[name]))
+
+
 def run_when_ready(
     after: Mapping[str, Sequence[str]],
     job: Callable[[str, list[Future]], object],
@@ -21,14 +32,30 @@ def run_when_ready(
 
     Parameters
     ----------
-    after : name of every job -> names of those before it
-    job : takes a name and the ended futures of those before it; called in the pool
-    n_parallel : jobs at a time; as many as the pool has workers, so that none is queued before its turn
+    after : mapping of str to sequence of str
+        Names of the jobs before it, by the name of every job.
+    job : callable
+        Takes a name and the ended futures of those before it; called in the pool.
+    pool : Executor
+    n_parallel : int
+        Jobs at a time; as many as the pool has workers, so that none is queued before its turn.
+
+    Returns
+    -------
+    dict of str to Future
 
     Raises
     ------
     graphlib.CycleError
         If jobs wait for each other.
+
+    Examples
+    --------
+    >>> from concurrent.futures import ThreadPoolExecutor
+    >>> with ThreadPoolExecutor(1) as pool:
+    ...     done = run_when_ready({"b": ["a"], "a": []}, lambda name, before: name.upper(), pool, 1)
+    >>> list(done), done["b"].result()
+    (['a', 'b'], 'B')
     """
     order = TopologicalSorter(after)
     order.prepare()

@@ -42,7 +42,26 @@ def metrics(runs: Iterable[Run]) -> pd.DataFrame:
 def against_no_avoidance(table: pd.DataFrame, times: float = 2.0) -> pd.DataFrame:
     """How many times the least distance without avoidance each condition keeps, and whether that is enough.
 
-    Adds to `metrics`: `value` (the ratio), `enough` (at least `times`), and `why` in words where it is not.
+    Parameters
+    ----------
+    table : DataFrame
+        As from `metrics`.
+    times : float
+        What is enough.
+
+    Returns
+    -------
+    DataFrame
+        Columns `script, detector, min_distance_m, value` (the ratio), `enough` (at least `times`), and
+        `why` in words where it is not.
+
+    Examples
+    --------
+    >>> runs = pd.DataFrame(
+    ...     {"script": "a", "detector": [NO_AVOIDANCE, "mediapipe"], "min_distance_m": [0.04, 0.12]}
+    ... )
+    >>> against_no_avoidance(runs)[["detector", "value", "enough"]].values.tolist()
+    [['mediapipe', 3.0, True]]
     """
     base = table[table["detector"] == NO_AVOIDANCE].set_index("script")["min_distance_m"]
     rest = table[table["detector"] != NO_AVOIDANCE].copy()
@@ -51,6 +70,21 @@ def against_no_avoidance(table: pd.DataFrame, times: float = 2.0) -> pd.DataFram
     rest["why"] = ["" if row.enough else _why(row) for row in rest.itertuples()]
     columns = ["script", "detector", "min_distance_m", "value", "enough", "why"]
     return rest[columns].reset_index(drop=True)
+
+
+def sure_keypoints(frame: pd.Series) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of an image of a run: keypoints in space, which of them are sure, and the person's true ones.
+
+    Returns
+    -------
+    array, shape (n_people, 136, 3)
+        In the robot's root frame, metres.
+    array of bool, shape (n_people, 136)
+        Those in space whose score is above `SURE`.
+    array, shape (136, 3)
+    """
+    points_m, scores, truth_m = keypoints_m(frame)
+    return points_m, (scores > SURE) & np.isfinite(points_m[..., 0]), truth_m
 
 
 def keypoint_errors(runs: Iterable[Run]) -> pd.DataFrame:
@@ -62,8 +96,7 @@ def keypoint_errors(runs: Iterable[Run]) -> pd.DataFrame:
     parts = []
     for run in runs:
         for _, frame in run.frames.iterrows():
-            points, scores, truth = keypoints_m(frame)
-            kept = (scores > SURE) & np.isfinite(points[..., 0])
+            points, kept, truth = sure_keypoints(frame)
             either_m = [np.linalg.norm(points - side, axis=2) for side in (truth, truth[mirror("halpe136")])]
             near = np.linalg.norm(points - HOME_M["left"], axis=2) < REACH_M
             about = {"script": run.job.trial.script, "detector": run.job.condition, "t_s": frame["t_s"]}
@@ -79,6 +112,19 @@ def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> d
     The robot's speed is the fastest the hand was in any of the runs. It brakes within one control period,
     which is when its velocities can be zero: an assumption, real joints take longer. Detectors that gave
     no keypoint have no error, and no separation.
+
+    Parameters
+    ----------
+    runs : iterable of Run
+    errors : DataFrame
+        As from `keypoint_errors`.
+    period_s : float
+        Of the controller.
+
+    Returns
+    -------
+    dict of str to Separation
+        By detector; the terms of ISO/TS 15066.
     """
     runs = list(runs)
     robot_m_s = max(float(run.cycles["hand_error_m"].diff().abs().max()) for run in runs) / period_s
@@ -140,14 +186,9 @@ def _sightings(run: Run, near_s: np.ndarray) -> dict:
     if not len(run.frames) or not len(near_s):
         return {"seen_share": np.nan, "blind_s": np.nan}
     frames = run.frames[run.frames["t_s"].between(near_s[0], near_s[-1])]
-    seen = np.array([_is_seen(frame) for _, frame in frames.iterrows()], bool)
+    seen = np.array([sure_keypoints(frame)[1].any() for _, frame in frames.iterrows()], bool)
     times = np.concatenate([[near_s[0]], frames["t_s"].to_numpy()[seen], [near_s[-1]]])
     return {"seen_share": float(seen.mean()), "blind_s": float(np.diff(times).max())}
-
-
-def _is_seen(frame: pd.Series) -> bool:
-    points, scores, _ = keypoints_m(frame)
-    return bool(((scores > SURE) & np.isfinite(points[..., 0])).any())
 
 
 def _crossing_s(t: np.ndarray, distance_m: np.ndarray) -> float:

@@ -1,4 +1,4 @@
-"""The motion capture test's material: one recording, its clock offset, and its registration.
+"""The data of the motion capture test: one recording, its clock offset, and its registration.
 
 A simulated recording knows its exact transform and clock; clicks are simulated there. A laboratory's own
 holds `clicks.csv` (markers clicked in images, see `hicp_lib.mocap.clicking`), or `registration.json` when
@@ -18,30 +18,13 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.runtime.run import detect_images
 from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_ablation
-from hicp_lib.evaluation.space.mocap_error import (
-    MIN_SCORES,
-    POSITION,
-    TABLE_JOINTS,
-    marker_means,
-    mocap_errors,
-)
+from hicp_lib.evaluation.space.mocap_error import MIN_SCORES, TABLE_JOINTS, marker_means, mocap_errors
 from hicp_lib.evaluation.space.occlusion import lines_of_sight
-from hicp_lib.evaluation.space.stability import position_array
+from hicp_lib.evaluation.space.stability import POSITION, position_array
 from hicp_lib.lifting.robust import METHODS
 from hicp_lib.lifting.table import lift_found
+from hicp_lib.mocap import registration
 from hicp_lib.mocap.clicking import CLICKS_FILE, read_clicks
-from hicp_lib.mocap.registration import (
-    CAMERA_MARKER,
-    N_PAPER_MARKERS,
-    REGISTRATION_FILE,
-    Registration,
-    all_clicks,
-    as_in_paper,
-    lift_clicks,
-    papers_choice,
-    read_registration,
-    same_clicks,
-)
 from hicp_lib.mocap.reprojection import by_reprojection
 from hicp_lib.mocap.synchronisation import ClockOffset, clock_offset
 from hicp_lib.recordings.qualisys import MotionCapture, read_mocap
@@ -54,12 +37,15 @@ class Registered:
 
     Attributes
     ----------
-    fits : in the order of the module `hicp_lib.mocap.registration`, then by reprojection: the one to use
-    exact : the true transform T_base_mocap, (4, 4); None where it is not known
-    clicks : the clicks of the images the paper's registration rests on; empty where the transform was given
+    fits : list of Registration
+        In the order of the module `hicp_lib.mocap.registration`, then by reprojection: the one to use.
+    exact : array, shape (4, 4), or None
+        The true transform T_base_mocap; None where it is not known.
+    clicks : DataFrame
+        The clicks of the images the paper's registration rests on; empty where the transform was given.
     """
 
-    fits: list[Registration]
+    fits: list[registration.Registration]
     exact: np.ndarray | None
     clicks: pd.DataFrame
 
@@ -80,7 +66,18 @@ def open_mocap(recording: Recording) -> MotionCapture:
 
 
 def detect_frames(recording: Recording, detectors: Sequence[str]) -> dict[str, list[Detections]]:
-    """Detector -> detections of every frame; kept on disk."""
+    """What detectors find in every frame; kept on disk.
+
+    Parameters
+    ----------
+    recording : Recording
+    detectors : sequence of str
+
+    Returns
+    -------
+    dict of str to list of Detections
+        By detector, in the order of the frames.
+    """
     paths = dict(enumerate(recording.rgb_paths))
     return {
         detector: [result.detections for result in detect_images(detector, paths).values()]
@@ -91,12 +88,21 @@ def detect_frames(recording: Recording, detectors: Sequence[str]) -> dict[str, l
 def lift_frames(
     recording: Recording, found: Mapping[str, Sequence[Detections]]
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Everyone's keypoints in space, columns as of `hicp_lib.lifting.table.lift_found`; kept on disk.
+    """Everyone's keypoints in space; kept on disk.
+
+    Parameters
+    ----------
+    recording : Recording
+    found : mapping of str to sequence of Detections
+        As from `detect_frames`.
 
     Returns
     -------
-    Those by each of `METHODS`; and the first detector's also by every step between them, where true
-    positions are known (for `ablation`)
+    DataFrame
+        Columns as of `hicp_lib.lifting.table.lift_found`, by each of `METHODS`.
+    DataFrame
+        The first detector's, also by every step between the methods where true positions are known (for
+        `ablation`).
     """
     n_steps = METHODS if read_truth(recording) is None else METHODS | N_STEPS
     table = kept(lift_found, recording, found, n_steps)
@@ -108,7 +114,14 @@ def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame)
 
     Parameters
     ----------
-    points : the first of `lift_frames`; those of all detectors and methods are compared at once
+    recording : Recording
+    mocap : MotionCapture
+    points : DataFrame
+        The first of `lift_frames`; those of all detectors and methods are compared at once.
+
+    Returns
+    -------
+    ClockOffset
 
     Raises
     ------
@@ -138,33 +151,54 @@ def register(
 
     Parameters
     ----------
-    offset_s : of the motion capture's clock, as from `find_clock`
-    n_images, noise_px, seed : of the simulated clicks; not used on a laboratory's own recording
+    recording : Recording
+    mocap : MotionCapture
+    offset_s : float
+        Of the motion capture's clock, as from `find_clock`.
+    n_images : int
+        Images with simulated clicks; like the two below, not used on a laboratory's own recording.
+    noise_px : float
+        Standard deviation of a simulated click in each direction.
+    seed : int
+        Of the simulated clicks.
+
+    Returns
+    -------
+    Registered
 
     Raises
     ------
     InputError
         If the recording has neither clicks nor a registration, or they are malformed.
     """
-    simulation = read_simulation(recording)
-    clicks_path, given = recording.folder / CLICKS_FILE, recording.folder / REGISTRATION_FILE
+    simulation, clicks_path = read_simulation(recording), recording.folder / CLICKS_FILE
     if simulation:
         from hicp_lib.simulation.sensors.clicks import simulate_clicks
 
-        exact = np.array(simulation["T_base_mocap"])
-        clicks = simulate_clicks(
-            recording, mocap, exact, n_images, noise_px, simulation["mocap_offset_s"], seed
-        )
-        return _from_clicks(recording, mocap, clicks, offset_s, exact)
-    if clicks_path.is_file():
+        exact, true_offset_s = np.array(simulation["T_base_mocap"]), simulation["mocap_offset_s"]
+        clicks = simulate_clicks(recording, mocap, exact, n_images, noise_px, true_offset_s, seed)
+    elif clicks_path.is_file():
+        exact = None
         clicks = read_clicks(clicks_path, open_recording(recording.folder), mocap.names)
         clicks = clicks[clicks["frame"] < len(recording)]
-        return _from_clicks(recording, mocap, clicks, offset_s, None)
-    if given.is_file():
-        return Registered([read_registration(given)], None, pd.DataFrame())
+    else:
+        return Registered([_given(recording)], None, pd.DataFrame())
+    matched = registration.lift_clicks(recording, clicks, mocap, offset_s)
+    eight = registration.papers_choice(matched)
+    fits = [registration.same_clicks(eight), registration.all_clicks(matched)]
+    fits.append(by_reprojection(recording, clicks, mocap, fits[-1], offset_s))
+    if registration.CAMERA_MARKER in mocap.names:
+        fits.insert(0, registration.as_in_paper(eight, recording, mocap, offset_s))
+    return Registered(fits, exact, clicks.merge(eight[["frame", "marker"]]))
+
+
+def _given(recording: Recording) -> registration.Registration:
+    file, n_clicks = registration.REGISTRATION_FILE, registration.N_PAPER_MARKERS
+    if (recording.folder / file).is_file():
+        return registration.read_registration(recording.folder / file)
     raise InputError(
-        f"{recording.folder}: has neither {CLICKS_FILE} (frame,marker,u_px,v_px) nor {REGISTRATION_FILE}; "
-        f"click {N_PAPER_MARKERS} or more markers with hicp_lib.mocap.clicking, or give T_base_mocap"
+        f"{recording.folder}: has neither {CLICKS_FILE} (frame,marker,u_px,v_px) nor {file}; click {n_clicks}"
+        " or more markers with hicp_lib.mocap.clicking, or give T_base_mocap"
     )
 
 
@@ -173,14 +207,24 @@ def medians_under(
 ) -> pd.DataFrame:
     """What the choice of the registration does to the median errors of elbows and wrists.
 
+    Parameters
+    ----------
+    registered : Registered
+    points : DataFrame
+        The first of `lift_frames`.
+    recording : Recording
+    mocap : MotionCapture
+    offset_s : float
+        Of the motion capture's clock.
+
     Returns
     -------
-    DataFrame, columns `registration, detector, method, part`, `median_m` (both sides together; score above
-    0.1); the exact transform, where it is known, comes last
+    DataFrame
+        Columns `registration, detector, method, part, median_m` (both sides together; score above 0.1); the
+        exact transform, where it is known, comes last.
     """
     fits = {fit.method: fit.T_base_mocap for fit in registered.fits}
-    if registered.exact is not None:
-        fits["exact"] = registered.exact
+    fits |= {} if registered.exact is None else {"exact": registered.exact}
     tables = []
     for name, T_base_mocap in fits.items():
         reference = marker_means(mocap, recording.times_s - offset_s, T_base_mocap, TABLE_JOINTS)
@@ -195,7 +239,22 @@ def medians_under(
 def errors_at_joints(
     points: pd.DataFrame, registered: Registered, recording: Recording, mocap: MotionCapture, offset_s: float
 ) -> pd.DataFrame:
-    """`mocap_errors` under the best registration, with the lines of sight: columns `distance_m, sight`."""
+    """`mocap_errors` under the best registration, with the lines of sight: columns `distance_m, sight`.
+
+    Parameters
+    ----------
+    points : DataFrame
+        The first of `lift_frames`.
+    registered : Registered
+    recording : Recording
+    mocap : MotionCapture
+    offset_s : float
+        Of the motion capture's clock.
+
+    Returns
+    -------
+    DataFrame
+    """
     stamps_s, T_base_mocap = recording.times_s - offset_s, registered.fits[-1].T_base_mocap
     reference = marker_means(mocap, stamps_s, T_base_mocap)
     errors = mocap_errors(points, reference, read_truth(recording))
@@ -206,19 +265,3 @@ def ablation(recording: Recording, stepwise: pd.DataFrame) -> pd.DataFrame | Non
     """`lifting_ablation` of the second of `lift_frames`; None where no true positions are known."""
     truth = read_truth(recording)
     return None if truth is None else lifting_ablation(stepwise, truth)
-
-
-def _from_clicks(
-    recording: Recording,
-    mocap: MotionCapture,
-    clicks: pd.DataFrame,
-    offset_s: float,
-    exact: np.ndarray | None,
-) -> Registered:
-    matched = lift_clicks(recording, clicks, mocap, offset_s)
-    eight = papers_choice(matched)
-    fits = [same_clicks(eight), all_clicks(matched)]
-    fits.append(by_reprojection(recording, clicks, mocap, fits[-1], offset_s))
-    if CAMERA_MARKER in mocap.names:
-        fits.insert(0, as_in_paper(eight, recording, mocap, offset_s))
-    return Registered(fits, exact, clicks.merge(eight[["frame", "marker"]]))

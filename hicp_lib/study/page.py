@@ -25,12 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.checkout import (
-    EARLIER_RESULTS_VARIABLE,
-    PROFILE_VARIABLE,
-    RESULTS_VARIABLE,
-    working_folder,
-)
+from hicp_lib.core import checkout
 from hicp_lib.core.extras import needs
 from hicp_lib.core.files import atomic_path, write_bytes, write_json
 from hicp_lib.study.provenance import peak_memory_mb, provenance, provenance_html
@@ -48,7 +43,7 @@ if TYPE_CHECKING:
 
 SCHEMA_VERSION = 1
 PLOTLY_MIME = "application/vnd.plotly.v1+json"
-_SVG_STYLE = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
+_SVG_STYLE: dict[Any, Any] = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
 _SAVE_OPTIONS: dict[str, dict[str, Any]] = {
     "png": {},
     "svg": {"metadata": {"Date": None}},
@@ -61,25 +56,39 @@ class Study:
 
     Parameters
     ----------
-    name : the notebook's file name without `.ipynb`
-    parameters : every parameter of the notebook's `parameters` cell, by its name; `hicp report`
-        refuses a run whose stamp differs from what it was given
+    name : str
+        The notebook's file name without `.ipynb`.
+    **parameters
+        Every parameter of the notebook's `parameters` cell, by its name; `hicp report` refuses a run whose
+        stamp differs from what it was given.
 
     Attributes
     ----------
-    folder : where this run's results are written
-    results : where the notebooks before this one left theirs, a folder each; in Jupyter, those of the
-        last full report
+    folder : Path
+        Where this run's results are written.
+    results : Path
+        Where the notebooks before this one left theirs, a folder each; in Jupyter, those of the last full
+        report.
+
+    Examples
+    --------
+    >>> study = Study("05_tiny", seed=3)
+    >>> study.folder.parts[-3:]
+    ('results', 'interactive', '05_tiny')
+    >>> study.value("ap", float("nan"))
+    Traceback (most recent call last):
+        ...
+    ValueError: a result is nan; record None for what was not measured
     """
 
     def __init__(self, name: str, /, **parameters: Any):
-        profile = os.environ.get(PROFILE_VARIABLE, "interactive")
-        kept = working_folder() / "results"
-        results = Path(os.environ.get(RESULTS_VARIABLE) or kept / profile)
+        profile = os.environ.get(checkout.PROFILE_VARIABLE, "interactive")
+        kept = checkout.working_folder() / "results"
+        results = Path(os.environ.get(checkout.RESULTS_VARIABLE) or kept / profile)
         self.name = name
         self.parameters = _plain(parameters)
         self.folder = results / name
-        self.results = Path(os.environ.get(EARLIER_RESULTS_VARIABLE) or kept / "full")
+        self.results = Path(os.environ.get(checkout.EARLIER_RESULTS_VARIABLE) or kept / "full")
         self._link = f"../results/{profile}/{name}"
         self._values: dict[str, Any] = {}
         self._captions: dict[str, dict[str, str]] = {}
@@ -97,25 +106,33 @@ class Study:
         if figure.table is not None:
             figure.figure.set_layout_engine("none")  # what was found for the PNG holds for the SVG
             write_bytes(self.folder / f"{name}.svg", _rendered(figure.figure, "svg"))
-            self.save(name, figure.table)
-            _write_csv(self.folder / f"{name}.csv", figure.table)
+            self._save_for_download(name, figure.table)
             downloads += ["svg", "parquet", "csv"]
-        self._captions[name] = {"file": f"{name}.{kind}", "caption": figure.caption, "alt": figure.alt}
-        source = f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
-        image = f'<img src="{source}" alt="{html.escape(figure.alt)}">'
-        self._show_figure(name, image, figure.caption, downloads)
+        self._show_image(name, content, figure.alt, figure.caption, downloads)
 
     def animation(self, name: str, webp: bytes, caption: str, alt: str) -> None:
-        """Save an animated WebP and show it; it plays offline, on its own."""
+        """Save an animated WebP and show it; it plays offline, on its own.
+
+        Parameters
+        ----------
+        name : str
+        webp : bytes
+            The file's content.
+        caption, alt : str
+        """
         write_bytes(self.folder / f"{name}.webp", webp)
-        self._captions[name] = {"file": f"{name}.webp", "caption": caption, "alt": alt}
-        source = f"data:image/webp;base64,{base64.b64encode(webp).decode()}"
-        self._show_figure(name, f'<img src="{source}" alt="{html.escape(alt)}">', caption, ["webp"])
+        self._show_image(name, webp, alt, caption, ["webp"])
 
     def scene(self, name: str, scene: go.Figure, caption: str, alt: str) -> None:
         """Save an interactive 3D scene (its data as JSON) and show it.
 
         JupyterLab and VS Code draw the data with the plotly.js they bring; the book's page loads it once.
+
+        Parameters
+        ----------
+        name : str
+        scene : plotly.graph_objects.Figure
+        caption, alt : str
         """
         data = scene.to_json()
         write_bytes(self.folder / f"{name}.json", data.encode())
@@ -126,9 +143,17 @@ class Study:
         self._show_figure(name, "", caption, ["json"])
 
     def table(self, name: str, table: pd.DataFrame, caption: str, digits: int = 3) -> None:
-        """Save a table (Parquet, CSV) and show it; NaN is shown as a dash, floats with `digits` decimals."""
-        self.save(name, table)
-        _write_csv(self.folder / f"{name}.csv", table)
+        """Save a table (Parquet, CSV) and show it; NaN is shown as a dash.
+
+        Parameters
+        ----------
+        name : str
+        table : DataFrame
+        caption : str
+        digits : int
+            Decimals of its floats, as shown.
+        """
+        self._save_for_download(name, table)
         self._captions[name] = {"caption": caption}
         style = table.style.hide(axis="index").format(precision=digits, na_rep="–").set_uuid(name)
         shown = style.to_html(table_attributes='class="table"')
@@ -138,11 +163,9 @@ class Study:
         """Save a table as Parquet without showing it; its parameters travel in the file's metadata."""
         arrow = pa.Table.from_pandas(table, preserve_index=False)
         stamp = {"schema": SCHEMA_VERSION, "notebook": self.name, "parameters": self.parameters}
-        arrow = arrow.replace_schema_metadata(
-            (arrow.schema.metadata or {}) | {b"hicp": json.dumps(stamp).encode()}
-        )
+        metadata = (arrow.schema.metadata or {}) | {b"hicp": json.dumps(stamp).encode()}
         with atomic_path(self.folder / f"{name}.parquet") as temporary:
-            pq.write_table(arrow, temporary)
+            pq.write_table(arrow.replace_schema_metadata(metadata), temporary)
 
     def value(self, name: str, value: Any) -> None:
         """Record a number, text or list for the prose of the book; None means "not run".
@@ -163,10 +186,20 @@ class Study:
         write_json(self.folder / "provenance.json", stamp, indent=2)
         display(HTML(provenance_html(stamp)))
 
+    def _save_for_download(self, name: str, table: pd.DataFrame) -> None:
+        self.save(name, table)
+        write_bytes(self.folder / f"{name}.csv", table.to_csv(index=False).encode())
+
+    def _show_image(self, name: str, content: bytes, alt: str, caption: str, downloads: list[str]) -> None:
+        """Show the first of the downloads, an image."""
+        kind = downloads[0]
+        self._captions[name] = {"file": f"{name}.{kind}", "caption": caption, "alt": alt}
+        source = f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
+        self._show_figure(name, f'<img src="{source}" alt="{html.escape(alt)}">', caption, downloads)
+
     def _show_figure(self, name: str, body: str, caption: str, downloads: list[str]) -> None:
-        links = " ".join(
-            f'<a href="{self._link}/{name}.{kind}" download>{kind.upper()}</a>' for kind in downloads
-        )
+        link = f'<a href="{self._link}/{name}.{{}}" download>{{}}</a>'
+        links = " ".join(link.format(kind, kind.upper()) for kind in downloads)
         caption = f'{html.escape(caption)} <span class="hicp-download">{links}</span>'
         display(HTML(f'<figure class="hicp" id="{name}">{body}<figcaption>{caption}</figcaption></figure>'))
 
@@ -177,10 +210,6 @@ def _rendered(figure, kind: str) -> bytes:
     with mpl.rc_context(_SVG_STYLE):
         figure.savefig(buffer, format=kind, **_SAVE_OPTIONS[kind])
     return buffer.getvalue()
-
-
-def _write_csv(path: Path, table: pd.DataFrame) -> None:
-    write_bytes(path, table.to_csv(index=False).encode())
 
 
 def _plain(value: Any) -> Any:

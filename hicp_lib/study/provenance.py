@@ -28,16 +28,9 @@ from hicp_lib.detectors.weights.user import own_sha256
 LOCK_PATH = (CHECKOUT or LIBRARY_DIR) / "environment.lock"
 
 _SHOWN_VERSIONS = (
-    "numpy",
-    "pandas",
-    "opencv-python-headless",
-    "onnxruntime",
-    "mediapipe",
-    "open3d-cpu",
-    "open3d",
-    "pycocotools",
-    "matplotlib",
-)
+    "numpy", "pandas", "opencv-python-headless", "onnxruntime", "mediapipe", "open3d-cpu", "open3d",
+    "pycocotools", "matplotlib",
+)  # fmt: skip
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
@@ -68,12 +61,9 @@ def git_state() -> dict[str, Any]:
 
     An installed library may lie within somebody else's repository, whose commit says nothing of it.
     """
-    commit = _git("rev-parse", "HEAD")
     status = _git("status", "--porcelain")
-    return {
-        "commit": commit or "unknown",
-        "changed_files": None if status is None else len(status.splitlines()),
-    }
+    changed_files = None if status is None else len(status.splitlines())
+    return {"commit": _git("rev-parse", "HEAD") or "unknown", "changed_files": changed_files}
 
 
 def _git(*arguments: str) -> str | None:
@@ -89,9 +79,8 @@ def _git(*arguments: str) -> str | None:
 def versions() -> dict[str, str]:
     """Python's version and those of the libraries that can move a number."""
     installed = {d.name.lower(): d.version for d in importlib.metadata.distributions()}
-    return {"python": platform.python_version()} | {
-        n: installed[n] for n in _SHOWN_VERSIONS if n in installed
-    }
+    shown = {name: installed[name] for name in _SHOWN_VERSIONS if name in installed}
+    return {"python": platform.python_version()} | shown
 
 
 def weights_sha256() -> dict[str, str]:
@@ -103,15 +92,16 @@ def weights_sha256() -> dict[str, str]:
     return {name: row["sha256"] for name, row in weights.items()} | own_sha256()
 
 
+def usable_cores() -> int:
+    """Cores that this process may use; at least 1."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def machine() -> dict[str, Any]:
     """Processor, cores, system and the thread limits set by the environment."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    system = f"{platform.system()} {platform.machine()}"
     threads = {name: os.environ[name] for name in _THREAD_VARIABLES if name in os.environ}
-    return {
-        "cpu": _cpu_model(),
-        "cores": cores,
-        "system": f"{platform.system()} {platform.machine()}",
-    } | threads
+    return {"cpu": _cpu_model(), "cores": usable_cores(), "system": system} | threads
 
 
 def _cpu_model() -> str:
@@ -135,7 +125,14 @@ def onnx_providers() -> list[str]:
 
 
 def provenance(parameters: dict[str, Any]) -> dict[str, Any]:
-    """Everything a reader needs to judge or repeat a result made now, in this process, with `parameters`."""
+    """Everything a reader needs to judge or repeat a result made now, in this process, with `parameters`.
+
+    Examples
+    --------
+    >>> stamp = provenance({"seed": 0})
+    >>> stamp["parameters"], len(stamp["library_sha256"])
+    ({'seed': 0}, 64)
+    """
     return {
         "parameters": parameters,
         "git": git_state(),
@@ -151,24 +148,26 @@ def provenance(parameters: dict[str, Any]) -> dict[str, Any]:
 
 def provenance_html(stamp: dict[str, Any]) -> str:
     """The footer of a page: what the notebook ran with, folded away until asked for."""
-    git, machine = stamp["git"], stamp["machine"]
+    git = stamp["git"]
     changed = {None: "", 0: ""}.get(git["changed_files"], f" with {git['changed_files']} changed files")
+    parameters = {k: f"= {json.dumps(v, ensure_ascii=False)}" for k, v in stamp["parameters"].items()}
+    hashes = {name: stamp[f"{name}_sha256"][:12] for name in ("library", "lock", "data")}
     rows = {
-        "Parameters": ", ".join(
-            f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in stamp["parameters"].items()
-        ),
+        "Parameters": _listed(parameters),
         "Commit": git["commit"][:12] + changed,
-        "Hashes": ", ".join(f"{k} {stamp[k + '_sha256'][:12]}" for k in ("library", "lock", "data")),
-        "Weights": ", ".join(f"{k} {v[:12]}" for k, v in stamp["weights_sha256"].items()),
-        "Versions": ", ".join(f"{k} {v}" for k, v in stamp["versions"].items()),
+        "Hashes": _listed(hashes),
+        "Weights": _listed({name: sha256[:12] for name, sha256 in stamp["weights_sha256"].items()}),
+        "Versions": _listed(stamp["versions"]),
         "Inference": ", ".join(stamp["onnx_providers"]) or "ONNX Runtime not used",
-        "Machine": ", ".join(f"{k} {v}" for k, v in machine.items()),
+        "Machine": _listed(stamp["machine"]),
         "Wall time": f"{stamp['wall_s']:.1f} s",
     }
-    body = "".join(
-        f'<tr><th scope="row">{k}</th><td>{html.escape(str(v))}</td></tr>' for k, v in rows.items()
-    )
+    body = "".join(f'<tr><th scope="row">{k}</th><td>{html.escape(v)}</td></tr>' for k, v in rows.items())
     return (
         '<details class="hicp-provenance"><summary>What this page was made with</summary>'
         f"<table><tbody>{body}</tbody></table></details>"
     )
+
+
+def _listed(named: dict[str, Any]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in named.items())

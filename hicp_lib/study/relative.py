@@ -1,4 +1,4 @@
-"""The relative 3D test's material: recordings of a still person, detected and lifted, view by view.
+"""The data of the relative 3D test: recordings of a still person, detected and lifted, view by view.
 
 A *view* is one recording: "upper" and "lower" when simulated, as the paper's two holders of the camera; a
 lab's own are called after their folders.
@@ -13,13 +13,13 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.detectors.runtime.run import detect_images
 from hicp_lib.evaluation.space.spread_causes import found_in
 from hicp_lib.experiments.recordings.open import open_experiment
 from hicp_lib.lifting.table import lift_found
 from hicp_lib.recordings.recording import Recording, read_joints, read_truth
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
 from hicp_lib.robot.segments import Segment, body_segments
+from hicp_lib.study.mocap import detect_frames
 
 Found = Mapping[tuple[str, str], Sequence[Detections]]
 
@@ -27,12 +27,18 @@ Found = Mapping[tuple[str, str], Sequence[Detections]]
 def open_views(
     recording: str = "", recording_lower: str = "", n_frames: int = 100, seed: int = 0
 ) -> dict[str, Recording]:
-    """View -> recording: the folders given, or two simulated ones where none is.
+    """The recordings given by their views, or two simulated ones where none is.
 
     Parameters
     ----------
-    recording, recording_lower : a lab's own recordings of a person who sits still; the second is optional
-    n_frames, seed : of the simulated ones
+    recording, recording_lower : str
+        Folders of a lab's own recordings of a person who sits still; the second is optional.
+    n_frames, seed : int
+        Of the simulated ones.
+
+    Returns
+    -------
+    dict of str to Recording
 
     Raises
     ------
@@ -40,35 +46,49 @@ def open_views(
         If a folder is not a recording.
     """
     given = [folder for folder in (recording, recording_lower) if folder]
-    if given:
-        return {
-            name: open_experiment("relative-upper", folder)
-            for name, folder in zip(_names(given), given, strict=True)
-        }
-    return {view: open_experiment(f"relative-{view}", "", n_frames, seed) for view in ("upper", "lower")}
-
-
-def _names(folders: Sequence[str]) -> list[str]:
-    names = [Path(folder).name for folder in folders]
-    return names if len(set(names)) == len(names) else list(folders)
+    if not given:
+        return {view: open_experiment(f"relative-{view}", "", n_frames, seed) for view in ("upper", "lower")}
+    names = [Path(folder).name for folder in given]
+    views = names if len(set(names)) == len(names) else given
+    folders = zip(views, given, strict=True)
+    return {view: open_experiment("relative-upper", folder) for view, folder in folders}
 
 
 def detect_views(
     views: Mapping[str, Recording], detectors: Sequence[str]
 ) -> dict[tuple[str, str], list[Detections]]:
-    """(view, detector) -> detections of every frame; kept on disk."""
+    """What detectors find in every frame of every view; kept on disk.
+
+    Parameters
+    ----------
+    views : mapping of str to Recording
+    detectors : sequence of str
+
+    Returns
+    -------
+    dict of (str, str) to list of Detections
+        By view and detector, in the order of the frames.
+    """
     return {
-        (view, detector): [
-            result.detections
-            for result in detect_images(detector, dict(enumerate(recording.rgb_paths))).values()
-        ]
+        (view, detector): detections
         for view, recording in views.items()
-        for detector in detectors
+        for detector, detections in detect_frames(recording, detectors).items()
     }
 
 
 def lift_views(views: Mapping[str, Recording], found: Found) -> pd.DataFrame:
-    """Everything lifted by every method: columns `view` and those of `lift_found`.
+    """Everything lifted by every method.
+
+    Parameters
+    ----------
+    views : mapping of str to Recording
+    found : mapping of (str, str) to sequence of Detections
+        As from `detect_views`.
+
+    Returns
+    -------
+    DataFrame
+        Columns `view` and those of `hicp_lib.lifting.table.lift_found`.
 
     Raises
     ------
@@ -97,8 +117,7 @@ def true_positions(views: Mapping[str, Recording]) -> dict[str, pd.DataFrame] | 
 def robot_body(views: Mapping[str, Recording]) -> list[Segment]:
     """The robot's body in the first view's first frame (base frame); empty where joints are not known."""
     recording = next(iter(views.values()))
-    joints = read_joints(recording)
-    columns = [f"{name}_rad" for name in HEAD_JOINTS]
+    joints, columns = read_joints(recording), [f"{name}_rad" for name in HEAD_JOINTS]
     if joints is None or not set(columns) <= set(joints):
         return []
     head_rad = joints.set_index("frame").loc[0, columns].to_numpy(float)

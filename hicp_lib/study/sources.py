@@ -20,11 +20,16 @@ class Source:
 
     Attributes
     ----------
-    kind : "rendered" or "halpe"
-    note : what the people are, in the words of captions
-    annotations, images : the whole images' annotation file and folder
-    basic, headless : dataset folders (`images/` and `annotations.json`)
-    summary : what `create_hicp` kept and left out, and why
+    kind : str
+        "rendered" or "halpe".
+    note : str
+        What the people are, in the words of captions.
+    annotations, images : Path
+        The whole images' annotation file and folder.
+    basic, headless : Path
+        Dataset folders (`images/` and `annotations.json`).
+    summary : dict
+        What `create_hicp` kept and left out, and why.
     """
 
     kind: str
@@ -53,13 +58,30 @@ def open_source(
 
     Parameters
     ----------
-    source : "rendered" (uses `n_scenes`, `seed`) or "halpe" (uses `annotations_path`, `images_dir`)
-    min_pixels : the smallest crop that is kept
+    source : str
+        "rendered" (uses `n_scenes`, `seed`) or "halpe" (uses `annotations_path`, `images_dir`).
+    annotations_path, images_dir : str or Path
+        Halpe's annotation file, and the folder of COCO's images.
+    n_scenes, seed : int
+        Of the rendered scenes.
+    min_pixels : int
+        The smallest crop that is kept.
+
+    Returns
+    -------
+    Source
 
     Raises
     ------
     InputError
         For an unknown source, or Halpe annotations or images that are not there.
+
+    Examples
+    --------
+    >>> open_source("photographs")
+    Traceback (most recent call last):
+        ...
+    hicp_lib.core.errors.InputError: source='photographs' is unknown; use one of rendered, halpe
     """
     if source == "rendered":
         annotations, images = _rendered(n_scenes, seed)
@@ -93,8 +115,9 @@ def _crops(annotations: Path, images: Path, min_pixels: int) -> Path:
         raise InputError(f"{annotations}: is not there; give the path of the annotation file")
     if not images.is_dir():
         raise InputError(f"{images}: is not there; give the folder that holds the annotated images")
-    people = {"annotations": sha256_file(annotations), "folder": str(images.resolve()), "images": images}
-    folder = cache_dir() / "hicp" / key([create_hicp], **people, min_pixels=min_pixels)[:16]
+    sha256, resolved = sha256_file(annotations), str(images.resolve())
+    crops = key([create_hicp], annotations=sha256, folder=resolved, images=images, min_pixels=min_pixels)
+    folder = cache_dir() / "hicp" / crops[:16]
     if not (folder / "summary.json").is_file():
         create_hicp(annotations, images, folder, min_pixels=min_pixels, progress=sys.stderr.isatty())
     return folder

@@ -19,9 +19,18 @@ def surveyed_data_sets() -> pd.DataFrame:
 
 
 def surveyed_detectors(run: Collection[str]) -> pd.DataFrame:
-    """Detectors, one row each, with a column `here`: "run", or "not run" and the command that would.
+    """Detectors (the paper's Table II), one row each, with a column `here`: "run", or what would run it.
 
-    `run` holds the names of the detectors that were run; one that was imported as NAME-imported counts.
+    Parameters
+    ----------
+    run : collection of str
+        Names of the detectors that were run; one that was imported as NAME-imported counts.
+
+    Examples
+    --------
+    >>> table = surveyed_detectors(["mediapipe", "mmpose-imported"]).set_index("detector")
+    >>> table.at["mediapipe", "here"], table.at["mmpose", "here"]
+    ('run', 'run')
     """
     table = pd.DataFrame(read_json(_SURVEY_FILE)["detectors"]).drop(columns="reference")
     return table.assign(here=[_status(name, run) for name in table["detector"]])

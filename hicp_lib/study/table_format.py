@@ -59,7 +59,19 @@ def in_units(table: pd.DataFrame, titles: Mapping[str, str], text: bool = False)
 
 
 def with_bounds(value: float, low: float, high: float, digits: int = 2) -> str:
-    """A value with its interval as "0.71 [0.65, 0.77]", alone where it has none; a dash where it is NaN."""
+    """A value with its interval, alone where it has none; a dash where it is NaN.
+
+    Parameters
+    ----------
+    value, low, high : float
+    digits : int
+        Decimals.
+
+    Examples
+    --------
+    >>> with_bounds(0.714, 0.65, 0.77), with_bounds(0.714, np.nan, np.nan), with_bounds(np.nan, 0, 0)
+    ('0.71 [0.65, 0.77]', '0.71', '–')
+    """
     interval = f" [{low:.{digits}f}, {high:.{digits}f}]" if value == value and low == low else ""
     return _number(value, digits) + interval
 
@@ -67,9 +79,25 @@ def with_bounds(value: float, low: float, high: float, digits: int = 2) -> str:
 def bounds_of(
     rows: pd.DataFrame, columns: Sequence[str] = ("value", "low", "high"), factor: float = 1, digits: int = 2
 ) -> list[str]:
-    """`with_bounds` of each row's value and the two ends of its interval, multiplied by `factor`."""
+    """`with_bounds` of each row's value and the two ends of its interval.
+
+    Parameters
+    ----------
+    rows : DataFrame
+    columns : sequence of str
+        The value's and its interval's.
+    factor : float
+        Multiplies the numbers, to bring them to another unit.
+    digits : int
+        Decimals.
+
+    Returns
+    -------
+    list of str
+    """
     numbers = factor * rows[list(columns)]
-    return [with_bounds(*row, digits=digits) for row in numbers.itertuples(index=False, name=None)]
+    rows_of_three = numbers.itertuples(index=False, name=None)
+    return [with_bounds(value, low, high, digits) for value, low, high in rows_of_three]
 
 
 def in_cm(*lengths_m: Iterable[float]) -> list[str]:

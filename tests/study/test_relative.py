@@ -14,6 +14,7 @@ from hicp_lib.experiments.recordings.open import data_note
 from hicp_lib.recordings.recording import JOINTS_FILE, SIMULATION_FILE, TRUTH_FILE
 from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.robot.kinematics import HEAD_JOINTS
+from hicp_lib.study import mocap
 from hicp_lib.study import relative as relative_views
 
 CAMERA = Camera(width_px=64, height_px=48, fx_px=50, fy_px=50, cx_px=31.5, cy_px=23.5)
@@ -61,7 +62,7 @@ def test_everything_found_is_lifted_by_every_method(lab, monkeypatch):
     views = relative_views.open_views(str(lab / "a/still"))
     given = {0: one_wrist(31.5, 23.5), 1: one_wrist(41.5, 13.5)}
     monkeypatch.setattr(
-        relative_views, "detect_images",
+        mocap, "detect_images",
         lambda detector, paths: {k: SimpleNamespace(detections=given[k]) for k in paths},
     )  # fmt: skip
     found = relative_views.detect_views(views, ["mediapipe"])

@@ -31,14 +31,23 @@ class Selection:
 
     Attributes
     ----------
-    notebook, table : the file `<notebook>/<table>.parquet` of the results
-    where : column -> the value rows must have there, or a list of such values; imported detections
-        (`mmpose-imported`) count as the detector's
-    unlike : column -> the value, or values, that rows must not have
-    pick : "each" row, or the one with the "least" or "greatest" value
-    value, low, high : columns of the quantity and of its interval; no interval when they are ""
-    scale : multiplies the quantity, to bring it to the claim's unit
-    name : columns that name a row in the evidence
+    notebook, table : str
+        The file `<notebook>/<table>.parquet` of the results.
+    where : dict of str to object
+        Column -> the value rows must have there, or a list of such values; imported detections
+        (`mmpose-imported`) count as the detector's.
+    value : str
+        Column of the quantity.
+    unlike : dict of str to object
+        Column -> the value, or values, that rows must not have.
+    pick : str
+        "each" row, or the one with the "least" or "greatest" value.
+    low, high : str
+        Columns of the quantity's interval; no interval when they are "".
+    scale : float
+        Multiplies the quantity, to bring it to the claim's unit.
+    name : tuple of str
+        Columns that name a row in the evidence.
     """
 
     notebook: str
@@ -57,7 +66,18 @@ class Selection:
 class Comparison:
     """One comparison; every selected row on the left is compared with every one on the right.
 
-    `match` names columns that must agree between the two rows compared.
+    Attributes
+    ----------
+    relation : str
+        One of `RELATIONS`.
+    left : Selection
+    right : Selection or float
+    margin : float
+        Of `>` and `<`: the difference must be larger than this.
+    tolerance : float
+        Of `within`: the difference may be as large as this.
+    match : tuple of str
+        Columns that must agree between the two rows compared.
     """
 
     relation: str
@@ -74,14 +94,21 @@ class Claim:
 
     Attributes
     ----------
-    id, section, text : where the paper makes it, and what it says in our words
-    statement : what the tests ask, for readers
-    paper : the paper's value as text, "" where it gives none
-    unit : of the quantities that the evidence shows
-    tests : all must hold
-    only_on : "", or one of `ONLY_ON`. "photographs": the claim is about these, and nothing rendered can test
-        it. "rendered people": its tables hold nothing else, whatever data the run was given
-    reason, command : for what no result can test here: why not, and what would
+    id, section, text : str
+        Where the paper makes it, and what it says in our words.
+    statement : str
+        What the tests ask, for readers.
+    paper : str
+        The paper's value, "" where it gives none.
+    unit : str
+        Of the quantities that the evidence shows.
+    tests : tuple of Comparison
+        All must hold.
+    only_on : str
+        "", or one of `ONLY_ON`. "photographs": the claim is about these, and nothing rendered can test it.
+        "rendered people": its tables hold nothing else, whatever data the run was given.
+    reason, command : str
+        For what no result can test here: why not, and what would.
     """
 
     id: str
@@ -99,10 +126,25 @@ class Claim:
 def read_claims(path: Path = CLAIMS_FILE) -> list[Claim]:
     """Read the claims.
 
+    Parameters
+    ----------
+    path : Path
+        A JSON list of claims.
+
+    Returns
+    -------
+    list of Claim
+
     Raises
     ------
     InputError
         Naming the claim and what is wrong with it.
+
+    Examples
+    --------
+    >>> claims = read_claims()
+    >>> len({claim.id for claim in claims}) == len(claims)
+    True
     """
     rows = read_json(path)
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):

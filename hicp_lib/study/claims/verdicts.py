@@ -27,6 +27,7 @@ NOT_REPRODUCED = "not reproduced"
 NOT_TESTABLE = "not testable here"
 VERDICTS = (REPRODUCED, ON_RENDERED_DATA, NOT_REPRODUCED, NOT_TESTABLE)
 
+_TABLE_COLUMNS = ["section", "claim", "tested", "paper", "ours", "verdict", "why_not", "command"]
 _PHOTOGRAPHS = "hicp report -p source halpe -p annotations_path HALPE.json -p images_dir DIR"
 
 
@@ -36,8 +37,13 @@ class Verdict:
 
     Attributes
     ----------
-    ours : the evidence as text
-    reason, command : why the claim was not tested, and what would test it
+    claim : Claim
+    verdict : str
+        One of `VERDICTS`.
+    ours : str
+        The evidence.
+    reason, command : str
+        Why the claim was not tested, and what would test it.
     """
 
     claim: Claim
@@ -49,7 +55,18 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number with its 95 % interval (the number itself where it has none), and the row it is from."""
+    """A number of a result table.
+
+    Attributes
+    ----------
+    value : float
+    low, high : float
+        Its 95 % interval; the number itself where it has none.
+    row : dict of str to object
+        The row it is from.
+    name : str
+        The row's, in the evidence.
+    """
 
     value: float
     low: float
@@ -66,37 +83,34 @@ class _MissingError(Exception):
         self.command = command
 
 
-def judge(claims: list[Claim], results: Path) -> list[Verdict]:
+def judge_claims(claims: list[Claim], results: Path) -> list[Verdict]:
     """The verdict on every claim.
 
     Parameters
     ----------
-    results : folder with one folder of result files per notebook
+    claims : list of Claim
+    results : Path
+        Folder with one folder of result files per notebook.
+
+    Returns
+    -------
+    list of Verdict
 
     Raises
     ------
     InputError
         If a claim asks for a column that its table does not have.
     """
-    return [_judge(claim, results) for claim in claims]
+    return [_judge_claim(claim, results) for claim in claims]
 
 
 def verdict_table(verdicts: list[Verdict]) -> pd.DataFrame:
     """One row per claim: `section, claim, tested, paper, ours, verdict, why_not, command`."""
     rows = [
-        {
-            "section": v.claim.section,
-            "claim": v.claim.text,
-            "tested": v.claim.statement,
-            "paper": v.claim.paper or "–",
-            "ours": v.ours or "–",
-            "verdict": v.verdict,
-            "why_not": v.reason,
-            "command": v.command,
-        }
-        for v in verdicts
+        (c.section, c.text, c.statement, c.paper or "–", v.ours or "–", v.verdict, v.reason, v.command)
+        for c, v in ((verdict.claim, verdict) for verdict in verdicts)
     ]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=_TABLE_COLUMNS)
 
 
 def for_reading(table: pd.DataFrame, verdict: str) -> pd.DataFrame:
@@ -119,7 +133,7 @@ def verdict_counts(table: pd.DataFrame) -> dict[str, int]:
     return {verdict: int((table["verdict"] == verdict).sum()) for verdict in VERDICTS}
 
 
-def _judge(claim: Claim, results: Path) -> Verdict:
+def _judge_claim(claim: Claim, results: Path) -> Verdict:
     if not claim.tests:
         return Verdict(claim, NOT_TESTABLE, reason=claim.reason, command=claim.command)
     try:
@@ -150,19 +164,34 @@ def _try(test: Comparison, results: Path) -> tuple[bool | None, list[str]]:
     """Whether a test holds (None: open), and the quantities it rests on in words."""
     left = select(test.left, results)
     if isinstance(test.right, float):
-        right = [Quantity(test.right, test.right, test.right, {}, "")]
+        right, shown_right = [Quantity(test.right, test.right, test.right, {}, "")], False
     else:
-        right = select(test.right, results)
+        right, shown_right = select(test.right, results), True
     pairs = [(a, b) for a in left for b in right if all(a.row.get(c) == b.row.get(c) for c in test.match)]
     if not pairs:
         reason = f"no two rows of {test.left.table} agree in {', '.join(test.match)}"
         raise _MissingError(reason, "hicp report")
-    shown = [a for a, _ in pairs] + ([b for _, b in pairs] if isinstance(test.right, Selection) else [])
+    shown = [a for a, _ in pairs] + [b for _, b in pairs if shown_right]
     return holds(test, pairs), [_in_words(quantity) for quantity in shown]
 
 
 def holds(test: Comparison, pairs: list[tuple[Quantity, Quantity]]) -> bool | None:
-    """True when every pair's interval is on the claimed side, False when one is wholly off it, else None."""
+    """True when every pair's interval is on the claimed side, False when one is wholly off it, else None.
+
+    Parameters
+    ----------
+    test : Comparison
+    pairs : list of (Quantity, Quantity)
+        The left and the right side.
+
+    Examples
+    --------
+    >>> from hicp_lib.study.claims.statements import Selection
+    >>> test = Comparison(">", Selection("02_evaluation_2d", "ap", {}, "value"), 0.5)
+    >>> half, left = Quantity(0.5, 0.5, 0.5, {}, ""), Quantity(0.7, 0.6, 0.8, {}, "mmpose")
+    >>> holds(test, [(left, half)]), holds(test, [(half, left)]), holds(test, [(left, left)])
+    (True, False, None)
+    """
     outcomes = [_compare(test, a.low - b.high, a.high - b.low) for a, b in pairs]
     return False if False in outcomes else None if None in outcomes else True
 
@@ -236,7 +265,8 @@ def _quantity(selection: Selection, row: dict[str, Any]) -> Quantity:
         for column in (selection.value, selection.low, selection.high)
     )
     name = " ".join(_plain(row[column]) for column in selection.name)
-    return Quantity(value, *sorted((low, high)), row, name)
+    low, high = sorted((low, high))
+    return Quantity(value, low, high, row, name)
 
 
 def _plain(label: Any) -> str:

@@ -13,11 +13,14 @@ from hicp_lib.experiments.avoidance.skin_distance import FAR_M
 from hicp_lib.robot.kinematics import ARM_JOINTS
 from hicp_lib.robot.separation import Separation, separation_table
 from hicp_lib.study.avoidance import FIELD_M, WITHIN_M
-from hicp_lib.study.plots.style import Figure, detector_colour, in_style, in_words, legend_entries, new_figure
+from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 
 _STYLES = {NO_AVOIDANCE: ":", PUBLISHED_GAINS: "--"}
 _ROWS = {"distance_m": "distance (cm)", "activation": "activation", "hand_error_m": "hand from post (cm)"}
 _TERM_COLOURS = ("#0072B2", "#E69F00", "#D55E00", "#999999", "#009E73", "#CC79A7")
+_ANGLES = [f"{joint}_rad" for joint in ARM_JOINTS]
 _EVERY = 5  # control periods between rows of the tables
 
 
@@ -28,16 +31,26 @@ def condition_colour(name: str) -> str:
 
 @in_style
 def over_time(runs: Sequence[Run], separations: Mapping[str, Separation], note: str) -> Figure:
-    """Distance, highest activation and the hand's way over time: a column per script."""
-    names = list(dict.fromkeys(run.job.trial.script for run in runs))
-    size = {"width_in": 3.6 * len(names) + 0.6, "height_in": 7.2}
-    figure, axes = new_figure(3, len(names), **size, sharex=True, sharey="row", squeeze=False)
-    for column, name in zip(axes.T, names, strict=True):
-        column[0].set_title(name)
-        _phases(column)
-        for run in runs:
-            if run.job.trial.script == name:
-                _lines(column, run)
+    """Distance, highest activation and the hand's way over time: a column per script.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    separations : mapping of str to Separation
+        By detector; drawn as dotted levels.
+    note : str
+        What the data are, for the caption.
+    """
+    by_script: dict[str, list[Run]] = {}
+    for run in runs:
+        by_script.setdefault(run.job.trial.script, []).append(run)
+    size = {"width_in": 3.6 * len(by_script) + 0.6, "height_in": 7.2}
+    figure, axes = new_figure(3, len(by_script), **size, sharex=True, sharey="row", squeeze=False)
+    for column, (script, of_script) in zip(axes.T, by_script.items(), strict=True):
+        column[0].set_title(script)
+        _shade_near_phase(column)
+        for run in of_script:
+            _draw_run(column, run)
         for detector, separation in separations.items():
             level_cm = 100 * min(separation.distance_m, FAR_M)
             column[0].axhline(level_cm, color=condition_colour(detector), lw=1, ls=(0, (1, 2)))
@@ -46,8 +59,8 @@ def over_time(runs: Sequence[Run], separations: Mapping[str, Separation], note: 
     for axis, label in zip(axes[:, 0], _ROWS.values(), strict=True):
         axis.set_ylabel(label)
     axes[0, 0].set_ylim(0, 100 * FAR_M)
-    figure.legend(*legend_entries(axes), loc="outside lower center", ncols=2)
-    nearest = {run.job.condition: [] for run in runs}
+    marks.legend_below(figure, axes, ncols=2, fontsize=10)
+    nearest: dict[str, list[str]] = {run.job.condition: [] for run in runs}
     for run in runs:
         nearest[run.job.condition].append(f"{100 * run.cycles['distance_m'].min():.1f}")
     return Figure(
@@ -65,24 +78,25 @@ def over_time(runs: Sequence[Run], separations: Mapping[str, Separation], note: 
 def joint_motion(runs: Sequence[Run], note: str) -> Figure:
     """How far each joint turns from its rest: a panel per script, of one condition."""
     figure, axes = new_figure(1, len(runs), 3.6 * len(runs) + 0.6, 3.4, sharey=True, squeeze=False)
+    turned_most = []
     for axis, run in zip(axes[0], runs, strict=True):
-        angles = run.cycles[[f"{joint}_rad" for joint in ARM_JOINTS]].to_numpy()
-        turned_deg = np.degrees(angles - angles[0])
-        _phases([axis])
+        angles_rad = run.cycles[_ANGLES].to_numpy()
+        turned_deg = np.degrees(angles_rad - angles_rad[0])
+        most = ARM_JOINTS[int(np.abs(turned_deg).max(axis=0).argmax())]
+        turned_most.append(f"{most.replace('_', ' ')} ({run.job.trial.script})")
+        _shade_near_phase([axis])
         for number, joint in enumerate(ARM_JOINTS):
             style = "--" if joint.startswith("torso") else "-"
             axis.plot(run.cycles["t_s"], turned_deg[:, number], style, lw=1.4, label=joint.replace("_", " "))
         axis.set(title=run.job.trial.script, xlabel="time (s)")
     axes[0, 0].set_ylabel("turned (degrees)")
-    figure.legend(*legend_entries(axes), loc="outside lower center", ncols=5)
-    most = {run.job.trial.script: _most_turned(run) for run in runs}
+    marks.legend_below(figure, axes, ncols=5, fontsize=10)
     return Figure(
         figure,
         "Joints of torso (dashed) and arm, from their angles at the post; "
         f"{runs[0].job.condition}. Data: {note}.",
-        "Lines over time. The joints that turn most: "
-        + in_words([f"{joint.replace('_', ' ')} ({name})" for name, joint in most.items()]) + ".",
-        _table(runs, [f"{joint}_rad" for joint in ARM_JOINTS]),
+        f"Lines over time. The joints that turn most: {in_words(turned_most)}.",
+        _table(runs, _ANGLES),
     )  # fmt: skip
 
 
@@ -110,7 +124,7 @@ def separation_terms(separations: Mapping[str, Separation], note: str) -> Figure
     )
 
 
-def _lines(column, run: Run) -> None:
+def _draw_run(column, run: Run) -> None:
     name, t = run.job.condition, run.cycles["t_s"]
     for axis, what in zip(column, _ROWS, strict=True):
         scale = 100 if what.endswith("_m") else 1
@@ -121,15 +135,10 @@ def _lines(column, run: Run) -> None:
             column[0].axhline(100 * level, color="#DDDDDD", lw=0.6)
 
 
-def _phases(axes) -> None:
+def _shade_near_phase(axes) -> None:
     """Shade the time from when the person is as near as they go until they begin to leave."""
     for axis in axes:
         axis.axvspan(NEAR_S, LEAVES_S[0], color="#F0F0F0", lw=0)
-
-
-def _most_turned(run: Run) -> str:
-    angles = run.cycles[[f"{joint}_rad" for joint in ARM_JOINTS]].to_numpy()
-    return ARM_JOINTS[int(np.abs(angles - angles[0]).max(axis=0).argmax())]
 
 
 def _table(runs: Sequence[Run], columns: list[str]) -> pd.DataFrame:

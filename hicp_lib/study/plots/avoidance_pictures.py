@@ -18,12 +18,12 @@ from PIL import Image
 from hicp_lib.core.keypoints import LIMBS
 from hicp_lib.experiments.avoidance.closed_loop import start_posture
 from hicp_lib.experiments.avoidance.reaching import in_root, script
-from hicp_lib.experiments.avoidance.runs import Run, image, keypoints_m
+from hicp_lib.experiments.avoidance.runs import Run, image
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.segments import body_segments
 from hicp_lib.robot.skin import read_skin
-from hicp_lib.study.avoidance import SURE
+from hicp_lib.study.avoidance import SURE, sure_keypoints
 from hicp_lib.study.plots.avoidance import condition_colour
 from hicp_lib.study.plots.people import draw_people
 from hicp_lib.study.plots.style import Figure, in_style, new_figure
@@ -31,12 +31,22 @@ from hicp_lib.study.plots.style import Figure, in_style, new_figure
 _TURN_RAD, _TILT_RAD = np.radians(35.0), np.radians(18.0)  # of the view: to the side, from above
 _LIMITS_M = ((-1.2, 0.3), (-0.48, 0.7))
 _PERSON_COLOUR = "#666666"
+_LOWERED_M = 0.1  # the picture's origin lies above the root
 _WEBP = {"quality": 55, "method": 4}
 
 
 @in_style
 def filmstrip(run: Run, times_s: Sequence[float], note: str) -> Figure:
-    """Some moments of a run, one column each: the camera's picture, and robot and person in space."""
+    """Some moments of a run, one column each: the camera's picture, and robot and person in space.
+
+    Parameters
+    ----------
+    run : Run
+    times_s : sequence of float
+        Of the moments.
+    note : str
+        What the data are, for the caption.
+    """
     figure, axes = new_figure(2, len(times_s), 3.0 * len(times_s), 4.9, squeeze=False)
     for (above, below), time_s in zip(axes.T, times_s, strict=True):
         _draw_moment(above, below, run, time_s)
@@ -51,26 +61,37 @@ def filmstrip(run: Run, times_s: Sequence[float], note: str) -> Figure:
 
 
 def animation(run: Run, rate_hz: float = 6.0, dpi: int = 64) -> bytes:
-    """The same as an animated WebP in real time."""
+    """The same as an animated WebP in real time.
+
+    Parameters
+    ----------
+    run : Run
+    rate_hz : float
+        Pictures per second.
+    dpi : int
+
+    Returns
+    -------
+    bytes
+        The file's content.
+    """
     pictures, times_s = [], np.arange(0, run.cycles["t_s"].iloc[-1], 1 / rate_hz).tolist()
     with mpl.rc_context({"figure.constrained_layout.use": True, "font.size": 10}):
-        figure, axes = new_figure(1, 2, 10.4, 4.0, width_ratios=[1.15, 1])
+        figure, (camera, space) = new_figure(1, 2, 10.4, 4.0, width_ratios=[1.15, 1])
         canvas = FigureCanvasAgg(figure)
         figure.set_dpi(dpi)
-        _draw_moment(*axes, run, times_s[0])
+        _draw_moment(camera, space, run, times_s[0])
         canvas.draw()
         figure.set_layout_engine("none")  # all pictures are laid out like the first
         for time_s in times_s:
-            for drawn in [artist for axis in axes for artist in (*axis.images, *axis.collections)]:
+            for drawn in [artist for axis in (camera, space) for artist in (*axis.images, *axis.collections)]:
                 drawn.remove()
-            _draw_moment(*axes, run, time_s)
+            _draw_moment(camera, space, run, time_s)
             canvas.draw()
             pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]))
-    content = io.BytesIO()
-    first, *rest = pictures
-    first.save(
-        content, "webp", save_all=True, append_images=rest, duration=round(1000 / rate_hz), loop=0, **_WEBP
-    )
+    content, period_ms = io.BytesIO(), round(1000 / rate_hz)
+    sequence = {"save_all": True, "append_images": pictures[1:], "duration": period_ms, "loop": 0}
+    pictures[0].save(content, "webp", **sequence, **_WEBP)
     return content.getvalue()
 
 
@@ -78,12 +99,12 @@ def _draw_moment(camera, space, run: Run, time_s: float) -> None:
     cycle = run.cycles.iloc[int(np.argmin(np.abs(run.cycles["t_s"] - time_s)))]
     past = run.frames[run.frames["t_s"] <= time_s + 1e-9]
     frame = past.iloc[-1] if len(past) else None
-    _draw_picture(camera, run, frame, time_s)
+    _draw_image(camera, run, frame, time_s)
     _draw_space(space, run, cycle, frame)
     space.set_title(f"{100 * cycle['distance_m']:.0f} cm, activation {cycle['activation']:.2f}")
 
 
-def _draw_picture(axis, run: Run, frame: pd.Series | None, time_s: float) -> None:
+def _draw_image(axis, run: Run, frame: pd.Series | None, time_s: float) -> None:
     axis.axis("off")
     axis.set_title(f"{time_s:.1f} s")
     if frame is not None:
@@ -95,41 +116,34 @@ def _draw_picture(axis, run: Run, frame: pd.Series | None, time_s: float) -> Non
 def _draw_space(axis, run: Run, cycle: pd.Series, frame: pd.Series | None) -> None:
     trial = run.job.trial
     truth_m = in_root(script(trial.script, trial.seed).person_at(cycle["t_s"]).keypoints_m)
-    posture = _posture(cycle)
+    posture = start_posture().moved("left", np.array([cycle[f"{joint}_rad"] for joint in ARM_JOINTS]))
     _draw_robot(axis, posture)
-    _draw_limbs(axis, truth_m)
+    limbs = np.stack(_project(truth_m[np.array(LIMBS)]), axis=-1)
+    axis.add_collection(LineCollection(list(limbs), linewidths=1.2, colors=_PERSON_COLOUR, zorder=2))
     positions, _ = read_skin().in_root(load_icub(), posture)
-    u, v = _seen(positions)
+    u, v = _project(positions)
     axis.scatter(u, v, c=np.asarray(cycle["activations"]), s=9, cmap="Reds", vmin=0, vmax=0.5, lw=0, zorder=3)
     if frame is not None:
-        points, scores, _ = keypoints_m(frame)
-        u, v = _seen(points[(scores > SURE) & np.isfinite(points[..., 0])])
+        points_m, is_sure, _ = sure_keypoints(frame)
+        u, v = _project(points_m[is_sure])
         axis.scatter(u, v, s=8, color=condition_colour(run.job.condition), zorder=4)
     axis.set(xlim=_LIMITS_M[0], ylim=_LIMITS_M[1], aspect="equal")
     axis.axis("off")
-
-
-def _posture(cycle: pd.Series) -> Posture:
-    return start_posture().moved("left", np.array([cycle[f"{joint}_rad"] for joint in ARM_JOINTS]))
 
 
 def _draw_robot(axis, posture: Posture) -> None:
     chains = (posture.angles(name) for name in ("head", "left", "right"))
     points_per_m = 72 * axis.get_position().width * axis.figure.get_figwidth() / np.ptp(_LIMITS_M[0])
     segments = body_segments(load_icub(), *chains)
-    ends = np.stack(_seen(np.stack([(s.start_m, s.end_m) for s in segments])), axis=-1)
+    ends = np.stack(_project(np.stack([(s.start_m, s.end_m) for s in segments])), axis=-1)
     widths = [2 * segment.radius_m * points_per_m for segment in segments]
-    axis.add_collection(LineCollection(ends, linewidths=widths, colors="#C9CED6", capstyle="round", zorder=0))
+    bars = LineCollection(list(ends), linewidths=widths, colors="#C9CED6", capstyle="round", zorder=0)
+    axis.add_collection(bars)
 
 
-def _draw_limbs(axis, points_m: np.ndarray) -> None:
-    ends = np.stack(_seen(points_m[np.array(LIMBS)]), axis=-1)
-    axis.add_collection(LineCollection(ends, linewidths=1.2, colors=_PERSON_COLOUR, zorder=2))
-
-
-def _seen(points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _project(points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points (..., 3) of the root frame as they lie in the picture: to the right, and up."""
     x, y, z = np.moveaxis(np.asarray(points_m, float), -1, 0)
     right = np.cos(_TURN_RAD) * x - np.sin(_TURN_RAD) * y
     away = np.sin(_TURN_RAD) * x + np.cos(_TURN_RAD) * y
-    return right, np.cos(_TILT_RAD) * z - np.sin(_TILT_RAD) * away - 0.1
+    return right, np.cos(_TILT_RAD) * z - np.sin(_TILT_RAD) * away - _LOWERED_M

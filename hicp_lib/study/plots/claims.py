@@ -16,11 +16,11 @@ from hicp_lib.study.claims.verdicts import (
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 
 # Okabe and Ito's palette; the hatch says the same without colour.
-_LOOKS = {
-    REPRODUCED: ("#009E73", ""),
-    ON_RENDERED_DATA: ("#56B4E9", "//"),
-    NOT_REPRODUCED: ("#D55E00", "xx"),
-    NOT_TESTABLE: ("#D9D9D9", ".."),
+_FILLS = {
+    REPRODUCED: {"color": "#009E73", "hatch": ""},
+    ON_RENDERED_DATA: {"color": "#56B4E9", "hatch": "//"},
+    NOT_REPRODUCED: {"color": "#D55E00", "hatch": "xx"},
+    NOT_TESTABLE: {"color": "#D9D9D9", "hatch": ".."},
 }
 
 
@@ -41,10 +41,8 @@ def verdicts(table: pd.DataFrame) -> Figure:
     figure, axis = new_figure(1, 1, 8.0, 1.4 + 0.32 * len(sections))
     left = np.zeros(len(sections))
     for verdict in VERDICTS:
-        colour, hatch = _LOOKS[verdict]
-        axis.barh(
-            sections, counts[verdict], left=left, color=colour, hatch=hatch, edgecolor="white", label=verdict
-        )
+        pen = {"edgecolor": "white", "label": verdict} | _FILLS[verdict]
+        axis.barh(sections, counts[verdict], left=left, **pen)
         left += counts[verdict].to_numpy()
     axis.invert_yaxis()
     axis.set(xlabel="claims", ylabel="section of the paper", xticks=range(int(left.max()) + 1))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pandas as pd
 
-from hicp_lib.study.plots.style import SUBSET_COLOURS, Figure, detector_colour, in_style, in_words, new_figure
+from hicp_lib.evaluation.calibration.curves import N_BINS
+from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.palette import SUBSET_COLOURS, detector_colour
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _MEASURES = {"AP": "average precision of hands", "share": "share of labelled hands found"}
 _GROUPS = {"body": "body", "hand": "hands"}
@@ -14,35 +16,37 @@ _GROUPS = {"body": "body", "hand": "hands"}
 @in_style
 def ingredients(table: pd.DataFrame, note: str) -> Figure:
     """Average precision and hands found per variant and subset; `table` from `compare_hands`."""
-    variants = list(dict.fromkeys(table["variant"]))
+    variants = list(table["variant"].unique())
     figure, axes = new_figure(1, 2, 10.0, 1.2 + 0.5 * len(variants), sharey=True)
     for axis, (measure, label) in zip(axes, _MEASURES.items(), strict=True):
         for k, (subset, rows) in enumerate(table.groupby("subset", sort=False)):
-            y = np.array([variants.index(variant) for variant in rows["variant"]]) + 0.2 * (k - 0.5)
-            value = rows[measure].to_numpy()
-            whiskers = np.abs(rows[[f"{measure}_low", f"{measure}_high"]].to_numpy().T - value)
-            axis.errorbar(
-                value, y, xerr=whiskers, fmt="o", color=SUBSET_COLOURS.get(subset), label=subset, capsize=3
-            )
+            reach = marks.whiskers(rows, measure, f"{measure}_low", f"{measure}_high")
+            pen = {"fmt": "o", "color": SUBSET_COLOURS.get(subset), "label": subset, "capsize": 3}
+            y = rows["variant"].map(variants.index) + marks.offset(k, 2, 0.2)
+            axis.errorbar(rows[measure], y, xerr=reach, **pen)
         axis.set(xlabel=label, xlim=(0, None))
-    axes[0].set(yticks=range(len(variants)), yticklabels=variants, ylim=(len(variants) - 0.5, -0.5))
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
-    said = [f"{row.variant} {row.AP:.2f} on {row.subset}" for row in table.itertuples()]
+    marks.name_rows(axes[0], variants)
+    _legend_above(figure, axes[0])
+    said = series_text(table.set_index(["variant", "subset"])["AP"], "{0} {2:.2f} on {1}")
     caption = (
         "What each ingredient buys: average precision of hands, and the share of labelled hands found, "
         f"with 95 % bootstrap intervals over source images: {note}."
     )
-    return Figure(
-        figure, caption, f"Dots with whiskers per variant. Average precision: {in_words(said)}.", table
-    )
+    return Figure(figure, caption, f"Dots with whiskers per variant. Average precision: {said}.", table)
 
 
 @in_style
 def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, min_term: float, note: str) -> Figure:
     """Hit rate against score, raw and calibrated, over the number of keypoints per bin of the score.
 
-    `curves` and `errors` from `calibration_study`.
+    Parameters
+    ----------
+    curves, errors : DataFrame
+        As from `calibration_study`.
+    min_term : float
+        What counts as a hit: the OKS term from which on.
+    note : str
+        What the data are, for the caption.
     """
     cases = list(dict.fromkeys(zip(curves["detector"], curves["group"], strict=True)))
     figure, axes = new_figure(
@@ -57,8 +61,7 @@ def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, min_term: flo
         lower.set(xlabel="score", xlim=(-0.02, 1.02))
     axes[0, 0].set(ylabel="share of hits", ylim=(-0.02, 1.02))
     axes[1, 0].set(ylabel="keypoints")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
+    _legend_above(figure, axes[0, 0])
     said = [
         f"{row.detector} {_GROUPS.get(row.group, row.group)} {row.raw:.2f} to {row.calibrated:.2f}"
         for row in errors.itertuples()
@@ -74,14 +77,15 @@ def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, min_term: flo
 
 def _draw_curves(upper, lower, rows: pd.DataFrame, colour: str) -> None:
     upper.plot([0, 1], [0, 1], "--", color="#888888", lw=1)
-    for shift, (kind, marker, fill) in zip(
-        (-0.02, 0.02), (("raw", "o", "white"), ("calibrated", "s", colour)), strict=True
-    ):
+    for k, (kind, marker, fill) in enumerate((("raw", "o-", "white"), ("calibrated", "s-", colour))):
         part = rows[rows["scores"] == kind]
-        whiskers = np.abs(part[["low", "high"]].to_numpy().T - part["rate"].to_numpy())
-        upper.errorbar(
-            part["score"], part["rate"], yerr=whiskers, fmt=f"{marker}-", color=colour, mfc=fill, lw=1,
-            elinewidth=0.7, markersize=5, label=kind,
-        )  # fmt: skip
-        lower.bar((part["bin"] + 0.5) / 10 + shift, part["count"], 0.036, color=fill, ec=colour)
+        pen = {"color": colour, "mfc": fill, "lw": 1, "elinewidth": 0.7, "markersize": 5, "label": kind}
+        upper.errorbar(part["score"], part["rate"], marks.whiskers(part, "rate"), fmt=marker, **pen)
+        x = (part["bin"] + 0.5) / N_BINS + marks.offset(k, 2, 0.04)
+        lower.bar(x, part["count"], 0.036, color=fill, ec=colour)
     lower.grid(axis="x", visible=False)
+
+
+def _legend_above(figure, axis) -> None:
+    handles, labels = axis.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))

@@ -12,18 +12,13 @@ import pandas as pd
 from hicp_lib.core.images import read_image
 from hicp_lib.core.keypoints import COCO_17, FACE, LEFT_HAND, NAMES, RIGHT_HAND
 from hicp_lib.formats.annotations import Annotations
-from hicp_lib.study.plots.people import draw_people, picture_grid, visible_scores
-from hicp_lib.study.plots.style import (
-    BODY_COLOUR,
-    HEAD_COLOUR,
-    SUBSET_COLOURS,
-    Figure,
-    in_style,
-    in_words,
-    new_figure,
-)
+from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.palette import BODY_COLOUR, HEAD_COLOUR, SUBSET_COLOURS
+from hicp_lib.study.plots.people import draw_truth, picture_grid
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _TRUTH_COLOUR = "#F0E442"
+_EDGES = ("left", "top", "right", "bottom")
 _PARTS = {
     **{NAMES[i].replace("_", " "): [i] for i in COCO_17},
     "face (68)": FACE,
@@ -33,15 +28,35 @@ _PARTS = {
 
 
 def with_truth(annotations: Annotations, images_dir: str | Path, image_id: int) -> np.ndarray:
-    """An image with its annotated keypoints drawn, those of people marked as crowd left out."""
+    """An image with its annotated keypoints drawn, those of people marked as crowd left out.
+
+    Parameters
+    ----------
+    annotations : Annotations
+    images_dir : str or Path
+    image_id : int
+
+    Returns
+    -------
+    array, shape (height, width, 3)
+        RGB, uint8.
+    """
     rows = (annotations.image_ids == image_id) & ~annotations.is_crowd
-    image = read_image(Path(images_dir) / annotations.images[image_id].file_name)
-    shown = visible_scores(annotations.visibility[rows])
-    return draw_people(image, annotations.keypoints_px[rows], shown, _TRUTH_COLOUR)
+    return draw_truth(annotations, images_dir, image_id, rows, _TRUTH_COLOUR)
 
 
 def scenes(annotations: Annotations, images_dir: str | Path, image_ids: Sequence[int], note: str) -> Figure:
-    """Whole images (upper row) and the same with their annotated keypoints (lower row)."""
+    """Whole images (upper row) and the same with their annotated keypoints (lower row).
+
+    Parameters
+    ----------
+    annotations : Annotations
+    images_dir : str or Path
+    image_ids : sequence of int
+        Those shown.
+    note : str
+        What the data are, for the caption.
+    """
     plain = [read_image(Path(images_dir) / annotations.images[i].file_name) for i in image_ids]
     marked = [with_truth(annotations, images_dir, i) for i in image_ids]
     n_people = [int((annotations.image_ids == i).sum()) for i in image_ids]
@@ -56,15 +71,22 @@ def scenes(annotations: Annotations, images_dir: str | Path, image_ids: Sequence
 
 @in_style
 def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
-    """How Headless is made, as in the paper's figure, for some rows of `hicp_dataset.plan`.
+    """How Headless is made, as in the paper's figure.
 
     Red: the box of the head's keypoints and their centre; green: the body's; dashed: the cut.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Rows of `hicp_lib.datasets.subsets.plan`.
+    images_dir : str or Path
+        Of the whole images.
+    note : str
+        What the data are, for the caption.
     """
     figure, axes = new_figure(1, len(table), 2.6 * len(table), 3.8, squeeze=False)
     for axis, (_, row) in zip(axes[0], table.iterrows(), strict=True):
-        left, top, right, bottom = (
-            int(row[f"basic_crop_{edge}_px"]) for edge in ("left", "top", "right", "bottom")
-        )
+        left, top, right, bottom = row[[f"basic_crop_{edge}_px" for edge in _EDGES]].astype(int)
         image = read_image(Path(images_dir) / row["file_name"])[top:bottom, left:right]
         axis.imshow(image, extent=(left - 0.5, right - 0.5, bottom - 0.5, top - 0.5))
         for part, colour in (("head", HEAD_COLOUR), ("body", BODY_COLOUR)):
@@ -77,33 +99,38 @@ def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
         "How Headless is made, on real rows of the data: extent and centre of the head's keypoints (red), "
         f"of the other body keypoints (green), and the cut (dashed). {note}"
     )
-    sides = in_words([str(side) for side in table["cut_side"]])
     alt = (
         f"{len(table)} people with a red box around the head, a green box around the body and a dashed cut "
-        f"between them; the removed sides are {sides}."
+        f"between them; the removed sides are {in_words(map(str, table['cut_side']))}."
     )
     return Figure(figure, caption, alt, table)
 
 
 def _draw_box(axis, row: pd.Series, part: str, colour: str) -> None:
-    left, top, right, bottom = (row[f"{part}_{edge}_px"] for edge in ("left", "top", "right", "bottom"))
+    left, top, right, bottom = row[[f"{part}_{edge}_px" for edge in _EDGES]]
     box = matplotlib.patches.Rectangle((left, top), right - left, bottom - top, fill=False, ec=colour, lw=2)
     axis.add_patch(box)
     axis.plot(row[f"{part}_u_px"], row[f"{part}_v_px"], "o", color=colour, mec="white", mew=1.2, markersize=9)
 
 
 def _draw_cut(axis, row: pd.Series) -> None:
-    line = {"top": axis.axhline, "bottom": axis.axhline, "left": axis.axvline, "right": axis.axvline}[
-        row["cut_side"]
-    ]
-    line(row[f"headless_crop_{row['cut_side']}_px"] - 0.5, color="black", lw=2.6, ls=(0, (4, 2)))
-    line(row[f"headless_crop_{row['cut_side']}_px"] - 0.5, color="white", lw=1.6, ls=(0, (4, 2)))
+    side = row["cut_side"]
+    draw_line = axis.axhline if side in ("top", "bottom") else axis.axvline
+    for colour, width in (("black", 2.6), ("white", 1.6)):
+        draw_line(row[f"headless_crop_{side}_px"] - 0.5, color=colour, lw=width, ls=(0, (4, 2)))
 
 
 def pairs(subsets: Mapping[str, tuple[Annotations, Path]], image_ids: Sequence[int], note: str) -> Figure:
     """The same people in each subset, with their annotated keypoints.
 
-    `subsets` maps a name to its annotations and its folder of images.
+    Parameters
+    ----------
+    subsets : mapping of str to (Annotations, Path)
+        By name, its annotations and its folder of images.
+    image_ids : sequence of int
+        Those shown.
+    note : str
+        What the data are, for the caption.
     """
     rows = [
         [with_truth(annotations, images_dir, i) if i in annotations.images else None for i in image_ids]
@@ -121,39 +148,43 @@ def pairs(subsets: Mapping[str, tuple[Annotations, Path]], image_ids: Sequence[i
 @in_style
 def labelled_share(subsets: Mapping[str, Annotations], note: str) -> Figure:
     """Share of people in whom a part is labelled; for face and hands, the mean over their points."""
+    visible = {name: data.visibility[~data.is_crowd] > 0 for name, data in subsets.items()}
     table = pd.DataFrame(
-        {"part": part, "subset": name, "share": float((_people(data).visibility[:, indices] > 0).mean())}
-        for name, data in subsets.items()
+        {"part": part, "subset": name, "share": float(labelled[:, indices].mean())}
+        for name, labelled in visible.items()
         for part, indices in _PARTS.items()
-        if len(_people(data))
+        if len(labelled)
     )
     figure, axis = new_figure(1, 1, 9.0, 3.6)
     wide = table.pivot(index="part", columns="subset", values="share").reindex(list(_PARTS))[list(subsets)]
     for k, name in enumerate(subsets):
-        x = np.arange(len(wide)) + (k - (len(subsets) - 1) / 2) * 0.4
+        x = np.arange(len(wide)) + marks.offset(k, len(subsets), 0.4)
         axis.bar(x, wide[name], 0.38, color=SUBSET_COLOURS.get(name), label=name)
     axis.set_xticks(np.arange(len(wide)), wide.index, rotation=50, ha="right")
     axis.set(ylabel="share of people", ylim=(0, 1))
     axis.grid(axis="x", visible=False)
     axis.legend(loc="upper right", ncols=2, bbox_to_anchor=(1, 1.16))
-    means = [f"{name} {wide[name].mean():.0%}" for name in wide]
+    said = series_text(wide.mean(), "{} {:.0%}")
     caption = f"Share of people in whom a keypoint is labelled (occluded ones included): {note}."
-    return Figure(
-        figure, caption, f"Bars per body part for each subset; mean over parts: {in_words(means)}.", table
-    )
-
-
-def _people(annotations: Annotations) -> Annotations:
-    return annotations.take(~annotations.is_crowd)
+    return Figure(figure, caption, f"Bars per body part for each subset; mean over parts: {said}.", table)
 
 
 @in_style
 def crop_sizes(table: pd.DataFrame, min_pixels: int, note: str) -> Figure:
-    """Distribution of the crops' sizes before the smallest are dropped; `table` from `hicp_dataset.plan`."""
-    sizes = (table["basic_crop_right_px"] - table["basic_crop_left_px"]) * (
-        table["basic_crop_bottom_px"] - table["basic_crop_top_px"]
-    )
-    sizes = sizes[sizes > 0].to_numpy(float)
+    """Distribution of the crops' sizes before the smallest are dropped.
+
+    Parameters
+    ----------
+    table : DataFrame
+        As from `hicp_lib.datasets.subsets.plan`.
+    min_pixels : int
+        The limit.
+    note : str
+        What the data are, for the caption.
+    """
+    left, top, right, bottom = (table[f"basic_crop_{edge}_px"] for edge in _EDGES)
+    sizes = ((right - left) * (bottom - top)).to_numpy(float)
+    sizes = sizes[sizes > 0]
     figure, axis = new_figure(1, 1, 7.5, 3.0)
     bins = np.geomspace(max(sizes.min(), 1), sizes.max() * 1.01, 30)
     axis.hist(sizes[sizes >= min_pixels], bins, color=SUBSET_COLOURS["basic"], label="kept")

@@ -9,8 +9,10 @@ import pandas as pd
 
 from hicp_lib.core.images import read_image
 from hicp_lib.formats.annotations import Annotations
+from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.palette import detector_colour
 from hicp_lib.study.plots.people import picture_grid
-from hicp_lib.study.plots.style import Figure, detector_colour, in_style, in_words, new_figure
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _LABELS = {
     "distance": "distance [m]",
@@ -31,7 +33,16 @@ _SUBSET_STYLES = {"basic": "-", "headless": "--", "close": ":"}
 
 
 def dose_pictures(annotations: Annotations, folder: Path, person: int = 0) -> Figure:
-    """Every picture of one person, a row for each dose."""
+    """Every picture of one person, a row for each dose.
+
+    Parameters
+    ----------
+    annotations : Annotations
+        Of the doses' pictures; they say person, dose and level.
+    folder : Path
+        Holds `images`.
+    person : int
+    """
     rows: dict[str, list] = {}
     for image_id, extra in zip(annotations.image_ids.tolist(), annotations.extras, strict=True):
         if extra["source_image_id"] == person:
@@ -59,98 +70,85 @@ def dose_curves(table: pd.DataFrame, group: str) -> Figure:
     """
     table = table[table["group"] == group]
     rows = table[table["measure"] != "hidden keypoints hit"]
-    doses = list(dict.fromkeys(rows["dose"]))
-    figure, axes = _panels(len(doses), "AP, share of hits")
-    for axis, dose in zip(axes.flat, doses, strict=False):
-        for (detector, measure), part in rows[rows["dose"] == dose].groupby(
-            ["detector", "measure"], sort=False
-        ):
-            solid = measure == "AP"
-            label = detector if solid else f"{detector}, {measure}"
-            _line(axis, part.sort_values("level"), detector, "-" if solid else ":", label)
+    styles = dict.fromkeys(rows["measure"], ":") | {"AP": "-"}
+    labels = {measure: f", {measure}" for measure in styles} | {"AP": ""}
+    figure, axes = _dose_panels(rows, "measure", styles, labels, "AP, share of hits")
+    marks.legend_below(figure, axes[0, 0], ncols=2)
+    for axis, (dose, part) in zip(axes.flat, rows.groupby("dose", sort=False), strict=False):
         if dose in _LOGARITHMIC:
-            ticks = sorted(rows.loc[rows["dose"] == dose, "level"].unique())
+            ticks = np.unique(part["level"])
             axis.set_xscale("log")
             axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
-        axis.set(xlabel=_LABELS.get(dose, dose), ylim=(-0.02, 1.02))
-    handles, labels = axes.flat[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=9)
     caption = (
         "Detection against dose, one thing varied and the rest fixed: average precision (solid) and the "
         "share of visible keypoints hit (dotted), with 95 % bootstrap intervals over people. Rendered "
         "people."
     )
     lows = rows[rows["measure"] == "AP"].groupby(["detector", "dose"], sort=False)["value"].min()
-    said = [f"{detector} {value:.2f} for {dose}" for (detector, dose), value in lows.items()]
-    return Figure(figure, caption, f"Curves per dose. Lowest average precision: {in_words(said)}.", table)
+    said = series_text(lows, "{0} {2:.2f} for {1}")
+    return Figure(figure, caption, f"Curves per dose. Lowest average precision: {said}.", table)
 
 
 @in_style
 def observed_curves(table: pd.DataFrame, note: str) -> Figure:
     """Hit rate against doses as the data set has them; `table` from `dose_curves.observed_curves`."""
-    doses = list(dict.fromkeys(table["dose"]))
-    figure, axes = _panels(len(doses), "share of hits")
-    for axis, dose in zip(axes.flat, doses, strict=False):
-        for (subset, detector), part in table[table["dose"] == dose].groupby(
-            ["subset", "detector"], sort=False
-        ):
-            style = _SUBSET_STYLES.get(subset, "-.")
-            _line(axis, part.sort_values("level"), detector, style, f"{detector}, {subset}")
-        axis.set(xlabel=_LABELS.get(dose, dose), ylim=(-0.02, 1.02))
-    handles, labels = axes.flat[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=9)
+    subsets = table["subset"].unique()
+    styles = dict.fromkeys(subsets, "-.") | _SUBSET_STYLES
+    labels = {subset: f", {subset}" for subset in subsets}
+    figure, axes = _dose_panels(table, "subset", styles, labels, "share of hits")
+    marks.legend_below(figure, axes[0, 0], ncols=3)
     caption = (
         "Share of labelled body keypoints hit, by fifths of what the data set happens to hold of each "
         f"dose, with 95 % bootstrap intervals over source images: {note}."
     )
     spread = table.groupby(["detector", "dose"], sort=False)["value"].agg(np.ptp)
-    said = [f"{detector} {value:.2f} for {dose}" for (detector, dose), value in spread.items()]
-    return Figure(figure, caption, f"Curves per dose. Range of the hit rate: {in_words(said)}.", table)
+    said = series_text(spread, "{0} {2:.2f} for {1}")
+    return Figure(figure, caption, f"Curves per dose. Range of the hit rate: {said}.", table)
 
 
-def _panels(n: int, label: str):
-    columns = min(n, 3)
-    rows = -(-n // columns)
+def _dose_panels(table: pd.DataFrame, by: str, styles: dict, labels: dict, ylabel: str):
+    """A panel per dose, with a line and its interval for each detector and value of the column `by`."""
+    doses = table["dose"].unique()
+    columns = min(len(doses), 3)
+    rows = -(-len(doses) // columns)
     figure, axes = new_figure(rows, columns, 3.7 * columns, 2.9 * rows + 0.5, sharey=True, squeeze=False)
-    for axis in axes.flat[n:]:
+    for axis, dose in zip(axes.flat, doses, strict=False):
+        lines = table[table["dose"] == dose].groupby(["detector", by], sort=False)
+        for (detector, value), part in lines:
+            part, colour = part.sort_values("level"), detector_colour(detector)
+            pen = {"color": colour, "ls": styles[value], "label": f"{detector}{labels[value]}"}
+            axis.plot(part["level"], part["value"], marker="o", ms=3.5, **pen)
+            axis.fill_between(part["level"], part["low"], part["high"], color=colour, alpha=0.13, lw=0)
+        axis.set(xlabel=_LABELS.get(dose, dose), ylim=(-0.02, 1.02))
+    for axis in axes.flat[len(doses) :]:
         axis.set_axis_off()
-    for row in axes:
-        row[0].set(ylabel=label)
+    for axis in axes[:, 0]:
+        axis.set(ylabel=ylabel)
     return figure, axes
-
-
-def _line(axis, rows: pd.DataFrame, detector: str, style: str, label: str) -> None:
-    colour = detector_colour(detector)
-    axis.plot(rows["level"], rows["value"], style, marker="o", ms=3.5, color=colour, label=label)
-    axis.fill_between(rows["level"], rows["low"], rows["high"], color=colour, alpha=0.13, lw=0)
 
 
 @in_style
 def flicker_rates(table: pd.DataFrame, note: str) -> Figure:
     """Flicker rate and jitter as detected and filtered; `table` from `flicker.flicker`."""
     measures = ("flicker rate", "jitter [px]")
-    detectors = list(dict.fromkeys(table["detector"]))[::-1]
+    detectors = list(table["detector"].unique())[::-1]
     figure, axes = new_figure(1, len(measures), 9.0, 1.3 + 0.55 * len(detectors), sharey=True)
+    cases = table.set_index(["tracks", "measure", "detector"])
     for axis, measure in zip(axes, measures, strict=True):
-        for shift, kind, filled in ((0.13, "as detected", True), (-0.13, "filtered", False)):
+        for k, tracks in enumerate(("filtered", "as detected")):
             for y, detector in enumerate(detectors):
-                case = (table["detector"] == detector) & (table["tracks"] == kind)
-                row = table[case & (table["measure"] == measure)].iloc[0]
-                colour = detector_colour(detector)
-                axis.errorbar(
-                    row["value"], y + shift, xerr=[[row["value"] - row["low"]], [row["high"] - row["value"]]],
-                    fmt="o", color=colour, mfc=colour if filled else "white", capsize=2,
-                )  # fmt: skip
+                case, colour = cases.loc[[(tracks, measure, detector)]], detector_colour(detector)
+                fill = colour if tracks == "as detected" else "white"
+                pen = {"xerr": marks.whiskers(case), "fmt": "o", "color": colour, "mfc": fill, "capsize": 2}
+                axis.errorbar(case["value"], y + marks.offset(k, 2, 0.26), **pen)
         axis.set(xlabel=measure, xlim=(0, None), ylim=(-0.5, len(detectors) - 0.5))
     axes[0].set(yticks=range(len(detectors)), yticklabels=detectors)
-    lag = table[(table["measure"] == "latency [s]") & (table["tracks"] == "filtered")]
-    said = [f"{row.detector} {1000 * row.value:.0f} ms" for row in lag.itertuples()]
+    lag_ms = 1000 * cases.loc[("filtered", "latency [s]"), "value"]
     caption = (
         "Keypoints that come and go between consecutive frames, and how far they jump, as detected "
         f"(filled) and through a causal filter (open), with 95 % bootstrap intervals over seconds: {note}. "
-        f"Delay of the filter: {in_words(said)}."
+        f"Delay of the filter: {series_text(lag_ms, '{} {:.0f} ms')}."
     )
-    rates = table[(table["measure"] == "flicker rate") & (table["tracks"] == "as detected")]
-    said = [f"{row.detector} {row.value:.3f}" for row in rates.itertuples()]
-    return Figure(figure, caption, f"Dots with whiskers. Flicker rate as detected: {in_words(said)}.", table)
+    said = series_text(cases.loc[("as detected", "flicker rate"), "value"], "{} {:.3f}")
+    return Figure(figure, caption, f"Dots with whiskers. Flicker rate as detected: {said}.", table)

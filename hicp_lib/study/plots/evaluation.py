@@ -9,18 +9,12 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
+from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.palette import THRESHOLD_MARKERS, detector_colour
 from hicp_lib.study.plots.people import detections_grid
-from hicp_lib.study.plots.style import (
-    THRESHOLD_MARKERS,
-    Figure,
-    detector_colour,
-    in_style,
-    in_words,
-    legend_entries,
-    new_figure,
-)
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
-_GROUP_TITLES = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
+GROUP_TITLES = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
 _THRESHOLDS = {".5": ("AP50", "AR50"), ".75": ("AP75", "AR75"), ".5:.95": ("AP", "AR")}
 
 
@@ -30,16 +24,23 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
 
     Parameters
     ----------
-    table : one row per subset x group x detector x metric, columns
-        `subset, group, detector, metric, value, low, high` (interval bounds at 95 %)
-    data_note : on what data, e.g. "rendered people"; becomes part of the caption
+    table : DataFrame
+        One row per subset x group x detector x metric, columns `subset, group, detector, metric, value, low,
+        high` (interval bounds at 95 %).
+    data_note : str
+        On what data, e.g. "rendered people"; becomes part of the caption.
     """
-    figure, axes, panels = _panels(table, 4.0, "average recall", "average precision")
-    for axis, rows in panels:
+    figure, axes = _panels(table, 4.0, "average recall", "average precision")
+    for axis, rows, _, _ in marks.facets(axes, table, "group", "subset"):
         for detector, of_detector in rows.groupby("detector", sort=False):
-            _scatter_detector(axis, of_detector.set_index("metric"), detector)
+            _scatter_detector(axis, of_detector, detector)
         axis.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")
-    _legend(figure, axes, list(dict.fromkeys(table["detector"])))
+    colours = marks.detector_lines(axes[0, 0], table["detector"].unique())
+    names = [f"OKS {name}" for name in THRESHOLD_MARKERS]
+    shapes = marks.legend_lines(
+        axes[0, 0], names, ({"marker": m, "ls": ""} for m in THRESHOLD_MARKERS.values())
+    )
+    figure.legend(handles=[*colours, *shapes], loc="outside lower center", ncols=4, fontsize=9)
     caption = (
         f"Average precision against average recall per detector, on {data_note}. The shape is the OKS "
         "threshold (square .5, circle .75, triangle the mean over .5:.05:.95), as in Fig. 4 of the paper; "
@@ -49,60 +50,33 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
 
 
 def _panels(table: pd.DataFrame, height_in: float, x_label: str, y_label: str):
-    """A panel for each group of keypoints (down) and subset (across).
-
-    Returns the figure, its axes (groups, subsets), and each axis with its rows of the table.
-    """
-    subsets, groups = list(dict.fromkeys(table["subset"])), list(dict.fromkeys(table["group"]))
-    size = 4.4 * len(subsets), height_in * len(groups)
-    figure, axes = new_figure(len(groups), len(subsets), *size, sharex=True, sharey=True, squeeze=False)
-    panels = []
-    for of_group, group in zip(axes, groups, strict=True):
-        for axis, subset in zip(of_group, subsets, strict=True):
-            axis.set_title(f"{subset.capitalize()} · {_GROUP_TITLES.get(group, group)}")
-            panels.append((axis, table[(table["subset"] == subset) & (table["group"] == group)]))
-    for axis in axes[-1]:
-        axis.set_xlabel(x_label)
-    for axis in axes[:, 0]:
-        axis.set_ylabel(y_label)
-    return figure, axes, panels
+    """A figure with a panel for each group of keypoints (down) and subset (across), and its axes."""
+    shape = table["group"].nunique(), table["subset"].nunique()
+    size = 4.4 * shape[1], height_in * shape[0]
+    figure, axes = new_figure(*shape, *size, sharex=True, sharey=True, squeeze=False)
+    for axis, _, group, subset in marks.facets(axes, table, "group", "subset"):
+        title = f"{subset.capitalize()} · {GROUP_TITLES.get(group, group)}"
+        axis.set(title=title, xlabel=x_label, ylabel=y_label)
+        axis.label_outer()
+    return figure, axes
 
 
 def _scatter_detector(axis, rows: pd.DataFrame, detector: str) -> None:
-    colour = detector_colour(detector)
+    by_metric = {metric: row for metric, row in rows.groupby("metric")}
     for threshold, (precision, recall) in _THRESHOLDS.items():
-        y, x = rows.loc[precision], rows.loc[recall]
-        axis.errorbar(
-            x["value"], y["value"], xerr=_whiskers(x), yerr=_whiskers(y),
-            fmt=THRESHOLD_MARKERS[threshold], color=colour, markersize=7, elinewidth=0.9, alpha=0.9,
-        )  # fmt: skip
-
-
-def _whiskers(row) -> list[list[float]] | None:
-    if not np.isfinite([row["value"], row["low"], row["high"]]).all():
-        return None
-    return [[max(0.0, row["value"] - row["low"])], [max(0.0, row["high"] - row["value"])]]
-
-
-def _legend(figure, axes, detectors) -> None:
-    axis = axes[0, 0]
-    shapes = [
-        axis.plot([], [], marker, color="#444444", label=f"OKS {name}")[0]
-        for name, marker in THRESHOLD_MARKERS.items()
-    ]
-    colours = [axis.plot([], [], "-", lw=4, color=detector_colour(name), label=name)[0] for name in detectors]
-    figure.legend(handles=[*colours, *shapes], loc="outside lower center", ncols=4, fontsize=9)
+        y, x = by_metric[precision], by_metric[recall]
+        reach = {"xerr": marks.whiskers(x), "yerr": marks.whiskers(y)}
+        pen = {"color": detector_colour(detector), "markersize": 7, "elinewidth": 0.9, "alpha": 0.9}
+        axis.errorbar(x["value"], y["value"], fmt=THRESHOLD_MARKERS[threshold], **reach, **pen)
 
 
 def _describe_best(table: pd.DataFrame) -> str:
-    best = []
     rows = table[(table["metric"] == "AP") & table["value"].notna()]
-    for (subset, group), part in rows.groupby(["subset", "group"], sort=False):
-        top = part.loc[part["value"].idxmax()]
-        best.append(f"{top['detector']} with {top['value']:.2f} on {subset} {group}")
-    return (
-        f"Scatter of average precision against average recall. Highest average precision: {in_words(best)}."
+    best = rows.loc[rows.groupby(["subset", "group"], sort=False)["value"].idxmax()]
+    said = series_text(
+        best.set_index(["detector", "subset", "group"])["value"], "{0} with {3:.2f} on {1} {2}"
     )
+    return f"Scatter of average precision against average recall. Highest average precision: {said}."
 
 
 @in_style
@@ -112,29 +86,26 @@ def loss_without_head(table: pd.DataFrame, data_note: str) -> Figure:
     `table` as for `precision_recall`; only rows with metric "AP" are drawn.
     """
     rows = table[table["metric"] == "AP"]
-    groups = list(dict.fromkeys(rows["group"]))
+    names, groups = (rows[name].unique() for name in ("detector", "group"))
     figure, axes = new_figure(1, len(groups), 4.4 * len(groups), 3.2, sharex=True, squeeze=False)
     for axis, group in zip(axes[0], groups, strict=True):
         part = rows[rows["group"] == group].pivot(index="detector", columns="subset", values="value")
-        part = part.reindex([name for name in dict.fromkeys(rows["detector"]) if name in part.index])[::-1]
+        part = part.reindex([name for name in names[::-1] if name in part.index])
         for y, (detector, row) in enumerate(part.iterrows()):
             colour = detector_colour(detector)
             axis.plot([row["headless"], row["basic"]], [y, y], "-", color=colour, lw=3, alpha=0.45)
             axis.plot(row["basic"], y, "o", color=colour, markersize=9)
             axis.plot(row["headless"], y, "o", color=colour, mfc="white", mew=2, markersize=9)
         axis.set(yticks=range(len(part)), yticklabels=list(part.index), xlabel="average precision (.5:.95)")
-        axis.set(xlim=(-0.02, 1.02), ylim=(-0.6, len(part) - 0.4))
-        axis.set_title(_GROUP_TITLES.get(group, group))
+        axis.set(xlim=(-0.02, 1.02), ylim=(-0.6, len(part) - 0.4), title=GROUP_TITLES.get(group, group))
     drops = rows.pivot_table(index=["detector", "group"], columns="subset", values="value")
-    change = (drops["headless"] - drops["basic"]).dropna()
-    said = in_words([f"{name} {group} {value:+.2f}" for (name, group), value in change.items()])
+    said = series_text((drops["headless"] - drops["basic"]).dropna(), "{} {} {:+.2f}")
     caption = (
         "What removing the head costs: average precision on Basic (filled) and Headless (open) for each "
         f"detector, on {data_note}."
     )
-    return Figure(
-        figure, caption, f"Average precision with and without the head. Change per detector: {said}.", rows
-    )
+    alt = f"Average precision with and without the head. Change per detector: {said}."
+    return Figure(figure, caption, alt, rows)
 
 
 @in_style
@@ -143,19 +114,17 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
 
     `table` has one row per person: columns `subset, group, detector, oks` (0 when nobody was found).
     """
-    label = "share of people at least as good"
-    figure, axes, panels = _panels(table, 3.2, "OKS of the best detection", label)
+    figure, axes = _panels(table, 3.2, "OKS of the best detection", "share of people at least as good")
     medians = []
-    for axis, rows in panels:
-        for (subset, group, detector), people in rows.groupby(["subset", "group", "detector"], sort=False):
+    for axis, rows, group, subset in marks.facets(axes, table, "group", "subset"):
+        for detector, people in rows.groupby("detector", sort=False):
             oks = np.sort(people["oks"].to_numpy())
             share = 1 - np.arange(len(oks)) / len(oks)
             steps = np.r_[0, oks, 1], np.r_[1, share, 0]
             axis.step(*steps, color=detector_colour(detector), where="pre", label=detector)
             medians.append(f"{detector} {np.median(oks):.2f} ({subset} {group})")
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
-    handles, labels = legend_entries(axes)
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9)
+    marks.legend_below(figure, axes)
     caption = (
         f"Share of annotated people whose best-fitting detection reaches a given OKS, on {data_note}; "
         "a person nobody found counts with OKS 0."
@@ -168,12 +137,18 @@ def examples(folders, truth, found, n_people: int, note: str) -> Figure:
 
     Parameters
     ----------
-    folders : subset -> dataset folder
-    truth, found : as in `hicp_lib.evaluation.ap.metric_table`
+    folders : mapping of str to Path
+        Subset -> dataset folder.
+    truth : mapping of str to Annotations
+        By subset.
+    found : mapping of (str, str) to mapping of int to Detections
+        By subset and detector, then by image id.
+    n_people : int
+        How many are shown.
+    note : str
+        What the data are, for the caption.
     """
-    shared = [
-        i for i in list(truth.values())[-1].images if all(i in people.images for people in truth.values())
-    ]
+    shared = [i for i in list(truth.values())[-1].images if all(i in p.images for p in truth.values())]
     detectors = list(dict.fromkeys(detector for _, detector in found))
     pictures = {
         f"{subset} {i}": (
@@ -189,24 +164,14 @@ def examples(folders, truth, found, n_people: int, note: str) -> Figure:
 @in_style
 def time_per_image(table: pd.DataFrame, machine_note: str) -> Figure:
     """Distribution of the detection time per image; `table` has columns `detector, time_ms`."""
-    detectors = list(dict.fromkeys(table["detector"]))[::-1]
-    samples = [table.loc[table["detector"] == name, "time_ms"].dropna().to_numpy() for name in detectors]
+    detectors = table["detector"].unique()[::-1]
+    samples = [table.loc[table["detector"] == name, "time_ms"].dropna() for name in detectors]
     figure, axis = new_figure(1, 1, 7.5, 0.8 + 0.55 * len(detectors))
-    boxes = axis.boxplot(samples, orientation="horizontal", whis=(5, 95), showfliers=False, patch_artist=True)
-    for box, median, name in zip(boxes["boxes"], boxes["medians"], detectors, strict=True):
-        box.set(facecolor=detector_colour(name), alpha=0.6)
-        median.set(color="black", lw=1.5)
-    axis.set(
-        yticks=range(1, len(detectors) + 1),
-        yticklabels=detectors,
-        xlabel="time per image [ms]",
-        xlim=(0, None),
-    )
-    medians = [
-        f"{name} {np.median(times):.0f} ms"
-        for name, times in zip(detectors, samples, strict=True)
-        if len(times)
-    ]
+    marks.draw_boxes(axis, samples, map(detector_colour, detectors))
+    axis.set(yticks=range(1, len(detectors) + 1), yticklabels=detectors)
+    axis.set(xlabel="time per image [ms]", xlim=(0, None))
+    pairs = zip(detectors, samples, strict=True)
+    medians = [f"{name} {np.median(times):.0f} ms" for name, times in pairs if len(times)]
     caption = (
         f"Time to detect people in one image, {machine_note}: box 25–75 %, whiskers 5–95 %, line the median."
     )

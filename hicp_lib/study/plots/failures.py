@@ -9,16 +9,18 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.images import read_image
 from hicp_lib.datasets.visibility import CLASSES
 from hicp_lib.evaluation.failures.error_kinds import KINDS
 from hicp_lib.evaluation.failures.placed_keypoints import STATES
 from hicp_lib.formats.annotations import Annotations
-from hicp_lib.study.plots.people import draw_people, picture_grid, visible_scores
-from hicp_lib.study.plots.style import Figure, detector_colour, in_style, in_words, legend_entries, new_figure
+from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.evaluation import GROUP_TITLES
+from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
-_GROUPS = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
 _TRUTH_COLOUR = "#39D353"
+_ONE_CROP = ["subset", "image_id", "annotation_id"]
 _KIND_COLOURS = dict(
     zip(KINDS, ("#1B9E4B", "#9BD3A0", "#0072B2", "#CC79A7", "#D5272D", "#BDBDBD", "#5F5F5F"), strict=True)
 )
@@ -28,17 +30,25 @@ _STATE_STYLES = dict(zip(STATES, (("-", "o"), ("--", "s"), (":", "^"), (":", "x"
 def class_examples(
     classes: pd.DataFrame, truth: Mapping[str, Annotations], folders: Mapping[str, Path], note: str
 ) -> Figure:
-    """The first crop of every class, with the labelled keypoints; `classes` from `people_classes`."""
+    """The first crop of every class, with the labelled keypoints.
+
+    Parameters
+    ----------
+    classes : DataFrame
+        As from `people_classes`.
+    truth : mapping of str to Annotations
+        By subset.
+    folders : mapping of str to Path
+        The subsets' dataset folders.
+    note : str
+        What the data are, for the caption.
+    """
     first = classes.drop_duplicates("class").set_index("class")
     names = [name for name in CLASSES if name in first.index]
     pictures = []
-    for name in names:
-        subset, image_id, annotation_id = first.loc[name, ["subset", "image_id", "annotation_id"]]
-        people = truth[subset]
-        image = read_image(Path(folders[subset]) / "images" / people.images[image_id].file_name)
-        row = people.ids == annotation_id
-        scores = visible_scores(people.visibility[row])
-        pictures.append(draw_people(image, people.keypoints_px[row], scores, _TRUTH_COLOUR))
+    for subset, image_id, annotation_id in first.loc[names, _ONE_CROP].itertuples(index=False):
+        people, images_dir = truth[subset], Path(folders[subset]) / "images"
+        pictures.append(draw_truth(people, images_dir, image_id, people.ids == annotation_id, _TRUTH_COLOUR))
     columns = -(-len(names) // 2)
     rows = [pictures[start : start + columns] for start in range(0, len(pictures), columns)]
     figure = picture_grid(
@@ -54,31 +64,29 @@ def class_examples(
 def class_precision(table: pd.DataFrame, note: str) -> Figure:
     """Average precision and recall per class; `table` from `compare_classes`."""
     rows = table[table["metric"].isin(["AP", "AR"])]
-    groups, detectors = (list(dict.fromkeys(rows[name])) for name in ("group", "detector"))
+    groups, detectors = (list(rows[name].unique()) for name in ("group", "detector"))
     names = [name for name in CLASSES if name in set(rows["class"])]
-    figure, axes = new_figure(
-        1, len(groups), 4.8 * len(groups) + 1, 1.3 + 0.42 * len(names), sharey=True, squeeze=False
-    )
+    size = 4.8 * len(groups) + 1, 1.3 + 0.42 * len(names)
+    figure, axes = new_figure(1, len(groups), *size, sharey=True, squeeze=False)
     for axis, group in zip(axes[0], groups, strict=True):
         of_group = rows[rows["group"] == group]
         for (detector, metric), part in of_group.groupby(["detector", "metric"], sort=False):
-            below = 0.24 * (detectors.index(detector) - (len(detectors) - 1) / 2) + 0.09 * (metric == "AR")
+            below = marks.offset(detectors.index(detector), len(detectors), 0.24) + 0.09 * (metric == "AR")
             y = part["class"].map(names.index) + below
             _dots(axis, part, y, detector, filled=metric == "AP", label=f"{detector}, {metric}")
         _say_too_few(axis, names, set(of_group.loc[of_group["value"].isna(), "class"]))
-        axis.set(xlabel="AP (filled), AR (open)", xlim=(-0.02, 1.02), title=_GROUPS.get(group, group))
+        axis.set(xlabel="AP (filled), AR (open)", xlim=(-0.02, 1.02), title=GROUP_TITLES.get(group, group))
     counts = rows[rows["group"] == groups[0]].drop_duplicates("class").set_index("class")["n_people"]
-    labels = [f"{name} ({counts.get(name, 0)})" for name in names]
-    axes[0, 0].set(yticks=range(len(names)), yticklabels=labels, ylim=(len(names) - 0.5, -0.5))
-    _legend(figure, axes, ncols=2)
+    marks.name_rows(axes[0, 0], [f"{name} ({counts.get(name, 0)})" for name in names])
+    marks.legend_below(figure, axes, ncols=2)
     caption = (
         "Average precision and recall (OKS .5:.95) by what the picture shows, with the number of people "
         f"whose body counts; all subsets together; 95 % bootstrap intervals over source images: {note}."
     )
     best = rows.query("group == 'body' and metric == 'AP'").dropna(subset="value")
     best = best.sort_values("value", ascending=False).groupby("class").head(1)
-    said = [f"{row['detector']} {row['value']:.2f} for {row['class']}" for _, row in best.iterrows()]
-    alt = f"Dots per class and detector. Best average precision for bodies: {in_words(said)}."
+    said = series_text(best.set_index(["detector", "class"])["value"], "{0} {2:.2f} for {1}")
+    alt = f"Dots per class and detector. Best average precision for bodies: {said}."
     return Figure(figure, caption, alt, rows)
 
 
@@ -91,33 +99,35 @@ def _say_too_few(axis, names: list[str], few: set[str]) -> None:
 
 
 def _dots(axis, rows: pd.DataFrame, y, detector: str, filled: bool = True, label: str = "") -> None:
-    value, colour = rows["value"].to_numpy(float), detector_colour(detector)
-    whiskers = np.abs(rows[["low", "high"]].to_numpy(float).T - value)
-    axis.errorbar(
-        value, y, xerr=whiskers, fmt="o", color=colour, mfc=colour if filled else "white",
-        label=label or detector, capsize=2, ms=5,
-    )  # fmt: skip
-
-
-def _legend(figure, axes, **options) -> None:
-    place = {"loc": "outside lower center", "ncols": 4, "fontsize": 9} | options
-    figure.legend(*legend_entries(np.atleast_1d(axes)), **place)
+    colour = detector_colour(detector)
+    pen = {"color": colour, "mfc": colour if filled else "white", "label": label or detector}
+    value = rows["value"].astype(float)
+    axis.errorbar(value, y, xerr=marks.whiskers(rows), fmt="o", capsize=2, ms=5, **pen)
 
 
 def _detector_panels(table: pd.DataFrame, width_in: float, height_in: float, **shared):
     """The figure, its axes, and for each detector of a table its axis with its rows."""
-    detectors = list(dict.fromkeys(table["detector"])) or ["none given"]
-    size = width_in * len(detectors) + 0.8, height_in
-    figure, axes = new_figure(1, len(detectors), *size, sharey=True, squeeze=False, **shared)
-    for axis, detector in zip(axes[0], detectors, strict=True):
+    by_detector = dict(list(table.groupby("detector", sort=False))) or {"none given": table}
+    size = width_in * len(by_detector) + 0.8, height_in
+    figure, axes = new_figure(1, len(by_detector), *size, sharey=True, squeeze=False, **shared)
+    for axis, detector in zip(axes[0], by_detector, strict=True):
         axis.set_title(detector)
-    rows = [table[table["detector"] == detector] for detector in detectors]
-    return figure, axes[0], list(zip(axes[0], detectors, rows, strict=True))
+    return figure, axes[0], [(axis, *case) for axis, case in zip(axes[0], by_detector.items(), strict=True)]
 
 
 @in_style
 def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
-    """Stacked shares of the kinds of error; `table` from `kind_shares` of one group of keypoints."""
+    """Stacked shares of the kinds of error (Ronchi and Perona, ICCV 2017).
+
+    Parameters
+    ----------
+    table : DataFrame
+        As from `kind_shares`, of one group of keypoints.
+    by : str
+        Its column that names the bars.
+    note : str
+        What the data are, for the caption.
+    """
     order = [name for name in CLASSES if name in set(table[by])] or list(dict.fromkeys(table[by]))
     figure, axes, panels = _detector_panels(table, 4.2, 1.5 + 0.36 * len(order))
     for axis, _, rows in panels:
@@ -129,43 +139,40 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
         _say_too_few(axis, order, set(part.index[part.isna().all(axis=1)]))
         axis.set(xlabel="share of labelled keypoints", xlim=(0, 1))
         axis.grid(axis="y", visible=False)
-    axes[0].set(yticks=range(len(order)), yticklabels=order, ylim=(len(order) - 0.5, -0.5))
-    _legend(figure, axes, ncols=4)
+    marks.name_rows(axes[0], order)
+    marks.legend_below(figure, axes)
     worst = table[(table["kind"] == "miss") & table["share"].notna()]
-    said = [f"{row['detector']} {row['share']:.2f} on {row[by]}" for _, row in worst.iterrows()]
+    said = series_text(worst.set_index(["detector", by])["share"], "{0} {2:.2f} on {1}")
     caption = (
         "What becomes of labelled keypoints, by the kinds of error of Ronchi and Perona, and those that "
         f"are not given or belong to people who are not found: {note}."
     )
-    return Figure(figure, caption, f"Stacked bars per {by}. Shares of misses: {in_words(said)}.", table)
+    return Figure(figure, caption, f"Stacked bars per {by}. Shares of misses: {said}.", table)
 
 
 @in_style
 def head_change(table: pd.DataFrame, note: str) -> Figure:
     """Change of the hit rate of each keypoint when the head is cut off; from `change_per_keypoint`."""
-    names, detectors = (list(dict.fromkeys(table[name])) for name in ("keypoint", "detector"))
+    names, detectors = (list(table[name].unique()) for name in ("keypoint", "detector"))
     figure, axis = new_figure(1, 1, 7.5, 1.2 + 0.3 * len(names))
     for k, detector in enumerate(detectors):
         part = table[table["detector"] == detector].rename(columns={"change": "value"})
-        y = part["keypoint"].map(names.index) + 0.24 * (k - (len(detectors) - 1) / 2)
-        _dots(axis, part, y, detector)
+        _dots(axis, part, part["keypoint"].map(names.index) + marks.offset(k, len(detectors), 0.24), detector)
     axis.axvline(0, color="#444444", lw=1)
-    labels = [name.replace("_", " ") for name in names]
-    axis.set(yticks=range(len(names)), yticklabels=labels, ylim=(len(names) - 0.5, -0.5))
+    marks.name_rows(axis, [name.replace("_", " ") for name in names])
     axis.set(xlabel="change of the share of keypoints hit, without the head")
-    _legend(figure, axis)
-    mean = table.groupby("detector", sort=False)["change"].mean()
-    said = [f"{name} {value:+.2f}" for name, value in mean.items()]
+    marks.legend_below(figure, axis)
+    said = series_text(table.groupby("detector", sort=False)["change"].mean(), "{} {:+.2f}")
     caption = (
         "Without the head: change of the share of keypoints hit, on the same keypoints of the same people, "
         f"with 95 % bootstrap intervals over source images: {note}."
     )
-    return Figure(figure, caption, f"Dots per keypoint and detector. Mean change: {in_words(said)}.", table)
+    return Figure(figure, caption, f"Dots per keypoint and detector. Mean change: {said}.", table)
 
 
 @in_style
-def invented_heads(table: pd.DataFrame, note: str) -> Figure:
-    """Where head keypoints are put when the head was cut off; `table` from `without_head.invented_heads`."""
+def hallucinated_heads(table: pd.DataFrame, note: str) -> Figure:
+    """Where keypoints of the head are given that was cut off; `table` from `without_head.invented_heads`."""
     figure, axes, panels = _detector_panels(table, 4.0, 4.4, sharex=True)
     for axis, detector, rows in panels:
         dots = axis.scatter(rows["along"], rows["below"], c=rows["score"], s=14, vmin=0, vmax=1, alpha=0.8)
@@ -175,14 +182,13 @@ def invented_heads(table: pd.DataFrame, note: str) -> Figure:
         axis.set(xlabel="along the cut [of the picture]")
     axes[0].set(ylabel="below the cut [of the picture]")
     figure.colorbar(dots, ax=axes, label="score", shrink=0.8)
-    _legend(figure, axes)
-    beyond = table["below"] < 0
-    said = [f"{d} {share:.2f}" for d, share in beyond.groupby(table["detector"], sort=False).mean().items()]
+    marks.legend_below(figure, axes)
+    said = series_text((table["below"] < 0).groupby(table["detector"], sort=False).mean())
     caption = (
         "Noses, eyes and ears given in pictures whose head was cut off (square: the picture, turned so "
         f"that the cut is above), coloured by score: {note}."
     )
-    return Figure(figure, caption, f"Scatter of places. Share put beyond the cut: {in_words(said)}.", table)
+    return Figure(figure, caption, f"Scatter of places. Share put beyond the cut: {said}.", table)
 
 
 @in_style
@@ -191,26 +197,23 @@ def scores_by_state(table: pd.DataFrame, note: str) -> Figure:
     figure, axes, panels = _detector_panels(table, 4.2, 4.2)
     for axis, detector, of_detector in panels:
         for state, (line, marker) in _STATE_STYLES.items():
-            rows = of_detector[of_detector["state"] == state].astype({"value": float})
+            rows = of_detector[of_detector["state"] == state]
             if rows.empty:
                 continue
-            whiskers = np.abs(rows[["low", "high"]].to_numpy(float).T - rows["value"].to_numpy())
-            axis.errorbar(
-                rows["score"], rows["value"], yerr=whiskers, ls=line, marker=marker, ms=5, capsize=2,
-                color=detector_colour(detector), label=state,
-            )  # fmt: skip
+            pen = {"ls": line, "marker": marker, "ms": 5, "capsize": 2, "color": detector_colour(detector)}
+            axis.errorbar(rows["score"], rows["value"], marks.whiskers(rows), label=state, **pen)
         axis.plot([0, 1], [0, 1], "--", color="#AAAAAA", lw=1)
         axis.set(xlim=(0, 1.02), ylim=(-0.02, 1.02), xlabel="score")
     axes[0].set(ylabel="share of hits")
-    _legend(figure, axes)
+    marks.legend_below(figure, axes)
     top = table[table["state"] == "outside"].groupby("detector", sort=False).tail(1)
-    said = [f"{row.detector} {row.value:.2f} at {row.score:.2f}" for row in top.itertuples()]
+    said = series_text(top.set_index(["detector", "score"])["value"], "{0} {2:.2f} at {1:.2f}")
     caption = (
         "What a score is worth by where the keypoint truly is: share of hits per fifth of the score, for "
         "keypoints that are visible, hidden, and outside the picture, with 95 % bootstrap intervals over "
         f"source images: {note}."
     )
-    alt = f"Curves of hits against score. Highest scores outside the picture: {in_words(said)}."
+    alt = f"Curves of hits against score. Highest scores outside the picture: {said}."
     return Figure(figure, caption, alt, table)
 
 
@@ -221,19 +224,30 @@ def gallery(
     found: Mapping[tuple[str, str], Mapping[int, Detections]],
     note: str,
 ) -> Figure:
-    """The worst cases, a row for each detector and kind of case; `cases` from `worst_cases`."""
+    """The worst cases, a row for each detector and kind of case.
+
+    Parameters
+    ----------
+    cases : DataFrame
+        As from `worst_cases`.
+    folders : mapping of str to Path
+        The subsets' dataset folders.
+    truth : mapping of str to Annotations
+        By subset.
+    found : mapping of (str, str) to mapping of int to Detections
+        By subset and detector, then by image id.
+    note : str
+        What the data are, for the caption.
+    """
     rows, titles = [], []
     for (detector, case), part in cases.groupby(["detector", "case"], sort=False):
         pictures = []
         for subset, image_id in part[["subset", "image_id"]].itertuples(index=False):
-            people = truth[subset].take((truth[subset].image_ids == image_id) & ~truth[subset].is_crowd)
-            image = read_image(Path(folders[subset]) / "images" / people.images[image_id].file_name)
-            seen = visible_scores(people.visibility) * np.isin(np.arange(136), np.arange(26))
-            image = draw_people(image, people.keypoints_px, seen, _TRUTH_COLOUR)
-            detections = found[subset, detector].get(image_id, Detections.none())
-            scores = detections.scores
-            colour = detector_colour(detector)
-            pictures.append(draw_people(image, detections.keypoints_px, scores, colour))
+            people, images_dir = truth[subset], Path(folders[subset]) / "images"
+            of_image = (people.image_ids == image_id) & ~people.is_crowd
+            image = draw_truth(people, images_dir, image_id, of_image, _TRUTH_COLOUR, n_keypoints=26)
+            found_in = found[subset, detector].get(image_id, Detections.none())
+            pictures.append(draw_detections(image, found_in, detector))
         rows.append(pictures)
         titles.append(f"{detector}\n{case}")
     return picture_grid(

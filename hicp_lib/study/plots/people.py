@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import cv2
 import matplotlib.colors
 import numpy as np
 
 from hicp_lib.core.detections import Detections
+from hicp_lib.core.images import read_image
 from hicp_lib.core.keypoints import FACE, HANDS, LIMBS, N_KEYPOINTS
-from hicp_lib.study.plots.style import Figure, detector_colour, in_style, in_words, new_figure
+from hicp_lib.formats.annotations import Annotations
+from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 
 _SHIFT = 4  # fractional bits of OpenCV's drawing coordinates
+_MAX_PX = 1e5  # points farther off would overflow them
+_RIM_PX, _RIM_COLOUR = 1.6, (20, 20, 20)
+# Widths of lines and radii of points, as multiples of a body limb's width.
+_HAND_LIMB, _FACE_POINT, _HAND_POINT, _BODY_POINT = 0.55, 0.45, 0.6, 1.2
+_CELL_RATIOS = (0.4, 1.7)  # height over width of a cell: at least, at most
 
 
 def draw_people(
@@ -27,43 +36,109 @@ def draw_people(
 
     Parameters
     ----------
-    image : array, shape (height, width, 3), RGB, uint8
-    keypoints_px : array, shape (n_persons, 136, 2), NaN where absent
-    scores : array, shape (n_persons, 136); points and limbs below `min_score` are left out
-    colour : any Matplotlib colour; every line gets a thin dark rim so that it shows on any background
-    thickness_px : width of a body limb; default a 260th of the image's diagonal
+    image : array, shape (height, width, 3)
+        RGB, uint8.
+    keypoints_px : array, shape (n_persons, 136, 2)
+        NaN where absent.
+    scores : array, shape (n_persons, 136)
+    colour : str
+        Any Matplotlib colour; every line gets a thin dark rim so that it shows on any background.
+    min_score : float
+        Points below it, and their limbs, are left out.
+    thickness_px : float, optional
+        Width of a body limb; a 260th of the image's diagonal where left out.
+
+    Returns
+    -------
+    array, shape (height, width, 3)
+
+    Examples
+    --------
+    >>> keypoints_px, scores = np.full((1, 136, 2), np.nan), np.zeros((1, 136))
+    >>> keypoints_px[0, 0], scores[0, 0] = (8, 4), 0.9
+    >>> draw_people(np.zeros((9, 16, 3), np.uint8), keypoints_px, scores, "#FF0000")[4, 8].tolist()
+    [255, 0, 0]
     """
     canvas = np.ascontiguousarray(image).copy()
     rgb = tuple(int(round(255 * channel)) for channel in matplotlib.colors.to_rgb(colour))
     width_px = thickness_px or max(1.5, np.hypot(*image.shape[:2]) / 260)
     for points, confidence in zip(keypoints_px, scores, strict=True):
-        shown = (
-            np.isfinite(points).all(axis=1) & (confidence >= min_score) & (np.abs(points).max(axis=1) < 1e5)
-        )
-        for rim, pen in ((1.6, (20, 20, 20)), (0.0, rgb)):
-            _draw_limbs(canvas, points, shown, pen, width_px, rim)
-            _draw_points(canvas, points, shown, pen, width_px, rim)
+        is_near = np.isfinite(points).all(axis=1) & (np.abs(points).max(axis=1) < _MAX_PX)
+        shown = is_near & (confidence >= min_score)
+        for rim_px, pen in ((_RIM_PX, _RIM_COLOUR), (0.0, rgb)):
+            _draw_person(canvas, points, shown, pen, width_px, rim_px)
     return canvas
 
 
-def _draw_limbs(canvas, points, shown, pen, width_px, rim) -> None:
+def draw_detections(
+    image: np.ndarray, found: Detections, detector: str, min_score: float = 0.1
+) -> np.ndarray:
+    """Draw what a detector found onto a copy of an image, in the detector's colour.
+
+    Parameters
+    ----------
+    image : array, shape (height, width, 3)
+        RGB, uint8.
+    found : Detections
+    detector : str
+        Its name.
+    min_score : float
+        Points below it, and their limbs, are left out.
+
+    Returns
+    -------
+    array, shape (height, width, 3)
+    """
+    return draw_people(image, found.keypoints_px, found.scores, detector_colour(detector), min_score)
+
+
+def draw_truth(
+    annotations: Annotations,
+    images_dir: str | Path,
+    image_id: int,
+    rows: np.ndarray,
+    colour: str,
+    n_keypoints: int = N_KEYPOINTS,
+) -> np.ndarray:
+    """An image with annotated keypoints drawn.
+
+    Parameters
+    ----------
+    annotations : Annotations
+    images_dir : str or Path
+        Folder of the images.
+    image_id : int
+    rows : array of bool, shape (n_annotations,)
+        Whose keypoints.
+    colour : str
+        Any Matplotlib colour.
+    n_keypoints : int
+        Of Halpe's 136, only the first so many: 26 are body, feet and head.
+
+    Returns
+    -------
+    array, shape (height, width, 3)
+        RGB, uint8.
+    """
+    image = read_image(Path(images_dir) / annotations.images[image_id].file_name)
+    scores = visible_scores(annotations.visibility[rows]) * (np.arange(N_KEYPOINTS) < n_keypoints)
+    return draw_people(image, annotations.keypoints_px[rows], scores, colour)
+
+
+def _draw_person(canvas, points, shown, pen, width_px: float, rim_px: float) -> None:
     for a, b in LIMBS:
         if shown[a] and shown[b]:
-            width = width_px * (0.55 if a in HANDS else 1.0) + rim
-            cv2.line(
-                canvas, _fixed(points[a]), _fixed(points[b]), pen, max(1, round(width)), cv2.LINE_AA, _SHIFT
-            )
-
-
-def _draw_points(canvas, points, shown, pen, width_px, rim) -> None:
+            width = max(1, round(width_px * (_HAND_LIMB if a in HANDS else 1.0) + rim_px))
+            cv2.line(canvas, _fixed(points[a]), _fixed(points[b]), pen, width, cv2.LINE_AA, _SHIFT)
     for i in np.flatnonzero(shown):
-        size = 0.45 if i in FACE else 0.6 if i in HANDS else 1.2
-        radius = round((width_px * size + rim / 2) * (1 << _SHIFT))
+        size = _FACE_POINT if i in FACE else _HAND_POINT if i in HANDS else _BODY_POINT
+        radius = round((width_px * size + rim_px / 2) * (1 << _SHIFT))
         cv2.circle(canvas, _fixed(points[i]), radius, pen, -1, cv2.LINE_AA, _SHIFT)
 
 
 def _fixed(point) -> tuple[int, int]:
-    return tuple(int(round(value * (1 << _SHIFT))) for value in point)
+    u, v = (int(round(value * (1 << _SHIFT))) for value in point)
+    return u, v
 
 
 @in_style
@@ -76,34 +151,37 @@ def picture_grid(
     alt: str,
     cell_in: float = 2.2,
 ) -> Figure:
-    """Pictures in rows and columns, each scaled into an equal cell; None leaves a cell empty."""
+    """Pictures in rows and columns, each scaled into an equal cell.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of array, shape (height, width, 3)
+        RGB, uint8; None leaves a cell empty.
+    row_titles, column_titles : sequence of str
+    caption, alt : str
+    cell_in : float
+        Width of a cell in inches.
+
+    Returns
+    -------
+    Figure
+    """
     n_columns = max(len(row) for row in rows)
     # Each row is as high as its highest picture needs, within limits; cells are equally wide.
-    heights = [
-        float(
-            np.clip(
-                max((image.shape[0] / image.shape[1] for image in row if image is not None), default=1),
-                0.4,
-                1.7,
-            )
-        )
-        for row in rows
-    ]
+    ratios = [[image.shape[0] / image.shape[1] for image in row if image is not None] for row in rows]
+    heights = [float(np.clip(max(of_row, default=1), *_CELL_RATIOS)) for of_row in ratios]
     size = {"width_in": cell_in * n_columns, "height_in": cell_in * sum(heights) + 0.3}
     figure, axes = new_figure(len(rows), n_columns, squeeze=False, height_ratios=heights, **size)
-    for i, row in enumerate(rows):
-        for j in range(n_columns):
-            axis = axes[i, j]
-            axis.set(xticks=[], yticks=[])
-            axis.grid(False)
-            for spine in axis.spines.values():
-                spine.set_visible(False)
-            if j < len(row) and row[j] is not None:
-                axis.imshow(row[j], interpolation="lanczos")
-            if i == 0 and j < len(column_titles):
-                axis.set_title(column_titles[j], loc="center", fontsize=9)
-            if j == 0 and i < len(row_titles):
-                axis.set_ylabel(row_titles[i], fontsize=9)
+    for (i, j), axis in np.ndenumerate(axes):
+        axis.set(xticks=[], yticks=[])
+        axis.grid(False)
+        axis.spines[:].set_visible(False)
+        if j < len(rows[i]) and rows[i][j] is not None:
+            axis.imshow(rows[i][j], interpolation="lanczos")
+    for axis, title in zip(axes[0], column_titles, strict=False):
+        axis.set_title(title, loc="center", fontsize=9)
+    for axis, title in zip(axes[:, 0], row_titles, strict=False):
+        axis.set_ylabel(title, fontsize=9)
     return Figure(figure, caption, alt)
 
 
@@ -114,22 +192,23 @@ def detections_grid(
 
     Parameters
     ----------
-    pictures : title -> (RGB image, detector name -> its detections); all with the same detectors
-    min_score : keypoints below it are not drawn
-    note : what the pictures are, for the caption
+    pictures : mapping of str to (array, mapping of str to Detections)
+        Title -> RGB image, and detector name -> its detections; all with the same detectors.
+    min_score : float
+        Keypoints below it are not drawn.
+    note : str
+        What the pictures are, for the caption.
+
+    Returns
+    -------
+    Figure
     """
     detectors = list(next(iter(pictures.values()))[1])
     rows = [
-        [
-            draw_people(image, found[d].keypoints_px, found[d].scores, detector_colour(d), min_score)
-            for d in detectors
-        ]
+        [draw_detections(image, found[d], d, min_score) for d in detectors]
         for image, found in pictures.values()
     ]
-    seen = [
-        f"{detector} {sum(len(found[detector]) > 0 for _, found in pictures.values())}"
-        for detector in detectors
-    ]
+    seen = [f"{d} {sum(len(found[d]) > 0 for _, found in pictures.values())}" for d in detectors]
     return picture_grid(
         rows,
         row_titles=list(pictures),
@@ -141,6 +220,16 @@ def detections_grid(
 
 
 def visible_scores(visibility: np.ndarray) -> np.ndarray:
-    """Annotated visibility flags as drawing scores: visible 1, occluded 0.5, not labelled 0."""
+    """Annotated visibility flags as drawing scores: visible 1, occluded 0.5, not labelled 0.
+
+    Parameters
+    ----------
+    visibility : array, shape (n_persons, 136)
+        COCO's flags: 0, 1 or 2.
+
+    Returns
+    -------
+    array, shape (n_persons, 136)
+    """
     flags = np.asarray(visibility, dtype=float).reshape(-1, N_KEYPOINTS)
     return np.where(flags >= 2, 1.0, np.where(flags > 0, 0.5, 0.0))

@@ -17,11 +17,11 @@ from hicp_lib.core.camera import Camera, deproject, transform
 from hicp_lib.evaluation.space.stability import POSITION
 from hicp_lib.recordings.recording import Recording, read_depth_m, read_rgb
 from hicp_lib.robot.segments import Segment
+from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
 from hicp_lib.study.plots.skeleton import limb_lines
-from hicp_lib.study.plots.style import detector_colour, in_words
+from hicp_lib.study.plots.style import in_words
 
 ROBOT_COLOUR = "#5F6B7A"
-TRUTH_COLOUR = "#111111"
 VIEW_STYLES = (("#E377C2", "solid"), ("#17BECF", "dash"))  # of its cameras, and of its skeletons' lines
 _FRUSTUM_DEPTH_M = 0.05
 _EYE = {"x": 0.6, "y": 1.4, "z": 0.6}  # from in front of the robot, to its right
@@ -38,16 +38,25 @@ def scene(
 
     Parameters
     ----------
-    recordings : view -> recording; all camera poses are drawn, and what the first saw in its first frame
-    medians : table of `hicp_lib.evaluation.space.stability.median_positions`, one method; one skeleton per
-        view and detector
-    robot : body segments in the base frame; empty where the joints are not known
-    truth : view -> table with `keypoint, x_m, y_m, z_m`, the first view's is drawn; None where not known
+    recordings : mapping of str to Recording
+        By view; all camera poses are drawn, and what the first saw in its first frame.
+    medians : DataFrame
+        As from `hicp_lib.evaluation.space.stability.median_positions`, one method; one skeleton per view and
+        detector.
+    robot : sequence of Segment
+        The robot's body in the base frame; empty where the joints are not known.
+    truth : mapping of str to DataFrame, optional
+        By view, columns `keypoint, x_m, y_m, z_m`, of which the first is drawn; None where not known.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
     """
     first = next(iter(recordings))
     traces = [point_cloud(recordings[first], 0)]
     if robot:
-        traces.append(_robot(robot))
+        ends = [np.concatenate([[segment.start_m, segment.end_m], _PEN_UP]) for segment in robot]
+        traces.append(_line(np.concatenate(ends), "robot", ROBOT_COLOUR, 14))
     styles = dict(zip(recordings, itertools.cycle(VIEW_STYLES), strict=False))
     for view, recording in recordings.items():
         lines = _frusta(recording.intrinsics, recording.T_base_cam)
@@ -70,7 +79,21 @@ def scene(
 def point_cloud(
     recording: Recording, frame: int, n_points: int = 15_000, max_depth_m: float = 1.7
 ) -> go.Scatter3d:
-    """What the camera saw in one frame nearer than `max_depth_m`, as about `n_points` coloured points."""
+    """What the camera saw in one frame, as coloured points in the base frame.
+
+    Parameters
+    ----------
+    recording : Recording
+    frame : int
+    n_points : int
+        About so many.
+    max_depth_m : float
+        What is farther is left out.
+
+    Returns
+    -------
+    plotly.graph_objects.Scatter3d
+    """
     depth_m, rgb = read_depth_m(recording, frame), read_rgb(recording, frame)
     n_near = int((depth_m < max_depth_m).sum())  # no depth is NaN: not near
     step = max(1, int(np.ceil(np.sqrt(n_near / n_points))))
@@ -88,24 +111,17 @@ def _line(points_m: np.ndarray, name: str, colour: str, width: float, dash: str 
     """A line through points (n, 3), interrupted where they are NaN."""
     x, y, z = points_m.astype(np.float32).T
     line = {"color": colour, "width": width, "dash": dash}
-    return go.Scatter3d(
-        x=x, y=y, z=z, mode="lines", line=line, name=name, hoverinfo="name", connectgaps=False
-    )
-
-
-def _robot(segments: Sequence[Segment]) -> go.Scatter3d:
-    ends = [np.concatenate([[segment.start_m, segment.end_m], _PEN_UP]) for segment in segments]
-    return _line(np.concatenate(ends), "robot", ROBOT_COLOUR, 14)
+    said = {"name": name, "hoverinfo": "name"}
+    return go.Scatter3d(x=x, y=y, z=z, mode="lines", line=line, connectgaps=False, **said)
 
 
 def _frusta(intrinsics: Camera, T_base_cam: np.ndarray) -> np.ndarray:
     """Lines of a small pyramid per camera pose, shape (n, 3)."""
     right, bottom = intrinsics.width_px - 0.5, intrinsics.height_px - 0.5
     pixels_px = np.array([(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom)])
-    corners = deproject(intrinsics, pixels_px, np.full(4, _FRUSTUM_DEPTH_M))
+    a, b, c, d = deproject(intrinsics, pixels_px, np.full(4, _FRUSTUM_DEPTH_M))
     apex = np.zeros(3)
-    outline = [*corners, corners[0], apex, corners[1], corners[2], apex, corners[3]]
-    lines = np.concatenate([outline, _PEN_UP])
+    lines = np.array([a, b, c, d, a, apex, b, c, apex, d, *_PEN_UP])
     return transform(T_base_cam, lines).reshape(-1, 3)
 
 

@@ -20,12 +20,23 @@ def limb_lines(
 
     Parameters
     ----------
-    rows : table with `keypoint` (Halpe names) and coordinates; of a table with many frames, the first counts
-    columns : the d coordinates
+    rows : DataFrame
+        With `keypoint` (Halpe names) and coordinates; of a table with many frames, the first counts.
+    columns : sequence of str
+        The d coordinates.
+    limbs : sequence of (int, int)
+        Keypoints of Halpe-136 that are joined.
 
     Returns
     -------
-    array, shape (3 n, d): start, end and NaN of every limb
+    array, shape (3 n, d)
+        Start, end and NaN of every limb.
+
+    Examples
+    --------
+    >>> elbow_and_wrist = pd.DataFrame({"keypoint": ["left_elbow", "left_wrist"], "x_m": [0.0, 0.3]})
+    >>> limb_lines(elbow_and_wrist, ["x_m"]).ravel().tolist()
+    [0.0, 0.3, nan]
     """
     points = np.full((N_KEYPOINTS, len(columns)), np.nan)
     rows = rows.drop_duplicates("keypoint")

@@ -1,38 +1,17 @@
-"""One style for all figures: the palette, a fixed colour per detector, and what a figure carries."""
+"""One style for all figures, what a figure carries, and its numbers in words."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib.figure
 import matplotlib.pyplot as plt
 import pandas as pd
 
-# Okabe and Ito's colour-blind-safe palette; a detector keeps its colour on every page.
-DETECTOR_COLOURS: dict[str, str] = {
-    "mediapipe": "#0072B2",
-    "mediapipe-pose": "#56B4E9",
-    "mediapipe-hands": "#CC79A7",
-    "openpose-mobilenet": "#E69F00",
-    "openpose": "#D55E00",
-    "mmpose": "#009E73",
-    "alphapose": "#7F5FA8",
-    "detectron2": "#8C6D31",
-    "combined": "#882255",
-}
-OTHER_COLOUR = "#595959"
-
-# The two subsets of HiCP, and the two boxes of the paper's figure of how they are made.
-SUBSET_COLOURS = {"basic": "#0072B2", "headless": "#D55E00"}
-HEAD_COLOUR = "#D5272D"
-BODY_COLOUR = "#1B9E4B"
-
-# The paper's marker shapes for the OKS thresholds.
-THRESHOLD_MARKERS = {".5": "s", ".75": "o", ".5:.95": "^"}
-
-_RC = {
+_RC: dict[Any, Any] = {
     "figure.dpi": 110,
     "savefig.dpi": 160,
     "figure.constrained_layout.use": True,
@@ -58,10 +37,13 @@ class Figure:
 
     Attributes
     ----------
-    figure : the Matplotlib figure
-    caption : what is drawn, on what data, with what uncertainty; one or two sentences
-    alt : what a reader who cannot see it should know: the axes and the main finding
-    table : the numbers behind it, offered for download; None for pictures
+    figure : matplotlib.figure.Figure
+    caption : str
+        What is drawn, on what data, with what uncertainty; one or two sentences.
+    alt : str
+        What a reader who cannot see it should know: the axes and the main finding.
+    table : DataFrame or None
+        The numbers behind it, offered for download; None for pictures.
     """
 
     figure: matplotlib.figure.Figure
@@ -85,31 +67,40 @@ def new_figure(n_rows: int = 1, n_columns: int = 1, width_in: float = 8.0, heigh
     """`plt.subplots` with the size in inches, of a figure that pyplot forgets at once.
 
     A notebook then shows what it is given, not what pyplot remembers.
+
+    Parameters
+    ----------
+    n_rows, n_columns : int
+        Of axes.
+    width_in, height_in : float
+        The figure's size in inches.
+    **kwargs
+        Further ones of `plt.subplots`.
     """
     figure, axes = plt.subplots(n_rows, n_columns, figsize=(width_in, height_in), **kwargs)
     plt.close(figure)
     return figure, axes
 
 
-def detector_colour(name: str) -> str:
-    """The colour of a detector, also of variants such as "mmpose-imported"; others take the neutral grey.
+def in_words(items: Iterable[str]) -> str:
+    """Items as one enumerates them.
 
-    All combinations ("combined:BODY+HANDS") share one.
+    Examples
+    --------
+    >>> in_words(["a"]), in_words(["a", "b", "c"]), in_words([])
+    ('a', 'a, b and c', 'nothing')
     """
-    kind = name.partition(":")[0]
-    known = [detector for detector in DETECTOR_COLOURS if f"{kind}-".startswith(f"{detector}-")]
-    return DETECTOR_COLOURS[max(known, key=len)] if known else OTHER_COLOUR
+    *others, last = list(items) or ["nothing"]
+    return f"{', '.join(others)} and {last}" if others else last
 
 
-def legend_entries(axes) -> tuple[list, list[str]]:
-    """Handles and labels of all axes of an array, each label once: what `figure.legend` takes."""
-    found = {}
-    for axis in axes.flat:
-        found.update({label: handle for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)})
-    return list(found.values()), list(found)
+def series_text(values: pd.Series, pattern: str = "{} {:.2f}") -> str:
+    """`in_words` of a series, each value put into a pattern after the labels of its index.
 
-
-def in_words(items: Sequence[str]) -> str:
-    """'a', 'a and b', 'a, b and c'."""
-    items = list(items)
-    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}" if items else "nothing"
+    Examples
+    --------
+    >>> series_text(pd.Series({"mediapipe": 0.514, "mmpose": 0.7}))
+    'mediapipe 0.51 and mmpose 0.70'
+    """
+    keys = values.index.to_frame(index=False).itertuples(index=False, name=None)
+    return in_words([pattern.format(*key, value) for key, value in zip(keys, values, strict=True)])

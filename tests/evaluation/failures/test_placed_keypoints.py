@@ -42,7 +42,7 @@ def test_where_nobody_is_found_every_table_and_figure_is_empty_but_there(world):
     placed = placed_keypoints(truth, found, source)
     assert placed.empty and placed["given"].dtype.kind == "b"
     assert invented_shares(placed, 0.3, 10).empty
-    assert "(0)" in draw.invented_heads(invented_heads(placed), "drawn").figure.axes[0].get_title("left")
+    assert "(0)" in draw.hallucinated_heads(invented_heads(placed), "drawn").figure.axes[0].get_title("left")
     assert draw.scores_by_state(scores_by_state(placed, 10), "drawn").table.empty
     remarks = paper_remarks(placed, all_errors(truth, found), truth, found, 10)
     assert remarks["measure"].nunique() == len(MEASURES)

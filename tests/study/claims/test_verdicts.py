@@ -42,7 +42,7 @@ def rows(**changes: tuple[float, float, float]) -> list[dict]:
 
 
 def verdict(claims, results):
-    return v.judge([claims], results)[0]
+    return v.judge_claims([claims], results)[0]
 
 
 LOSES = Comparison("<", LOSS, 0.0)
@@ -220,7 +220,7 @@ def judged_on(write, medians) -> dict[str, str]:
     """Verdicts by id on the claims that rest on motion capture alone, shoulders aside (not in the tables)."""
     results = write(medians, notebook="04_mocap_3d", table="medians")
     claims = [c for c in read_claims() if c.tests and c.tests[0].left.table == "medians"]
-    return {o.claim.id: o.verdict for o in v.judge(claims, results) if o.claim.id != "shoulders-worst"}
+    return {o.claim.id: o.verdict for o in v.judge_claims(claims, results) if o.claim.id != "shoulders-worst"}
 
 
 def test_the_papers_own_numbers_bear_out_its_claims(write, paper_medians):
@@ -281,7 +281,8 @@ def test_a_malformed_claim_is_named(tmp_path, row, message):
 
 def test_for_reading_every_claim_appears_once(write):
     results = write(rows(a=(-0.4, -0.5, -0.3)))
-    table = v.verdict_table(v.judge([claim(LOSES), claim(reason="no robot", command="buy one")], results))
+    claims = [claim(LOSES), claim(reason="no robot", command="buy one")]
+    table = v.verdict_table(v.judge_claims(claims, results))
     parts = {verdict: v.for_reading(table, verdict) for verdict in v.VERDICTS}
     assert {verdict: len(part) for verdict, part in parts.items() if len(part)} == {
         v.REPRODUCED: 1, v.NOT_TESTABLE: 1,

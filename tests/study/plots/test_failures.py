@@ -53,11 +53,11 @@ def test_change_without_the_head_is_drawn_for_every_keypoint():
     assert "mediapipe -0.10 and openpose-mobilenet -0.10" in figure.alt
 
 
-def test_invented_heads_are_scattered_where_they_were_put():
+def test_hallucinated_heads_are_scattered_where_they_were_put():
     table = pd.DataFrame(
         {"detector": "mediapipe", "along": [0.2, 0.8], "below": [-0.1, 0.4], "score": [0.9, 0.1]}
     )
-    figure = failures.invented_heads(table, "made up")
+    figure = failures.hallucinated_heads(table, "made up")
     dots = figure.figure.axes[0].collections[0].get_offsets()
     np.testing.assert_allclose(dots, [[0.2, -0.1], [0.8, 0.4]])
     assert "mediapipe 0.50" in figure.alt

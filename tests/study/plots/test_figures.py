@@ -8,7 +8,8 @@ import pytest
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.study.plots import evaluation, people
-from hicp_lib.study.plots.style import DETECTOR_COLOURS, Figure, detector_colour, in_words
+from hicp_lib.study.plots.palette import DETECTOR_COLOURS, detector_colour
+from hicp_lib.study.plots.style import Figure, in_words
 
 METRICS = ("AP", "AP50", "AP75", "AR", "AR50", "AR75")
 

@@ -7,7 +7,7 @@ import pytest
 from hicp_lib.evaluation.space.mocap_error import JOINTS, TABLE_JOINTS, error_dependence
 from hicp_lib.study.paper_tables import paper_medians
 from hicp_lib.study.plots import mocap as draw
-from hicp_lib.study.plots.style import detector_colour
+from hicp_lib.study.plots.palette import detector_colour
 
 N = 90
 TIMES_S = 100 + np.arange(N) / 15

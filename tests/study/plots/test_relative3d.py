@@ -7,7 +7,7 @@ import pytest
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.study.plots import relative3d, within_distance
-from hicp_lib.study.plots.style import DETECTOR_COLOURS
+from hicp_lib.study.plots.palette import DETECTOR_COLOURS
 
 VIEWS, DETECTORS = ("upper", "lower"), ("mediapipe", "openpose-mobilenet")
 PARTS = ("left wrist", "right wrist", "left hand", "right hand")
