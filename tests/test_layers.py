@@ -39,7 +39,9 @@ def test_the_library_keeps_its_floors():
     ],
 )
 def test_a_forbidden_import_is_told(tmp_path, module, statement, contract):
-    shutil.copytree(CHECKOUT / "hicp_lib", tmp_path / "hicp_lib", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        CHECKOUT / "hicp_lib", tmp_path / "hicp_lib", ignore=shutil.ignore_patterns("__pycache__")
+    )
     shutil.copy(CHECKOUT / "pyproject.toml", tmp_path)
     with open(tmp_path / "hicp_lib" / module, "a") as file:
         file.write(f"\n\ndef _upwards():\n    {statement}\n")
