@@ -13,7 +13,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_NO_INPUT := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup system report test wheel-check test-lowest lab doctor lint lock clean
+.PHONY: help setup system report test wheel-check test-lowest lab doctor lint coverage mutants lock clean
 
 help:
 	@echo "make report [PROFILE=full|quick]  run the study and build the report"
@@ -22,7 +22,9 @@ help:
 	@echo "make test-lowest                  test on the lowest versions allowed"
 	@echo "make lab                          open the notebooks in JupyterLab"
 	@echo "make doctor                       check the installation, line by line"
-	@echo "make lint                         check the style of the code"
+	@echo "make lint                         check style, types, imports and spelling"
+	@echo "make coverage                     run the tests, and tell what they do not reach"
+	@echo "make mutants                      change the code at random: do the tests notice?"
 	@echo "make lock                         pin the environment anew (needs uv)"
 	@echo "make clean                        remove what was built, but no download"
 
@@ -44,8 +46,16 @@ lab: setup
 doctor: $(INSTALLED)
 	@$(BIN)/hicp doctor
 
+# All that .pre-commit-config.yaml names, from the locked environment: no network.
 lint: $(INSTALLED)
-	@$(BIN)/ruff check .
+	@$(BIN)/pre-commit run --all-files
+
+coverage: setup
+	@$(BIN)/python -m pytest -n logical --dist loadfile --cov --cov-report=term:skip-covered $(PYTEST_ARGS)
+
+# Runs for hours; a sample: make mutants MUTANTS_ARGS="--n 60"
+mutants: setup
+	@$(BIN)/python tools/mutate.py $(MUTANTS_ARGS)
 
 setup: $(INSTALLED) system
 	@$(BIN)/hicp models fetch
@@ -89,7 +99,7 @@ system: $(INSTALLED)
 lock:
 	@command -v $(UV) >/dev/null || { echo "make: uv is missing; run: pip install uv" >&2; exit 1; }
 	@$(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-annotate \
-	  --all-extras --group mediapipe --group test --group build --custom-compile-command "make lock" \
+	  --all-extras --group mediapipe --group test --group lint --group build --custom-compile-command "make lock" \
 	  --output-file environment.lock pyproject.toml
 
 clean:
