@@ -7,6 +7,7 @@ recording had a part in it.
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -99,14 +100,36 @@ def load_measures(path: Path = MEASURES_FILE) -> BodyMeasures:
     True
     """
     shapes = {"below_skin_mm": (136,), "closest_mm": (136, 136), "farthest_mm": (136, 136)}
+    tables_mm = read_arrays(path, shapes, "the measures of the body model", "tools/measure_body.py")
+    return BodyMeasures(*(table_mm / 1000 for table_mm in tables_mm))
+
+
+def read_arrays(path: Path, shapes: Mapping[str, tuple[int, ...]], what: str, tool: str) -> list[np.ndarray]:
+    """Arrays of a file that a tool of this project made.
+
+    Parameters
+    ----------
+    path : Path
+        Of an NPZ file.
+    shapes : mapping of str to tuple of int
+        Shape of each array to read, by name; -1 where any length will do.
+    what, tool : str
+        What the file holds and what makes it, for the error's message.
+
+    Returns
+    -------
+    list of array
+
+    Raises
+    ------
+    InputError
+        If the file is missing or not such a file.
+    """
     try:
         with np.load(path, allow_pickle=False) as stored:
-            tables = [stored[name].reshape(shape) / 1000 for name, shape in shapes.items()]
+            return [stored[name].reshape(shape) for name, shape in shapes.items()]
     except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise InputError(
-            f"{path}: not the measures of the body model ({error}); run tools/measure_body.py"
-        ) from None
-    return BodyMeasures(*tables)
+        raise InputError(f"{path}: not {what} ({error}); run {tool}") from None
 
 
 def found_parents(found: np.ndarray) -> np.ndarray:

@@ -12,17 +12,16 @@ hands of this model too, in other sizes; hands of real people differ more from i
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from hicp_lib.core.datafiles import DATA_DIR
-from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import HAND_LIMBS, LEFT_HAND, RIGHT_HAND
 from hicp_lib.core.memo import memoised
 from hicp_lib.core.quaternions import matrices_from_quaternions
+from hicp_lib.lifting.body_measures import read_arrays
 
 SHAPES_FILE = DATA_DIR / "hand_shapes.npz"
 PALM = np.array([0, 5, 9, 13, 17])
@@ -66,11 +65,9 @@ def load_hand_shapes(path: Path = SHAPES_FILE) -> np.ndarray:
     >>> load_hand_shapes().shape[1:]
     (21, 3)
     """
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            return (stored["shapes_tenth_mm"].reshape(-1, 21, 3) / 10_000).astype(np.float32)
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: not shapes of hands ({error}); run tools/measure_hands.py") from None
+    shapes = {"shapes_tenth_mm": (-1, 21, 3)}
+    (tenth_mm,) = read_arrays(path, shapes, "shapes of hands", "tools/measure_hands.py")
+    return (tenth_mm / 10_000).astype(np.float32)
 
 
 def with_hand_shapes(

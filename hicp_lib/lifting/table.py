@@ -76,10 +76,8 @@ def lift_found(
     """
     for detections in found.values():
         if len(detections) != len(recording):
-            raise InputError(
-                f"{recording.folder}: {len(recording)} frames, but detections of {len(detections)} images; "
-                "detect people in the frames of this recording"
-            )
+            counts = f"{len(recording)} frames, but detections of {len(detections)} images"
+            raise InputError(f"{recording.folder}: {counts}; detect people in the frames of this recording")
     frames: dict[str, list[_Frame]] = {detector: [] for detector in found}
     for k in range(len(recording)):
         depth_m = read_depth_m(recording, k)

@@ -59,11 +59,8 @@ def read_clicks(path: str | Path, recording: Recording, markers: Sequence[str]) 
         _check_click(f"{path}: row {row}", click, recording, markers)
     twice = table.duplicated(["frame", "marker"])
     if twice.any():
-        click = table[twice].iloc[0]
-        raise InputError(
-            f"{path}: row {twice.idxmax() + 2}: {click['marker']} is clicked twice in this frame; "
-            "keep one of them"
-        )
+        again = f"{table['marker'][twice].iloc[0]} is clicked twice in this frame"
+        raise InputError(f"{path}: row {twice.idxmax() + 2}: {again}; keep one of them")
     return table.astype({"frame": int, "u_px": float, "v_px": float})
 
 
@@ -152,13 +149,11 @@ def _read_table(path: str | Path) -> pd.DataFrame:
 def _check_click(where: str, click: dict, recording: Recording, markers: Sequence[str]) -> None:
     frame, marker, *pixel = (click[name] for name in COLUMNS)
     if not is_number(frame) or frame != int(frame) or not 0 <= frame < len(recording):
-        raise InputError(
-            f"{where}: frame is {frame!r}; expected a whole number from 0 to {len(recording) - 1}"
-        )
+        expected = f"expected a whole number from 0 to {len(recording) - 1}"
+        raise InputError(f"{where}: frame is {frame!r}; {expected}")
     if marker not in markers:
-        raise InputError(
-            f"{where}: marker {marker!r} is not in the motion capture; it has {', '.join(markers)}"
-        )
+        known = ", ".join(markers)
+        raise InputError(f"{where}: marker {marker!r} is not in the motion capture; it has {known}")
     sizes = (recording.intrinsics.width_px, recording.intrinsics.height_px)
     for name, value, size in zip(COLUMNS[2:], pixel, sizes, strict=True):
         if not is_number(value) or not inside(np.array([value, 0]), (0, 0, size, 1)):

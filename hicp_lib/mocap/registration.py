@@ -186,10 +186,8 @@ def register_by_camera_marker(
         If `hicp_lib.core.alignment.arun` refuses the points, or the marker `camera` is missing.
     """
     if CAMERA_MARKER not in mocap.names:
-        raise InputError(
-            f"motion capture has no marker {CAMERA_MARKER!r}; name the one on the camera so, or click "
-            "markers in more images and use all of them"
-        )
+        hint = "name the one on the camera so, or click markers in more images and use all of them"
+        raise InputError(f"motion capture has no marker {CAMERA_MARKER!r}; {hint}")
     fit = _fit(matched)
     camera = pd.DataFrame({"frame": range(len(recording)), "marker": CAMERA_MARKER})
     marker_m = measured_markers(recording, camera, mocap, offset_s)
@@ -287,9 +285,8 @@ def read_registration(path: str | Path) -> Registration:
         raise InputError(f"{path}: T_base_mocap: expected 4 rows of 4 finite numbers, the last 0, 0, 0, 1")
     R = T[:3, :3]
     if np.abs(R @ R.T - np.eye(3)).max() > _MAX_SKEW or np.linalg.det(R) < 0:
-        raise InputError(
-            f"{path}: T_base_mocap: its first three columns are not a rotation; give R, then t in m"
-        )
+        wrong = "its first three columns are not a rotation"
+        raise InputError(f"{path}: T_base_mocap: {wrong}; give R, then t in m")
     return Registration("given", T)
 
 

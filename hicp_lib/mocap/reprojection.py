@@ -64,9 +64,8 @@ def register_by_reprojection(
     seen = _matched(recording, clicks, mocap, offset_s)
     n = len(seen.points_m)
     if n < _MIN_CLICKS:
-        raise InputError(
-            f"{n} clicked markers were measured; registration by reprojection needs {_MIN_CLICKS}: click more"
-        )
+        needed = f"registration by reprojection needs {_MIN_CLICKS}"
+        raise InputError(f"{n} clicked markers were measured; {needed}: click more")
     T = _solve(recording.intrinsics, seen, start.T_base_mocap)
     errors_m = _across_m(recording.intrinsics, seen, T)
     left_out_m = [

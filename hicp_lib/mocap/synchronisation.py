@@ -129,10 +129,8 @@ def clock_offset(
     early[half:], late[:half] = np.nan, np.nan
     lag, correlation = _best_lag(speeds_a, speeds_b)
     if not np.isfinite(lag):
-        raise InputError(
-            "no clock offset makes camera and motion capture move together; record at least some seconds of "
-            "clear movement that both see"
-        )
+        hint = "record at least some seconds of clear movement that both see"
+        raise InputError(f"no clock offset makes camera and motion capture move together; {hint}")
     lags = (lag, *(_best_lag(part, speeds_b, near=lag)[0] for part in (early, late)))
     start_s = float(times_a_s[0] - times_b_s[0])
     offset_s, early_s, late_s = (start_s + value / _RATE_HZ for value in lags)

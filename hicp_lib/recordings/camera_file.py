@@ -60,11 +60,11 @@ def read_camera(path: str | Path) -> tuple[Camera, float]:
     side = (_is_side, f"a whole number from 1 to {MAX_SIDE_PX}", "give the size of the images in pixels")
     width, height = (int(read(key, *side)) for key in ("width", "height"))
     numbers = (_is_matrix, f"nine finite numbers ({_LAYOUT})", "write the matrix column by column")
-    intrinsics = Camera(width, height, *_focal_and_centre(path, read("intrinsic_matrix", *numbers)))
-    scale = "the number of depth units per metre, at least 1"
-    return intrinsics, float(
-        read("depth_scale", _is_scale, scale, "for depth images in millimetres write 1000")
-    )
+    matrix = read("intrinsic_matrix", *numbers)
+    intrinsics = Camera(width, height, *_focal_and_centre(f"{path}: intrinsic_matrix", matrix))
+    units = "the number of depth units per metre, at least 1"
+    scale = read("depth_scale", _is_scale, units, "for depth images in millimetres write 1000")
+    return intrinsics, float(scale)
 
 
 def write_camera(path: str | Path, intrinsics: Camera, depth_units_per_m: float) -> None:
@@ -123,17 +123,13 @@ def _is_matrix(value: object) -> bool:
     return isinstance(value, list) and len(value) == 9 and all(map(is_number, value))
 
 
-def _focal_and_centre(path: str | Path, matrix: list) -> tuple[float, float, float, float]:
+def _focal_and_centre(where: str, matrix: list) -> tuple[float, float, float, float]:
     fx, *zeros_x, zero_y, fy, zero_z, cx, cy, one = map(float, matrix)
     if any((*zeros_x, zero_y, zero_z)) or one != 1:
-        by_rows = matrix[6:] == [0, 0, 1]
-        raise InputError(
-            f"{path}: intrinsic_matrix: expected {_LAYOUT}, other places hold other numbers; "
-            + ("write the matrix column by column" if by_rows else "undistort images with skew first")
-        )
+        is_by_rows = matrix[6:] == [0, 0, 1]
+        hint = "write the matrix column by column" if is_by_rows else "undistort images with skew first"
+        raise InputError(f"{where}: expected {_LAYOUT}, other places hold other numbers; {hint}")
     if min(fx, fy) <= 0:
-        raise InputError(
-            f"{path}: intrinsic_matrix: expected positive focal lengths, found {fx:g} and {fy:g}; "
-            "give them in pixels"
-        )
+        wrong = f"expected positive focal lengths, found {fx:g} and {fy:g}"
+        raise InputError(f"{where}: {wrong}; give them in pixels")
     return fx, fy, cx, cy

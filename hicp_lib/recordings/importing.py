@@ -182,10 +182,8 @@ def _open_bag(bag: Path) -> Any:
         import open3d as o3d
 
     if not hasattr(o3d.t.io, "RSBagReader"):
-        raise InputError(
-            f"{bag}: this Open3D was built without RealSense; use its tools elsewhere to save the frames, "
-            "then import with --open3d"
-        )
+        hint = "use its tools elsewhere to save the frames, then import with --open3d"
+        raise InputError(f"{bag}: this Open3D was built without RealSense; {hint}")
     if not bag.is_file():
         raise InputError(f"{bag}: is not there; give a .bag recorded by the RealSense viewer")
     reader = o3d.t.io.RSBagReader()

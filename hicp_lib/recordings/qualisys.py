@@ -234,10 +234,8 @@ def _split_columns(
         times_s = _times_s(values[:, :leading], rate_hz) if 0 <= leading <= 2 else None
         if times_s is not None:
             return times_s, values[:, leading : leading + 3 * n_markers]
-    raise InputError(
-        f"{path}: row {row} has {values.shape[1]} columns; expected 3 for each of {n_markers} markers, "
-        "after Frame and Time if exported"
-    )
+    expected = f"expected 3 for each of {n_markers} markers, after Frame and Time if exported"
+    raise InputError(f"{path}: row {row} has {values.shape[1]} columns; {expected}")
 
 
 def _times_s(leading: np.ndarray, rate_hz: float) -> np.ndarray | None:

@@ -102,10 +102,8 @@ def open_recording(folder: str | Path) -> Recording:
     pose_s, T_base_cam = read_poses(folder / POSES_FILE)
     rgb, depth, pose = associate_frames(rgb_s, depth_s, pose_s)
     if len(rgb) == 0:
-        raise InputError(
-            f"{folder}: no frame has colour, depth and pose within {MAX_DIFFERENCE_S:g} s; "
-            "bring their clocks together"
-        )
+        none = f"no frame has colour, depth and pose within {MAX_DIFFERENCE_S:g} s"
+        raise InputError(f"{folder}: {none}; bring their clocks together")
     rgb_paths, depth_paths = [folder / rgb_names[k] for k in rgb], [folder / depth_names[k] for k in depth]
     mocap = folder / MOCAP_FILE
     return Recording(

@@ -88,9 +88,8 @@ def read_poses(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
         pose = [_number(path, number, field) for field in fields]
         length = np.linalg.norm(pose[3:])
         if not abs(length - 1) <= _UNIT_TOLERANCE:
-            raise _error(
-                path, number, f"has a quaternion of length {length:.4g}; expected qx qy qz qw of length 1"
-            )
+            wrong = f"has a quaternion of length {length:.4g}; expected qx qy qz qw of length 1"
+            raise _error(path, number, wrong)
         rows.append([time_s, *pose])
     table = np.array(rows)
     T_base_cam = np.tile(np.eye(4), (len(table), 1, 1))

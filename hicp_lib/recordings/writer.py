@@ -77,10 +77,8 @@ class RecordingWriter:
             raise InputError(f"{self.folder}: time {time_s} s is not after the frame before; sort frames")
         expected = (self.intrinsics.height_px, self.intrinsics.width_px)
         if rgb.shape[:2] != expected or depth_m.shape != expected:
-            raise InputError(
-                f"{self.folder}: colour {rgb.shape[:2]} and depth {depth_m.shape} (height, width) must both "
-                f"be {expected}, as the intrinsics say"
-            )
+            found = f"colour {rgb.shape[:2]} and depth {depth_m.shape} (height, width)"
+            raise InputError(f"{self.folder}: {found} must both be {expected}, as the intrinsics say")
         index = len(self._times_s)
         write_rgb(self.folder / rgb_name(index), rgb)
         write_depth(self.folder / depth_name(index), depth_m, self.depth_units_per_m)

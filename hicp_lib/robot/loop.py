@@ -51,12 +51,10 @@ class Perception:
     scores: np.ndarray
 
     def __post_init__(self) -> None:
-        n = len(self.keypoints_m)
-        if np.shape(self.keypoints_m) != (n, N_KEYPOINTS, 3) or np.shape(self.scores) != (n, N_KEYPOINTS):
-            raise ValueError(
-                f"keypoints {np.shape(self.keypoints_m)} and scores {np.shape(self.scores)}: expected "
-                f"(p, {N_KEYPOINTS}, 3) and (p, {N_KEYPOINTS})"
-            )
+        n, shapes = len(self.keypoints_m), (np.shape(self.keypoints_m), np.shape(self.scores))
+        if shapes != ((n, N_KEYPOINTS, 3), (n, N_KEYPOINTS)):
+            expected = f"(p, {N_KEYPOINTS}, 3) and (p, {N_KEYPOINTS})"
+            raise ValueError(f"keypoints {shapes[0]} and scores {shapes[1]}: expected {expected}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -72,10 +72,9 @@ def _join(torso_deg: ArrayLike, limb_deg: ArrayLike, joints: tuple[str, ...]) ->
     torso, limb = np.asarray(torso_deg, dtype=float), np.asarray(limb_deg, dtype=float)
     n_limb = len(joints) - 3
     if torso.shape[-1:] != (3,) or limb.ndim != torso.ndim or limb.shape[-1] < n_limb:
-        raise InputError(
-            f"joint angles of shapes {torso.shape} and {limb.shape}: expected rows of 3 (torso: yaw, roll, "
-            f"pitch) and of {n_limb} or more; give as many rows of both"
-        )
+        expected = f"expected rows of 3 (torso: yaw, roll, pitch) and of {n_limb} or more"
+        shapes = f"joint angles of shapes {torso.shape} and {limb.shape}"
+        raise InputError(f"{shapes}: {expected}; give as many rows of both")
     angles = np.concatenate([torso[..., ::-1], limb[..., :n_limb]], axis=-1)
     _check(angles.reshape(-1, len(joints)), joints)
     return np.deg2rad(angles)
@@ -87,7 +86,6 @@ def _check(angles_deg: np.ndarray, joints: tuple[str, ...]) -> None:
     if not possible.all():
         row, column = np.argwhere(~possible)[0]
         low, high = limits[column]
-        raise InputError(
-            f"joint angles: row {row}, {joints[column]}: {angles_deg[row, column]:g} degrees, expected "
-            f"{low:g} to {high:g}; give degrees, the torso as yaw, roll, pitch"
-        )
+        wrong = f"{angles_deg[row, column]:g} degrees, expected {low:g} to {high:g}"
+        hint = "give degrees, the torso as yaw, roll, pitch"
+        raise InputError(f"joint angles: row {row}, {joints[column]}: {wrong}; {hint}")

@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 
 from hicp_lib.core.datafiles import DATA_DIR
-from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_json
 from hicp_lib.core.memo import memoised
 from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
+from hicp_lib.robot.tables import read_robot_file
 
 SKIN_FILE = DATA_DIR / "icub_skin.json"
 COLUMNS = ["x_mm", "y_mm", "z_mm", "normal_x", "normal_y", "normal_z"]
@@ -89,15 +88,11 @@ def read_skin(path: Path = SKIN_FILE) -> Skin:
     >>> skin.positions_m[skin.slices["left_hand"]].shape
     (5, 3)
     """
-    data = read_json(path)
-    try:
-        if data["columns"] != COLUMNS:
-            raise ValueError(f"columns are not {', '.join(COLUMNS)}")
-        taxels = {part: _taxels(part, data["parts"]) for part in data["parts"]}
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise InputError(
-            f"{path}: not the robot's skin ({error!r}); restore the file from the repository"
-        ) from None
+    return read_robot_file(path, "skin", COLUMNS, _skin)
+
+
+def _skin(data: dict[str, Any]) -> Skin:
+    taxels = {part: _taxels(part, data["parts"]) for part in data["parts"]}
     ends = np.cumsum([len(rows) for rows in taxels.values()]).tolist()
     rows = np.concatenate(list(taxels.values()))
     return Skin(

@@ -6,9 +6,10 @@ z, moves `d` along z and `a` along x, and turns by `alpha` about x. data/README.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from hicp_lib.core.memo import memoised
 
 ICUB_FILE = DATA_DIR / "icub.json"
 COLUMNS = ["joint", "link", "a_m", "d_m", "alpha_deg", "offset_deg"]
+Read = TypeVar("Read")
 _MAX_SKEW = 1e-4  # by which a rotation may differ from the nearest one: numbers are rounded
 
 
@@ -114,15 +116,40 @@ def read_tables(path: Path = ICUB_FILE) -> Tables:
     >>> list(tables.heads), list(tables.arms), list(tables.T_head_camera)
     (['v1', 'v2'], ['v1', 'v1.7', 'v2'], ['level', 'tilted'])
     """
+    return read_robot_file(path, "tables", COLUMNS, _tables)
+
+
+def read_robot_file(path: Path, what: str, columns: list[str], parse: Callable[[dict], Read]) -> Read:
+    """What a JSON file of this project says of the robot.
+
+    Parameters
+    ----------
+    path : Path
+    what : str
+        What the file holds, for the error's message.
+    columns : list of str
+        What its key `columns` must say.
+    parse : callable
+        Makes of its content what is returned; what is wrong there may raise anything but `OSError`.
+
+    Returns
+    -------
+    object
+        What `parse` does.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, has other columns, or cannot be parsed.
+    """
     data = read_json(path)
     try:
-        if data["columns"] != COLUMNS:
-            raise ValueError(f"columns are not {', '.join(COLUMNS)}")
-        return _tables(data)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(
-            f"{path}: not the robot's tables ({error!r}); restore the file from the repository"
-        ) from None
+        if data["columns"] != columns:
+            raise ValueError(f"columns are not {', '.join(columns)}")
+        return parse(data)
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        wrong = f"not the robot's {what} ({error!r})"
+        raise InputError(f"{path}: {wrong}; restore the file from the repository") from None
 
 
 def _tables(data: dict[str, Any]) -> Tables:
