@@ -7,6 +7,7 @@ recording had a part in it.
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,29 +21,29 @@ from hicp_lib.core.memo import memoised
 MEASURES_FILE = DATA_DIR / "body_measures.npz"
 
 
+_CHAINS = ("right_shoulder left_shoulder", "right_shoulder neck", "right_shoulder nose head_top",
+           "left_hip mid_hip")  # fmt: skip
+_CHAINS_OF_A_SIDE = (
+    "{0}_shoulder {0}_hip {0}_knee {0}_ankle {0}_big_toe", "{0}_ankle {0}_small_toe", "{0}_ankle {0}_heel",
+    "{0}_shoulder {0}_elbow {0}_wrist {0}_hand_root", "nose {0}_eye", "nose {0}_ear",
+)  # fmt: skip
+
+
 def _parents() -> np.ndarray:
     parents = np.full(N_KEYPOINTS, -1)
-    parents[INDEX["left_shoulder"]] = INDEX["right_shoulder"]
-    for side in ("left", "right"):
-        chain = [f"{side}_{joint}" for joint in ("shoulder", "hip", "knee", "ankle")]
-        chains = [chain, [f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist", "hand_root")]]
-        chains += [[f"{side}_ankle", f"{side}_{end}"] for end in ("big_toe", "small_toe", "heel")]
-        chains += [["nose", f"{side}_{end}"] for end in ("eye", "ear")]
-        for names in chains:
-            for parent, child in zip(names, names[1:], strict=False):
-                parents[INDEX[child]] = INDEX[parent]
-    for child, parent in (("neck", "right_shoulder"), ("nose", "right_shoulder"), ("head_top", "nose"),
-                          ("mid_hip", "left_hip")):  # fmt: skip
-        parents[INDEX[child]] = INDEX[parent]
+    of_sides = (chain.format(side) for side in ("left", "right") for chain in _CHAINS_OF_A_SIDE)
+    for chain in (*_CHAINS, *of_sides):
+        above, *below = (INDEX[name] for name in chain.split())
+        parents[below] = [above, *below[:-1]]
     parents[FACE] = INDEX["nose"]
+    begin, end = np.array(HAND_LIMBS).T
     for hand in (LEFT_HAND, RIGHT_HAND):
-        for parent, child in HAND_LIMBS:
-            parents[hand[child]] = hand[parent]
+        parents[hand[end]] = hand[begin]
     return parents
 
 
 PARENTS = _parents()
-"""The keypoint each one hangs on, (136,), -1 for the root: a tree from the right shoulder outwards."""
+"""The keypoint each one hangs on, shape (136,), -1 for the root: a tree from the right shoulder outwards."""
 
 
 def _levels() -> np.ndarray:
@@ -54,7 +55,7 @@ def _levels() -> np.ndarray:
 
 
 LEVELS = _levels()
-"""How many keypoints each one is away from the root, (136,)."""
+"""How many keypoints each one is away from the root, shape (136,)."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,10 @@ class BodyMeasures:
 
     Attributes
     ----------
-    below_skin_m : (136,), how deep the keypoint lies below the surface that is seen from the front
-    closest_m, farthest_m : (136, 136), least and most distance between two keypoints
+    below_skin_m : array, shape (136,)
+        How deep the keypoint lies below the surface that is seen from the front.
+    closest_m, farthest_m : array, shape (136, 136)
+        Least and most distance between two keypoints.
     """
 
     below_skin_m: np.ndarray
@@ -76,32 +79,76 @@ class BodyMeasures:
 def load_measures(path: Path = MEASURES_FILE) -> BodyMeasures:
     """The measures of the project's body model.
 
+    Parameters
+    ----------
+    path : Path, optional
+
+    Returns
+    -------
+    BodyMeasures
+
+    Raises
+    ------
+    InputError
+        If the file is missing or not such a file.
+
+    Examples
+    --------
+    >>> elbow, wrist = INDEX["left_elbow"], INDEX["left_wrist"]
+    >>> measures = load_measures()
+    >>> bool(0.15 < measures.closest_m[elbow, wrist] < measures.farthest_m[elbow, wrist] < 0.35)
+    True
+    """
+    shapes = {"below_skin_mm": (136,), "closest_mm": (136, 136), "farthest_mm": (136, 136)}
+    tables_mm = read_arrays(path, shapes, "the measures of the body model", "tools/measure_body.py")
+    return BodyMeasures(*(table_mm / 1000 for table_mm in tables_mm))
+
+
+def read_arrays(path: Path, shapes: Mapping[str, tuple[int, ...]], what: str, tool: str) -> list[np.ndarray]:
+    """Arrays of a file that a tool of this project made.
+
+    Parameters
+    ----------
+    path : Path
+        Of an NPZ file.
+    shapes : mapping of str to tuple of int
+        Shape of each array to read, by name; -1 where any length will do.
+    what, tool : str
+        What the file holds and what makes it, for the error's message.
+
+    Returns
+    -------
+    list of array
+
     Raises
     ------
     InputError
         If the file is missing or not such a file.
     """
-    shapes = {"below_skin_mm": (136,), "closest_mm": (136, 136), "farthest_mm": (136, 136)}
     try:
         with np.load(path, allow_pickle=False) as stored:
-            tables = [stored[name].reshape(shape) / 1000 for name, shape in shapes.items()]
+            return [stored[name].reshape(shape) for name, shape in shapes.items()]
     except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise InputError(
-            f"{path}: not the measures of the body model ({error}); run tools/measure_body.py"
-        ) from None
-    return BodyMeasures(*tables)
+        raise InputError(f"{path}: not {what} ({error}); run {tool}") from None
 
 
-def hang_together(found: np.ndarray) -> np.ndarray:
+def found_parents(found: np.ndarray) -> np.ndarray:
     """Which found keypoint each found keypoint hangs on, when those between are not found.
 
     Parameters
     ----------
-    found : (n,) keypoints, increasing
+    found : array of int, shape (n,)
+        Keypoints in the Halpe order, increasing.
 
     Returns
     -------
-    array, (n,): index into `found`, -1 for those that hang on none
+    array of int, shape (n,)
+        Index into `found`, -1 for those that hang on none.
+
+    Examples
+    --------
+    >>> found_parents(np.array([INDEX["left_shoulder"], INDEX["left_wrist"]]))
+    array([-1,  0])
     """
     place = np.full(N_KEYPOINTS + 1, -1)
     place[found] = np.arange(len(found))

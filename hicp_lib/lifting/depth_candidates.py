@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hicp_lib.core.camera import Camera
+from hicp_lib.core.camera import Camera, deproject
+from hicp_lib.core.images import inside
 from hicp_lib.core.keypoints import BODY, N_KEYPOINTS
 from hicp_lib.lifting.paper import has_depth
 
@@ -25,10 +26,14 @@ class Candidates:
 
     Attributes
     ----------
-    rays : array, shape (m, 3), lines of sight in the camera frame, z = 1
-    depth_m : array, shape (m, k), the keypoint's below each surface sampled; NaN where none was
-    cost : array, shape (m, k): 0 at the keypoint, 1 at the neighbourhood's edge, more on depth steps
-    sigma_m : array, shape (m,), depths that differ so much cost 1
+    rays : array, shape (m, 3)
+        Lines of sight in the camera frame, z = 1.
+    depth_m : array, shape (m, k)
+        The keypoint's below each surface sampled; NaN where none was.
+    cost : array, shape (m, k)
+        0 at the keypoint, 1 at the neighbourhood's edge, more on depth steps.
+    sigma_m : array, shape (m,)
+        Depths that differ so much cost 1.
     """
 
     rays: np.ndarray
@@ -37,11 +42,20 @@ class Candidates:
     sigma_m: np.ndarray
 
     def take(self, rows: np.ndarray) -> Candidates:
-        """Those of some keypoints."""
+        """Those of some keypoints.
+
+        Parameters
+        ----------
+        rows : array of int or of bool
+
+        Returns
+        -------
+        Candidates
+        """
         return Candidates(self.rays[rows], self.depth_m[rows], self.cost[rows], self.sigma_m[rows])
 
 
-def look_around(
+def depth_candidates(
     keypoints: np.ndarray,
     pixels_px: np.ndarray,
     near_m: np.ndarray,
@@ -49,14 +63,34 @@ def look_around(
     intrinsics: Camera,
     below_m: np.ndarray,
 ) -> Candidates:
-    """Candidates of keypoints that lie in the image.
+    """Candidates of keypoints that lie in the image: the surfaces seen around them.
 
     Parameters
     ----------
-    keypoints : array, shape (m,), which they are, Halpe order
+    keypoints : array of int, shape (m,)
+        Which they are, Halpe order.
     pixels_px : array, shape (m, 2)
-    near_m : array, shape (m,), about how far away; sets the neighbourhood's size in pixels
-    below_m : array, shape (136,), how deep keypoints lie below the surface
+        (u, v).
+    near_m : array, shape (m,)
+        About how far away; sets the neighbourhood's size in pixels.
+    depth_m : array, shape (height, width)
+        Depth along the camera's z axis; 0, NaN or infinite: none.
+    intrinsics : Camera
+    below_m : array, shape (136,)
+        How deep keypoints lie below the surface.
+
+    Returns
+    -------
+    Candidates
+
+    Examples
+    --------
+    >>> camera = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+    >>> wrist, wall_m, below_m = np.array([9]), np.full((48, 64), 2.0), np.full(136, 0.03)
+    >>> pixels_px, near_m = np.array([[31.5, 23.5]]), np.array([2.0])
+    >>> found = depth_candidates(wrist, pixels_px, near_m, wall_m, camera, below_m)
+    >>> np.unique(found.depth_m), found.rays
+    (array([2.03]), array([[0., 0., 1.]]))
     """
     radius_px = np.maximum(intrinsics.fx_px * RADIUS_M[keypoints] / near_m, 2)
     steps = np.linspace(-1, 1, _SAMPLES)
@@ -66,9 +100,7 @@ def look_around(
     )
     surface_m, is_steep = _sample(depth_m, rows, columns)
     away = (columns - pixels_px[:, :1]) ** 2 + (rows - pixels_px[:, 1:]) ** 2
-    middle_px = np.array([intrinsics.cx_px, intrinsics.cy_px])
-    slopes = (pixels_px - middle_px) / [intrinsics.fx_px, intrinsics.fy_px]
-    rays = np.column_stack([slopes, np.ones(len(slopes))])
+    rays = deproject(intrinsics, pixels_px, np.ones(len(pixels_px)))
     deeper_m = below_m[keypoints] / np.linalg.norm(rays, axis=1)
     return Candidates(
         rays=rays,
@@ -78,11 +110,22 @@ def look_around(
     )
 
 
-def costs_of_depths(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
-    """What each depth of an even grid costs each keypoint, (m, g): the least over what explains it.
+def depth_costs(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
+    """What each depth costs each keypoint: the least over what explains it.
 
     It is on the line of sight of a surface sampled, or hidden behind one; in front of all of them it
     would be seen.
+
+    Parameters
+    ----------
+    candidates : Candidates
+        Of m keypoints, each with a depth at least.
+    grid_m : array, shape (g,)
+        Depths, evenly spaced.
+
+    Returns
+    -------
+    array, shape (m, g)
     """
     nearest_m = np.nanmin(candidates.depth_m, axis=1)
     beyond_m = np.concatenate([[np.inf], grid_m, [np.inf]])  # what is not on the grid ends up at its ends
@@ -99,10 +142,22 @@ def costs_of_depths(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
     return costs[:, 1:-1]
 
 
-def settle(candidates: Candidates, chosen_m: np.ndarray, grid_step_m: float) -> np.ndarray:
-    """Depths (m,): the weighted mean of the candidates that agree with those chosen on the grid.
+def refine_depths(candidates: Candidates, chosen_m: np.ndarray, grid_step_m: float) -> np.ndarray:
+    """The weighted mean of the candidates that agree with depths chosen on a grid.
 
     Without any, the keypoint is hidden, and the grid's depth remains.
+
+    Parameters
+    ----------
+    candidates : Candidates
+        Of m keypoints.
+    chosen_m : array, shape (m,)
+    grid_step_m : float
+
+    Returns
+    -------
+    array, shape (m,)
+        Metres.
     """
     within_m = np.maximum(2 * candidates.sigma_m, grid_step_m)[:, None]
     agree = abs(candidates.depth_m - chosen_m[:, None]) < within_m
@@ -115,7 +170,7 @@ def settle(candidates: Candidates, chosen_m: np.ndarray, grid_step_m: float) -> 
 def _sample(depth_m: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Depth at pixels, NaN where there is none, and whether there is a depth step or a hole beside them."""
     height, width = depth_m.shape
-    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
+    is_inside = inside(np.stack([columns, rows], axis=-1), (0, 0, width, height))
     # One pixel in from the border, so that there are pixels on all sides.
     rows, columns = np.clip(rows, 1, height - 2), np.clip(columns, 1, width - 2)
     surface_m = depth_m[rows, columns]
@@ -123,4 +178,4 @@ def _sample(depth_m: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> tuple
     down = abs(depth_m[rows + 1, columns] - depth_m[rows - 1, columns])
     with np.errstate(invalid="ignore"):
         is_flat = (across < _STEEP_M) & (down < _STEEP_M)
-    return np.where(inside & has_depth(surface_m), surface_m, np.nan), ~is_flat
+    return np.where(is_inside & has_depth(surface_m), surface_m, np.nan), ~is_flat

@@ -12,26 +12,23 @@ hands of this model too, in other sizes; hands of real people differ more from i
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from hicp_lib.core.datafiles import DATA_DIR
-from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import HAND_LIMBS, LEFT_HAND, RIGHT_HAND
 from hicp_lib.core.memo import memoised
 from hicp_lib.core.quaternions import matrices_from_quaternions
+from hicp_lib.lifting.body_measures import read_arrays
 
 SHAPES_FILE = DATA_DIR / "hand_shapes.npz"
 PALM = np.array([0, 5, 9, 13, 17])
 """Keypoints of a hand that do not move against each other: its root and the knuckles."""
 FINGERS = (np.arange(1, 5), *(np.arange(knuckle + 1, knuckle + 4) for knuckle in PALM[1:]))
 """The keypoints of each finger that do, thumb first."""
-_FINGER_OF = np.full(21, -1)
-for _number, _finger in enumerate(FINGERS):
-    _FINGER_OF[_finger] = _number
+_FINGER_OF = np.where(np.isin(np.arange(21), PALM), -1, (np.arange(21) - 1) // 4)
 
 _LEAST_OF_PALM = 4  # fewer of it found do not tell how it is turned
 _SIZES, _SIZE_SIGMA = (0.88, 0.96, 1.04, 1.12), 0.1
@@ -47,31 +44,51 @@ _BESIDE_M, _BEHIND_M = 0.015, 0.010  # a keypoint so near a limb in the image, s
 
 @memoised()
 def load_hand_shapes(path: Path = SHAPES_FILE) -> np.ndarray:
-    """Right hands, shape (n, 21, 3), metres, about the middle of the palm, palms turned alike.
+    """Right hands about the middle of the palm, palms turned alike.
+
+    Parameters
+    ----------
+    path : Path, optional
+
+    Returns
+    -------
+    array of float32, shape (n, 21, 3)
+        Metres.
 
     Raises
     ------
     InputError
         If the file is missing or not such a file.
+
+    Examples
+    --------
+    >>> load_hand_shapes().shape[1:]
+    (21, 3)
     """
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            return (stored["shapes_tenth_mm"].reshape(-1, 21, 3) / 10_000).astype(np.float32)
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: not shapes of hands ({error}); run tools/measure_hands.py") from None
+    shapes = {"shapes_tenth_mm": (-1, 21, 3)}
+    (tenth_mm,) = read_arrays(path, shapes, "shapes of hands", "tools/measure_hands.py")
+    return (tenth_mm / 10_000).astype(np.float32)
 
 
-def favour_hand_shapes(
+def with_hand_shapes(
     costs: np.ndarray, grid_m: np.ndarray, rays: np.ndarray, found: np.ndarray
 ) -> np.ndarray:
-    """Costs (m, g) of depths; for what a hand hides, other depths than its shape gives cost more.
+    """Costs of depths; for what a hand hides, other depths than its shape gives cost more.
 
     Parameters
     ----------
-    costs : array, shape (m, g), of each keypoint at each depth
-    grid_m : array, shape (g,), evenly spaced
-    rays : array, shape (m, 3), lines of sight, z = 1
-    found : array, shape (m,), the keypoints, Halpe order, increasing
+    costs : array, shape (m, g)
+        Of each keypoint at each depth.
+    grid_m : array, shape (g,)
+        Depths, evenly spaced.
+    rays : array, shape (m, 3)
+        Lines of sight, z = 1.
+    found : array of int, shape (m,)
+        The keypoints, Halpe order, increasing.
+
+    Returns
+    -------
+    array, shape (m, g)
     """
     costs = costs.copy()
     for hand, is_right in ((LEFT_HAND, False), (RIGHT_HAND, True)):
@@ -88,18 +105,29 @@ def favour_hand_shapes(
 def fit_hand(
     costs: np.ndarray, grid_m: np.ndarray, rays: np.ndarray, which: np.ndarray, is_right: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Depths of a hand's keypoints and how far the good fits disagree, (k,) each.
+    """Depths of a hand's keypoints, and how far the good fits disagree.
 
     Parameters
     ----------
-    costs, grid_m, rays : as of `favour_hand_shapes`, for k keypoints of one hand
-    which : array, shape (k,), their numbers in the hand, increasing
+    costs : array, shape (k, g)
+    grid_m : array, shape (g,)
+    rays : array, shape (k, 3)
+        These three as of `with_hand_shapes`, for k keypoints of one hand.
+    which : array of int, shape (k,)
+        Their numbers in the hand, increasing.
+    is_right : bool
+        Whether it is the right hand.
+
+    Returns
+    -------
+    depth_m, spread_m : array, shape (k,)
+        Mean of the good fits, and standard deviation among them.
     """
     is_palm = _FINGER_OF[which] < 0
     middle_m = np.median(grid_m[costs[is_palm].argmin(axis=1)])
     places_m, costs = rays[:, :2].T * middle_m, np.minimum(costs, _MOST)
     known = middle_m, places_m, grid_m - middle_m, costs
-    seen = _Seen(which, *(array.astype(np.float32) for array in known))
+    seen = _SeenHand(which, *(array.astype(np.float32) for array in known))
     palms = _place_palm(seen.take(is_palm), is_right)
     total, mean_m, square_m2 = palms.cost, *np.empty((2, len(which), len(palms.cost)))
     mean_m[is_palm], square_m2[is_palm] = palms.behind_m, palms.behind_m**2
@@ -113,12 +141,19 @@ def fit_hand(
 
 
 def hidden_by_limbs(slopes: np.ndarray, depth_m: np.ndarray, which: np.ndarray) -> np.ndarray:
-    """Which of k keypoints of a hand lie behind a limb of it that they are no end of, (k,).
+    """Which keypoints of a hand lie behind a limb of it that they are no end of.
 
     Parameters
     ----------
-    slopes, depth_m : arrays, shapes (k, 2) and (k,), x / z and z
-    which : array, shape (k,), their numbers in the hand
+    slopes : array, shape (k, 2)
+        x / z and y / z.
+    depth_m : array, shape (k,)
+    which : array of int, shape (k,)
+        Their numbers in the hand.
+
+    Returns
+    -------
+    array of bool, shape (k,)
     """
     row = np.full(21, -1)
     row[which] = np.arange(len(which))
@@ -135,15 +170,21 @@ def hidden_by_limbs(slopes: np.ndarray, depth_m: np.ndarray, which: np.ndarray) 
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _SeenHand:
     """What is known of k keypoints of a hand, float32.
 
     Attributes
     ----------
-    which : array, shape (k,), their numbers in the hand
-    middle_m : how far away the palm's middle seems to be
-    places_m : array, shape (2, k), where they are seen, measured at that depth
-    grid_m, costs : arrays, shapes (g,) and (k, g), depths behind it and what they cost
+    which : array of int, shape (k,)
+        Their numbers in the hand.
+    middle_m : array, shape ()
+        How far away the palm's middle seems to be.
+    places_m : array, shape (2, k)
+        Where they are seen, measured at that depth.
+    grid_m : array, shape (g,)
+        Depths behind it.
+    costs : array, shape (k, g)
+        What they cost.
     """
 
     which: np.ndarray
@@ -152,7 +193,7 @@ class _Seen:
     grid_m: np.ndarray
     costs: np.ndarray
 
-    def take(self, some: np.ndarray) -> _Seen:
+    def take(self, some: np.ndarray) -> _SeenHand:
         return replace(self, which=self.which[some], places_m=self.places_m[:, some], costs=self.costs[some])
 
     def apart_m(self, points_m: np.ndarray) -> np.ndarray:
@@ -175,10 +216,14 @@ class _Palms:
 
     Attributes
     ----------
-    turns : array, shape (p, 3, 3), times the size
-    z_m : array, shape (p,), how far their middles lie behind where they seem to be
-    shift_m : array, shape (2, p), across the line of sight
-    behind_m : array, shape (k, p), how far their k keypoints found lie behind where the middle seems to be
+    turns : array, shape (p, 3, 3)
+        Times the size.
+    z_m : array, shape (p,)
+        How far their middles lie behind where they seem to be.
+    shift_m : array, shape (2, p)
+        Across the line of sight.
+    behind_m : array, shape (k, p)
+        How far their k keypoints found lie behind where the middle seems to be.
     cost : array, shape (p,)
     """
 
@@ -208,7 +253,7 @@ def _turns(is_right: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return scaled, (0.5 * ((sizes - 1) / _SIZE_SIGMA) ** 2).astype(np.float32), palms_m
 
 
-def _place_palm(seen: _Seen, is_right: bool) -> _Palms:
+def _place_palm(seen: _SeenHand, is_right: bool) -> _Palms:
     turns, total, points_m = _turns(is_right)
     points_m = points_m[:, np.searchsorted(PALM, seen.which)]
     apart_m = seen.apart_m(points_m)
@@ -224,7 +269,7 @@ def _place_palm(seen: _Seen, is_right: bool) -> _Palms:
     return _Palms(turns[palm], z_m, shift_m[:, palm], points_m[2][:, palm] + z_m, total.ravel()[best])
 
 
-def _bend(seen: _Seen, palms: _Palms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _bend(seen: _SeenHand, palms: _Palms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Fingers on each palm: what they cost in their best shapes, (p,), and how deep they lie, (k, p).
 
     That is behind where the middle seems to be, in the mean over shapes by how well they fit; and the mean

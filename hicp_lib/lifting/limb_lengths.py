@@ -10,7 +10,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from hicp_lib.core.keypoints import LEFT_HAND
-from hicp_lib.lifting.body_measures import LEVELS, BodyMeasures, hang_together
+from hicp_lib.lifting.body_measures import LEVELS, BodyMeasures, found_parents
 
 # A limb longer or shorter than people's by a share of its length and some more costs 1, and so on with the
 # square up to a most. Limbs of the body seen too short are often the detector's fault; hands are rigid.
@@ -25,10 +25,11 @@ class Limbs:
 
     Attributes
     ----------
-    begin, end : arrays, shape (n,), rows of the keypoints at their ends, `begin` nearer to the root
-    costs : array, shape (n, g, 2 r + 1), what their lengths cost: for each depth of the beginning, at each of
-        r steps nearer to r steps further of the end. With more steps all of them are too long by the most
-        that costs
+    begin, end : array of int, shape (n,)
+        Rows of the keypoints at their ends, `begin` nearer to the root.
+    costs : array, shape (n, g, 2 r + 1)
+        What their lengths cost: for each depth of the beginning, at each of r steps nearer to r steps further
+        of the end. With more steps all of them are too long by the most that costs.
     """
 
     begin: np.ndarray
@@ -45,11 +46,20 @@ def limbs_outwards(
 
     Parameters
     ----------
-    grid_m : array, shape (g,), depths, evenly spaced
-    rays : array, shape (m, 3), lines of sight, z = 1
-    found : array, shape (m,), the keypoints, Halpe order, increasing
+    grid_m : array, shape (g,)
+        Depths, evenly spaced.
+    rays : array, shape (m, 3)
+        Lines of sight, z = 1.
+    found : array of int, shape (m,)
+        The keypoints, Halpe order, increasing.
+    measures : BodyMeasures
+
+    Returns
+    -------
+    list of Limbs
+        From the root outwards.
     """
-    above, step_m = hang_together(found), grid_m[1] - grid_m[0]
+    above, step_m = found_parents(found), grid_m[1] - grid_m[0]
     limbs = []
     for of_hand in (False, True):
         end = np.flatnonzero((above >= 0) & ((found >= LEFT_HAND[0]) == of_hand))
@@ -63,7 +73,7 @@ def limbs_outwards(
         levels = LEVELS[found[end]]
         for level in np.unique(levels):
             alike = levels == level
-            limbs.append((level, Limbs(*pairs[:, alike], costs[alike])))
+            limbs.append((level, Limbs(above[end[alike]], end[alike], costs[alike])))
     return [of_level for _, of_level in sorted(limbs, key=itemgetter(0))]
 
 
@@ -76,12 +86,24 @@ def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> np.ndarray:
 
     Parameters
     ----------
-    costs : array, shape (m, g), of each keypoint at each depth of the limbs' grid
-    limbs : from the root outwards, as `limbs_outwards` gives them
+    costs : array, shape (m, g)
+        Of each keypoint at each depth of the limbs' grid.
+    limbs : sequence of Limbs
+        From the root outwards, as `limbs_outwards` gives them.
 
     Returns
     -------
-    array, shape (m,): index into the grid
+    array of int, shape (m,)
+        Index into the grid.
+
+    Examples
+    --------
+    >>> costs = np.array([[0.0, 1.0, 5.0], [4.0, 0.0, 4.0]])
+    >>> choose_along_limbs(costs, [])
+    array([0, 1])
+    >>> one_step_only = Limbs(np.array([0]), np.array([1]), np.full((1, 3, 3), [9.0, 0.0, 9.0]))
+    >>> choose_along_limbs(costs, [one_step_only])
+    array([1, 1])
     """
     g = costs.shape[1]
     widest = max((some.costs.shape[2] for some in limbs), default=1)
@@ -110,8 +132,9 @@ class _Limits:
         is_hand = pairs[1] >= LEFT_HAND[0]
         share, more_m, most_short = (np.where(is_hand, _HAND[name], _BODY[name]) for name in _BODY)
         most_m = measures.farthest_m[*pairs]
-        limits = measures.closest_m[*pairs], most_m, share * most_m + more_m, np.sqrt(most_short)
-        self.least_m, self.most_m, self.sigma_m, self.most_short = np.float32(limits)[..., None, None]
+        limits_m = measures.closest_m[*pairs], most_m, share * most_m + more_m
+        limits = np.array([*limits_m, np.sqrt(most_short)], np.float32)[..., None, None]
+        self.least_m, self.most_m, self.sigma_m, self.most_short = limits
 
     @property
     def farthest_m(self) -> np.ndarray:

@@ -46,21 +46,14 @@ class Lifted:
 
     Attributes
     ----------
-    points_m : array, shape (n_people, 136, 3), camera frame; NaN where not lifted
-    reason : array, shape (n_people, 136), int8, index into `REASONS`
+    points_m : array, shape (n_people, 136, 3)
+        In the camera frame; NaN where not lifted.
+    reason : array of int8, shape (n_people, 136)
+        Index into `REASONS`.
     """
 
     points_m: np.ndarray
     reason: np.ndarray
-
-
-@dataclass(frozen=True)
-class InImage:
-    """Keypoints that lie in the image: `which` (n_people, 136) are; row and column of their pixels, (n,)."""
-
-    which: np.ndarray
-    rows: np.ndarray
-    columns: np.ndarray
 
 
 def lift(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera) -> Lifted:
@@ -68,64 +61,60 @@ def lift(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera) -> L
 
     Parameters
     ----------
-    keypoints_px : array, shape (n_people, 136, 2), (u, v), pixel centres at integers; NaN: not detected
-    depth_m : array, shape (height, width), depth along the camera's z axis at the pixels of the image the
-        keypoints were found in; 0, NaN or infinite: no depth
-    intrinsics : of that image
+    keypoints_px : array, shape (n_people, 136, 2)
+        (u, v), pixel centres at integers; NaN: not detected.
+    depth_m : array, shape (height, width)
+        Depth along the camera's z axis at the pixels of the image the keypoints were found in; 0, NaN or
+        infinite: no depth.
+    intrinsics : Camera
+        Of that image.
+
+    Returns
+    -------
+    Lifted
 
     Raises
     ------
     ValueError
         If the shapes are not these.
+
+    Examples
+    --------
+    >>> keypoints_px = np.full((1, 136, 2), np.nan)
+    >>> keypoints_px[0, 9] = 40, 20  # the left wrist
+    >>> lifted = lift(keypoints_px, np.full((48, 64), 2.0), Camera(64, 48, 100.0, 100.0, 32.0, 24.0))
+    >>> lifted.points_m[0, 9], REASONS[lifted.reason[0, 9]], REASONS[lifted.reason[0, 10]]
+    (array([ 0.16, -0.08,  2.  ]), 'lifted', 'not_detected')
     """
-    keypoints_px, depth_m, reason, found = checked(keypoints_px, depth_m, intrinsics)
-    radius_px = intrinsics.fx_px * np.broadcast_to(RADIUS_M, reason.shape)[found.which]
-    half_px = _half_widths(depth_m, found.rows, found.columns, radius_px)
-    lifted = np.full((len(half_px), 3), np.nan)
-    for some in _of_like_size(half_px):
-        lifted[some] = _medians(depth_m, found.rows[some], found.columns[some], half_px[some], intrinsics)
-    reason[found.which] = np.where(np.isnan(lifted[:, 2]), NO_DEPTH, LIFTED)
-    points_m = np.full((*reason.shape, 3), np.nan)
-    points_m[found.which] = lifted
-    return Lifted(points_m, reason)
-
-
-def checked(
-    keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, InImage]:
-    """Arguments of `lift` as float arrays, reasons as known so far (n_people, 136), what is in the image."""
     keypoints_px, depth_m = np.asarray(keypoints_px, float), np.asarray(depth_m)
     if keypoints_px.ndim != 3 or keypoints_px.shape[1:] != (N_KEYPOINTS, 2):
         raise ValueError(f"keypoints have shape {keypoints_px.shape}, not (n_people, {N_KEYPOINTS}, 2)")
-    height, width = intrinsics.height_px, intrinsics.width_px
-    if depth_m.shape != (height, width):
-        raise ValueError(f"the depth image has shape {depth_m.shape}, the camera's is {(height, width)}")
+    size = (intrinsics.height_px, intrinsics.width_px)
+    if depth_m.shape != size:
+        raise ValueError(f"the depth image has shape {depth_m.shape}, the camera's is {size}")
     if not np.issubdtype(depth_m.dtype, np.floating):
         depth_m = depth_m.astype(float)
-    u, v = keypoints_px[..., 0], keypoints_px[..., 1]
-    which = intrinsics.contains(keypoints_px)
-    reason = np.where(np.isnan(u + v), NOT_DETECTED, OUTSIDE_IMAGE).astype(np.int8)
-    columns, rows = np.floor(keypoints_px[which] + 0.5).astype(int).T
-    return keypoints_px, depth_m, reason, InImage(which, rows, columns)
+    is_inside = intrinsics.contains(keypoints_px)
+    at = np.floor(keypoints_px[is_inside, ::-1] + 0.5).astype(int).T
+    half_px = _half_widths(depth_m, at, intrinsics.fx_px * RADIUS_M[np.nonzero(is_inside)[1]])
+    lifted = np.full((len(half_px), 3), np.nan)
+    for some in _of_like_size(half_px):
+        lifted[some] = _medians(depth_m, at[:, some], half_px[some], intrinsics)
+    is_unknown = np.isnan(keypoints_px.sum(axis=2))
+    reason = np.where(is_unknown, NOT_DETECTED, OUTSIDE_IMAGE).astype(np.int8)
+    reason[is_inside] = np.where(np.isnan(lifted[:, 2]), NO_DEPTH, LIFTED)
+    points_m = np.full((*reason.shape, 3), np.nan)
+    points_m[is_inside] = lifted
+    return Lifted(points_m, reason)
 
 
-def windows(
-    depth_m: np.ndarray, rows: np.ndarray, columns: np.ndarray, half_px: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Square pieces of a depth image around pixels; 0 beyond the image's border.
+def _windows(depth_m: np.ndarray, at: np.ndarray, half_px: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Square pieces of a depth image around pixels (rows and columns, (2, n)), 0 beyond the image's border.
 
-    Parameters
-    ----------
-    rows, columns : arrays, shape (n,), the middle pixels
-
-    Returns
-    -------
-    depth_m : array, shape (n, w, w), w = 2 half_px + 1
-    rows, columns : arrays, shape (n, w), those of the pieces
+    Depths (n, w, w), w = 2 half_px + 1, and the rows and columns (n, w) of the pieces.
     """
-    steps = np.arange(-half_px, half_px + 1)
     height, width = depth_m.shape
-    rows, columns = rows[:, None] + steps, columns[:, None] + steps
+    rows, columns = at[:, :, None] + np.arange(-half_px, half_px + 1)
     inside_rows, inside_columns = (
         np.maximum(np.minimum(at, n - 1), 0) for at, n in ((rows, height), (columns, width))
     )
@@ -137,7 +126,22 @@ def windows(
 
 
 def has_depth(depth_m: np.ndarray) -> np.ndarray:
-    """Where a depth image holds a depth: positive and finite."""
+    """Where a depth image holds a depth: positive and finite.
+
+    Parameters
+    ----------
+    depth_m : array
+
+    Returns
+    -------
+    array of bool
+        Of the same shape.
+
+    Examples
+    --------
+    >>> has_depth(np.array([0.0, 1.5, np.nan, np.inf]))
+    array([False,  True, False, False])
+    """
     return (depth_m > 0) & (depth_m < np.inf)
 
 
@@ -150,9 +154,9 @@ def _of_like_size(half_px: np.ndarray) -> Iterator[np.ndarray]:
         yield from np.array_split(alike, n_blocks) if n_blocks > 1 else [alike]
 
 
-def _half_widths(depth_m, rows, columns, radius_px: np.ndarray) -> np.ndarray:
+def _half_widths(depth_m: np.ndarray, at: np.ndarray, radius_px: np.ndarray) -> np.ndarray:
     """Half widths of the neighbourhoods in whole pixels, (n,); `radius_px` is fx r, (n,), pixels x metres."""
-    half = _sizes(radius_px, depth_m[rows, columns])
+    half = _sizes(radius_px, depth_m[*at])
     lost, reach = np.flatnonzero(half < 0), 0
     while len(lost):  # in holes; no corner of a neighbourhood is farther away than that of the least depth
         limit = int(np.ceil(np.sqrt(2) * radius_px[lost].max() / MIN_DEPTH_M))
@@ -160,7 +164,7 @@ def _half_widths(depth_m, rows, columns, radius_px: np.ndarray) -> np.ndarray:
             break
         is_little = len(lost) * (2 * limit + 1) ** 2 <= _LITTLE
         reach = limit if reach and is_little else min(max(4 * reach, 2), limit)
-        half[lost] = _nearest_that_reaches(depth_m, rows[lost], columns[lost], radius_px[lost], reach)
+        half[lost] = _sizes_that_reach(depth_m, at[:, lost], radius_px[lost], reach)
         lost = lost[half[lost] < 0]
     return np.maximum(half, 0)  # a hole that nothing reaches is alone, and has no depth
 
@@ -171,16 +175,16 @@ def _sizes(radius_px: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
     return np.where(has_depth(depth_m), sizes, -1).astype(int)
 
 
-def _nearest_that_reaches(depth_m, rows, columns, radius_px, reach: int) -> np.ndarray:
+def _sizes_that_reach(depth_m: np.ndarray, at: np.ndarray, radius_px: np.ndarray, reach: int) -> np.ndarray:
     """Half width that the nearest pixel sets whose neighbourhood reaches the middle, (n,).
 
     -1 where there is none within `reach` pixels.
     """
-    pieces, _, _ = windows(depth_m, rows, columns, reach)
+    pieces, _, _ = _windows(depth_m, at, reach)
     order, away = _disk(reach)
-    sizes = _sizes(radius_px[:, None], pieces.reshape(len(rows), -1)[:, order])
+    sizes = _sizes(radius_px[:, None], pieces.reshape(len(pieces), -1)[:, order])
     nearest = (sizes >= away).argmax(axis=1)  # the first, and the first of all where there is none
-    sizes = sizes[np.arange(len(rows)), nearest]
+    sizes = sizes[np.arange(len(sizes)), nearest]
     return np.where(sizes >= away[nearest], sizes, -1)
 
 
@@ -193,10 +197,10 @@ def _disk(reach: int) -> tuple[np.ndarray, np.ndarray]:
     return order, np.maximum(abs(steps), abs(steps[:, None])).ravel()[order]
 
 
-def _medians(depth_m, rows, columns, half_px, intrinsics: Camera) -> np.ndarray:
+def _medians(depth_m: np.ndarray, at: np.ndarray, half_px: np.ndarray, intrinsics: Camera) -> np.ndarray:
     """Coordinate-wise medians of lifted neighbourhoods, (n, 3); gathered in windows of the largest's size."""
     reach = int(half_px.max())
-    z, v, u = windows(depth_m, rows, columns, reach)
+    z, v, u = _windows(depth_m, at, reach)
     x = ((u - intrinsics.cx_px) / intrinsics.fx_px).astype(z.dtype)
     y = ((v - intrinsics.cy_px) / intrinsics.fy_px).astype(z.dtype)
     missing = ~has_depth(z)

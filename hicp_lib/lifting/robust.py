@@ -1,7 +1,7 @@
 """Lifting beyond the paper: joints instead of skin, what is seen near a keypoint, limbs of human length.
 
-The paper's method (`lifting`) reads the depth of whatever fills most of a keypoint's neighbourhood.
-What exact truth shows to go wrong with it, and the steps here that mend it:
+The paper's method (`hicp_lib.lifting.paper`) reads the depth of whatever fills most of a keypoint's
+neighbourhood. What exact truth shows to go wrong with it, and the steps here that mend it:
 
 - It gives the skin, not the joint in the middle of the limb. *below_surface*: a keypoint is put as far
   behind what is seen, along the line of sight, as it lies below the skin of the body model.
@@ -21,7 +21,7 @@ of depths, more turns of the hand, and a lower cost of being hidden. Keypoints o
 they are taken at the cheapest of the surfaces near them.
 
 Measures of people come from the body model (`body_measures`, `hand_shapes`). The costs (there, and in
-`near_surfaces` and `limb_lengths`) were chosen by hand on rendered people who are in no recording of the
+`depth_candidates` and `limb_lengths`) were chosen by hand on rendered people who are in no recording of the
 study.
 """
 
@@ -34,8 +34,8 @@ import numpy as np
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.keypoints import BODY, FACE, N_KEYPOINTS
 from hicp_lib.lifting.body_measures import load_measures
-from hicp_lib.lifting.depth_candidates import Candidates, costs_of_depths, look_around, settle
-from hicp_lib.lifting.hand_shapes import favour_hand_shapes
+from hicp_lib.lifting.depth_candidates import Candidates, depth_candidates, depth_costs, refine_depths
+from hicp_lib.lifting.hand_shapes import with_hand_shapes
 from hicp_lib.lifting.limb_lengths import choose_along_limbs, limbs_outwards
 from hicp_lib.lifting.paper import LIFTED, MIN_DEPTH_M, NO_DEPTH, Lifted, lift
 
@@ -52,8 +52,35 @@ _IN_BODY, _IN_FACE = (np.isin(np.arange(N_KEYPOINTS), part) for part in (BODY, F
 def lift_robust(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera) -> Lifted:
     """Lift the keypoints of everyone in an image; this module's head says how.
 
-    Parameters and errors as in `lifting.lift`. Keypoints are lifted when there is depth within 30 mm (body
-    and feet) or 10 mm (face and hands) of them.
+    Keypoints are lifted when there is depth within 30 mm (body and feet) or 10 mm (face and hands) of them.
+
+    Parameters
+    ----------
+    keypoints_px : array, shape (n_people, 136, 2)
+        (u, v), pixel centres at integers; NaN: not detected.
+    depth_m : array, shape (height, width)
+        Depth along the camera's z axis; 0, NaN or infinite: no depth.
+    intrinsics : Camera
+        Of that image.
+
+    Returns
+    -------
+    Lifted
+
+    Raises
+    ------
+    ValueError
+        If the shapes are not these.
+
+    Examples
+    --------
+    The joint lies below the skin that the camera sees, here at 2 m:
+
+    >>> keypoints_px = np.full((1, 136, 2), np.nan)
+    >>> keypoints_px[0, 9] = 32, 24  # the left wrist
+    >>> lifted = lift_robust(keypoints_px, np.full((48, 64), 2.0), Camera(64, 48, 100.0, 100.0, 32.0, 24.0))
+    >>> bool(2.0 < lifted.points_m[0, 9, 2] < 2.05)
+    True
     """
     return lift_in_steps(keypoints_px, depth_m, intrinsics, [len(STEPS)])[0]
 
@@ -63,8 +90,26 @@ def lift_in_steps(
 ) -> list[Lifted]:
     """Lift the keypoints of everyone in an image with the first of `STEPS`: what each brings.
 
-    Parameters and errors as in `lifting.lift`; `n_steps`, how many of the steps, for each result: 0 for the
-    paper's method. What results have in common is worked out once.
+    What results have in common is worked out once.
+
+    Parameters
+    ----------
+    keypoints_px : array, shape (n_people, 136, 2)
+    depth_m : array, shape (height, width)
+    intrinsics : Camera
+        These three as in `lift_robust`.
+    n_steps : sequence of int
+        How many of the steps, for each result: 0 for the paper's method.
+
+    Returns
+    -------
+    list of Lifted
+        One for each of `n_steps`.
+
+    Raises
+    ------
+    ValueError
+        If the shapes are not these.
     """
     depth_m = np.asarray(depth_m, np.result_type(depth_m, np.float32))
     paper = lift(keypoints_px, depth_m, intrinsics)
@@ -98,7 +143,7 @@ def _depths(
     nearest_m, farthest_m = max(middle_m - _REACH_M, MIN_DEPTH_M), middle_m + _REACH_M
     # What is seen may be the wall: the neighbourhood is never smaller than at the person's middle.
     near_m = np.clip(np.fmin(first_m, middle_m), nearest_m, None)
-    candidates = look_around(found, pixels_px, near_m, depth_m, intrinsics, load_measures().below_skin_m)
+    candidates = depth_candidates(found, pixels_px, near_m, depth_m, intrinsics, load_measures().below_skin_m)
     return np.arange(nearest_m, farthest_m, _GRID_M), candidates
 
 
@@ -106,17 +151,17 @@ def _choose(
     found: np.ndarray, grid_m: np.ndarray, candidates: Candidates, n_steps: Sequence[int]
 ) -> Iterator[np.ndarray]:
     """Points (m, 3) of one person's keypoints after two steps or more, for each number of them."""
-    of_surfaces = costs_of_depths(candidates, grid_m)
+    of_surfaces = depth_costs(candidates, grid_m)
     on = np.flatnonzero(~_IN_FACE[found])  # what hangs on limbs
     limbs = limbs_outwards(grid_m, candidates.rays[on], found[on], load_measures())
     for n in n_steps:
         costs, steps = of_surfaces, STEPS[:n]
         if "hand_shapes" in steps:
-            costs = favour_hand_shapes(costs, grid_m, candidates.rays, found)
+            costs = with_hand_shapes(costs, grid_m, candidates.rays, found)
         chosen = costs.argmin(axis=1)
         if "limb_lengths" in steps:
             chosen[on] = choose_along_limbs(costs[on], limbs)
-        yield candidates.rays * settle(candidates, grid_m[chosen], _GRID_M)[:, None]
+        yield candidates.rays * refine_depths(candidates, grid_m[chosen], _GRID_M)[:, None]
 
 
 def _middle_m(found: np.ndarray, first_m: np.ndarray) -> float:

@@ -16,6 +16,9 @@ from hicp_lib.lifting.robust import METHODS, lift_in_steps
 from hicp_lib.recordings.recording import Recording, read_depth_m
 
 _NAMES = {"keypoint": pd.Series(NAMES), "reason": pd.Series(REASONS)}
+_COORDINATES = ("x_m", "y_m", "z_m", "x_cam_m", "y_cam_m", "z_cam_m")
+_Columns = dict[str, np.ndarray]
+_Frame = tuple[_Columns, list[_Columns]]
 
 
 def lift_recording(
@@ -25,15 +28,19 @@ def lift_recording(
 
     Parameters
     ----------
-    detections : of each frame's colour image, in the recording's order
-    method : "robust" or "paper"
+    recording : Recording
+    detections : sequence of Detections
+        Of each frame's colour image, in the recording's order.
+    method : str, optional
+        "robust" or "paper".
 
     Returns
     -------
-    DataFrame, one row per frame x person x keypoint detected, columns
-        frame (row of the recording), t_s, person (0 has the best score), keypoint (Halpe name), u_px, v_px,
-        score, x_m, y_m, z_m (robot's base frame), x_cam_m, y_cam_m, z_cam_m (camera frame), reason (one of
-        `lifting.REASONS`); coordinates are NaN where the reason is not "lifted"
+    DataFrame
+        One row per frame x person x keypoint detected, columns frame (row of the recording), t_s, person
+        (0 has the best score), keypoint (Halpe name), u_px, v_px, score, x_m, y_m, z_m (robot's base frame),
+        x_cam_m, y_cam_m, z_cam_m (camera frame), reason (one of `hicp_lib.lifting.paper.REASONS`);
+        coordinates are NaN where the reason is not "lifted".
 
     Raises
     ------
@@ -51,12 +58,16 @@ def lift_found(
 
     Parameters
     ----------
-    found : detector -> detections of each frame, as of `lift_recording`
-    n_steps : method -> how many of `robust_lifting.STEPS` it takes
+    recording : Recording
+    found : mapping of str to sequence of Detections
+        By detector, detections of each frame, as of `lift_recording`.
+    n_steps : mapping of str to int, optional
+        By method, how many of `hicp_lib.lifting.robust.STEPS` it takes.
 
     Returns
     -------
-    DataFrame, columns detector, method and those of `lift_recording`; method by method of each detector
+    DataFrame
+        Columns detector, method and those of `lift_recording`; method by method of each detector.
 
     Raises
     ------
@@ -65,31 +76,42 @@ def lift_found(
     """
     for detections in found.values():
         if len(detections) != len(recording):
-            raise InputError(
-                f"{recording.folder}: {len(recording)} frames, but detections of {len(detections)} images; "
-                "detect people in the frames of this recording"
-            )
-    frames = {detector: [] for detector in found}
+            counts = f"{len(recording)} frames, but detections of {len(detections)} images"
+            raise InputError(f"{recording.folder}: {counts}; detect people in the frames of this recording")
+    frames: dict[str, list[_Frame]] = {detector: [] for detector in found}
     for k in range(len(recording)):
         depth_m = read_depth_m(recording, k)
         for detector, detections in found.items():
             frames[detector].append(_lift_frame(recording, k, depth_m, detections[k], list(n_steps.values())))
-    tables = [
-        _table(detector_frames, i).assign(detector=detector, method=method)
+    tables = {
+        (detector, method): _table(detector_frames, i)
         for detector, detector_frames in frames.items()
         for i, method in enumerate(n_steps)
-    ]
-    table = pd.concat(tables, ignore_index=True)
-    return table[["detector", "method", *table.columns.drop(["detector", "method"])]]
+    }
+    return pd.concat(tables, names=["detector", "method"]).droplevel(2).reset_index()
 
 
 def steps_of(method: str) -> int:
-    """How many of `robust_lifting.STEPS` a way of lifting takes.
+    """How many of `hicp_lib.lifting.robust.STEPS` a way of lifting takes.
+
+    Parameters
+    ----------
+    method : str
+        One of `hicp_lib.lifting.robust.METHODS`.
+
+    Returns
+    -------
+    int
 
     Raises
     ------
     InputError
         For an unknown name.
+
+    Examples
+    --------
+    >>> steps_of("paper"), steps_of("robust")
+    (0, 4)
     """
     if method not in METHODS:
         raise InputError(f"no method {method!r} of lifting; choose one of {', '.join(sorted(METHODS))}")
@@ -98,26 +120,26 @@ def steps_of(method: str) -> int:
 
 def _lift_frame(
     recording: Recording, k: int, depth_m: np.ndarray, found: Detections, n_steps: Sequence[int]
-) -> tuple[dict[str, np.ndarray], list[dict[str, np.ndarray]]]:
+) -> _Frame:
     """Columns that no method changes, and the others for each method; keypoints and reasons as numbers."""
     best_first = np.argsort(-found.person_scores, kind="stable")
     keypoints_px, scores = found.keypoints_px[best_first], found.scores[best_first]
     person, keypoint = np.nonzero(np.isfinite(keypoints_px).all(axis=2))
     u_px, v_px = keypoints_px[person, keypoint].T
-    detected = {"frame": np.full(len(person), k), "t_s": np.full(len(person), recording.times_s[k])}
-    detected |= {"person": person, "keypoint": keypoint, "u_px": u_px, "v_px": v_px}
-    detected["score"] = scores[person, keypoint]
+    detected = {
+        "frame": np.full(len(person), k), "t_s": np.full(len(person), recording.times_s[k]), "person": person,
+        "keypoint": keypoint, "u_px": u_px, "v_px": v_px, "score": scores[person, keypoint],
+    }  # fmt: skip
     in_space = []
     for lifted in lift_in_steps(keypoints_px, depth_m, recording.intrinsics, n_steps):
         seen_m = lifted.points_m[person, keypoint]
         base_m = transform(recording.T_base_cam[k], seen_m)
-        columns = dict(zip(("x_m", "y_m", "z_m"), base_m.T, strict=True))
-        columns |= dict(zip(("x_cam_m", "y_cam_m", "z_cam_m"), seen_m.T, strict=True))
+        columns = dict(zip(_COORDINATES, [*base_m.T, *seen_m.T], strict=True))
         in_space.append(columns | {"reason": lifted.reason[person, keypoint]})
     return detected, in_space
 
 
-def _table(frames: Sequence[tuple[dict, list[dict]]], method: int) -> pd.DataFrame:
+def _table(frames: Sequence[_Frame], method: int) -> pd.DataFrame:
     """One method's table of the columns of all frames."""
     parts = [detected | in_space[method] for detected, in_space in frames]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -21,6 +21,8 @@ import pandas as pd
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
 from hicp_lib.core.files import write_bytes
+from hicp_lib.core.images import inside
+from hicp_lib.recordings.camera_file import is_number
 from hicp_lib.recordings.recording import Recording, read_rgb
 
 with needs("report"):
@@ -28,6 +30,7 @@ with needs("report"):
 
 CLICKS_FILE = "clicks.csv"
 COLUMNS = ["frame", "marker", "u_px", "v_px"]
+_MARGINS_PX = 160  # of the figure, beside the image
 
 
 def read_clicks(path: str | Path, recording: Recording, markers: Sequence[str]) -> pd.DataFrame:
@@ -35,11 +38,16 @@ def read_clicks(path: str | Path, recording: Recording, markers: Sequence[str]) 
 
     Parameters
     ----------
-    markers : the names there are in the motion capture
+    path : str or Path
+    recording : Recording
+        The one that was clicked in.
+    markers : sequence of str
+        The names there are in the motion capture.
 
     Returns
     -------
-    DataFrame, columns `frame` (row of the recording), `marker`, `u_px, v_px`
+    DataFrame
+        Columns `frame` (row of the recording), `marker`, `u_px, v_px`.
 
     Raises
     ------
@@ -51,11 +59,8 @@ def read_clicks(path: str | Path, recording: Recording, markers: Sequence[str]) 
         _check_click(f"{path}: row {row}", click, recording, markers)
     twice = table.duplicated(["frame", "marker"])
     if twice.any():
-        click = table[twice].iloc[0]
-        raise InputError(
-            f"{path}: row {twice.idxmax() + 2}: {click['marker']} is clicked twice in this frame; "
-            "keep one of them"
-        )
+        again = f"{table['marker'][twice].iloc[0]} is clicked twice in this frame"
+        raise InputError(f"{path}: row {twice.idxmax() + 2}: {again}; keep one of them")
     return table.astype({"frame": int, "u_px": float, "v_px": float})
 
 
@@ -64,9 +69,21 @@ def record_click(
 ) -> pd.DataFrame:
     """Write a marker's position into the recording's `clicks.csv`, in place of an earlier one.
 
+    Parameters
+    ----------
+    recording : Recording
+    markers : sequence of str
+        The names there are in the motion capture.
+    frame : int
+        Row of the recording.
+    marker : str
+    u_px, v_px : float
+        Pixel centres at integers.
+
     Returns
     -------
-    All clicks so far, as `read_clicks`
+    DataFrame
+        All clicks so far, as `read_clicks`.
 
     Raises
     ------
@@ -86,8 +103,22 @@ def record_click(
 
 
 def show_frame(recording: Recording, frame: int, clicks: pd.DataFrame | None = None) -> go.Figure:
-    """The image of a frame, to zoom into (drag) and read pixels from (hover); clicks so far are marked."""
-    source, width = _data_uri(read_rgb(recording, frame)), recording.intrinsics.width_px
+    """The image of a frame, to zoom into (drag) and read pixels from (hover); clicks so far are marked.
+
+    Parameters
+    ----------
+    recording : Recording
+    frame : int
+        Row of the recording.
+    clicks : DataFrame, optional
+        As from `read_clicks`.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    _, encoded = cv2.imencode(".png", cv2.cvtColor(read_rgb(recording, frame), cv2.COLOR_RGB2BGR))
+    source = f"data:image/png;base64,{base64.b64encode(encoded.tobytes()).decode()}"
     figure = go.Figure(go.Image(source=source, hovertemplate="u %{x}, v %{y}<extra></extra>"))
     if clicks is not None:
         here = clicks[clicks["frame"] == frame]
@@ -97,12 +128,8 @@ def show_frame(recording: Recording, frame: int, clicks: pd.DataFrame | None = N
             textposition="top center", textfont={"color": "#D55E00"}, hoverinfo="text", showlegend=False,
         )  # fmt: skip
     title = f"frame {frame}: drag to zoom, double-click to go back"
-    return figure.update_layout(title=title, dragmode="zoom", width=width + 160, margin={"t": 40, "b": 20})
-
-
-def _data_uri(image: np.ndarray) -> str:
-    _, encoded = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
-    return f"data:image/png;base64,{base64.b64encode(encoded.tobytes()).decode()}"
+    width = recording.intrinsics.width_px + _MARGINS_PX
+    return figure.update_layout(title=title, dragmode="zoom", width=width, margin={"t": 40, "b": 20})
 
 
 def _read_table(path: str | Path) -> pd.DataFrame:
@@ -121,23 +148,13 @@ def _read_table(path: str | Path) -> pd.DataFrame:
 
 def _check_click(where: str, click: dict, recording: Recording, markers: Sequence[str]) -> None:
     frame, marker, *pixel = (click[name] for name in COLUMNS)
-    if not _is_number(frame) or frame != int(frame) or not 0 <= frame < len(recording):
-        raise InputError(
-            f"{where}: frame is {frame!r}; expected a whole number from 0 to {len(recording) - 1}"
-        )
+    if not is_number(frame) or frame != int(frame) or not 0 <= frame < len(recording):
+        expected = f"expected a whole number from 0 to {len(recording) - 1}"
+        raise InputError(f"{where}: frame is {frame!r}; {expected}")
     if marker not in markers:
-        raise InputError(
-            f"{where}: marker {marker!r} is not in the motion capture; it has {', '.join(markers)}"
-        )
+        known = ", ".join(markers)
+        raise InputError(f"{where}: marker {marker!r} is not in the motion capture; it has {known}")
     sizes = (recording.intrinsics.width_px, recording.intrinsics.height_px)
     for name, value, size in zip(COLUMNS[2:], pixel, sizes, strict=True):
-        if not _is_number(value) or not -0.5 <= value < size - 0.5:
+        if not is_number(value) or not inside(np.array([value, 0]), (0, 0, size, 1)):
             raise InputError(f"{where}: {name} is {value!r}; expected a pixel from 0 to {size - 1}")
-
-
-def _is_number(value: object) -> bool:
-    return (
-        isinstance(value, int | float | np.number)
-        and not isinstance(value, bool)
-        and bool(np.isfinite(value))
-    )

@@ -2,11 +2,11 @@
 
 Three ways, from the same kind of clicks (`reprojection` has a fourth, without depth):
 
-- `as_in_paper`: eight markers in two images give the rotation by Arun's method; the translation is the
-  one that puts the marker on the camera at the camera's optical centre (paper section IV-C). It is as wrong
-  as that marker is far from the centre.
-- `same_clicks`: rotation and translation by Arun's method from the same eight markers.
-- `all_clicks`: the same from the markers of all clicked images, those left out that do not agree
+- `register_by_camera_marker`: eight markers in two images give the rotation by Arun's method; the
+  translation is the one that puts the marker on the camera at the camera's optical centre (paper section
+  IV-C). It is as wrong as that marker is far from the centre.
+- `register_selected`: rotation and translation by Arun's method from the same eight markers.
+- `register_robustly`: the same from the markers of all clicked images, those left out that do not agree
   with the others.
 """
 
@@ -21,7 +21,7 @@ import pandas as pd
 from hicp_lib.core.alignment import RigidFit, arun
 from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_json, write_json
+from hicp_lib.core.files import read_json
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.lifting.paper import lift
 from hicp_lib.mocap.synchronisation import interpolate_mocap
@@ -32,9 +32,11 @@ CAMERA_MARKER = "camera"
 REGISTRATION_FILE = "registration.json"
 N_PAPER_MARKERS, N_PAPER_IMAGES = 8, 2
 _SEEN, _MEASURED = ["x_m", "y_m", "z_m"], ["mocap_x_m", "mocap_y_m", "mocap_z_m"]
-_MIN_OUTLIER_M = 0.02
+_OUTLIER_MEDIANS = 3 * 1.4826  # three standard deviations, as multiples of the median residual, ...
+_MIN_OUTLIER_M = 0.02  # ... and this are what residuals left out are beyond
 _MAX_ROUNDS = 20
-_MAX_STRETCH_M = 0.1
+_MAX_STRETCH_M = 0.1  # by which a distance may differ between what is seen and what is measured
+_MAX_SKEW = 1e-4  # by which a rotation of a file may differ from one: files are rounded
 
 
 @dataclass(frozen=True)
@@ -43,18 +45,26 @@ class Registration:
 
     Attributes
     ----------
-    method : how it was found, in words
+    method : str
+        How it was found, in words.
     T_base_mocap : array, shape (4, 4)
-    n_points : clicked markers it rests on; 0 where it was given
-    rms_m, leave_one_out_m : root mean square residual, and median leave-one-out error, of Arun's fit
-        to them; NaN where it was given
+    n_points : int
+        Clicked markers it rests on; 0 where it was given.
+    rms_m, leave_one_out_m : float
+        Root mean square residual, and median leave-one-out error, of Arun's fit to them; NaN where it was
+        given.
+
+    Examples
+    --------
+    >>> Registration("given", np.eye(4)).n_points
+    0
     """
 
     method: str
     T_base_mocap: np.ndarray
     n_points: int = 0
-    rms_m: float = float("nan")
-    leave_one_out_m: float = float("nan")
+    rms_m: float = np.nan
+    leave_one_out_m: float = np.nan
 
 
 def lift_clicks(
@@ -66,32 +76,69 @@ def lift_clicks(
 
     Parameters
     ----------
-    clicks : as from `read_clicks`
-    offset_s : to add to the motion capture's stamps to have them on the camera's clock
+    recording : Recording
+    clicks : DataFrame
+        As from `hicp_lib.mocap.clicking.read_clicks`.
+    mocap : MotionCapture
+    offset_s : float, optional
+        To add to the motion capture's stamps to have them on the camera's clock.
 
     Returns
     -------
-    DataFrame, columns `frame, marker, x_m, y_m, z_m, mocap_x_m, mocap_y_m, mocap_z_m`
+    DataFrame
+        Columns `frame, marker, x_m, y_m, z_m, mocap_x_m, mocap_y_m, mocap_z_m`.
     """
-    tables = []
+    clicks = clicks.sort_values("frame", kind="stable", ignore_index=True)
+    seen_m = np.full((len(clicks), 3), np.nan)
     for frame, rows in clicks.groupby("frame"):
         pixels_px = np.full((len(rows), N_KEYPOINTS, 2), np.nan)
         pixels_px[:, 0] = rows[["u_px", "v_px"]]
         points_m = lift(pixels_px, read_depth_m(recording, frame), recording.intrinsics).points_m[:, 0]
-        stamp_s = recording.times_s[[frame]] - offset_s
-        columns = [mocap.names.index(name) for name in rows["marker"]]
-        measured_m = interpolate_mocap(mocap.times_s, mocap.points_m[:, columns], stamp_s)[0]
-        table = rows[["frame", "marker"]].copy()
-        table[_SEEN], table[_MEASURED] = transform(recording.T_base_cam[frame], points_m), measured_m
-        tables.append(table)
-    return pd.concat(tables, ignore_index=True).dropna(ignore_index=True)
+        seen_m[rows.index] = transform(recording.T_base_cam[frame], points_m)
+    table = clicks[["frame", "marker"]].copy()
+    table[_SEEN], table[_MEASURED] = seen_m, measured_markers(recording, clicks, mocap, offset_s)
+    return table.dropna(ignore_index=True)
 
 
-def papers_choice(matched: pd.DataFrame) -> pd.DataFrame:
+def measured_markers(
+    recording: Recording, clicks: pd.DataFrame, mocap: MotionCapture, offset_s: float
+) -> np.ndarray:
+    """Where clicked markers were measured when they were seen.
+
+    Parameters
+    ----------
+    recording : Recording
+    clicks : DataFrame
+        With columns `frame` and `marker`, n rows.
+    mocap : MotionCapture
+    offset_s : float
+        To add to the motion capture's stamps to have them on the camera's clock.
+
+    Returns
+    -------
+    array, shape (n, 3)
+        In the motion capture's frame; NaN where not measured.
+    """
+    stamps_s = recording.times_s[clicks["frame"].to_numpy()] - offset_s
+    columns = [mocap.names.index(name) for name in clicks["marker"]]
+    return interpolate_mocap(mocap.times_s, mocap.points_m, stamps_s)[np.arange(len(clicks)), columns]
+
+
+def select_paper_markers(matched: pd.DataFrame) -> pd.DataFrame:
     """Eight markers in two images, as in the paper: of the two images that show most markers, the eight
     that lie furthest from each other.
 
     Clicks whose depth is that of something else, a wall behind for one, are not chosen.
+
+    Parameters
+    ----------
+    matched : DataFrame
+        As from `lift_clicks`.
+
+    Returns
+    -------
+    DataFrame
+        At most eight rows of it.
     """
     matched = matched[_keeps_distances(matched)]
     frames = matched["frame"].value_counts(sort=True).sort_index(kind="stable").nlargest(N_PAPER_IMAGES).index
@@ -106,68 +153,122 @@ def papers_choice(matched: pd.DataFrame) -> pd.DataFrame:
 
 def _keeps_distances(matched: pd.DataFrame) -> np.ndarray:
     """Which points (n,) are as far from most others in the one frame as in the other, to a decimetre."""
-    seen, measured = (matched[names].to_numpy() for names in (_SEEN, _MEASURED))
-    stretched_m = np.abs(_distances_between(seen) - _distances_between(measured))
-    return np.median(stretched_m, axis=1) < _MAX_STRETCH_M
+    seen_m, measured_m = (
+        np.linalg.norm(points_m[:, None] - points_m, axis=2)
+        for points_m in (matched[names].to_numpy() for names in (_SEEN, _MEASURED))
+    )
+    return np.median(np.abs(seen_m - measured_m), axis=1) < _MAX_STRETCH_M
 
 
-def _distances_between(points_m: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(points_m[:, None] - points_m[None], axis=2)
-
-
-def as_in_paper(
+def register_by_camera_marker(
     matched: pd.DataFrame, recording: Recording, mocap: MotionCapture, offset_s: float = 0.0
 ) -> Registration:
     """Rotation by Arun's method; translation from the marker on the camera, its median over the frames.
 
+    The paper's section IV-C.
+
+    Parameters
+    ----------
+    matched : DataFrame
+        As from `select_paper_markers`.
+    recording : Recording
+    mocap : MotionCapture
+    offset_s : float, optional
+        To add to the motion capture's stamps to have them on the camera's clock.
+
+    Returns
+    -------
+    Registration
+
     Raises
     ------
     InputError
-        If `arun` refuses the points, or the marker `camera` is missing.
+        If `hicp_lib.core.alignment.arun` refuses the points, or the marker `camera` is missing.
     """
     if CAMERA_MARKER not in mocap.names:
-        raise InputError(
-            f"motion capture has no marker {CAMERA_MARKER!r}; name the one on the camera so, or click "
-            "markers in more images and use all of them"
-        )
+        hint = "name the one on the camera so, or click markers in more images and use all of them"
+        raise InputError(f"motion capture has no marker {CAMERA_MARKER!r}; {hint}")
     fit = _fit(matched)
-    column = [mocap.names.index(CAMERA_MARKER)]
-    marker_m = interpolate_mocap(mocap.times_s, mocap.points_m[:, column], recording.times_s - offset_s)[:, 0]
+    camera = pd.DataFrame({"frame": range(len(recording)), "marker": CAMERA_MARKER})
+    marker_m = measured_markers(recording, camera, mocap, offset_s)
     if np.isnan(marker_m).all():
         raise InputError(f"marker {CAMERA_MARKER!r} was measured in no frame of the recording")
     T = fit.T_b_a.copy()
     T[:3, 3] = np.nanmedian(recording.T_base_cam[:, :3, 3] - marker_m @ T[:3, :3].T, axis=0)
-    return _registration("paper: eight clicks, camera marker", T, fit)
+    return _registration("paper: eight clicks, camera marker", fit, T)
 
 
-def same_clicks(matched: pd.DataFrame) -> Registration:
-    """Arun's method alone, from all of `matched`. Raises as `arun`."""
-    fit = _fit(matched)
-    return _registration("Arun: the same eight clicks", fit.T_b_a, fit)
+def register_selected(matched: pd.DataFrame) -> Registration:
+    """Arun's method alone, from all of some markers.
 
+    Parameters
+    ----------
+    matched : DataFrame
+        As from `select_paper_markers`.
 
-def all_clicks(matched: pd.DataFrame) -> Registration:
-    """Arun's method from all of `matched` that agree.
+    Returns
+    -------
+    Registration
 
-    The start is from points that keep their distances to most others, as for `papers_choice`. Then points
-    whose residual is beyond three robust standard deviations (and 2 cm) are left out, and the fit is made
-    anew, until it stays. Raises as `arun`.
+    Raises
+    ------
+    InputError
+        If `hicp_lib.core.alignment.arun` refuses the points.
+
+    Examples
+    --------
+    >>> corners_m = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    >>> matched = pd.DataFrame(np.c_[corners_m + [0, 0, 2], corners_m], columns=[*_SEEN, *_MEASURED])
+    >>> registration = register_selected(matched)
+    >>> registration.n_points, round(registration.T_base_mocap[2, 3], 6)
+    (4, np.float64(2.0))
     """
-    seen, measured = matched[_SEEN].to_numpy(), matched[_MEASURED].to_numpy()
+    return _registration("Arun: the same eight clicks", _fit(matched))
+
+
+def register_robustly(matched: pd.DataFrame) -> Registration:
+    """Arun's method from all markers that agree.
+
+    The start is from points that keep their distances to most others, as for `select_paper_markers`. Then
+    points whose residual is beyond three robust standard deviations (and 2 cm) are left out, and the fit is
+    made anew, until it stays.
+
+    Parameters
+    ----------
+    matched : DataFrame
+        As from `lift_clicks`.
+
+    Returns
+    -------
+    Registration
+
+    Raises
+    ------
+    InputError
+        If `hicp_lib.core.alignment.arun` refuses the points.
+    """
+    seen_m, measured_m = matched[_SEEN].to_numpy(), matched[_MEASURED].to_numpy()
     kept = _keeps_distances(matched)
     for _ in range(_MAX_ROUNDS):
-        fit = arun(measured[kept], seen[kept])
-        residuals_m = np.linalg.norm(transform(fit.T_b_a, measured) - seen, axis=1)
-        bound_m = max(_MIN_OUTLIER_M, 3 * 1.4826 * float(np.median(residuals_m[kept])))
-        agrees = residuals_m <= bound_m
+        fit = arun(measured_m[kept], seen_m[kept])
+        residuals_m = np.linalg.norm(transform(fit.T_b_a, measured_m) - seen_m, axis=1)
+        agrees = residuals_m <= max(_MIN_OUTLIER_M, _OUTLIER_MEDIANS * float(np.median(residuals_m[kept])))
         if (agrees == kept).all() or agrees.sum() < 3:
             break
         kept = agrees
-    return _registration("all clicks", fit.T_b_a, fit)
+    return _registration("all clicks", fit)
 
 
 def read_registration(path: str | Path) -> Registration:
     """Read `registration.json` of a laboratory that knows the transform: `{"T_base_mocap": 4 rows of 4}`.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Registration
 
     Raises
     ------
@@ -183,23 +284,19 @@ def read_registration(path: str | Path) -> Registration:
     if T.shape != (4, 4) or not np.isfinite(T).all() or (T[3] != [0, 0, 0, 1]).any():
         raise InputError(f"{path}: T_base_mocap: expected 4 rows of 4 finite numbers, the last 0, 0, 0, 1")
     R = T[:3, :3]
-    if np.abs(R @ R.T - np.eye(3)).max() > 1e-4 or np.linalg.det(R) < 0:
-        raise InputError(
-            f"{path}: T_base_mocap: its first three columns are not a rotation; give R, then t in m"
-        )
+    if np.abs(R @ R.T - np.eye(3)).max() > _MAX_SKEW or np.linalg.det(R) < 0:
+        wrong = "its first three columns are not a rotation"
+        raise InputError(f"{path}: T_base_mocap: {wrong}; give R, then t in m")
     return Registration("given", T)
-
-
-def write_registration(path: str | Path, registration: Registration) -> None:
-    """Write what `read_registration` reads."""
-    write_json(path, {"T_base_mocap": registration.T_base_mocap.tolist(), "method": registration.method})
 
 
 def _fit(matched: pd.DataFrame) -> RigidFit:
     return arun(matched[_MEASURED].to_numpy(), matched[_SEEN].to_numpy())
 
 
-def _registration(method: str, T_base_mocap: np.ndarray, fit: RigidFit) -> Registration:
-    left_out = fit.leave_one_out_m[np.isfinite(fit.leave_one_out_m)]
-    typical_m = float(np.median(left_out)) if len(left_out) else float("nan")
-    return Registration(method, T_base_mocap, len(fit.residuals_m), fit.rms_m, typical_m)
+def _registration(method: str, fit: RigidFit, T_base_mocap: np.ndarray | None = None) -> Registration:
+    """What was found from a fit; its transform unless another is given."""
+    left_out_m = fit.leave_one_out_m[np.isfinite(fit.leave_one_out_m)]
+    typical_m = float(np.median(left_out_m)) if len(left_out_m) else np.nan
+    T = fit.T_b_a if T_base_mocap is None else T_base_mocap
+    return Registration(method, T, len(fit.residuals_m), fit.rms_m, typical_m)

@@ -15,8 +15,7 @@ import pandas as pd
 from hicp_lib.core.camera import Camera, project, transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
-from hicp_lib.mocap.registration import Registration
-from hicp_lib.mocap.synchronisation import interpolate_mocap
+from hicp_lib.mocap.registration import Registration, measured_markers
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import Recording
 
@@ -25,12 +24,12 @@ with needs("analysis"):
     from scipy.spatial.transform import Rotation
 
 _MIN_CLICKS = 6
-# A click further off than this counts ever less.
-_CLICK_PX = 2.0
+_CLICK_PX = 2.0  # a click further off than this counts ever less
+_STEP = 0.01  # radians and metres that change about as much
 _BEHIND_PX = 1e4  # residual of a marker that a transform puts behind the camera
 
 
-def by_reprojection(
+def register_by_reprojection(
     recording: Recording,
     clicks: pd.DataFrame,
     mocap: MotionCapture,
@@ -43,13 +42,19 @@ def by_reprojection(
 
     Parameters
     ----------
-    clicks : as from `hicp_lib.mocap.clicking.read_clicks`
-    start : where to begin; some degrees and decimetres off are near enough
-    offset_s : to add to the motion capture's stamps to have them on the camera's clock
+    recording : Recording
+    clicks : DataFrame
+        As from `hicp_lib.mocap.clicking.read_clicks`.
+    mocap : MotionCapture
+    start : Registration
+        Where to begin; some degrees and decimetres off are near enough.
+    offset_s : float, optional
+        To add to the motion capture's stamps to have them on the camera's clock.
 
     Returns
     -------
-    Registration whose errors are across the line of sight: pixels times depth over focal length
+    Registration
+        Its errors are across the line of sight: pixels times depth over focal length.
 
     Raises
     ------
@@ -59,9 +64,8 @@ def by_reprojection(
     seen = _matched(recording, clicks, mocap, offset_s)
     n = len(seen.points_m)
     if n < _MIN_CLICKS:
-        raise InputError(
-            f"{n} clicked markers were measured; registration by reprojection needs {_MIN_CLICKS}: click more"
-        )
+        needed = f"registration by reprojection needs {_MIN_CLICKS}"
+        raise InputError(f"{n} clicked markers were measured; {needed}: click more")
     T = _solve(recording.intrinsics, seen, start.T_base_mocap)
     errors_m = _across_m(recording.intrinsics, seen, T)
     left_out_m = [
@@ -74,22 +78,29 @@ def by_reprojection(
 
 @dataclass(frozen=True)
 class _Clicked:
-    """Clicks (n, 2), the markers' measured positions (n, 3), and T_cam_base (n, 4, 4) of their images."""
+    """Clicked markers.
+
+    Attributes
+    ----------
+    pixels_px : array, shape (n, 2)
+        Where they were clicked.
+    points_m : array, shape (n, 3)
+        Where they were measured, in the motion capture's frame.
+    T_cam_base : array, shape (n, 4, 4)
+        Of their images.
+    """
 
     pixels_px: np.ndarray
     points_m: np.ndarray
     T_cam_base: np.ndarray
 
-    def take(self, rows) -> _Clicked:
+    def take(self, rows: np.ndarray | list[int]) -> _Clicked:
         return _Clicked(self.pixels_px[rows], self.points_m[rows], self.T_cam_base[rows])
 
 
 def _matched(recording: Recording, clicks: pd.DataFrame, mocap: MotionCapture, offset_s: float) -> _Clicked:
-    frames = clicks["frame"].to_numpy()
-    columns = [mocap.names.index(name) for name in clicks["marker"]]
-    measured_m = interpolate_mocap(mocap.times_s, mocap.points_m, recording.times_s[frames] - offset_s)
-    points_m = measured_m[np.arange(len(clicks)), columns]
-    T_cam_base = np.linalg.inv(recording.T_base_cam[frames])
+    points_m = measured_markers(recording, clicks, mocap, offset_s)
+    T_cam_base = np.linalg.inv(recording.T_base_cam[clicks["frame"].to_numpy()])
     rows = np.flatnonzero(np.isfinite(points_m).all(axis=1))
     return _Clicked(clicks[["u_px", "v_px"]].to_numpy(float), points_m, T_cam_base).take(rows)
 
@@ -100,7 +111,7 @@ def _solve(intrinsics: Camera, seen: _Clicked, T_start: np.ndarray) -> np.ndarra
         return np.nan_to_num(pixels_px - seen.pixels_px, nan=_BEHIND_PX).ravel()
 
     about_m = transform(T_start, seen.points_m).mean(axis=0)
-    found = least_squares(residuals, np.zeros(6), loss="cauchy", f_scale=_CLICK_PX, x_scale=0.01)
+    found = least_squares(residuals, np.zeros(6), loss="cauchy", f_scale=_CLICK_PX, x_scale=_STEP)
     return _moved(T_start, found.x, about_m)
 
 
@@ -113,7 +124,9 @@ def _moved(T: np.ndarray, step: np.ndarray, about_m: np.ndarray) -> np.ndarray:
     return moved
 
 
-def _reprojected(intrinsics: Camera, seen: _Clicked, T_base_mocap: np.ndarray):
+def _reprojected(
+    intrinsics: Camera, seen: _Clicked, T_base_mocap: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Pixels (n, 2) of the measured markers, NaN behind the camera, and their depths (n,) in metres."""
     points_cam_m = transform(seen.T_cam_base @ T_base_mocap, seen.points_m[:, None])[:, 0]
     return project(intrinsics, points_cam_m), points_cam_m[:, 2]

@@ -22,6 +22,9 @@ _CAMERA_GAP_S = 0.25
 _MAX_SPEED_M_S = 4.0
 _MIN_OVERLAP_S = 2.0
 _MAX_DRIFT_S = 0.5
+_STAMP_ERROR_S = 5e-7  # stamps in files are decimal
+_MIN_SHARE = 0.5  # of what was seen on the one clock, to be seen on the other as well
+_STANDING_M2_S2 = 1e-6  # variance of speeds, summed, of what stands still
 
 
 @dataclass(frozen=True)
@@ -30,10 +33,13 @@ class ClockOffset:
 
     Attributes
     ----------
-    offset_s : to add to b's stamps to have them on a's clock
-    correlation : of the speeds at that offset, up to 1
-    halves_s : the offset of each half of the recording alone; NaN where a half has too little motion.
-        A difference beyond what the halves scatter by is drift
+    offset_s : float
+        To add to b's stamps to have them on a's clock.
+    correlation : float
+        Of the speeds at that offset, up to 1.
+    halves_s : tuple of two floats
+        The offset of each half of the recording alone; NaN where a half has too little motion. A difference
+        beyond what the halves scatter by is drift.
     """
 
     offset_s: float
@@ -48,36 +54,40 @@ def interpolate_mocap(
 
     Parameters
     ----------
-    times_s : array, shape (n,), increasing
-    points_m : array, shape (n, m, 3); a point with a NaN coordinate is missing
+    times_s : array, shape (n,)
+        Increasing.
+    points_m : array, shape (n, m, 3)
+        A point with a NaN coordinate is missing.
     stamps_s : array, shape (k,)
-    max_gap_s : between samples further apart than this nothing is made up
+    max_gap_s : float, optional
+        Between samples further apart than this nothing is made up.
 
     Returns
     -------
-    array, shape (k, m, 3); NaN in longer gaps, before the first sample and after the last
+    array, shape (k, m, 3)
+        NaN in longer gaps, before the first sample and after the last.
+
+    Examples
+    --------
+    >>> points_m = np.array([[[0.0, 0, 0]], [[0.1, 0, 0]]])
+    >>> interpolate_mocap(np.array([0.0, 0.01]), points_m, np.array([0.005, 0.02]))[:, 0, 0]
+    array([0.05,  nan])
     """
     times_s, stamps_s = np.asarray(times_s, dtype=float), np.asarray(stamps_s, dtype=float)
-    n, m, _ = points_m.shape
-    if n == 0:
-        return np.full((len(stamps_s), m, 3), np.nan)
-    valid = np.isfinite(points_m).all(axis=-1)
-    frames = np.arange(n)[:, None]
-    last_valid = np.maximum.accumulate(np.where(valid, frames, -1))
-    next_valid = np.minimum.accumulate(np.where(valid, frames, n)[::-1])[::-1]
-    left = np.searchsorted(times_s, stamps_s, side="right") - 1
-    right = np.searchsorted(times_s, stamps_s, side="left")
-    before = np.where((left >= 0)[:, None], last_valid[left], -1)
-    after = np.where((right < n)[:, None], next_valid[np.minimum(right, n - 1)], n)
-    known = (before >= 0) & (after < n)
-    before, after = np.where(known, before, 0), np.where(known, after, 0)
-    span = times_s[after] - times_s[before]
-    share = (stamps_s[:, None] - times_s[before]) / np.where(span > 0, span, 1.0)
-    tracks = np.arange(m)
-    start, end = points_m[before, tracks], points_m[after, tracks]
-    # Half a microsecond: stamps in files are decimal.
-    known &= span <= max_gap_s + 5e-7
-    return np.where(known[..., None], start + share[..., None] * (end - start), np.nan)
+    found_m = np.full((len(stamps_s), *points_m.shape[1:]), np.nan)
+    for k, track_m in enumerate(points_m.swapaxes(0, 1)):
+        valid = np.isfinite(track_m).all(axis=1)
+        samples_s, positions_m = times_s[valid], track_m[valid]
+        before = np.searchsorted(samples_s, stamps_s, side="right") - 1
+        after = np.searchsorted(samples_s, stamps_s, side="left")
+        known = np.flatnonzero((before >= 0) & (after < len(samples_s)))
+        before, after = before[known], after[known]
+        span_s = samples_s[after] - samples_s[before]
+        share = (stamps_s[known] - samples_s[before]) / np.where(span_s > 0, span_s, 1.0)
+        start_m, end_m = positions_m[before], positions_m[after]
+        is_near = span_s <= max_gap_s + _STAMP_ERROR_S
+        found_m[known[is_near], k] = (start_m + share[:, None] * (end_m - start_m))[is_near]
+    return found_m
 
 
 def clock_offset(
@@ -92,13 +102,26 @@ def clock_offset(
 
     Parameters
     ----------
-    times_a_s, times_b_s : arrays, shapes (n,) and (k,), increasing; may start at any number
-    points_a_m, points_b_m : arrays, shapes (n, m, 3) and (k, m, 3); NaN where missing; any two frames
+    times_a_s, times_b_s : array, shapes (n,) and (k,)
+        Increasing; may start at any number.
+    points_a_m, points_b_m : array, shapes (n, m, 3) and (k, m, 3)
+        NaN where missing; in any two frames.
+
+    Returns
+    -------
+    ClockOffset
 
     Raises
     ------
     InputError
         If no offset makes the two move together.
+
+    Examples
+    --------
+    >>> times_s = np.arange(0, 10, 0.01)
+    >>> points_m = np.sin(times_s * (1 + times_s / 10))[:, None, None] * [0.3, 0.2, 0.1]
+    >>> round(clock_offset(times_s, points_m, times_s - 0.25, points_m).offset_s, 3)
+    0.25
     """
     speeds_a, speeds_b = _speeds(times_a_s, points_a_m), _speeds(times_b_s, points_b_m)
     half = len(speeds_a) // 2
@@ -106,14 +129,12 @@ def clock_offset(
     early[half:], late[:half] = np.nan, np.nan
     lag, correlation = _best_lag(speeds_a, speeds_b)
     if not np.isfinite(lag):
-        raise InputError(
-            "no clock offset makes camera and motion capture move together; record at least some seconds of "
-            "clear movement that both see"
-        )
-    halves = [_best_lag(part, speeds_b, near=lag)[0] for part in (early, late)]
+        hint = "record at least some seconds of clear movement that both see"
+        raise InputError(f"no clock offset makes camera and motion capture move together; {hint}")
+    lags = (lag, *(_best_lag(part, speeds_b, near=lag)[0] for part in (early, late)))
     start_s = float(times_a_s[0] - times_b_s[0])
-    offset_s, *halves_s = (start_s + value / _RATE_HZ for value in (lag, *halves))
-    return ClockOffset(offset_s, correlation, tuple(halves_s))
+    offset_s, early_s, late_s = (start_s + value / _RATE_HZ for value in lags)
+    return ClockOffset(offset_s, correlation, (early_s, late_s))
 
 
 def _speeds(times_s: np.ndarray, points_m: np.ndarray) -> np.ndarray:
@@ -158,8 +179,8 @@ def _correlations(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     covariance = (_sums(a, b) - sum_a * sum_b / mean_n).sum(axis=1)
     variance_a = (_sums(a**2, seen_b) - sum_a**2 / mean_n).sum(axis=1)
     variance_b = (_sums(seen_a, b**2) - sum_b**2 / mean_n).sum(axis=1)
-    enough = n.sum(axis=1) >= max(_MIN_OVERLAP_S * _RATE_HZ, 0.5 * min(seen_a.sum(), seen_b.sum()))
-    enough &= np.minimum(variance_a, variance_b) > 1e-6  # m^2/s^2 summed: standing still
+    enough = n.sum(axis=1) >= max(_MIN_OVERLAP_S * _RATE_HZ, _MIN_SHARE * min(seen_a.sum(), seen_b.sum()))
+    enough &= np.minimum(variance_a, variance_b) > _STANDING_M2_S2
     scale = np.sqrt(np.where(enough, variance_a * variance_b, 1.0))
     return np.where(enough, covariance / scale, np.nan)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -51,16 +52,31 @@ Points = tuple[np.ndarray, tuple[str, ...], float]
 def read_points(path: Path) -> Points:
     """Read the markers of a C3D file.
 
+    Parameters
+    ----------
+    path : Path
+
     Returns
     -------
-    points_m : (n, m, 3), NaN where the residual is negative
-    names : of the m markers, no two alike
-    rate_hz : frames per second
+    points_m : array, shape (n, m, 3)
+        NaN where the residual is negative.
+    names : tuple of str
+        Of the m markers, no two alike.
+    rate_hz : float
+        Frames per second.
 
     Raises
     ------
     InputError
         If the file is missing, damaged, or lacks names, rate or unit of length.
+
+    Examples
+    --------
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_points(Path(folder, "mocap.c3d"), np.ones((5, 2, 3)), ("elbow", "wrist"), 100.0)
+    ...     points_m, names, rate_hz = read_points(Path(folder, "mocap.c3d"))
+    >>> points_m.shape, names, rate_hz
+    ((5, 2, 3), ('elbow', 'wrist'), 100.0)
     """
     try:
         with open(path, "rb") as file:
@@ -73,19 +89,19 @@ def read_points(path: Path) -> Points:
         out = Path(folder) / "points.npz"
         command = [sys.executable, "-P", "-c", _CONVERT, str(path), str(out), str(_MAX_MEMORY_BYTES)]
         try:
-            done = subprocess.run(command, capture_output=True, timeout=_TIMEOUT_S).returncode == 0
-        except subprocess.TimeoutExpired:
-            done = False
-        if not done:
-            raise InputError(f"{path}: cannot be read as C3D; it may be cut off, export it again")
+            subprocess.run(command, capture_output=True, timeout=_TIMEOUT_S, check=True)
+        except subprocess.SubprocessError:
+            raise InputError(f"{path}: cannot be read as C3D; it may be cut off, export it again") from None
         with np.load(out, allow_pickle=False) as stored:
-            points = _checked(path, **{key: stored[key] for key in stored.files})
+            points = _checked(path, stored)
     _refuse_cut_off(path, head, len(points[0]))
     return points
 
 
-def _checked(path: Path, points, residuals, names, rate, units) -> Points:
-    names = tuple(str(name).strip() for name in names[: points.shape[1]])
+def _checked(path: Path, stored: Mapping[str, np.ndarray]) -> Points:
+    """Points, names and rate of what `_CONVERT` stored."""
+    points, rate, units = stored["points"], stored["rate"], stored["units"]
+    names = tuple(str(name).strip() for name in stored["names"][: points.shape[1]])
     if not names or len(names) != points.shape[1] or len(set(names)) != len(names) or "" in names:
         raise InputError(f"{path}: POINT:LABELS does not name every marker once; name them in Qualisys")
     if not len(rate) or not 0 < rate[0] <= _MAX_RATE_HZ:
@@ -93,7 +109,7 @@ def _checked(path: Path, points, residuals, names, rate, units) -> Points:
     if not len(units) or str(units[0]) not in _UNITS_M:
         raise InputError(f"{path}: POINT:UNITS is none of {', '.join(_UNITS_M)}; export it again")
     points_m = np.moveaxis(points, 0, -1).swapaxes(0, 1) * _UNITS_M[str(units[0])]
-    valid = (residuals.T >= 0) & np.isfinite(points_m).all(axis=2)
+    valid = (stored["residuals"].T >= 0) & np.isfinite(points_m).all(axis=2)
     return np.where(valid[..., None], points_m, np.nan), names, float(rate[0])
 
 
@@ -107,7 +123,16 @@ def _refuse_cut_off(path: Path, head: bytes, n_frames: int) -> None:
 
 
 def write_points(path: str | Path, points_m: np.ndarray, names: tuple[str, ...], rate_hz: float) -> None:
-    """Write markers (n, m, 3) in millimetres, single precision; NaN gets the residual -1.
+    """Write markers in millimetres, single precision; NaN gets the residual -1.
+
+    Parameters
+    ----------
+    path : str or Path
+    points_m : array, shape (n, m, 3)
+    names : tuple of str
+        Of the m markers.
+    rate_hz : float
+        Frames per second.
 
     Raises
     ------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -30,11 +30,24 @@ Read = TypeVar("Read")
 
 PLAUSIBLE_DEPTH_M = (0.1, 12.0)  # where the middle of what a camera near a robot sees must lie
 FURTHEST_POSE_M = 10.0  # from the base: a robot reaches less, a pose in millimetres more
+MIN_COVERED = 0.9  # share of the images' time that motion capture must last
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One line about a recording; `is_fatal` where it cannot be used as it is."""
+    """One line about a recording.
+
+    Attributes
+    ----------
+    text : str
+    is_fatal : bool
+        Whether the recording cannot be used as it is.
+
+    Examples
+    --------
+    >>> print(Finding("rgb.txt: holds no lines"))
+    rgb.txt: holds no lines
+    """
 
     text: str
     is_fatal: bool = True
@@ -44,115 +57,118 @@ class Finding:
 
 
 def check_recording(folder: str | Path) -> list[Finding]:
-    """Everything wrong with a recording, one finding each; none where all is well. Reads every image."""
-    folder = Path(folder)
+    """Everything wrong with a recording. Reads every image.
+
+    Parameters
+    ----------
+    folder : str or Path
+
+    Returns
+    -------
+    list of Finding
+        One each; none where all is well.
+
+    Examples
+    --------
+    >>> [str(finding) for finding in check_recording("nowhere")]
+    ['nowhere: is not a folder; give the folder of a recording']
+    """
+    folder, findings = Path(folder), _Findings()
     if not folder.is_dir():
         return [Finding(f"{folder}: is not a folder; give the folder of a recording")]
-    findings = list(_files(folder))
-    if any(finding.is_fatal for finding in findings):
-        return findings
-    recording = open_recording(folder)
-    return [*findings, *_images(recording), *_poses(recording), *_tables(recording), *_mocap(recording)]
+    _check_files(findings, folder)
+    if not any(finding.is_fatal for finding in findings):
+        recording = open_recording(folder)
+        for check in (_check_images, _check_poses, _check_tables, _check_mocap):
+            check(findings, recording)
+    return list(findings)
 
 
-def _files(folder: Path) -> Iterator[Finding]:
+class _Findings(list[Finding]):
+    def note(self, path: Path, text: str, is_fatal: bool = False) -> None:
+        self.append(Finding(f"{path}: {text}", is_fatal))
+
+    def attempt(self, read: Callable[..., Read], *arguments: object) -> Read | None:
+        """What is read; None, and a finding, where it cannot be."""
+        try:
+            return read(*arguments)
+        except InputError as error:
+            self.append(Finding(str(error)))
+            return None
+
+
+def _check_files(findings: _Findings, folder: Path) -> None:
     """Text files missing or malformed, images listed but not there, images without a partner."""
-    _, problem = _attempt(read_camera, folder / CAMERA_FILE)
-    yield from problem
-    times_s = []
-    for name in (RGB_LIST, DEPTH_LIST):
-        listed, problem = _attempt(read_file_list, folder / name)
-        yield from problem
-        if listed:
-            times_s.append(listed[0])
-            yield from _missing(folder, listed[1])
-    poses, problem = _attempt(read_poses, folder / POSES_FILE)
-    yield from problem
-    if poses and len(times_s) == 2:
-        yield from _unassociated(folder, *times_s, poses[0])
+    findings.attempt(read_camera, folder / CAMERA_FILE)
+    lists = [findings.attempt(read_file_list, folder / name) for name in (RGB_LIST, DEPTH_LIST)]
+    for _, names in filter(None, lists):
+        missing = [name for name in names if not (folder / name).is_file()]
+        if missing:
+            text = f"is not there; {len(missing)} of {len(names)} listed are not"
+            findings.note(folder / missing[0], text, is_fatal=True)
+    poses = findings.attempt(read_poses, folder / POSES_FILE)
+    if poses and all(lists):
+        _check_association(findings, folder, [times_s for times_s, _ in filter(None, [*lists, poses])])
 
 
-def _attempt(read: Callable[..., Read], *arguments) -> tuple[Read | None, list[Finding]]:
-    try:
-        return read(*arguments), []
-    except InputError as error:
-        return None, [Finding(str(error))]
-
-
-def _missing(folder: Path, names: list[str]) -> Iterator[Finding]:
-    missing = [name for name in names if not (folder / name).is_file()]
-    if missing:
-        yield Finding(f"{folder / missing[0]}: is not there; {len(missing)} of {len(names)} listed are not")
-
-
-def _unassociated(folder: Path, rgb_s, depth_s, pose_s) -> Iterator[Finding]:
+def _check_association(findings: _Findings, folder: Path, times_s: Sequence[np.ndarray]) -> None:
+    rgb_s, depth_s, pose_s = times_s
     is_fatal = len(associate_frames(rgb_s, depth_s, pose_s)[0]) == 0
     for name, other_s in (("depth image", depth_s), ("pose", pose_s)):
         n = len(rgb_s) - len(associate(rgb_s, other_s)[0])
         if n:
             text = f"{n} of {len(rgb_s)} colour images have no {name} within {MAX_DIFFERENCE_S:g} s"
-            yield Finding(f"{folder / RGB_LIST}: {text} and are left out", is_fatal)
+            findings.note(folder / RGB_LIST, f"{text} and are left out", is_fatal)
 
 
-def _images(recording: Recording) -> Iterator[Finding]:
-    """Images that cannot be read, are not of the right kind, or have another size."""
+def _check_images(findings: _Findings, recording: Recording) -> None:
+    """Images that cannot be read, are not of the right kind, or have another size; implausible depth."""
     middles_m = []
     for kind, read in (("colour", read_rgb), ("depth", read_depth_m)):
-        bad = []
+        bad = _Findings()
         for k in range(len(recording)):
-            image, problem = _attempt(read, recording, k)
-            bad += problem
+            image = bad.attempt(read, recording, k)
             if kind == "depth" and image is not None:
                 middles_m.append(np.median(image[image > 0]) if (image > 0).any() else np.nan)
         if bad:
-            yield Finding(f"{bad[0]} ({len(bad)} of {len(recording)} {kind} images are unusable)")
-    yield from _depths(recording, np.array(middles_m))
-
-
-def _depths(recording: Recording, middles_m: np.ndarray) -> Iterator[Finding]:
-    """Images without depth, and depth that cannot be right; from the middle depth of each image."""
-    empty = int(np.isnan(middles_m).sum())
-    if empty:
-        text = f"{empty} of {len(middles_m)} depth images hold no depth at all"
-        yield Finding(f"{recording.folder / DEPTH_LIST}: {text}", is_fatal=empty == len(middles_m))
+            findings.append(Finding(f"{bad[0]} ({len(bad)} of {len(recording)} {kind} images are unusable)"))
+    n, n_empty = len(middles_m), int(np.isnan(middles_m).sum())
+    if n_empty:
+        text = f"{n_empty} of {n} depth images hold no depth at all"
+        findings.note(recording.folder / DEPTH_LIST, text, is_fatal=n_empty == n)
     low, high = PLAUSIBLE_DEPTH_M
-    if empty < len(middles_m) and not low <= (middle := np.nanmedian(middles_m)) <= high:
+    if n_empty < n and not low <= (middle := np.nanmedian(middles_m)) <= high:
         scale = f"with depth_scale {recording.depth_units_per_m:g} the middle depth is {middle:.3g} m"
         text = f"{scale}; expected {low:g} to {high:g} m, correct the scale"
-        yield Finding(f"{recording.folder / CAMERA_FILE}: {text}", is_fatal=False)
+        findings.note(recording.folder / CAMERA_FILE, text)
 
 
-def _poses(recording: Recording) -> Iterator[Finding]:
+def _check_poses(findings: _Findings, recording: Recording) -> None:
     furthest_m = np.linalg.norm(recording.T_base_cam[:, :3, 3], axis=1).max()
     if furthest_m > FURTHEST_POSE_M:
         text = f"the camera is up to {furthest_m:.4g} m from the base; expected metres, not millimetres"
-        yield Finding(f"{recording.folder / POSES_FILE}: {text}", is_fatal=False)
+        findings.note(recording.folder / POSES_FILE, text)
 
 
-def _tables(recording: Recording) -> Iterator[Finding]:
+def _check_tables(findings: _Findings, recording: Recording) -> None:
     """Truth and joints, where there are any, that are no such tables."""
     for read in (read_truth, read_joints):
-        yield from _attempt(read, recording)[1]
+        findings.attempt(read, recording)
 
 
-def _mocap(recording: Recording) -> Iterator[Finding]:
+def _check_mocap(findings: _Findings, recording: Recording) -> None:
     """Motion capture that cannot be read, does not cover the recording, or lacks a marker."""
     from hicp_lib.recordings.qualisys import read_mocap  # ezc3d takes a while to load
 
-    path = recording.mocap_path
-    if path is None:
+    path, images_s = recording.mocap_path, recording.times_s
+    mocap = None if path is None else findings.attempt(read_mocap, path)
+    if path is None or mocap is None:
         return
-    mocap, problem = _attempt(read_mocap, path)
-    yield from problem
-    if mocap is None:
-        return
-    images_s = recording.times_s
-    if np.ptp(mocap.times_s) < 0.9 * np.ptp(images_s):
-        text = f"lasts {np.ptp(mocap.times_s):.2f} s, the images {np.ptp(images_s):.2f} s; export it whole"
-        yield Finding(f"{path}: {text}", is_fatal=False)
+    lasts_s, images_last_s = np.ptp(mocap.times_s), np.ptp(images_s)
+    if lasts_s < MIN_COVERED * images_last_s:
+        findings.note(path, f"lasts {lasts_s:.2f} s, the images {images_last_s:.2f} s; export it whole")
     if mocap.times_s[-1] < images_s[0] or mocap.times_s[0] > images_s[-1]:
-        yield Finding(f"{path}: does not overlap with the images in time; its clock is another", False)
+        findings.note(path, "does not overlap with the images in time; its clock is another")
     never = [n for k, n in enumerate(mocap.names) if np.isnan(mocap.points_m[:, k]).any(axis=1).all()]
     if never:
-        text = f"{', '.join(never)} never seen ({len(never)} of {len(mocap.names)} markers)"
-        yield Finding(f"{path}: {text}", is_fatal=False)
+        findings.note(path, f"{', '.join(never)} never seen ({len(never)} of {len(mocap.names)} markers)")

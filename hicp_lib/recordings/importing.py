@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,23 +19,27 @@ from hicp_lib.core.environment import with_variables
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
 from hicp_lib.core.files import atomic_path, read_json
-from hicp_lib.recordings.camera_file import read_camera, write_camera
-from hicp_lib.recordings.recording import CAMERA_FILE, DEPTH_LIST, POSES_FILE, RGB_LIST
-from hicp_lib.recordings.tum import read_poses, write_file_list, write_poses
-from hicp_lib.recordings.writer import depth_name, refuse_used_folder, rgb_name, write_depth, write_rgb
+from hicp_lib.recordings.camera_file import is_number, read_camera
+from hicp_lib.recordings.recording import check_columns
+from hicp_lib.recordings.tum import read_poses
+from hicp_lib.recordings.writer import (
+    depth_name,
+    refuse_used_folder,
+    rgb_name,
+    write_depth,
+    write_index,
+    write_rgb,
+)
 
 _IMAGE_KINDS = (".png", ".jpg", ".jpeg")
+_MAX_RATE_HZ = 10_000
 
 
-@dataclass(frozen=True)
-class PoseSource:
-    """Where poses come from: times (n,) in seconds and T_base_cam (n, 4, 4); one pose is for all times."""
-
-    times_s: np.ndarray
-    T_base_cam: np.ndarray
+Poses = tuple[np.ndarray, np.ndarray]
+"""Times (m,) in seconds and T_base_cam (m, 4, 4); one pose is for all times."""
 
 
-def read_pose_source(path: str | Path | None, mount: str = "level") -> PoseSource:
+def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
     """Poses from a TUM text file, or from a CSV of joint angles by the robot's kinematics.
 
     A CSV has a column `t_s` and one of degrees for every joint of torso and neck, such as
@@ -43,18 +47,33 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> PoseSourc
 
     Parameters
     ----------
-    mount : camera holder, for joint angles: "level" or "tilted"
+    path : str, Path or None
+    mount : str, optional
+        Camera holder, for joint angles: "level" or "tilted".
+
+    Returns
+    -------
+    times_s : array, shape (m,)
+        One time where the camera stands still.
+    T_base_cam : array, shape (m, 4, 4)
+        Camera coordinates to the robot's base frame.
 
     Raises
     ------
     InputError
         If the file cannot be read, or a column or number is missing.
+
+    Examples
+    --------
+    >>> times_s, T_base_cam = read_pose_source(None)
+    >>> times_s.shape, T_base_cam.shape
+    ((1,), (1, 4, 4))
     """
     if path is None:
-        return PoseSource(np.zeros(1), np.eye(4)[None])
+        return np.zeros(1), np.eye(4)[None]
     path = Path(path)
     if path.suffix.lower() != ".csv":
-        return PoseSource(*read_poses(path))
+        return read_poses(path)
     from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub  # not in every installation
 
     columns = ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)]
@@ -62,29 +81,33 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> PoseSourc
         table = pd.read_csv(path)
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: is not a CSV table ({str(error).splitlines()[0]})") from None
-    missing = [name for name in columns if name not in table.columns]
-    if missing:
-        raise InputError(f"{path}: has no column {missing[0]!r}; expected {', '.join(columns)}")
+    check_columns(path, table, columns)
     numbers = table[columns].apply(pd.to_numeric, errors="coerce").to_numpy(float)
-    bad = np.flatnonzero(~np.isfinite(numbers).all(axis=1) | (np.diff(numbers[:, 0], prepend=-np.inf) <= 0))
-    if len(bad) or len(numbers) == 0:
-        row = bad[0] + 1 if len(bad) else 1
+    is_bad = ~np.isfinite(numbers).all(axis=1) | (np.diff(numbers[:, 0], prepend=-np.inf) <= 0)
+    if is_bad.any() or len(numbers) == 0:
+        row = 1 + int(np.argmax([*is_bad, True]))
         raise InputError(f"{path}: row {row}: expected numbers, and a t_s after the one before")
-    return PoseSource(numbers[:, 0], load_icub().T_root_camera(np.radians(numbers[:, 1:]), mount))
+    return numbers[:, 0], load_icub().T_root_camera(np.radians(numbers[:, 1:]), mount)
 
 
-def import_open3d(
-    source: str | Path, out: str | Path, poses: PoseSource, rate_hz: float | None = None
-) -> int:
+def import_open3d(source: str | Path, out: str | Path, poses: Poses, rate_hz: float | None = None) -> int:
     """Import `color/`, `depth/` and `intrinsic.json` as Open3D's recorder writes them.
 
     Parameters
     ----------
-    rate_hz : frames per second; the file's `fps` when left out. The first frame is at time 0
+    source : str or Path
+        Folder with the three.
+    out : str or Path
+        Folder of the recording; new or empty.
+    poses : tuple of array
+        As `read_pose_source` gives them.
+    rate_hz : float, optional
+        Frames per second; the file's `fps` when left out. The first frame is at time 0.
 
     Returns
     -------
-    The number of frames
+    int
+        The number of frames.
 
     Raises
     ------
@@ -94,30 +117,37 @@ def import_open3d(
     source, out = Path(source), Path(out)
     if rate_hz is not None and not 0 < rate_hz < np.inf:
         raise InputError(f"rate is {rate_hz!r}; expected frames per second")
-    intrinsics, units = read_camera(source / "intrinsic.json")
+    intrinsics, depth_units_per_m = read_camera(source / "intrinsic.json")
     rgb, depth = (_images(source / name) for name in ("color", "depth"))
     if [path.stem for path in rgb] != [path.stem for path in depth]:
         raise InputError(f"{source}: color/ and depth/ hold other names; expected one depth image per colour")
     times_s = np.arange(len(rgb)) / (_rate_hz(source / "intrinsic.json") if rate_hz is None else rate_hz)
     refuse_used_folder(out)
-    names = []
-    for folder, paths in (("rgb", rgb), ("depth", depth)):
-        names.append([f"{folder}/{path.name}" for path in paths])
-        for path, name in zip(paths, names[-1], strict=True):
-            with atomic_path(out / name) as temporary:
-                shutil.copyfile(path, temporary)
-    _write_lists(out, intrinsics, units, times_s, *names, poses)
+    names = [f"rgb/{path.name}" for path in rgb], [f"depth/{path.name}" for path in depth]
+    for path, name in zip(rgb + depth, sum(names, []), strict=True):
+        with atomic_path(out / name) as temporary:
+            shutil.copyfile(path, temporary)
+    write_index(out, intrinsics, depth_units_per_m, times_s, *_poses_at(times_s, poses), names)
     return len(times_s)
 
 
-def import_bag(bag: str | Path, out: str | Path, poses: PoseSource) -> int:
+def import_bag(bag: str | Path, out: str | Path, poses: Poses) -> int:
     """Import a `.bag` recorded by the RealSense viewer or SDK; depth is aligned to colour on the way.
 
     Times are those of the file, in seconds; colour is stored as JPEG of high quality.
 
+    Parameters
+    ----------
+    bag : str or Path
+    out : str or Path
+        Folder of the recording; new or empty.
+    poses : tuple of array
+        As `read_pose_source` gives them.
+
     Returns
     -------
-    The number of frames
+    int
+        The number of frames.
 
     Raises
     ------
@@ -127,35 +157,33 @@ def import_bag(bag: str | Path, out: str | Path, poses: PoseSource) -> int:
     out = Path(out)
     refuse_used_folder(out)
     reader = _open_bag(Path(bag))
-    meta, times_s = reader.metadata, []
+    meta = reader.metadata
     if meta.color_format not in ("RGB8", "BGR8"):
         raise InputError(f"{bag}: colour is {meta.color_format}; record it as RGB8")
-    matrix = meta.intrinsics.intrinsic_matrix
+    stamps_s: list[float] = []
     for time_s, rgb, depth_units in _frames(reader):
-        if times_s and time_s <= times_s[-1]:
+        if stamps_s and time_s <= stamps_s[-1]:
             continue  # the reader may return the last frame twice
-        write_rgb(out / rgb_name(len(times_s)), rgb if meta.color_format == "RGB8" else rgb[..., ::-1].copy())
-        write_depth(out / depth_name(len(times_s)), depth_units, 1)
-        times_s.append(time_s)
-    if not times_s:
+        rgb = rgb if meta.color_format == "RGB8" else rgb[..., ::-1].copy()
+        write_rgb(out / rgb_name(len(stamps_s)), rgb)
+        write_depth(out / depth_name(len(stamps_s)), depth_units, 1)
+        stamps_s.append(time_s)
+    if not stamps_s:
         raise InputError(f"{bag}: holds no frames with colour and depth; record both streams")
+    times_s, matrix = np.array(stamps_s), meta.intrinsics.intrinsic_matrix
     intrinsics = Camera(meta.width, meta.height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2])
-    numbers = range(len(times_s))
-    names = [rgb_name(k) for k in numbers], [depth_name(k) for k in numbers]
-    _write_lists(out, intrinsics, meta.depth_scale, np.array(times_s), *names, poses)
+    write_index(out, intrinsics, meta.depth_scale, times_s, *_poses_at(times_s, poses))
     return len(times_s)
 
 
-def _open_bag(bag: Path):
+def _open_bag(bag: Path) -> Any:
     """Open3D's reader, opened."""
     with needs("render"), with_variables(OPEN3D_DISABLE_WEB_VISUALIZER="true"):
         import open3d as o3d
 
     if not hasattr(o3d.t.io, "RSBagReader"):
-        raise InputError(
-            f"{bag}: this Open3D was built without RealSense; use its tools elsewhere to save the frames, "
-            "then import with --open3d"
-        )
+        hint = "use its tools elsewhere to save the frames, then import with --open3d"
+        raise InputError(f"{bag}: this Open3D was built without RealSense; {hint}")
     if not bag.is_file():
         raise InputError(f"{bag}: is not there; give a .bag recorded by the RealSense viewer")
     reader = o3d.t.io.RSBagReader()
@@ -166,7 +194,7 @@ def _open_bag(bag: Path):
     return reader
 
 
-def _frames(reader) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
+def _frames(reader: Any) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
     """Time in seconds, colour (height, width, 3) and depth in units (height, width) of every frame."""
     frame = reader.next_frame()
     while not reader.is_eof():
@@ -187,16 +215,14 @@ def _images(folder: Path) -> list[Path]:
 
 def _rate_hz(path: Path) -> float:
     value = read_json(path).get("fps")
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 10_000:
+    if not (is_number(value) and 0 < value < _MAX_RATE_HZ):
         raise InputError(f"{path}: fps: expected frames per second, found {value!r}; give --rate")
     return float(value)
 
 
-def _write_lists(out: Path, intrinsics, units, times_s, rgb_names, depth_names, poses: PoseSource) -> None:
-    pose_s, T_base_cam = poses.times_s, poses.T_base_cam
-    if len(T_base_cam) == 1:
-        pose_s, T_base_cam = times_s, np.repeat(T_base_cam, len(times_s), axis=0)
-    write_camera(out / CAMERA_FILE, intrinsics, units)
-    write_poses(out / POSES_FILE, pose_s, T_base_cam)
-    write_file_list(out / DEPTH_LIST, times_s, depth_names)
-    write_file_list(out / RGB_LIST, times_s, rgb_names)
+def _poses_at(times_s: np.ndarray, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
+    """Poses and their times; of a camera that stands still, one for every image."""
+    pose_s, T_base_cam = poses
+    if len(pose_s) > 1:
+        return T_base_cam, pose_s
+    return np.repeat(T_base_cam, len(times_s), axis=0), times_s

@@ -6,8 +6,6 @@ data (.tsv)", and headers of exports found in public repositories; for C3D, ezc3
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
 from dataclasses import dataclass
@@ -15,7 +13,6 @@ from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
-import pandas as pd
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import write_bytes
@@ -33,10 +30,14 @@ class MotionCapture:
 
     Attributes
     ----------
-    times_s : (n,), increasing, on the motion capture system's own clock
-    names : of the m markers, no two alike
-    points_m : (n, m, 3); all three NaN where a marker was not measured
-    rate_hz : measurements per second
+    times_s : array, shape (n,)
+        Increasing, on the motion capture system's own clock.
+    names : tuple of str
+        Of the m markers, no two alike.
+    points_m : array, shape (n, m, 3)
+        All three NaN where a marker was not measured.
+    rate_hz : float
+        Measurements per second.
     """
 
     times_s: np.ndarray
@@ -52,10 +53,27 @@ def read_mocap(path: str | Path) -> MotionCapture:
     columns are optional. A marker is missing where a coordinate is empty, NULL or NaN, or where
     all three are exactly zero. Time starts at 0 at frame 1 unless the file has a Time column.
 
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    MotionCapture
+
     Raises
     ------
     InputError
         If the file is missing, damaged, or not 3D data; the row of a TSV file is named.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> mocap = MotionCapture(np.array([0.0, 0.01]), ("wrist",), np.array([[[0.1, 0.2, 0.3]]] * 2), 100.0)
+    >>> with TemporaryDirectory() as folder:
+    ...     write_tsv(Path(folder, "mocap.tsv"), mocap)
+    ...     read_mocap(Path(folder, "mocap.tsv")).points_m[1, 0]
+    array([0.1, 0.2, 0.3])
     """
     path = Path(path)
     if path.suffix.lower() == ".c3d":
@@ -71,6 +89,11 @@ def write_tsv(path: str | Path, mocap: MotionCapture) -> None:
     """Write 3D data as Qualisys exports them: header, column titles, Frame and Time, missing markers empty.
 
     Millimetres are written to three decimals, seconds to five.
+
+    Parameters
+    ----------
+    path : str or Path
+    mocap : MotionCapture
     """
     n, m = mocap.points_m.shape[:2]
     header = {
@@ -89,8 +112,17 @@ def write_tsv(path: str | Path, mocap: MotionCapture) -> None:
 def write_c3d(path: str | Path, mocap: MotionCapture) -> None:
     """Write C3D in millimetres, single precision; missing markers have the residual -1.
 
-    C3D has no column of times: the first frame is at 0, as `read_mocap` reads it. `InputError` for
-    more frames than the format counts to.
+    C3D has no column of times: the first frame is at 0, as `read_mocap` reads it.
+
+    Parameters
+    ----------
+    path : str or Path
+    mocap : MotionCapture
+
+    Raises
+    ------
+    InputError
+        For more frames than the format counts to.
     """
     c3d.write_points(path, mocap.points_m, mocap.names, mocap.rate_hz)
 
@@ -100,27 +132,25 @@ def _read_tsv(path: Path) -> MotionCapture:
         raw = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a TSV file") from None
-    # Marker names may be in the code page of the exporting computer; every byte is a letter there.
-    text = raw.decode("utf-8-sig") if _is_utf8(raw) else raw.decode("latin-1")
-    lines = re.split(r"\r\n|\n|\r", text.rstrip("\r\n \x1a"))
+    lines = re.split(r"\r\n|\n|\r", _decoded(raw).rstrip("\r\n \x1a"))
     start = next((k for k, line in enumerate(lines) if _is_data(line)), None)
     if start is None:
         _refuse_without_data(path, lines)
     header = _header(lines[:start])
     names, rate_hz = _names(path, header), _rate_hz(path, header)
     values = _numbers(path, lines, start)
-    leading = _leading_columns(path, values, len(names), rate_hz, start + 1)
+    times_s, coordinates_mm = _split_columns(path, values, len(names), rate_hz, start + 1)
     _check_count(path, header, "NO_OF_FRAMES", len(values), "rows of data")
-    points_m = 1e-3 * values[:, leading : leading + 3 * len(names)].reshape(len(values), -1, 3)
-    return MotionCapture(_times_s(values[:, :leading], rate_hz), names, _without_missing(points_m), rate_hz)
+    points_m = 1e-3 * coordinates_mm.reshape(len(values), -1, 3)
+    return MotionCapture(times_s, names, _without_missing(points_m), rate_hz)
 
 
-def _is_utf8(raw: bytes) -> bool:
+def _decoded(raw: bytes) -> str:
+    """Marker names may be in the code page of the exporting computer; every byte is a letter there."""
     try:
-        raw.decode("utf-8-sig")
+        return raw.decode("utf-8-sig")
     except UnicodeDecodeError:
-        return False
-    return True
+        return raw.decode("latin-1")
 
 
 def _is_data(line: str) -> bool:
@@ -150,11 +180,9 @@ def _names(path: Path, header: dict[str, list[str]]) -> tuple[str, ...]:
         raise InputError(f"{path}: holds {'/'.join(included)[:_SHOWN]} or rigid bodies; export 3D data")
     if "MARKER_NAMES" not in header:
         raise InputError(f"{path}: no line MARKER_NAMES above the data; export with the TSV header")
-    values = header["MARKER_NAMES"]
-    while values and not values[-1]:
-        values = values[:-1]
+    values = "\t".join(header["MARKER_NAMES"]).rstrip("\t").split("\t")
     twice = next((name for k, name in enumerate(values) if name in values[:k]), None)
-    if not values or "" in values or twice:
+    if "" in values or twice:
         wrong = f"names {twice[:_SHOWN]!r} twice" if twice else "has an empty name"
         raise InputError(f"{path}: MARKER_NAMES {wrong}; give every marker a name of its own")
     _check_count(path, header, "NO_OF_MARKERS", len(values), "names in MARKER_NAMES")
@@ -177,67 +205,49 @@ def _check_count(path: Path, header: dict[str, list[str]], key: str, found: int,
 
 def _numbers(path: Path, lines: list[str], start: int) -> np.ndarray:
     """The rows of data, NaN where a field is empty."""
-    width = lines[start].count("\t") + 1
+    rows, width = [], lines[start].count("\t") + 1
     for number, line in enumerate(lines[start:], start=start + 1):
-        found = line.count("\t") + 1
-        if found != width:
-            raise InputError(
-                f"{path}: row {number} has {found} columns, row {start + 1} has {width}; export it again"
-            )
-    table = io.StringIO("\n".join(lines[start:]) + "\n")
-    try:
-        values = pd.read_csv(
-            table, sep="\t", header=None, dtype=float, quoting=csv.QUOTE_NONE, skip_blank_lines=False,
-            na_values=list(_MISSING), keep_default_na=False, skipinitialspace=True,
-        ).to_numpy()  # fmt: skip
-    except (ValueError, OverflowError):
-        values = np.full((1, 1), np.inf)
-    if np.isinf(values).any():
-        _refuse_number(path, lines, start)
-    return values
+        fields = line.split("\t")
+        if len(fields) != width:
+            text = f"row {number} has {len(fields)} columns, row {start + 1} has {width}"
+            raise InputError(f"{path}: {text}; export it again")
+        rows.append([_number(f"{path}: row {number}, column", k, f) for k, f in enumerate(fields, start=1)])
+    return np.array(rows)
 
 
-def _refuse_number(path: Path, lines: list[str], start: int) -> NoReturn:
-    for number, line in enumerate(lines[start:], start=start + 1):
-        for column, field in enumerate(line.split("\t"), start=1):
-            text = field.strip()
-            if text in _MISSING or (_NUMBER.fullmatch(text) and math.isfinite(float(text))):
-                continue
-            hint = "export with a decimal point" if "," in text else "expected a number or nothing"
-            raise InputError(f"{path}: row {number}, column {column} is {text[:_SHOWN]!r}; {hint}")
-    raise InputError(f"{path}: the rows from {start + 1} on are not all numbers; export it again")
+def _number(where: str, column: int, field: str) -> float:
+    text = field.strip()
+    value = math.nan if text in _MISSING else float(text) if _NUMBER.fullmatch(text) else math.inf
+    if math.isinf(value):
+        hint = "export with a decimal point" if "," in text else "expected a number or nothing"
+        raise InputError(f"{where} {column} is {text[:_SHOWN]!r}; {hint}")
+    return value
 
 
-def _leading_columns(path: Path, values: np.ndarray, n_markers: int, rate_hz: float, row: int) -> int:
-    """How many columns (Frame, Time) come before the coordinates: those that count up."""
+def _split_columns(
+    path: Path, values: np.ndarray, n_markers: int, rate_hz: float, row: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n,) by the columns Frame and Time, if there are such, and the columns of coordinates."""
     extra = values.shape[1] - 3 * n_markers
     # Some exports end every line with a tab: one more column, and empty.
     for leading in (extra, extra - 1) if np.isnan(values[:, -1]).all() else (extra,):
-        columns = [values[:, k] for k in range(leading)]
-        if leading == 2 and _is_frame(columns[0]) and _is_time(columns[1], rate_hz):
-            return leading
-        if leading == 1 and (_is_frame(columns[0]) or _is_time(columns[0], rate_hz)) or leading == 0:
-            return leading
-    raise InputError(
-        f"{path}: row {row} has {values.shape[1]} columns; expected 3 for each of {n_markers} markers, "
-        "after Frame and Time if exported"
-    )
+        times_s = _times_s(values[:, :leading], rate_hz) if 0 <= leading <= 2 else None
+        if times_s is not None:
+            return times_s, values[:, leading : leading + 3 * n_markers]
+    expected = f"expected 3 for each of {n_markers} markers, after Frame and Time if exported"
+    raise InputError(f"{path}: row {row} has {values.shape[1]} columns; {expected}")
 
 
-def _is_frame(column: np.ndarray) -> bool:
-    return bool(column[0] == np.round(column[0]) and (np.diff(column) == 1).all())
-
-
-def _is_time(column: np.ndarray, rate_hz: float) -> bool:
-    return bool(np.allclose(np.diff(column), 1 / rate_hz, rtol=1e-3, atol=2e-5) and column[0] >= 0)
-
-
-def _times_s(leading: np.ndarray, rate_hz: float) -> np.ndarray:
+def _times_s(leading: np.ndarray, rate_hz: float) -> np.ndarray | None:
+    """Times by at most two columns, None if they are not Frame, Time or both: what counts up."""
     if leading.shape[1] == 0:
         return np.arange(len(leading)) / rate_hz
-    if leading.shape[1] == 1 and _is_frame(leading[:, 0]):
-        return (leading[:, 0] - 1) / rate_hz
-    return leading[:, -1].copy()
+    first, last = leading[:, 0], leading[:, -1]
+    is_frame = first[0] == np.round(first[0]) and (np.diff(first) == 1).all()
+    if leading.shape[1] == 1 and is_frame:
+        return (first - 1) / rate_hz
+    is_time = np.allclose(np.diff(last), 1 / rate_hz, rtol=1e-3, atol=2e-5) and last[0] >= 0
+    return last.copy() if is_time and (is_frame or leading.shape[1] == 1) else None
 
 
 def _without_missing(points_m: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ simulated recording holds more, as parquet and images: what is true (`read_truth
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -41,13 +42,20 @@ class Recording:
 
     Attributes
     ----------
-    folder : where it lies
-    intrinsics : of colour and of depth, which is aligned to it
-    depth_units_per_m : of the depth images
-    times_s : array, shape (n,), the colour images' times, increasing
-    rgb_paths, depth_paths : n paths each
-    T_base_cam : array, shape (n, 4, 4), camera coordinates to the robot's base frame
-    mocap_path : motion capture as exported, None where there is none
+    folder : Path
+        Where it lies.
+    intrinsics : Camera
+        Of colour and of depth, which is aligned to it.
+    depth_units_per_m : float
+        Of the depth images.
+    times_s : array, shape (n,)
+        The colour images' times, increasing.
+    rgb_paths, depth_paths : list of Path
+        n of them each.
+    T_base_cam : array, shape (n, 4, 4)
+        Camera coordinates to the robot's base frame.
+    mocap_path : Path or None
+        Motion capture as exported, None where there is none.
     """
 
     folder: Path
@@ -66,39 +74,56 @@ class Recording:
 def open_recording(folder: str | Path) -> Recording:
     """Open a recording; images are read later, one by one.
 
+    Parameters
+    ----------
+    folder : str or Path
+
+    Returns
+    -------
+    Recording
+
     Raises
     ------
     InputError
         If a file is missing or malformed, or no frame has colour, depth and pose.
+
+    Examples
+    --------
+    >>> open_recording("nowhere")
+    Traceback (most recent call last):
+    hicp_lib.core.errors.InputError: nowhere: is not a folder; give the folder of a recording
     """
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"{folder}: is not a folder; give the folder of a recording")
-    intrinsics, units = read_camera(folder / CAMERA_FILE)
+    intrinsics, depth_units_per_m = read_camera(folder / CAMERA_FILE)
     rgb_s, rgb_names = read_file_list(folder / RGB_LIST)
     depth_s, depth_names = read_file_list(folder / DEPTH_LIST)
     pose_s, T_base_cam = read_poses(folder / POSES_FILE)
     rgb, depth, pose = associate_frames(rgb_s, depth_s, pose_s)
     if len(rgb) == 0:
-        raise InputError(
-            f"{folder}: no frame has colour, depth and pose within {MAX_DIFFERENCE_S:g} s; "
-            "bring their clocks together"
-        )
+        none = f"no frame has colour, depth and pose within {MAX_DIFFERENCE_S:g} s"
+        raise InputError(f"{folder}: {none}; bring their clocks together")
+    rgb_paths, depth_paths = [folder / rgb_names[k] for k in rgb], [folder / depth_names[k] for k in depth]
     mocap = folder / MOCAP_FILE
     return Recording(
-        folder=folder,
-        intrinsics=intrinsics,
-        depth_units_per_m=units,
-        times_s=rgb_s[rgb],
-        rgb_paths=[folder / rgb_names[k] for k in rgb],
-        depth_paths=[folder / depth_names[k] for k in depth],
-        T_base_cam=T_base_cam[pose],
+        folder, intrinsics, depth_units_per_m, rgb_s[rgb], rgb_paths, depth_paths, T_base_cam[pose],
         mocap_path=mocap if mocap.is_file() else None,
-    )
+    )  # fmt: skip
 
 
 def first_frames(recording: Recording, n: int) -> Recording:
-    """The first `n` frames of a recording, all if it has fewer.
+    """The first frames of a recording, all if it has fewer.
+
+    Parameters
+    ----------
+    recording : Recording
+    n : int
+        At least 1.
+
+    Returns
+    -------
+    Recording
 
     Raises
     ------
@@ -107,26 +132,48 @@ def first_frames(recording: Recording, n: int) -> Recording:
     """
     if n < 1:
         raise InputError(f"{recording.folder}: {n} frames were asked for; expected at least 1")
-    return replace(
-        recording,
-        times_s=recording.times_s[:n],
-        rgb_paths=recording.rgb_paths[:n],
-        depth_paths=recording.depth_paths[:n],
-        T_base_cam=recording.T_base_cam[:n],
-    )
+    per_frame = ("times_s", "rgb_paths", "depth_paths", "T_base_cam")
+    return replace(recording, **{name: getattr(recording, name)[:n] for name in per_frame})
 
 
 def associate_frames(
     rgb_s: np.ndarray, depth_s: np.ndarray, pose_s: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows of colour, depth and poses that belong together, three arrays of shape (n,)."""
+    """Which colour images, depth images and poses belong together.
+
+    Parameters
+    ----------
+    rgb_s, depth_s, pose_s : array
+        Their times, increasing.
+
+    Returns
+    -------
+    rgb, depth, pose : array of int, shape (n,)
+        Rows of each, in the order of time.
+
+    Examples
+    --------
+    >>> associate_frames(np.array([0.0, 0.1]), np.array([0.1, 0.2]), np.array([0.0, 0.11]))
+    (array([1]), array([0]), array([1]))
+    """
     rgb, depth = associate(rgb_s, depth_s)
     with_pose, pose = associate(rgb_s[rgb], pose_s)
     return rgb[with_pose], depth[with_pose], pose
 
 
 def read_rgb(recording: Recording, k: int) -> np.ndarray:
-    """Colour image of frame `k`: RGB uint8, shape (height, width, 3).
+    """Colour image of a frame.
+
+    Parameters
+    ----------
+    recording : Recording
+    k : int
+        Row of the frame.
+
+    Returns
+    -------
+    array of uint8, shape (height, width, 3)
+        RGB.
 
     Raises
     ------
@@ -139,7 +186,18 @@ def read_rgb(recording: Recording, k: int) -> np.ndarray:
 
 
 def read_depth_m(recording: Recording, k: int) -> np.ndarray:
-    """Depth along the camera's axis of frame `k`: float32, shape (height, width), NaN where there is none.
+    """Depth image of a frame.
+
+    Parameters
+    ----------
+    recording : Recording
+    k : int
+        Row of the frame.
+
+    Returns
+    -------
+    array of float32, shape (height, width)
+        Along the camera's axis; NaN where there is none.
 
     Raises
     ------
@@ -150,16 +208,36 @@ def read_depth_m(recording: Recording, k: int) -> np.ndarray:
 
 
 def read_exact_depth_m(recording: Recording, k: int) -> np.ndarray | None:
-    """Depth as `read_depth_m`, without the sensor's errors; None in a recording that is not simulated."""
+    """Depth image of a frame without the sensor's errors.
+
+    Parameters
+    ----------
+    recording : Recording
+    k : int
+        Row of the frame.
+
+    Returns
+    -------
+    array of float32, shape (height, width), or None
+        As `read_depth_m`; None in a recording that is not simulated.
+    """
     path = recording.folder / EXACT_DEPTH_DIR / recording.depth_paths[k].name
     return _read_depth_m(recording, path) if path.is_file() else None
 
 
 def read_truth(recording: Recording) -> pd.DataFrame | None:
-    """Where the keypoints truly are; None in a recording that is not simulated.
+    """Where the keypoints truly are.
 
-    Columns: frame (row of the recording), t_s, keypoint (Halpe name), x_m, y_m, z_m (base frame),
-    u_px, v_px, visible (0 outside the image, 1 occluded, 2 visible).
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    DataFrame or None
+        Columns frame (row of the recording), t_s, keypoint (Halpe name), x_m, y_m, z_m (base frame), u_px,
+        v_px, visible (0 outside the image, 1 occluded, 2 visible); None in a recording that is not
+        simulated.
 
     Raises
     ------
@@ -170,7 +248,16 @@ def read_truth(recording: Recording) -> pd.DataFrame | None:
 
 
 def read_joints(recording: Recording) -> pd.DataFrame | None:
-    """Joint angles of the robot: frame, t_s, and one column `<joint>_rad` each; None where not recorded.
+    """Joint angles of the robot.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    DataFrame or None
+        Columns frame, t_s, and `<joint>_rad` for each joint; None where not recorded.
 
     Raises
     ------
@@ -181,9 +268,40 @@ def read_joints(recording: Recording) -> pd.DataFrame | None:
 
 
 def read_simulation(recording: Recording) -> dict | None:
-    """What a simulated recording was made with; None where it was not simulated."""
+    """What a simulated recording was made with.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    dict or None
+        None where it was not simulated.
+    """
     path = recording.folder / SIMULATION_FILE
     return read_json(path) if path.is_file() else None
+
+
+def check_columns(path: str | Path, table: pd.DataFrame, columns: Sequence[str]) -> None:
+    """Refuse a table that lacks a column.
+
+    Parameters
+    ----------
+    path : str or Path
+        Where it was read from.
+    table : DataFrame
+    columns : sequence of str
+        Those it must have.
+
+    Raises
+    ------
+    InputError
+        If one is missing; the first is named.
+    """
+    missing = [name for name in columns if name not in table.columns]
+    if missing:
+        raise InputError(f"{path}: has no column {missing[0]!r}; expected {', '.join(columns)}")
 
 
 def _read_depth_m(recording: Recording, path: Path) -> np.ndarray:
@@ -218,7 +336,5 @@ def _read_table(recording: Recording, name: str, columns: tuple[str, ...]) -> pd
         table = pq.read_table(path).to_pandas()
     except (OSError, pa.ArrowException) as error:
         raise InputError(f"{path}: is not a Parquet table ({str(error).splitlines()[0]})") from None
-    missing = [name for name in columns if name not in table.columns]
-    if missing:
-        raise InputError(f"{path}: has no column {missing[0]!r}; expected {', '.join(columns)}")
+    check_columns(path, table, columns)
     return table[table["frame"] < len(recording)].reset_index(drop=True)

@@ -19,31 +19,63 @@ from hicp_lib.core.quaternions import matrices_from_quaternions, quaternions_fro
 
 MAX_DIFFERENCE_S = 0.02  # images and poses further apart in time do not belong together
 _UNIT_TOLERANCE = 0.01  # a quaternion's length may differ from 1 by this much: files are rounded
+_MAX_ABS = 1e15  # seconds or metres; more is no time and no place
+_LIST_COLUMNS = "timestamp filename"
 _POSE_COLUMNS = "timestamp tx ty tz qx qy qz qw"
 
 
 def read_file_list(path: str | Path) -> tuple[np.ndarray, list[str]]:
-    """Read a list of images: times (n,) in seconds, and names relative to the list's folder.
+    """Read a list of images.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of `rgb.txt` or `depth.txt`.
+
+    Returns
+    -------
+    times_s : array, shape (n,)
+        Increasing.
+    names : list of str
+        Relative to the list's folder, and inside it.
 
     Raises
     ------
     InputError
         If the file cannot be read, is empty, or a line is not "timestamp filename" with a time
         after the one before and a name inside the folder.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     write_file_list(Path(folder, "rgb.txt"), np.array([0.0, 0.1]), ["rgb/0.jpg", "rgb/1.jpg"])
+    ...     read_file_list(Path(folder, "rgb.txt"))
+    (array([0. , 0.1]), ['rgb/0.jpg', 'rgb/1.jpg'])
     """
     times_s, names = [], []
-    for number, fields in _rows(path):
-        if len(fields) != 2:
-            raise _error(path, number, f"has {len(fields)} fields; expected 'timestamp filename'")
-        if not _is_inside(fields[1]):
-            raise _error(path, number, f"names {fields[1]!r}; expected a file inside the recording's folder")
-        times_s.append(_time_s(path, number, fields[0], times_s))
-        names.append(fields[1])
-    return _not_empty(path, np.array(times_s)), names
+    for number, time_s, (name,) in _rows(path, _LIST_COLUMNS):
+        if not _is_inside(name):
+            raise _error(path, number, f"names {name!r}; expected a file inside the recording's folder")
+        times_s.append(time_s)
+        names.append(name)
+    return np.array(times_s), names
 
 
 def read_poses(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
-    """Read poses: times (n,) in seconds, and T_base_cam (n, 4, 4) in metres.
+    """Read the poses of a camera.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of `groundtruth.txt`.
+
+    Returns
+    -------
+    times_s : array, shape (n,)
+        Increasing.
+    T_base_cam : array, shape (n, 4, 4)
+        Camera coordinates to the robot's base frame, metres.
 
     Raises
     ------
@@ -51,18 +83,15 @@ def read_poses(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
         If the file cannot be read, is empty, or a line is not eight finite numbers with a time
         after the one before and a quaternion of length 1.
     """
-    rows: list[list[float]] = []
-    for number, fields in _rows(path):
-        if len(fields) != 8:
-            raise _error(path, number, f"has {len(fields)} fields; expected '{_POSE_COLUMNS}'")
-        time_s = _time_s(path, number, fields[0], [row[0] for row in rows[-1:]])
-        rows.append([time_s, *(_number(path, number, field) for field in fields[1:])])
-        length = np.linalg.norm(rows[-1][4:])
+    rows = []
+    for number, time_s, fields in _rows(path, _POSE_COLUMNS):
+        pose = [_number(path, number, field) for field in fields]
+        length = np.linalg.norm(pose[3:])
         if not abs(length - 1) <= _UNIT_TOLERANCE:
-            raise _error(
-                path, number, f"has a quaternion of length {length:.4g}; expected qx qy qz qw of length 1"
-            )
-    table = _not_empty(path, np.array(rows).reshape(-1, 8))
+            wrong = f"has a quaternion of length {length:.4g}; expected qx qy qz qw of length 1"
+            raise _error(path, number, wrong)
+        rows.append([time_s, *pose])
+    table = np.array(rows)
     T_base_cam = np.tile(np.eye(4), (len(table), 1, 1))
     T_base_cam[:, :3, :3] = matrices_from_quaternions(table[:, 4:])
     T_base_cam[:, :3, 3] = table[:, 1:4]
@@ -70,16 +99,31 @@ def read_poses(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def write_file_list(path: str | Path, times_s: np.ndarray, names: Sequence[str]) -> None:
-    """Write a list of images, whole or not at all; times to the microsecond."""
+    """Write a list of images, whole or not at all; times to the microsecond.
+
+    Parameters
+    ----------
+    path : str or Path
+    times_s : array, shape (n,)
+    names : sequence of str
+        n of them, relative to the list's folder.
+    """
     lines = [f"{time_s:.6f} {name}" for time_s, name in zip(times_s, names, strict=True)]
-    _write(path, ["# timestamp filename", *lines])
+    _write(path, [f"# {_LIST_COLUMNS}", *lines])
 
 
 def write_poses(path: str | Path, times_s: np.ndarray, T_base_cam: np.ndarray) -> None:
-    """Write poses T_base_cam (n, 4, 4), whole or not at all; w is not negative."""
+    """Write poses, whole or not at all; w is not negative.
+
+    Parameters
+    ----------
+    path : str or Path
+    times_s : array, shape (n,)
+    T_base_cam : array, shape (n, 4, 4)
+        Camera coordinates to the robot's base frame, metres.
+    """
     T = np.asarray(T_base_cam, float)
-    quaternions = quaternions_from_matrices(T[:, :3, :3])
-    rows = np.column_stack([T[:, :3, 3], quaternions])
+    rows = np.column_stack([T[:, :3, 3], quaternions_from_matrices(T[:, :3, :3])])
     lines = [
         " ".join([f"{time_s:.6f}", *(f"{value:.9f}" for value in row)])
         for time_s, row in zip(times_s, rows, strict=True)
@@ -94,14 +138,23 @@ def associate(
 
     Parameters
     ----------
-    a_s, b_s : arrays, shapes (n,) and (m,), increasing
+    a_s, b_s : array, shapes (n,) and (m,)
+        Increasing.
+    max_difference_s : float, optional
+        Times further apart are not paired.
 
     Returns
     -------
-    Rows of `a_s` and of `b_s`, both of shape (k,), in the order of `a_s`
+    a, b : array of int, shape (k,)
+        Rows of `a_s` and of `b_s` that are pairs, in the order of `a_s`.
+
+    Examples
+    --------
+    >>> associate(np.array([0.0, 0.1, 0.2]), np.array([0.09, 0.105, 0.3]))
+    (array([1]), array([1]))
     """
-    low, high = (np.searchsorted(b_s, a_s + sign * max_difference_s, side) for sign, side in _WINDOW)
-    n_candidates = high - low
+    low = np.searchsorted(b_s, a_s - max_difference_s, "left")
+    n_candidates = np.searchsorted(b_s, a_s + max_difference_s, "right") - low
     a = np.repeat(np.arange(len(a_s)), n_candidates)
     b = np.arange(len(a)) + np.repeat(low - np.cumsum(n_candidates) + n_candidates, n_candidates)
     free_a, free_b = np.ones(len(a_s), bool), np.ones(len(b_s), bool)
@@ -113,28 +166,29 @@ def associate(
     return a[a >= 0], b[a >= 0]
 
 
-_WINDOW = ((-1, "left"), (1, "right"))
-
-
-def _rows(path: str | Path) -> Iterator[tuple[int, list[str]]]:
-    """Line number and fields of every line that says something."""
+def _rows(path: str | Path, columns: str) -> Iterator[tuple[int, float, list[str]]]:
+    """Line number, time and further fields of every line that says something."""
     try:
         text = Path(path).read_text(encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); a recording needs it") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: is not text in UTF-8; expected a text file of the TUM layout") from None
+    before_s = -np.inf
     for number, line in enumerate(text.split("\n"), start=1):
         fields = line.partition("#")[0].split()
-        if fields:
-            yield number, fields
-
-
-def _time_s(path: str | Path, number: int, text: str, before_s: list[float]) -> float:
-    time_s = _number(path, number, text)
-    if before_s and not time_s > before_s[-1]:
-        raise _error(path, number, f"timestamp {text} is not after the one before; sort the lines by time")
-    return time_s
+        if not fields:
+            continue
+        if len(fields) != len(columns.split()):
+            raise _error(path, number, f"has {len(fields)} fields; expected '{columns}'")
+        time_s = _number(path, number, fields[0])
+        if not time_s > before_s:
+            late = f"timestamp {fields[0]} is not after the one before; sort the lines by time"
+            raise _error(path, number, late)
+        yield number, time_s, fields[1:]
+        before_s = time_s
+    if np.isinf(before_s):
+        raise InputError(f"{path}: holds no lines; expected one per image or pose")
 
 
 def _number(path: str | Path, number: int, text: str) -> float:
@@ -142,7 +196,7 @@ def _number(path: str | Path, number: int, text: str) -> float:
         value = float(text)
     except ValueError:
         value = np.nan
-    if not abs(value) < 1e15:
+    if not abs(value) < _MAX_ABS:
         raise _error(path, number, f"{text[:40]!r} is not a finite number; expected seconds and metres")
     return value
 
@@ -152,12 +206,6 @@ def _is_inside(name: str) -> bool:
     windows = PureWindowsPath(name)
     is_relative = not (windows.drive or windows.root or PurePosixPath(name).root)
     return is_relative and ".." not in windows.parts and name.isprintable()
-
-
-def _not_empty(path: str | Path, values: np.ndarray) -> np.ndarray:
-    if len(values) == 0:
-        raise InputError(f"{path}: holds no lines; expected one per image or pose")
-    return values
 
 
 def _error(path: str | Path, number: int, problem: str) -> InputError:

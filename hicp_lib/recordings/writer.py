@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -24,13 +25,28 @@ class RecordingWriter:
 
     Parameters
     ----------
-    folder : new or empty
-    depth_units_per_m : 1000 stores millimetres, up to 65 m
+    folder : str or Path
+        New or empty.
+    intrinsics : Camera
+        Of colour and of depth, which is aligned to it.
+    depth_units_per_m : float, optional
+        1000 stores millimetres, up to 65 m.
 
     Raises
     ------
     InputError
         If the folder holds files.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from hicp_lib.recordings.recording import open_recording
+    >>> with TemporaryDirectory() as folder:
+    ...     writer = RecordingWriter(folder, Camera(32, 24, 30.0, 30.0, 15.5, 11.5))
+    ...     writer.add(0.0, np.zeros((24, 32, 3), np.uint8), np.ones((24, 32)), np.eye(4))
+    ...     writer.finish()
+    ...     len(open_recording(folder))
+    1
     """
 
     def __init__(self, folder: str | Path, intrinsics: Camera, depth_units_per_m: float = 1000.0):
@@ -41,7 +57,16 @@ class RecordingWriter:
         self._poses: list[np.ndarray] = []
 
     def add(self, time_s: float, rgb: np.ndarray, depth_m: np.ndarray, T_base_cam: np.ndarray) -> None:
-        """Write a frame: RGB uint8 (height, width, 3), depth in metres (height, width), the pose (4, 4).
+        """Write a frame.
+
+        Parameters
+        ----------
+        time_s : float
+        rgb : array of uint8, shape (height, width, 3)
+        depth_m : array, shape (height, width)
+            Along the camera's axis; what is not finite is stored as no depth.
+        T_base_cam : array, shape (4, 4)
+            Camera coordinates to the robot's base frame.
 
         Raises
         ------
@@ -52,10 +77,8 @@ class RecordingWriter:
             raise InputError(f"{self.folder}: time {time_s} s is not after the frame before; sort frames")
         expected = (self.intrinsics.height_px, self.intrinsics.width_px)
         if rgb.shape[:2] != expected or depth_m.shape != expected:
-            raise InputError(
-                f"{self.folder}: colour {rgb.shape[:2]} and depth {depth_m.shape} (height, width) must both "
-                f"be {expected}, as the intrinsics say"
-            )
+            found = f"colour {rgb.shape[:2]} and depth {depth_m.shape} (height, width)"
+            raise InputError(f"{self.folder}: {found} must both be {expected}, as the intrinsics say")
         index = len(self._times_s)
         write_rgb(self.folder / rgb_name(index), rgb)
         write_depth(self.folder / depth_name(index), depth_m, self.depth_units_per_m)
@@ -72,13 +95,8 @@ class RecordingWriter:
         """
         if not self._times_s:
             raise InputError(f"{self.folder}: no frames were added; a recording has at least one")
-        write_index(
-            self.folder,
-            self.intrinsics,
-            self.depth_units_per_m,
-            np.array(self._times_s),
-            np.array(self._poses),
-        )
+        times_s, T_base_cam = np.array(self._times_s), np.array(self._poses)
+        write_index(self.folder, self.intrinsics, self.depth_units_per_m, times_s, T_base_cam)
 
 
 def write_index(
@@ -87,40 +105,88 @@ def write_index(
     depth_units_per_m: float,
     times_s: np.ndarray,
     T_base_cam: np.ndarray,
+    pose_s: np.ndarray | None = None,
+    names: tuple[Sequence[str], Sequence[str]] | None = None,
 ) -> None:
-    """Make numbered images of a folder a recording; `rgb.txt`, without which it is none, comes last.
+    """Make images of a folder a recording; `rgb.txt`, without which it is none, comes last.
 
     Parameters
     ----------
-    times_s : array, shape (n,), of images 0 to n - 1, named by `rgb_name` and `depth_name`
-    T_base_cam : array, shape (n, 4, 4)
+    folder : str or Path
+    intrinsics : Camera
+    depth_units_per_m : float
+    times_s : array, shape (n,)
+        Of the images.
+    T_base_cam : array, shape (m, 4, 4)
+        Camera coordinates to the robot's base frame.
+    pose_s : array, shape (m,), optional
+        Times of the poses; those of the images when left out.
+    names : tuple of two sequences of str, optional
+        Files of colour and of depth within the folder; by `rgb_name` and `depth_name` when left out.
     """
     folder, numbers = Path(folder), range(len(times_s))
+    rgb, depth = names or ([rgb_name(k) for k in numbers], [depth_name(k) for k in numbers])
     write_camera(folder / CAMERA_FILE, intrinsics, depth_units_per_m)
-    write_poses(folder / POSES_FILE, times_s, T_base_cam)
-    write_file_list(folder / DEPTH_LIST, times_s, [depth_name(k) for k in numbers])
-    write_file_list(folder / RGB_LIST, times_s, [rgb_name(k) for k in numbers])
+    write_poses(folder / POSES_FILE, times_s if pose_s is None else pose_s, T_base_cam)
+    write_file_list(folder / DEPTH_LIST, times_s, depth)
+    write_file_list(folder / RGB_LIST, times_s, rgb)
 
 
 def rgb_name(index: int) -> str:
-    """Name of colour image `index` in a recording's folder."""
+    """Name of a colour image in a recording's folder.
+
+    Parameters
+    ----------
+    index : int
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> rgb_name(12), depth_name(12)
+    ('rgb/000012.jpg', 'depth/000012.png')
+    """
     return f"rgb/{index:06d}.jpg"
 
 
 def depth_name(index: int) -> str:
-    """Name of depth image `index` in a recording's folder."""
+    """Name of a depth image in a recording's folder.
+
+    Parameters
+    ----------
+    index : int
+
+    Returns
+    -------
+    str
+    """
     return f"depth/{index:06d}.png"
 
 
 def write_rgb(path: str | Path, rgb: np.ndarray) -> None:
-    """Write RGB uint8 (height, width, 3) as JPEG of high quality, whole or not at all."""
+    """Write colour as JPEG of high quality, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+    rgb : array of uint8, shape (height, width, 3)
+    """
     bgr = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
     _, encoded = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     write_bytes(path, encoded.tobytes())
 
 
 def write_depth(path: str | Path, depth_m: np.ndarray, depth_units_per_m: float) -> None:
-    """Write depth in metres (height, width) as 16-bit PNG; 0 where it is not finite or does not fit."""
+    """Write depth as 16-bit PNG; 0 where it is not finite or does not fit.
+
+    Parameters
+    ----------
+    path : str or Path
+    depth_m : array, shape (height, width)
+    depth_units_per_m : float
+    """
     units = np.rint(depth_m * depth_units_per_m)
     fits = (units >= 0) & (units <= _MOST_UNITS)  # what is not a number fits nowhere
     write_png(path, np.where(fits, units, 0).astype(np.uint16))
@@ -128,6 +194,10 @@ def write_depth(path: str | Path, depth_m: np.ndarray, depth_units_per_m: float)
 
 def refuse_used_folder(folder: Path) -> None:
     """Nothing is written over what is there.
+
+    Parameters
+    ----------
+    folder : Path
 
     Raises
     ------

@@ -29,19 +29,34 @@ class Settings:
 
     Attributes
     ----------
-    period_s : time between two commands
-    fastest_rad_s : of every joint (30 degrees per second in 2022, 20 in 2018)
-    retreat_rad_s : velocity `v_a` of the retreat per metre of lever arm (50 degrees per second)
-    gain : factor on it (published: 0.5 for what is seen, 1.5 for touch; ours acts on less, see `neutral`)
-    onset, neutral : magnitudes at which an obstacle begins to slow joints that turn towards it, and from
-        which on it pushes them back (ours; published: the push begins at 0.2, at full strength)
-    guard : part of a joint's range in which it slows down towards its limit
-    post_weight, rest_weight, smooth_weight : costs of the hand's velocity error (m/s)^2, of the joints'
-        from the way to rest (rad/s)^2, and of changes of velocity (rad/s)^2
-    approach_s : the hand wants to be at its post in this time, ... (ours)
-    approach_m_s : ... but no faster than this (ours)
-    rest_s : the joints want to be at rest in this time; with `rest_weight` (published: 0.01) it is such that
-        they do not swing about it (ours)
+    period_s : float
+        Time between two commands.
+    fastest_rad_s : float
+        Of every joint (30 degrees per second in 2022, 20 in 2018).
+    retreat_rad_s : float
+        Velocity `v_a` of the retreat per metre of lever arm (50 degrees per second).
+    gain : float
+        Factor on it (published: 0.5 for what is seen, 1.5 for touch; ours acts on less, see `neutral`).
+    onset, neutral : float
+        Magnitudes at which an obstacle begins to slow joints that turn towards it, and from which on it
+        pushes them back (ours; published: the push begins at 0.2, at full strength).
+    guard : float
+        Part of a joint's range in which it slows down towards its limit.
+    post_weight, rest_weight, smooth_weight : float
+        Costs of the hand's velocity error (m/s)^2, of the joints' from the way to rest (rad/s)^2, and of
+        changes of velocity (rad/s)^2.
+    approach_s : float
+        The hand wants to be at its post in this time, ... (ours)
+    approach_m_s : float
+        ... but no faster than this (ours).
+    rest_s : float
+        The joints want to be at rest in this time; with `rest_weight` (published: 0.01) it is such that they
+        do not swing about it (ours).
+
+    Examples
+    --------
+    >>> Settings(gain=2.0).period_s
+    0.02
     """
 
     period_s: float = 0.02
@@ -69,10 +84,27 @@ class Controller:
 
     Attributes
     ----------
-    icub : the robot
-    post_m : (3,) where the palm wants to be, root frame
-    rest_rad : (10,) angles the joints are drawn to
-    side : "left" or "right", the arm that is controlled
+    icub : ICub
+        The robot.
+    post_m : array, shape (3,)
+        Where the palm wants to be, root frame.
+    rest_rad : array, shape (10,)
+        Angles the joints are drawn to.
+    side : str
+        "left" or "right", the arm that is controlled.
+    settings : Settings
+
+    Examples
+    --------
+    At its post, with nobody near, the arm stands still:
+
+    >>> from hicp_lib.robot.home import HOME_M, home_posture
+    >>> from hicp_lib.robot.kinematics import load_icub
+    >>> icub = load_icub()
+    >>> home = home_posture(icub)
+    >>> controller = Controller(icub, np.array(HOME_M["left"]), home.angles("left"))
+    >>> bool(np.abs(controller.velocities(home, [])).max() < 1e-4)
+    True
     """
 
     icub: ICub
@@ -83,7 +115,18 @@ class Controller:
     _last: np.ndarray = field(default_factory=lambda: np.zeros(len(ARM_JOINTS)), repr=False)
 
     def velocities(self, posture: Posture, obstacles: list[Obstacle]) -> np.ndarray:
-        """Velocities (10,) rad/s of `ARM_JOINTS` for the next period.
+        """Velocities for the next period.
+
+        Parameters
+        ----------
+        posture : Posture
+            The robot's now.
+        obstacles : list of Obstacle
+
+        Returns
+        -------
+        array, shape (10,)
+            Of `ARM_JOINTS`, rad/s.
 
         Raises
         ------

@@ -2,7 +2,7 @@
 
 Root frame: origin on the axis of torso pitch, between the legs; metres, x backward, y to the robot's
 right, z up. Angles in radians, without clamping to the limits. Every chain begins at the root with the
-three joints of the torso, in the order pitch, roll, yaw (motor boards report another one: see `boards`).
+three joints of the torso, in the order pitch, roll, yaw (motor boards report another one: see `motor_order`).
 Poses and Jacobians are Pinocchio's, on models built from the tables in data/icub.json.
 """
 
@@ -33,11 +33,18 @@ class Chain:
 
     Attributes
     ----------
-    name : "head", "left", "right", "left_eye" or "right_eye"
-    joints : names of the joints, n of them, in the order of the angles
-    links : names of the frames after each row of the table
-    limits_rad : (n, 2), lowest and highest angle of every joint
-    cables : (k, n), lower_rad (k,), upper_rad (k,): `lower <= cables @ q <= upper` (arms only, else k = 0)
+    name : str
+        "head", "left", "right", "left_eye" or "right_eye".
+    joints : tuple of str
+        n of them, in the order of the angles.
+    links : tuple of str
+        The frames after each row of the table.
+    limits_rad : array, shape (n, 2)
+        Lowest and highest angle of every joint.
+    cables : array, shape (k, n)
+        Sums of angles that cables bound (arms only, else k = 0).
+    cables_lower_rad, cables_upper_rad : array, shape (k,)
+        `lower <= cables @ q <= upper`.
     """
 
     def __init__(self, name: str, tables: Tables, rows: Sequence[Row], limits: str):
@@ -55,12 +62,25 @@ class Chain:
 
         Parameters
         ----------
-        link : one of `links`
-        q_rad : (..., n) angles in the order of `joints`
+        link : str
+            One of `links`.
+        q_rad : array, shape (..., n)
+            Angles in the order of `joints`.
 
         Returns
         -------
-        (..., 4, 4)
+        array, shape (..., 4, 4)
+
+        Raises
+        ------
+        ValueError
+            For an unknown link.
+
+        Examples
+        --------
+        >>> hand = load_icub().chains["left"].T_root_link("hand", np.zeros(10))
+        >>> hand[:3, 3].round(3)
+        array([-0.011, -0.094, -0.177])
         """
         q = np.asarray(q_rad, dtype=float)
         frame = self._frame(link)
@@ -71,7 +91,18 @@ class Chain:
         return poses
 
     def T_root_links(self, q_rad: np.ndarray) -> dict[str, np.ndarray]:
-        """Poses (4, 4) of all links in the root frame at the angles (n,)."""
+        """Poses of all links in the root frame.
+
+        Parameters
+        ----------
+        q_rad : array, shape (n,)
+            Angles in the order of `joints`.
+
+        Returns
+        -------
+        dict of str to array, shape (4, 4)
+            By link.
+        """
         pin.framesForwardKinematics(self._model, self._data, np.asarray(q_rad, dtype=float))
         return {link: self._data.oMf[frame].homogeneous for link, frame in self._frames.items()}
 
@@ -80,13 +111,22 @@ class Chain:
 
         Parameters
         ----------
-        link : one of `links`
-        q_rad : (n,) angles
-        points_link_m : (..., 3) points in the link's frame; its origin when left out
+        link : str
+            One of `links`.
+        q_rad : array, shape (n,)
+            Angles in the order of `joints`.
+        points_link_m : array, shape (..., 3), optional
+            Points in the link's frame; its origin when left out.
 
         Returns
         -------
-        (..., 3, n), metres per radian along the axes of the root frame
+        array, shape (..., 3, n)
+            Metres per radian along the axes of the root frame.
+
+        Raises
+        ------
+        ValueError
+            For an unknown link.
         """
         frame = self._frame(link)
         full = pin.computeFrameJacobian(
@@ -111,9 +151,12 @@ class ICub:
 
     Attributes
     ----------
-    chains : "head" (6 joints), "left" and "right" (10), "left_eye" and "right_eye" (8)
-    T_head_camera : name of the camera holder -> (4, 4), colour camera in the frame of link "head"
-    parts : part of the skin -> (chain, link)
+    chains : dict of str to Chain
+        "head" (6 joints), "left" and "right" (10), "left_eye" and "right_eye" (8).
+    T_head_camera : dict of str to array, shape (4, 4)
+        Name of the camera holder -> colour camera in the frame of link "head".
+    parts : dict of str to tuple of str
+        Part of the skin -> (chain, link).
     """
 
     chains: dict[str, Chain]
@@ -125,12 +168,14 @@ class ICub:
 
         Parameters
         ----------
-        head_rad : (..., 6) angles of `HEAD_JOINTS`
-        mount : camera holder, "level" (looks 5.9 degrees down) or "tilted" (44.8 degrees)
+        head_rad : array, shape (..., 6)
+            Angles of `HEAD_JOINTS`.
+        mount : str, optional
+            Camera holder, "level" (looks 5.9 degrees down) or "tilted" (44.8 degrees).
 
         Returns
         -------
-        (..., 4, 4)
+        array, shape (..., 4, 4)
 
         Raises
         ------
@@ -150,22 +195,33 @@ def load_icub(head: str = "v2", arm: str = "v1", limits: str = "table") -> ICub:
 
     Parameters
     ----------
-    head : "v1" or "v2"
-    arm : "v1", "v1.7" or "v2"
-    limits : "table", the mechanical ones, or "software", the tighter ones of the robot's firmware
+    head : str, optional
+        "v1" or "v2".
+    arm : str, optional
+        "v1", "v1.7" or "v2".
+    limits : str, optional
+        "table", the mechanical ones, or "software", the tighter ones of the robot's firmware.
+
+    Returns
+    -------
+    ICub
 
     Raises
     ------
     InputError
         For an unknown version or set of limits.
+
+    Examples
+    --------
+    >>> icub = load_icub(limits="software")
+    >>> np.rad2deg(icub.chains["left"].limits_rad[ARM_JOINTS.index("elbow")]).round(1)
+    array([ 15., 106.])
     """
     tables = read_tables()
     for name, known in ((head, tables.heads), (arm, tables.arms), (limits, tables.limits_rad)):
         if name not in known:
             raise InputError(f"no {name!r} in the robot's tables; choose one of {', '.join(known)}")
-    neck = tables.torso + tables.heads[head]
-    rows = {name: neck + eyes for name, eyes in tables.eyes.items()}
-    rows |= {side: tables.torso + table for side, table in tables.arms[arm].items()}
+    rows = tables.heads[head] | tables.arms[arm]
     chains = {name: Chain(name, tables, table, limits) for name, table in rows.items()}
     return ICub(chains, tables.T_head_camera, tables.parts)
 

@@ -33,9 +33,17 @@ class Perception:
 
     Attributes
     ----------
-    time_s : when the image was taken, in the clock of the loop
-    keypoints_m : (p, 136, 3) of p people (none: p = 0) in the robot's root frame, NaN where unknown
-    scores : (p, 136), 0 to 1
+    time_s : float
+        When the image was taken, in the clock of the loop.
+    keypoints_m : array, shape (p, 136, 3)
+        Of p people (none: p = 0) in the robot's root frame, NaN where unknown.
+    scores : array, shape (p, 136)
+        0 to 1.
+
+    Raises
+    ------
+    ValueError
+        If the shapes are not these.
     """
 
     time_s: float
@@ -43,12 +51,10 @@ class Perception:
     scores: np.ndarray
 
     def __post_init__(self) -> None:
-        n = len(self.keypoints_m)
-        if np.shape(self.keypoints_m) != (n, N_KEYPOINTS, 3) or np.shape(self.scores) != (n, N_KEYPOINTS):
-            raise ValueError(
-                f"keypoints {np.shape(self.keypoints_m)} and scores {np.shape(self.scores)}: expected "
-                f"(p, {N_KEYPOINTS}, 3) and (p, {N_KEYPOINTS})"
-            )
+        n, shapes = len(self.keypoints_m), (np.shape(self.keypoints_m), np.shape(self.scores))
+        if shapes != ((n, N_KEYPOINTS, 3), (n, N_KEYPOINTS)):
+            expected = f"(p, {N_KEYPOINTS}, 3) and (p, {N_KEYPOINTS})"
+            raise ValueError(f"keypoints {shapes[0]} and scores {shapes[1]}: expected {expected}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +63,14 @@ class Command:
 
     Attributes
     ----------
-    time_s : when it was decided, in the clock of the loop
-    velocities_rad_s : (10,) of `hicp_lib.robot.kinematics.ARM_JOINTS`; zero when stopped
-    status : `FREE`, `AVOIDING` or `STOPPED`
-    reason : why the arm stands still; empty otherwise
+    time_s : float
+        When it was decided, in the clock of the loop.
+    velocities_rad_s : array, shape (10,)
+        Of `hicp_lib.robot.kinematics.ARM_JOINTS`; zero when stopped.
+    status : str
+        `FREE`, `AVOIDING` or `STOPPED`.
+    reason : str
+        Why the arm stands still; empty otherwise.
     """
 
     time_s: float
@@ -71,9 +81,14 @@ class Command:
 
 @dataclass(frozen=True, eq=False)
 class Threat:
-    """What the skin made of the keypoints: activation of every taxel (n,), and obstacles of the parts.
+    """What the skin made of the keypoints.
 
-    There are obstacles from the magnitude on at which joints begin to slow down.
+    Attributes
+    ----------
+    activations : array, shape (n,)
+        Of every taxel.
+    obstacles : list of Obstacle
+        Of the parts, from the magnitude on at which joints begin to slow down.
     """
 
     activations: np.ndarray
@@ -91,14 +106,35 @@ class AvoidanceLoop:
 
     Attributes
     ----------
-    controller : knows the robot, the arm and its post
-    skin : the robot's taxels
-    sensing : what a taxel senses
-    tracker : which keypoints are believed
-    valence : (136,) factors on how threatening each keypoint is, -1 to 1; 0: all alike, as in the paper
-    avoids : whether to give way at all; without it the arm keeps its post, and threats are still reported
-    blind_after_s : the arm stops when the newest perception is older than this. Empty ones count: they say
-        that nobody is seen
+    controller : Controller
+        Knows the robot, the arm and its post.
+    skin : Skin
+        The robot's taxels.
+    sensing : ReceptiveField
+        What a taxel senses.
+    tracker : KeypointTracker
+        Which keypoints are believed.
+    valence : array, shape (136,)
+        Factors on how threatening each keypoint is, -1 to 1; 0: all alike, as in the paper.
+    avoids : bool
+        Whether to give way at all; without it the arm keeps its post, and threats are still reported.
+    blind_after_s : float
+        The arm stops when the newest perception is older than this. Empty ones count: they say that nobody
+        is seen.
+
+    Examples
+    --------
+    >>> from hicp_lib.robot.home import HOME_M, home_posture
+    >>> from hicp_lib.robot.kinematics import load_icub
+    >>> icub = load_icub()
+    >>> home = home_posture(icub)
+    >>> loop = AvoidanceLoop(Controller(icub, np.array(HOME_M["left"]), home.angles("left")))
+    >>> nobody = Perception(0.0, np.zeros((0, 136, 3)), np.zeros((0, 136)))
+    >>> command, threat = loop.cycle(0.0, home, nobody)
+    >>> command.status, threat.obstacles
+    ('free', [])
+    >>> loop.cycle(2.0, home)[0].reason
+    'no perception in the last 1 s'
     """
 
     controller: Controller
@@ -115,6 +151,19 @@ class AvoidanceLoop:
         """One cycle: take in what was perceived since the last one, if anything, and decide.
 
         Whatever the perception holds, the command is finite and within all bounds.
+
+        Parameters
+        ----------
+        now_s : float
+            In the clock of the loop.
+        posture : Posture
+            The robot's now.
+        perception : Perception, optional
+
+        Returns
+        -------
+        Command
+        Threat
         """
         if perception is not None:
             self.tracker.see(perception.time_s, perception.keypoints_m, perception.scores, now_s)
@@ -129,7 +178,17 @@ class AvoidanceLoop:
         return Command(now_s, velocities, status), threat
 
     def threat(self, now_s: float, posture: Posture) -> Threat:
-        """Activations by what is believed now, and the obstacles they add up to."""
+        """Activations by what is believed now, and the obstacles they add up to.
+
+        Parameters
+        ----------
+        now_s : float
+        posture : Posture
+
+        Returns
+        -------
+        Threat
+        """
         points, weights = self.tracker.points(now_s)
         positions, normals = self.skin.in_root(self.controller.icub, posture)
         activations = self.sensing.activations(

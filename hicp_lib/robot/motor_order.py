@@ -8,6 +8,7 @@ arm joints, then those of the fingers. Source: the robot's documentation and iKi
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.robot.kinematics import ARM_JOINTS, HEAD_JOINTS
@@ -16,42 +17,64 @@ from hicp_lib.robot.tables import read_tables
 TOLERANCE_DEG = 5.0  # robots overshoot their limits a little; a swapped order or radians go beyond
 
 
-def head_from_boards(torso_deg: np.ndarray, head_deg: np.ndarray) -> np.ndarray:
+def head_from_motor_order(torso_deg: ArrayLike, head_deg: ArrayLike) -> np.ndarray:
     """Angles of `HEAD_JOINTS` from the boards of torso and head.
 
     Parameters
     ----------
-    torso_deg : (..., 3) yaw, roll, pitch
-    head_deg : (..., 3 or more) neck pitch, roll, yaw; what follows (the eyes) is left out
+    torso_deg : array, shape (..., 3)
+        Yaw, roll, pitch.
+    head_deg : array, shape (..., 3 or more)
+        Neck pitch, roll, yaw; what follows (the eyes) is left out.
 
     Returns
     -------
-    (..., 6) radians
+    array, shape (..., 6)
+        Radians.
 
     Raises
     ------
     InputError
         For angles that are not finite, or that the robot cannot have: usually another order or unit.
+
+    Examples
+    --------
+    >>> np.rad2deg(head_from_motor_order([30, 20, 10], [1, 2, 3, 0, 0, 0])).round(9)
+    array([10., 20., 30.,  1.,  2.,  3.])
     """
     return _join(torso_deg, head_deg, HEAD_JOINTS)
 
 
-def arm_from_boards(torso_deg: np.ndarray, arm_deg: np.ndarray) -> np.ndarray:
-    """Angles of `ARM_JOINTS` (..., 10) from the boards of torso (..., 3) and arm (..., 7 or more).
+def arm_from_motor_order(torso_deg: ArrayLike, arm_deg: ArrayLike) -> np.ndarray:
+    """Angles of `ARM_JOINTS` from the boards of torso and arm.
 
-    Units and errors as `head_from_boards`; what follows in the arm's board (the fingers) is left out.
+    Parameters
+    ----------
+    torso_deg : array, shape (..., 3)
+        Yaw, roll, pitch.
+    arm_deg : array, shape (..., 7 or more)
+        What follows (the fingers) is left out.
+
+    Returns
+    -------
+    array, shape (..., 10)
+        Radians.
+
+    Raises
+    ------
+    InputError
+        As `head_from_motor_order`.
     """
     return _join(torso_deg, arm_deg, ARM_JOINTS)
 
 
-def _join(torso_deg: np.ndarray, limb_deg: np.ndarray, joints: tuple[str, ...]) -> np.ndarray:
+def _join(torso_deg: ArrayLike, limb_deg: ArrayLike, joints: tuple[str, ...]) -> np.ndarray:
     torso, limb = np.asarray(torso_deg, dtype=float), np.asarray(limb_deg, dtype=float)
     n_limb = len(joints) - 3
     if torso.shape[-1:] != (3,) or limb.ndim != torso.ndim or limb.shape[-1] < n_limb:
-        raise InputError(
-            f"joint angles of shapes {torso.shape} and {limb.shape}: expected rows of 3 (torso: yaw, roll, "
-            f"pitch) and of {n_limb} or more; give as many rows of both"
-        )
+        expected = f"expected rows of 3 (torso: yaw, roll, pitch) and of {n_limb} or more"
+        shapes = f"joint angles of shapes {torso.shape} and {limb.shape}"
+        raise InputError(f"{shapes}: {expected}; give as many rows of both")
     angles = np.concatenate([torso[..., ::-1], limb[..., :n_limb]], axis=-1)
     _check(angles.reshape(-1, len(joints)), joints)
     return np.deg2rad(angles)
@@ -63,7 +86,6 @@ def _check(angles_deg: np.ndarray, joints: tuple[str, ...]) -> None:
     if not possible.all():
         row, column = np.argwhere(~possible)[0]
         low, high = limits[column]
-        raise InputError(
-            f"joint angles: row {row}, {joints[column]}: {angles_deg[row, column]:g} degrees, expected "
-            f"{low:g} to {high:g}; give degrees, the torso as yaw, roll, pitch"
-        )
+        wrong = f"{angles_deg[row, column]:g} degrees, expected {low:g} to {high:g}"
+        hint = "give degrees, the torso as yaw, roll, pitch"
+        raise InputError(f"joint angles: row {row}, {joints[column]}: {wrong}; {hint}")

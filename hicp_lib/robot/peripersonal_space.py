@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hicp_lib.robot.skin import Skin
 
@@ -27,6 +28,7 @@ ACTIVATION_THRESHOLD = 0.2
 
 _TABLE_STEP_M = 1e-4
 _TABLE_M = np.arange(-0.2, 0.6, _TABLE_STEP_M)
+_NEGLIGIBLE = 1e-3
 _BLOCK = 136  # points at once: intermediate arrays of one person's fit the processor's cache
 
 
@@ -36,11 +38,23 @@ class ReceptiveField:
 
     Attributes
     ----------
-    half_angle_rad, skin_radius_m : of the cone: its opening, and its radius where it meets the skin
-        (50 degrees and 7 cm since September 2016; 40 degrees and 5 cm before). It is round here and
-        opens behind the skin as in front of it; the robot's software cuts it square, along axes of the
-        taxel's that are not published.
-    point_radius_m : every point is a ball of this radius (3.5 cm: Nguyen et al. 2018, around keypoints)
+    half_angle_rad, skin_radius_m : float
+        Of the cone: its opening, and its radius where it meets the skin (50 degrees and 7 cm since September
+        2016; 40 degrees and 5 cm before). It is round here and opens behind the skin as in front of it; the
+        robot's software cuts it square, along axes of the taxel's that are not published.
+    point_radius_m : float
+        Every point is a ball of this radius (3.5 cm: Nguyen et al. 2018, around keypoints).
+
+    Examples
+    --------
+    A point 10 cm in front of a taxel, and one behind its cone:
+
+    >>> taxel, up = np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]])
+    >>> field = ReceptiveField()
+    >>> field.activations(taxel, up, np.array([[0, 0, 0.1]]), np.ones(1)).round(2)
+    array([0.54], dtype=float32)
+    >>> field.activations(taxel, up, np.array([[0.2, 0, 0.05]]), np.ones(1))
+    array([0.], dtype=float32)
     """
 
     half_angle_rad: float = np.deg2rad(50.0)
@@ -55,7 +69,7 @@ class ReceptiveField:
     @cached_property
     def reach_m(self) -> float:
         """Distance of a point beyond which nothing is activated by more than 0.001."""
-        return float(_TABLE_M[np.flatnonzero(self.table > 1e-3)[-1]]) + self.point_radius_m
+        return float(_TABLE_M[np.flatnonzero(self.table > _NEGLIGIBLE)[-1]]) + self.point_radius_m
 
     def activations(
         self, positions_m: np.ndarray, normals: np.ndarray, points_m: np.ndarray, gains: np.ndarray
@@ -64,13 +78,17 @@ class ReceptiveField:
 
         Parameters
         ----------
-        positions_m, normals : (n, 3), taxels, in the same frame as the points
-        points_m : (m, 3); what is not finite is left out
-        gains : (m,), factor on the response to each point, at least 0; see `gains`
+        positions_m, normals : array, shape (n, 3)
+            Taxels, in the same frame as the points.
+        points_m : array, shape (m, 3)
+            What is not finite is left out.
+        gains : array, shape (m,)
+            Factor on the response to each point, at least 0; see `gains`.
 
         Returns
         -------
-        (n,) float32, 0 where nothing is near
+        array of float32, shape (n,)
+            0 where nothing is near.
         """
         points, gains = self._near(positions_m, np.asarray(points_m, dtype=float), np.asarray(gains))
         if not len(points):
@@ -119,10 +137,14 @@ class Obstacle:
 
     Attributes
     ----------
-    part : name of the part
-    point_m : (3,) mean of the concerned taxels' positions, weighted by activation; frame of the part's link
-    normal : (3,) mean of their normals, weighted likewise; at most 1 long, less where they differ
-    magnitude : the highest activation
+    part : str
+        Name of the part.
+    point_m : array, shape (3,)
+        Mean of the concerned taxels' positions, weighted by activation; frame of the part's link.
+    normal : array, shape (3,)
+        Mean of their normals, weighted likewise; at most 1 long, less where they differ.
+    magnitude : float
+        The highest activation.
     """
 
     part: str
@@ -131,7 +153,7 @@ class Obstacle:
     magnitude: float
 
 
-def response(distance_m: np.ndarray) -> np.ndarray:
+def response(distance_m: ArrayLike) -> np.ndarray:
     """Activation by a point at a distance from the skin, 0 to 1 (its highest).
 
     Parzen windows over the histogram: every bin's share of touches as a normal curve at the bin's left
@@ -139,18 +161,41 @@ def response(distance_m: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    distance_m : (...), negative behind the skin
+    distance_m : float or array
+        Negative behind the skin.
+
+    Returns
+    -------
+    array
+        Of the same shape.
+
+    Examples
+    --------
+    >>> response(np.array([0.0, 0.1, 0.3])).round(2)
+    array([0.96, 0.43, 0.02])
     """
     return _parzen(np.asarray(distance_m, dtype=float)) / _highest()
 
 
-def gains(weights: np.ndarray, valence: np.ndarray | float = 0.0) -> np.ndarray:
+def gains(weights: ArrayLike, valence: ArrayLike = 0.0) -> np.ndarray:
     """Factors on the responses to points: how far they are believed, times `1 + min(1, valence)`.
 
     Parameters
     ----------
-    weights : (...), 0 to 1, how far each point is believed
-    valence : (...), -1 to 1; 0 neutral, 1 doubles the response, -0.5 halves it
+    weights : float or array
+        0 to 1, how far each point is believed.
+    valence : float or array, optional
+        -1 to 1; 0 neutral, 1 doubles the response, -0.5 halves it.
+
+    Returns
+    -------
+    array
+        Of the arguments' shape.
+
+    Examples
+    --------
+    >>> gains(np.array([1.0, 0.5]), np.array([-0.5, 1.0]))
+    array([0.5, 1. ])
     """
     return np.asarray(weights) * (1 + np.clip(valence, -1.0, 1.0))
 
@@ -160,7 +205,14 @@ def obstacles(skin: Skin, activations: np.ndarray, threshold: float = ACTIVATION
 
     Parameters
     ----------
-    activations : (n,) of the skin's taxels
+    skin : Skin
+    activations : array, shape (n,)
+        Of the skin's taxels.
+    threshold : float, optional
+
+    Returns
+    -------
+    list of Obstacle
     """
     found = []
     for part, rows in skin.slices.items():
@@ -175,8 +227,8 @@ def obstacles(skin: Skin, activations: np.ndarray, threshold: float = ACTIVATION
 
 def _parzen(distance_m: np.ndarray) -> np.ndarray:
     share = POSITIVES / (POSITIVES + NEGATIVES)
-    edges = HISTOGRAM_START_M + BIN_M * np.arange(len(share))
-    return np.exp(-0.5 * ((distance_m[..., None] - edges) / BIN_M) ** 2) @ share
+    edges_m = HISTOGRAM_START_M + BIN_M * np.arange(len(share))
+    return np.exp(-0.5 * ((distance_m[..., None] - edges_m) / BIN_M) ** 2) @ share
 
 
 @cache

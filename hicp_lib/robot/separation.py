@@ -23,11 +23,21 @@ class Separation:
 
     Attributes
     ----------
-    human_m_s, robot_m_s : speeds towards each other
-    reaction_s : T_r, from what happens to the robot's reaction
-    stopping_s : T_s, from there to standstill
-    intrusion_m : C
-    human_uncertainty_m, robot_uncertainty_m : Z_d and Z_r
+    human_m_s, robot_m_s : float
+        Speeds towards each other.
+    reaction_s : float
+        T_r, from what happens to the robot's reaction.
+    stopping_s : float
+        T_s, from there to standstill.
+    intrusion_m : float
+        C.
+    human_uncertainty_m, robot_uncertainty_m : float
+        Z_d and Z_r.
+
+    Examples
+    --------
+    >>> round(Separation(1.0, reaction_s=0.1, stopping_s=0.3, human_uncertainty_m=0.1).distance_m, 3)
+    0.99
     """
 
     robot_m_s: float
@@ -39,7 +49,13 @@ class Separation:
     human_m_s: float = HUMAN_SPEED_M_S
 
     def terms_m(self) -> dict[str, float]:
-        """The summands in metres, by what they stand for."""
+        """The summands of the distance.
+
+        Returns
+        -------
+        dict of str to float
+            By what they stand for.
+        """
         return {
             "person, until the robot stands": self.human_m_s * (self.reaction_s + self.stopping_s),
             "robot, while it reacts": self.robot_m_s * self.reaction_s,
@@ -56,7 +72,18 @@ class Separation:
 
 
 def separation_table(separations: Mapping[str, Separation]) -> pd.DataFrame:
-    """A row per term and for their sum, of each detector: columns `detector`, `term`, `value` (metres)."""
+    """The terms of several detectors and their sums.
+
+    Parameters
+    ----------
+    separations : mapping of str to Separation
+        By detector.
+
+    Returns
+    -------
+    DataFrame
+        A row per term and for their sum, of each detector: columns `detector`, `term`, `value` (metres).
+    """
     rows = [
         {"detector": name, "term": term, "value": value}
         for name, separation in separations.items()

@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 
 from hicp_lib.core.datafiles import DATA_DIR
-from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_json
 from hicp_lib.core.memo import memoised
 from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
+from hicp_lib.robot.tables import read_robot_file
 
 SKIN_FILE = DATA_DIR / "icub_skin.json"
 COLUMNS = ["x_mm", "y_mm", "z_mm", "normal_x", "normal_y", "normal_z"]
@@ -30,12 +29,12 @@ class Skin:
 
     Attributes
     ----------
-    parts : names of the parts, such as "left_forearm"
-    slices : part -> its rows in the arrays
-    positions_m, normals : (n, 3) in the frame of the part's link; normals are unit vectors, outward
+    slices : dict of str to slice
+        Part, such as "left_forearm" -> its rows in the arrays.
+    positions_m, normals : array, shape (n, 3)
+        In the frame of the part's link; normals are unit vectors, outward.
     """
 
-    parts: tuple[str, ...]
     slices: dict[str, slice]
     positions_m: np.ndarray
     normals: np.ndarray
@@ -44,8 +43,18 @@ class Skin:
         return len(self.positions_m)
 
     def in_root(self, icub: ICub, posture: Posture) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (n, 3) in metres and normals (n, 3) of all taxels in the root frame."""
-        chains = {icub.parts[part][0] for part in self.parts}
+        """All taxels in the root frame.
+
+        Parameters
+        ----------
+        icub : ICub
+        posture : Posture
+
+        Returns
+        -------
+        positions_m, normals : array, shape (n, 3)
+        """
+        chains = {icub.parts[part][0] for part in self.slices}
         links = {chain: icub.chains[chain].T_root_links(posture.angles(chain)) for chain in chains}
         positions, normals = np.empty_like(self.positions_m), np.empty_like(self.normals)
         for part, rows in self.slices.items():
@@ -60,24 +69,33 @@ class Skin:
 def read_skin(path: Path = SKIN_FILE) -> Skin:
     """The taxels of the project's robot.
 
+    Parameters
+    ----------
+    path : Path, optional
+
+    Returns
+    -------
+    Skin
+
     Raises
     ------
     InputError
         If the file is missing, or a part of it is incomplete or not numbers.
+
+    Examples
+    --------
+    >>> skin = read_skin()
+    >>> skin.positions_m[skin.slices["left_hand"]].shape
+    (5, 3)
     """
-    data = read_json(path)
-    try:
-        if data["columns"] != COLUMNS:
-            raise ValueError(f"columns are not {', '.join(COLUMNS)}")
-        taxels = {part: _taxels(part, data["parts"]) for part in data["parts"]}
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-        raise InputError(
-            f"{path}: not the robot's skin ({error!r}); restore the file from the repository"
-        ) from None
+    return read_robot_file(path, "skin", COLUMNS, _skin)
+
+
+def _skin(data: dict[str, Any]) -> Skin:
+    taxels = {part: _taxels(part, data["parts"]) for part in data["parts"]}
     ends = np.cumsum([len(rows) for rows in taxels.values()]).tolist()
     rows = np.concatenate(list(taxels.values()))
     return Skin(
-        parts=tuple(taxels),
         slices={part: slice(a, b) for part, a, b in zip(taxels, [0, *ends], ends, strict=False)},
         positions_m=1e-3 * rows[:, :3],
         normals=rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True),
@@ -111,9 +129,9 @@ def _patch(
 
     `front_mm` and `side_mm` are the half-axes; angle 0 is at the front, 90 degrees at the side.
     """
-    axis, angle = np.meshgrid(
-        np.linspace(0, 1, rows), np.deg2rad(np.linspace(*arc_deg, columns)), indexing="ij"
-    )
+    first_deg, last_deg = arc_deg
+    angles = np.deg2rad(np.linspace(first_deg, last_deg, columns))
+    axis, angle = np.meshgrid(np.linspace(0, 1, rows), angles, indexing="ij")
     front, side = np.array(front_mm, dtype=float), np.array(side_mm, dtype=float)
     cos, sin = np.cos(angle)[..., None], np.sin(angle)[..., None]
     centres = np.array(start_mm) + axis[..., None] * (np.array(end_mm) - np.array(start_mm))

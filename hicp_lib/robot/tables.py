@@ -6,9 +6,10 @@ z, moves `d` along z and `a` along x, and turns by `alpha` about x. data/README.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -19,11 +20,23 @@ from hicp_lib.core.memo import memoised
 
 ICUB_FILE = DATA_DIR / "icub.json"
 COLUMNS = ["joint", "link", "a_m", "d_m", "alpha_deg", "offset_deg"]
+Read = TypeVar("Read")
+_MAX_SKEW = 1e-4  # by which a rotation may differ from the nearest one: numbers are rounded
 
 
 @dataclass(frozen=True)
 class Row:
-    """One row of a Denavit-Hartenberg table; without a joint (None) it is held at zero."""
+    """One row of a Denavit-Hartenberg table.
+
+    Attributes
+    ----------
+    joint : str or None
+        Without one it is held at zero.
+    link : str
+        The frame after the row.
+    a_m, d_m : float
+    alpha_rad, offset_rad : float
+    """
 
     joint: str | None
     link: str
@@ -35,7 +48,15 @@ class Row:
 
 @dataclass(frozen=True)
 class Cable:
-    """A bound on a sum of joint angles, from the cables inside the shoulder; infinite where open."""
+    """A bound on a sum of joint angles, from the cables inside the shoulder.
+
+    Attributes
+    ----------
+    joints : dict of str to float
+        Joint -> factor.
+    lower_rad, upper_rad : float
+        Infinite where open.
+    """
 
     joints: dict[str, float]
     lower_rad: float
@@ -48,20 +69,23 @@ class Tables:
 
     Attributes
     ----------
-    T_root_base : (4, 4), before the first row
-    torso : the first two rows of every chain
-    heads : version -> rows of torso yaw and neck
-    eyes : "head" (the point between the eyes, eyes held straight), "left_eye", "right_eye" -> last rows
-    arms : version -> side -> rows of torso yaw and arm
-    limits_rad : set of limits ("table" or "software") -> joint -> (lowest, highest)
-    T_head_camera : name of the camera holder -> (4, 4), pose of the colour camera in the head-centre frame
-    parts : part of the skin -> (chain, link) whose frame it is described in
+    T_root_base : array, shape (4, 4)
+        Before the first row.
+    heads : dict of str to dict
+        Version -> "head" (the point between the eyes, eyes held straight), "left_eye", "right_eye" -> rows.
+    arms : dict of str to dict
+        Version -> side -> rows.
+    limits_rad : dict of str to dict
+        Set of limits ("table" or "software") -> joint -> (lowest, highest).
+    cables : tuple of Cable
+    T_head_camera : dict of str to array, shape (4, 4)
+        Name of the camera holder -> pose of the colour camera in the head-centre frame.
+    parts : dict of str to tuple of str
+        Part of the skin -> (chain, link) whose frame it is described in.
     """
 
     T_root_base: np.ndarray
-    torso: tuple[Row, ...]
-    heads: dict[str, tuple[Row, ...]]
-    eyes: dict[str, tuple[Row, ...]]
+    heads: dict[str, dict[str, tuple[Row, ...]]]
     arms: dict[str, dict[str, tuple[Row, ...]]]
     limits_rad: dict[str, dict[str, tuple[float, float]]]
     cables: tuple[Cable, ...]
@@ -73,31 +97,71 @@ class Tables:
 def read_tables(path: Path = ICUB_FILE) -> Tables:
     """The robot's tables.
 
+    Parameters
+    ----------
+    path : Path, optional
+
+    Returns
+    -------
+    Tables
+
     Raises
     ------
     InputError
         If the file is missing, or a table in it is incomplete or not numbers.
+
+    Examples
+    --------
+    >>> tables = read_tables()
+    >>> list(tables.heads), list(tables.arms), list(tables.T_head_camera)
+    (['v1', 'v2'], ['v1', 'v1.7', 'v2'], ['level', 'tilted'])
+    """
+    return read_robot_file(path, "tables", COLUMNS, _tables)
+
+
+def read_robot_file(path: Path, what: str, columns: list[str], parse: Callable[[dict], Read]) -> Read:
+    """What a JSON file of this project says of the robot.
+
+    Parameters
+    ----------
+    path : Path
+    what : str
+        What the file holds, for the error's message.
+    columns : list of str
+        What its key `columns` must say.
+    parse : callable
+        Makes of its content what is returned; what is wrong there may raise anything but `OSError`.
+
+    Returns
+    -------
+    object
+        What `parse` does.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, has other columns, or cannot be parsed.
     """
     data = read_json(path)
     try:
-        if data["columns"] != COLUMNS:
-            raise ValueError(f"columns are not {', '.join(COLUMNS)}")
-        return _tables(data)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(
-            f"{path}: not the robot's tables ({error!r}); restore the file from the repository"
-        ) from None
+        if data["columns"] != columns:
+            raise ValueError(f"columns are not {', '.join(columns)}")
+        return parse(data)
+    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+        wrong = f"not the robot's {what} ({error!r})"
+        raise InputError(f"{path}: {wrong}; restore the file from the repository") from None
 
 
 def _tables(data: dict[str, Any]) -> Tables:
-    limits = _limits(data["limits_deg"])
+    torso, limits = data["torso"], _limits(data["limits_deg"])
     return Tables(
         T_root_base=_transform(data["T_root_base"]),
-        torso=_rows(data["torso"]),
-        heads={version: _rows(rows) for version, rows in data["head"].items()},
-        eyes={name: _rows(rows) for name, rows in data["eyes"].items()},
+        heads={
+            version: {name: _rows(torso + neck + eye) for name, eye in data["eyes"].items()}
+            for version, neck in data["head"].items()
+        },
         arms={
-            version: {side: _rows(rows) for side, rows in sides.items()}
+            version: {side: _rows(torso + rows) for side, rows in sides.items()}
             for version, sides in data["arm"].items()
         },
         limits_rad={"table": limits, "software": limits | _limits(data["software_limits_deg"])},
@@ -126,12 +190,9 @@ def _limits(limits_deg: dict[str, list[float]]) -> dict[str, tuple[float, float]
 
 
 def _cable(cable: dict[str, Any]) -> Cable:
-    lower, upper = cable["limits_deg"]
-    return Cable(
-        {joint: float(factor) for joint, factor in cable["joints"].items()},
-        -np.inf if lower is None else float(np.deg2rad(lower)),
-        np.inf if upper is None else float(np.deg2rad(upper)),
-    )
+    given = zip(cable["limits_deg"], (-np.inf, np.inf), strict=True)
+    lower_rad, upper_rad = (float(np.deg2rad(none if limit is None else limit)) for limit, none in given)
+    return Cable({joint: float(factor) for joint, factor in cable["joints"].items()}, lower_rad, upper_rad)
 
 
 def _transform(rows: list[list[float]]) -> np.ndarray:
@@ -140,7 +201,7 @@ def _transform(rows: list[list[float]]) -> np.ndarray:
     if T.shape != (4, 4) or not np.isfinite(T).all():
         raise ValueError("a transform is not 4 x 4 numbers")
     u, _, vt = np.linalg.svd(T[:3, :3])
-    if np.abs(u @ vt - T[:3, :3]).max() > 1e-4:
+    if np.abs(u @ vt - T[:3, :3]).max() > _MAX_SKEW:
         raise ValueError("a transform is not a rotation and a translation")
     T[:3, :3] = u @ vt
     return T

@@ -24,14 +24,21 @@ class Trust:
 
     Attributes
     ----------
-    lowest_score, full_score : not believed at or below the first, fully from the second on, linear between
-        (the paper's two thresholds, 0.1 and 0.3)
-    jump_m, speed_m_s : two sightings `dt` apart are of the same thing within `jump_m + speed_m_s * dt`
-    confirm_frames : what appears is believed when it is seen again within so many frames
-    memory_s : what was believed is forgotten after this time: what appears then is new again
-    hold_s : fully believed for this long after the last sighting, which covers a detector's delay
-    fade_s : then falls to 1/e in this time (0.9 per cycle of 20 ms, as in HARMONIOUS, is 0.19 s)
-    max_people : only so many people are followed, the nearest to the robot
+    lowest_score, full_score : float
+        Not believed at or below the first, fully from the second on, linear between (the paper's two
+        thresholds, 0.1 and 0.3).
+    jump_m, speed_m_s : float
+        Two sightings `dt` apart are of the same thing within `jump_m + speed_m_s * dt`.
+    confirm_frames : int
+        What appears is believed when it is seen again within so many frames.
+    memory_s : float
+        What was believed is forgotten after this time: what appears then is new again.
+    hold_s : float
+        Fully believed for this long after the last sighting, which covers a detector's delay.
+    fade_s : float
+        Then falls to 1/e in this time (0.9 per cycle of 20 ms, as in HARMONIOUS, is 0.19 s).
+    max_people : int
+        Only so many people are followed, the nearest to the robot.
     """
 
     lowest_score: float = 0.1
@@ -55,6 +62,22 @@ class KeypointTracker:
     """Remembers what was seen of every person; one object per stream, in the order of time.
 
     A person is recognised from one frame to the next by the keypoints seen in both.
+
+    Parameters
+    ----------
+    trust : Trust, optional
+
+    Examples
+    --------
+    What is seen once is not believed, seen twice it is:
+
+    >>> tracker = KeypointTracker()
+    >>> points_m, scores = np.full((1, 136, 3), np.nan), np.full((1, 136), 0.9)
+    >>> points_m[0, 9] = -0.5, 0.0, 0.1  # the left wrist
+    >>> tracker.see(0.0, points_m, scores, now_s=0.0), tracker.points(0.0)[1][0, 9]
+    (True, np.float64(0.0))
+    >>> tracker.see(0.03, points_m, scores, now_s=0.03), tracker.points(0.03)[1][0, 9]
+    (True, np.float64(1.0))
     """
 
     def __init__(self, trust: Trust | None = None):
@@ -68,14 +91,17 @@ class KeypointTracker:
 
         Parameters
         ----------
-        time_s : when the image was taken; frames from the future, and ones not newer than the last, are
-            left out
-        keypoints_m : (p, 136, 3) in the root frame; NaN where unknown
-        scores : (p, 136)
+        time_s : float
+            When the image was taken; frames from the future, and ones not newer than the last, are left out.
+        keypoints_m : array, shape (p, 136, 3)
+            In the root frame; NaN where unknown.
+        scores : array, shape (p, 136)
+        now_s : float
 
         Returns
         -------
-        whether the frame was taken in
+        bool
+            Whether the frame was taken in.
         """
         if not self.latest_s < time_s <= now_s:
             return False
@@ -90,7 +116,19 @@ class KeypointTracker:
         return True
 
     def points(self, now_s: float) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (p, 136, 3) in the root frame, NaN where nothing is believed, and weights (p, 136)."""
+        """What is believed.
+
+        Parameters
+        ----------
+        now_s : float
+
+        Returns
+        -------
+        points_m : array, shape (p, 136, 3)
+            In the root frame, NaN where nothing is believed.
+        weights : array, shape (p, 136)
+            0 to 1.
+        """
         late_s = np.maximum(now_s - self._memory["believed_s"] - self.trust.hold_s, 0)
         span = self.trust.full_score - self.trust.lowest_score
         weights = np.clip((self._memory["score"] - self.trust.lowest_score) / span, 0, 1)

@@ -11,6 +11,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
+_STEEPNESS = 10  # of the way from full speed to none, over the guard
+
 
 def guarded_bounds(
     q_rad: np.ndarray, limits_rad: np.ndarray, fastest_rad_s: float, guard: float, period_s: float
@@ -23,28 +25,56 @@ def guarded_bounds(
 
     Parameters
     ----------
-    q_rad : (n,); limits_rad : (n, 2)
+    q_rad : array, shape (n,)
+    limits_rad : array, shape (n, 2)
+    fastest_rad_s : float
+    guard : float
+    period_s : float
+        Time between two commands.
 
     Returns
     -------
-    lowest, highest : (n,) rad/s
+    lowest, highest : array, shape (n,)
+        rad/s.
+
+    Examples
+    --------
+    A joint in the middle, and one half way through the guard before its upper limit:
+
+    >>> limits_rad = np.array([[-1.0, 1.0], [-1.0, 1.0]])
+    >>> lowest, highest = guarded_bounds(np.array([0.0, 0.95]), limits_rad, 0.5, 0.05, 0.02)
+    >>> highest.round(3)
+    array([0.5 , 0.25])
     """
     width = guard * (limits_rad[:, 1] - limits_rad[:, 0])
     room = np.stack([q_rad - limits_rad[:, 0], limits_rad[:, 1] - q_rad])
-    slowed = fastest_rad_s * 0.5 * (1 + np.tanh(10 * (room / width - 0.5)))
+    slowed = fastest_rad_s * 0.5 * (1 + np.tanh(_STEEPNESS * (room / width - 0.5)))
     # Bound by the limit itself: one period at that velocity ends on it.
     towards = np.maximum(np.minimum(slowed, room / period_s), -fastest_rad_s)
     return -towards[0], towards[1]
 
 
 def pushes(jacobian: np.ndarray, normal: np.ndarray, gain_rad_s: float) -> np.ndarray:
-    """Joint velocities (n,) that move a point of the skin back from an obstacle: `-J^T n` times the gain.
+    """Joint velocities that move a point of the skin back from an obstacle: `-J^T n` times the gain.
 
     Parameters
     ----------
-    jacobian : (3, n) of the point, root frame
-    normal : (3,) towards the obstacle, root frame
-    gain_rad_s : for a lever arm of one metre
+    jacobian : array, shape (3, n)
+        Of the point, root frame.
+    normal : array, shape (3,)
+        Towards the obstacle, root frame.
+    gain_rad_s : float
+        For a lever arm of one metre.
+
+    Returns
+    -------
+    array, shape (n,)
+        rad/s.
+
+    Examples
+    --------
+    >>> pushes(np.array([[0.3], [0.0], [0.0]]), np.array([1.0, 0.0, 0.0]), 2.0)
+    array([-0.6])
     """
     return -gain_rad_s * (jacobian.T @ normal)
 
@@ -66,8 +96,23 @@ def shape_bounds(
 
     Parameters
     ----------
-    lowest, highest : (n,) rad/s, before
-    obstacles : of each, the velocities (n,) it pushes with (see `pushes`), and its magnitude
+    lowest, highest : array, shape (n,)
+        rad/s, before.
+    obstacles : iterable of tuple
+        Of each, the velocities (n,) it pushes with (see `pushes`), and its magnitude.
+    onset, neutral : float
+        Magnitudes.
+
+    Returns
+    -------
+    lowest, highest : array, shape (n,)
+        rad/s.
+
+    Examples
+    --------
+    >>> low, high = np.array([-0.5]), np.array([0.5])
+    >>> shape_bounds(low, high, [(np.array([0.4]), 0.7)], onset=0.1, neutral=0.2)
+    (array([0.2]), array([0.5]))
     """
     low, high = lowest.copy(), highest.copy()
     for push, magnitude in obstacles:

@@ -25,7 +25,7 @@ from hicp_lib.lifting.robust import METHODS
 from hicp_lib.lifting.table import lift_found
 from hicp_lib.mocap import registration
 from hicp_lib.mocap.clicking import CLICKS_FILE, read_clicks
-from hicp_lib.mocap.reprojection import by_reprojection
+from hicp_lib.mocap.reprojection import register_by_reprojection
 from hicp_lib.mocap.synchronisation import ClockOffset, clock_offset
 from hicp_lib.recordings.qualisys import MotionCapture, read_mocap
 from hicp_lib.recordings.recording import MOCAP_FILE, Recording, open_recording, read_simulation, read_truth
@@ -184,11 +184,11 @@ def register(
     else:
         return Registered([_given(recording)], None, pd.DataFrame())
     matched = registration.lift_clicks(recording, clicks, mocap, offset_s)
-    eight = registration.papers_choice(matched)
-    fits = [registration.same_clicks(eight), registration.all_clicks(matched)]
-    fits.append(by_reprojection(recording, clicks, mocap, fits[-1], offset_s))
+    eight = registration.select_paper_markers(matched)
+    fits = [registration.register_selected(eight), registration.register_robustly(matched)]
+    fits.append(register_by_reprojection(recording, clicks, mocap, fits[-1], offset_s))
     if registration.CAMERA_MARKER in mocap.names:
-        fits.insert(0, registration.as_in_paper(eight, recording, mocap, offset_s))
+        fits.insert(0, registration.register_by_camera_marker(eight, recording, mocap, offset_s))
     return Registered(fits, exact, clicks.merge(eight[["frame", "marker"]]))
 
 

@@ -18,6 +18,7 @@ from hicp_lib.experiments.recordings.open import open_experiment
 from hicp_lib.lifting.table import lift_found
 from hicp_lib.recordings.recording import Recording, read_joints, read_truth
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
+from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.segments import Segment, body_segments
 from hicp_lib.study.mocap import detect_frames
 
@@ -121,4 +122,4 @@ def robot_body(views: Mapping[str, Recording]) -> list[Segment]:
     if joints is None or not set(columns) <= set(joints):
         return []
     head_rad = joints.set_index("frame").loc[0, columns].to_numpy(float)
-    return body_segments(load_icub(), head_rad)
+    return body_segments(load_icub(), Posture(head_rad[:3], head_rad[3:]))

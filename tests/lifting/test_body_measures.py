@@ -5,7 +5,7 @@ import pytest
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
-from hicp_lib.lifting.body_measures import LEVELS, PARENTS, hang_together, load_measures
+from hicp_lib.lifting.body_measures import LEVELS, PARENTS, found_parents, load_measures
 from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
 
@@ -24,13 +24,13 @@ def test_everything_hangs_on_the_right_shoulder():
 
 def test_what_is_not_found_is_skipped():
     found = np.sort([INDEX[name] for name in ("left_shoulder", "left_wrist", "left_index_2", "right_wrist")])
-    above = hang_together(found)
+    above = found_parents(found)
     names = {NAMES[k]: NAMES[found[a]] if a >= 0 else None for k, a in zip(found, above, strict=True)}
     assert names == {
         "left_shoulder": None, "right_wrist": None,
         "left_wrist": "left_shoulder", "left_index_2": "left_wrist",
     }  # fmt: skip
-    assert len(hang_together(np.array([], int))) == 0
+    assert len(found_parents(np.array([], int))) == 0
 
 
 def test_people_in_new_poses_have_these_measures():

@@ -8,10 +8,10 @@ from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND
 from hicp_lib.lifting.hand_shapes import (
     FINGERS,
     PALM,
-    favour_hand_shapes,
     fit_hand,
     hidden_by_limbs,
     load_hand_shapes,
+    with_hand_shapes,
 )
 
 GRID_M = np.arange(0.6, 1.4, 0.02)
@@ -56,7 +56,7 @@ def test_costs_change_only_for_hands_with_enough_of_the_palm():
     found = np.concatenate([[9], LEFT_HAND, RIGHT_HAND[few]])
     places_m = np.concatenate([points_m[:1], points_m, points_m[few]])
     costs = costs_of(places_m[:, 2])
-    with_hands = favour_hand_shapes(costs, GRID_M, places_m / places_m[:, 2:], found)
+    with_hands = with_hand_shapes(costs, GRID_M, places_m / places_m[:, 2:], found)
     changed = (with_hands != costs).any(axis=1)
     assert changed[1:22].any() and not changed[[0, *range(22, 26)]].any()
     assert (with_hands >= costs).all()

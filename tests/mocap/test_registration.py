@@ -9,15 +9,15 @@ from scipy.spatial.transform import Rotation
 
 from hicp_lib.core.camera import Camera, project, transform
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import write_json
 from hicp_lib.mocap.registration import (
     REGISTRATION_FILE,
-    all_clicks,
-    as_in_paper,
     lift_clicks,
-    papers_choice,
     read_registration,
-    same_clicks,
-    write_registration,
+    register_by_camera_marker,
+    register_robustly,
+    register_selected,
+    select_paper_markers,
 )
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import open_recording
@@ -100,9 +100,9 @@ def test_clicks_are_lifted_to_where_the_markers_are(laboratory, clicks):
 
 
 def test_arun_alone_finds_what_the_markers_say(laboratory, clicks):
-    matched = papers_choice(lift_clicks(laboratory[0], clicks, laboratory[1]))
+    matched = select_paper_markers(lift_clicks(laboratory[0], clicks, laboratory[1]))
     assert len(matched) == 8 and matched["frame"].nunique() <= 2
-    registration = same_clicks(matched)
+    registration = register_selected(matched)
     angle, displacement = errors_of(registration)
     assert angle < 0.005 and displacement < 0.005
     assert registration.n_points == 8 and registration.rms_m < 0.004
@@ -111,9 +111,9 @@ def test_arun_alone_finds_what_the_markers_say(laboratory, clicks):
 
 def test_the_papers_translation_is_off_by_where_the_camera_marker_sits(laboratory, clicks):
     recording, mocap = laboratory
-    matched = papers_choice(lift_clicks(recording, clicks, mocap))
-    registration = as_in_paper(matched, recording, mocap)
-    assert np.allclose(registration.T_base_mocap[:3, :3], same_clicks(matched).T_base_mocap[:3, :3])
+    matched = select_paper_markers(lift_clicks(recording, clicks, mocap))
+    registration = register_by_camera_marker(matched, recording, mocap)
+    assert np.allclose(registration.T_base_mocap[:3, :3], register_selected(matched).T_base_mocap[:3, :3])
     _, displacement = errors_of(registration)
     assert displacement == pytest.approx(np.linalg.norm(CAMERA_MARKER_CAM), abs=0.01)
 
@@ -122,16 +122,16 @@ def test_wrong_clicks_do_not_spoil_the_fit_to_many(laboratory, clicks):
     wrong = clicks.copy()
     wrong.loc[::7, "u_px"] += 25
     matched = lift_clicks(laboratory[0], wrong, laboratory[1])
-    robust = all_clicks(matched)
-    assert errors_of(robust)[1] < 0.004 < 0.02 < errors_of(same_clicks(matched))[1]
+    robust = register_robustly(matched)
+    assert errors_of(robust)[1] < 0.004 < 0.02 < errors_of(register_selected(matched))[1]
     assert robust.n_points == len(clicks) - len(wrong[::7])
 
 
 def test_clicks_on_the_wall_behind_are_not_among_the_eight(laboratory, clicks):
     matched = lift_clicks(laboratory[0], clicks, laboratory[1])
     matched.loc[::4, ["x_m", "y_m", "z_m"]] += [-0.4, 0.9, 1.2]
-    eight = papers_choice(matched)
-    assert len(eight) == 8 and same_clicks(eight).rms_m < 0.005
+    eight = select_paper_markers(matched)
+    assert len(eight) == 8 and register_selected(eight).rms_m < 0.005
 
 
 def test_many_clicks_on_the_wall_behind_do_not_spoil_the_fit(laboratory, clicks):
@@ -139,7 +139,7 @@ def test_many_clicks_on_the_wall_behind_do_not_spoil_the_fit(laboratory, clicks)
     rng = np.random.default_rng(0)
     behind = rng.random(len(matched)) < 0.4
     matched.loc[behind, ["x_m", "y_m", "z_m"]] += rng.normal(0, 1.0, (behind.sum(), 3)) + [0.5, 0.5, 1.5]
-    found = all_clicks(matched)
+    found = register_robustly(matched)
     assert errors_of(found)[1] < 0.005 and found.n_points == (~behind).sum()
 
 
@@ -157,18 +157,19 @@ def test_a_missing_camera_marker_is_refused(laboratory, clicks):
     matched = lift_clicks(recording, clicks, mocap)
     without = replace(mocap, names=NAMES[:9], points_m=mocap.points_m[:, :9])
     with pytest.raises(InputError, match="no marker 'camera'"):
-        as_in_paper(matched, recording, without)
+        register_by_camera_marker(matched, recording, without)
     mocap = replace(mocap, points_m=np.full_like(mocap.points_m, np.nan))
     with pytest.raises(InputError, match="measured in no frame"):
-        as_in_paper(matched, recording, mocap)
+        register_by_camera_marker(matched, recording, mocap)
 
 
-def test_a_given_transform_is_read_back(tmp_path, laboratory, clicks):
-    registration = same_clicks(lift_clicks(laboratory[0], clicks, laboratory[1]))
-    write_registration(tmp_path / REGISTRATION_FILE, registration)
+def test_a_given_transform_is_read(tmp_path):
+    write_json(tmp_path / REGISTRATION_FILE, {"T_base_mocap": T_BASE_MOCAP.round(5).tolist()})
     read = read_registration(tmp_path / REGISTRATION_FILE)
-    assert np.array_equal(read.T_base_mocap, registration.T_base_mocap)
-    assert read.method == "given" and read.n_points == 0
+    assert np.array_equal(read.T_base_mocap, T_BASE_MOCAP.round(5))
+    assert (
+        read.method == "given" and read.n_points == 0 and np.isnan([read.rms_m, read.leave_one_out_m]).all()
+    )
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from hicp_lib.core.camera import Camera, project, transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.mocap.registration import Registration
-from hicp_lib.mocap.reprojection import by_reprojection
+from hicp_lib.mocap.reprojection import register_by_reprojection
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import Recording
 
@@ -63,14 +63,14 @@ def displacement_m(T: np.ndarray, exact: np.ndarray, mocap: MotionCapture) -> fl
 @given(st.integers(0, 1000))
 def test_exact_clicks_give_the_exact_transform(seed):
     exact, recording, mocap, clicks, start = laboratory(seed)
-    found = by_reprojection(recording, clicks, mocap, start, offset_s=7.0)
+    found = register_by_reprojection(recording, clicks, mocap, start, offset_s=7.0)
     assert displacement_m(found.T_base_mocap, exact, mocap) < 1e-6
     assert found.rms_m < 1e-6 and found.leave_one_out_m < 1e-6 and found.n_points == 12 * N_IMAGES
 
 
 def test_clicks_a_pixel_off_leave_millimetres():
     exact, recording, mocap, clicks, start = laboratory(3, noise_px=1.0)
-    found = by_reprojection(recording, clicks, mocap, start, offset_s=7.0)
+    found = register_by_reprojection(recording, clicks, mocap, start, offset_s=7.0)
     assert displacement_m(found.T_base_mocap, exact, mocap) < 0.006
     # A pixel in u and in v, at a metre and a half.
     assert 0.5 * 1.41 * 1.5 / 615 < found.rms_m < 1.5 * 1.41 * 1.5 / 615
@@ -80,7 +80,7 @@ def test_wrong_clicks_and_missing_markers_do_little_harm():
     exact, recording, mocap, clicks, start = laboratory(5)
     clicks.loc[::9, "v_px"] += 60
     mocap.points_m[:, 4] = np.nan
-    found = by_reprojection(recording, clicks, mocap, start, offset_s=7.0)
+    found = register_by_reprojection(recording, clicks, mocap, start, offset_s=7.0)
     assert displacement_m(found.T_base_mocap, exact, mocap) < 0.01
     assert found.n_points == 11 * N_IMAGES
 
@@ -88,4 +88,4 @@ def test_wrong_clicks_and_missing_markers_do_little_harm():
 def test_too_few_clicks_are_refused():
     _, recording, mocap, clicks, start = laboratory(0)
     with pytest.raises(InputError, match="5 clicked markers were measured"):
-        by_reprojection(recording, clicks[:5], mocap, start, offset_s=7.0)
+        register_by_reprojection(recording, clicks[:5], mocap, start, offset_s=7.0)

@@ -62,9 +62,10 @@ def test_joint_angles_become_poses(tmp_path):
     header = ",".join(["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)])
     path = tmp_path / "joints.csv"
     path.write_text(f"{header}\n1.5,{','.join(map(str, angles_deg))}\n")
-    source = read_pose_source(path, "tilted")
+    times_s, T_base_cam = read_pose_source(path, "tilted")
     expected = load_icub().T_root_camera(np.radians(angles_deg), "tilted")
-    np.testing.assert_allclose(source.T_base_cam[0], expected)
+    np.testing.assert_allclose(T_base_cam[0], expected)
+    assert times_s.tolist() == [1.5]
     path.write_text(path.read_text().replace("10.0", "ten"))
     with pytest.raises(InputError, match="row 1: expected numbers"):
         read_pose_source(path)

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.robot.kinematics import ARM_JOINTS, HEAD_JOINTS, load_icub
-from hicp_lib.robot.motor_order import arm_from_boards, head_from_boards
+from hicp_lib.robot.motor_order import arm_from_motor_order, head_from_motor_order
+from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.segments import body_segments
 from hicp_lib.robot.tables import ICUB_FILE, read_tables
 
@@ -205,7 +206,7 @@ def test_arms_mirror_each_other(version, left):
 def test_positions_a_real_robot_logged(angles_deg, logged_m):
     """Right hand, from the controller's log in robotology/skeleton3D, Humanoids 2018 data set."""
     close(pose("right", "hand", angles_deg, arm="v1")[:3, 3], logged_m, 2e-6)
-    q = arm_from_boards(angles_deg[2::-1], [*angles_deg[3:], *np.zeros(9)])
+    q = arm_from_motor_order(angles_deg[2::-1], [*angles_deg[3:], *np.zeros(9)])
     close(load_icub().chains["right"].T_root_link("hand", q)[:3, 3], logged_m, 2e-6)
 
 
@@ -310,7 +311,7 @@ def test_limits_and_cables():
 
 
 def test_boards_report_the_torso_the_other_way_round():
-    q = head_from_boards([[30, 20, 10]], [[1, 2, 3, 4, 5, 6]])
+    q = head_from_motor_order([[30, 20, 10]], [[1, 2, 3, 4, 5, 6]])
     close(np.rad2deg(q), [[10, 20, 30, 1, 2, 3]], 1e-12)
 
 
@@ -326,7 +327,7 @@ def test_boards_report_the_torso_the_other_way_round():
 )
 def test_impossible_angles_are_refused(torso_deg, head_deg, says):
     with pytest.raises(InputError, match=says):
-        head_from_boards(torso_deg, head_deg)
+        head_from_motor_order(torso_deg, head_deg)
 
 
 @pytest.mark.parametrize("versions", [{"head": "v3"}, {"arm": "v3"}, {"limits": "none"}])
@@ -359,7 +360,7 @@ def test_spoilt_tables_are_refused(tmp_path, spoil):
 def test_segments_join_up():
     icub = load_icub()
     head, left = np.deg2rad([10, 5, -15, -20, 10, 25]), np.deg2rad(GOLDEN_ARM_DEG)
-    parts = {segment.part: segment for segment in body_segments(icub, head, left)}
+    parts = {segment.part: segment for segment in body_segments(icub, Posture(head[:3], head[3:], left[3:]))}
     close(parts["left_hand"].end_m, icub.chains["left"].T_root_link("hand", left)[:3, 3])
     close(parts["head"].end_m, icub.chains["head"].T_root_link("head", head)[:3, 3])
     close(parts["left_forearm"].end_m, parts["left_hand"].start_m)

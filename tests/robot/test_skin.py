@@ -10,7 +10,7 @@ from hicp_lib.core.files import read_json, write_json
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.skin import SKIN_FILE, read_skin
 
-ARMS_DOWN = Posture(np.zeros(3), np.zeros(3), np.zeros(7), np.zeros(7))
+ARMS_DOWN = Posture()
 MIRROR = np.array([1, -1, 1])
 
 

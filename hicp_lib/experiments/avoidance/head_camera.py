@@ -22,7 +22,7 @@ from hicp_lib.lifting.paper import lift
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.loop import Perception
 from hicp_lib.robot.posture import Posture
-from hicp_lib.robot.self_filter import without_own_body
+from hicp_lib.robot.self_filter import filter_self
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import render
 from hicp_lib.simulation.sensors.depth_camera import D435, simulate_depth
@@ -101,5 +101,5 @@ def perceived(found: Detections, depth_m: np.ndarray, time_s: float, posture: Po
     icub = load_icub()
     in_camera_m = lift(found.keypoints_px, depth_m, COLOUR).points_m
     T_root_camera = icub.T_root_camera(posture.angles("head"), MOUNT)
-    points_m = without_own_body(icub, posture, transform(T_root_camera, in_camera_m))
+    points_m = filter_self(icub, posture, transform(T_root_camera, in_camera_m))
     return Perception(time_s, points_m, found.scores)

@@ -22,10 +22,9 @@ _N_RINGS = 6
 
 def robot_surfaces(icub: ICub, posture: Posture) -> list[Surface]:
     """Torso, shoulders, arms and hands in the world; not the head, which carries the camera."""
-    chains = (posture.angles(name) for name in ("head", "left", "right"))
     return [
         Surface(_capsule(segment), m.plain(_HAND if "hand" in segment.part else _SHELL, 0.35))
-        for segment in body_segments(icub, *chains)
+        for segment in body_segments(icub, posture)
         if segment.part not in ("head", "neck")
     ]
 

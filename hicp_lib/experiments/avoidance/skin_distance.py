@@ -27,8 +27,7 @@ def robot_balls(icub: ICub, skin: Skin, posture: Posture) -> tuple[np.ndarray, n
     """
     taxels, _ = skin.in_root(icub, posture)
     places, radii = [taxels], [np.zeros(len(taxels))]
-    chains = (posture.angles(name) for name in ("head", "left", "right"))
-    for segment in body_segments(icub, *chains):
+    for segment in body_segments(icub, posture):
         if not segment.part.startswith(("left", "right")):
             continue
         n = 2 + int(np.linalg.norm(segment.end_m - segment.start_m) / _STEP_M)

@@ -132,9 +132,8 @@ def _draw_space(axis, run: Run, cycle: pd.Series, frame: pd.Series | None) -> No
 
 
 def _draw_robot(axis, posture: Posture) -> None:
-    chains = (posture.angles(name) for name in ("head", "left", "right"))
     points_per_m = 72 * axis.get_position().width * axis.figure.get_figwidth() / np.ptp(_LIMITS_M[0])
-    segments = body_segments(load_icub(), *chains)
+    segments = body_segments(load_icub(), posture)
     ends = np.stack(_project(np.stack([(s.start_m, s.end_m) for s in segments])), axis=-1)
     widths = [2 * segment.radius_m * points_per_m for segment in segments]
     bars = LineCollection(list(ends), linewidths=widths, colors="#C9CED6", capstyle="round", zorder=0)

@@ -8,6 +8,7 @@ from hicp_lib.core.camera import Camera
 from hicp_lib.recordings.recording import open_recording
 from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.robot.kinematics import load_icub
+from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.segments import body_segments
 from hicp_lib.study.plots import scene3d
 
@@ -50,7 +51,9 @@ def test_the_cloud_is_thinned(recording):
 
 def test_the_scene_holds_robot_cameras_skeletons_and_truth(recording):
     medians = SKELETON.assign(view="upper", detector="mediapipe")
-    figure = scene3d.scene({"upper": recording}, medians, body_segments(load_icub()), {"upper": SKELETON})
+    figure = scene3d.scene(
+        {"upper": recording}, medians, body_segments(load_icub(), Posture()), {"upper": SKELETON}
+    )
     traces = {trace.name: trace for trace in figure.data}
     assert list(traces) == ["point cloud", "robot", "cameras (upper)", "mediapipe (upper)", "true skeleton"]
     arm = traces["mediapipe (upper)"]
