@@ -42,7 +42,8 @@ def test_where_nobody_is_found_every_table_and_figure_is_empty_but_there(world):
     placed = placed_keypoints(truth, found, source)
     assert placed.empty and placed["given"].dtype.kind == "b"
     assert hallucinated_proportions(placed, 0.3, 10).empty
-    assert "(0)" in draw.hallucinated_heads(hallucinated_heads(placed), "drawn").figure.axes[0].get_title("left")
+    heads = draw.hallucinated_heads(hallucinated_heads(placed), "drawn")
+    assert "(0)" in heads.figure.axes[0].get_title("left")
     assert draw.scores_by_state(scores_by_state(placed, 10), "drawn").table.empty
     remarks = paper_remarks(placed, all_errors(truth, found), truth, found, 10)
     assert remarks["measure"].nunique() == len(MEASURES)
