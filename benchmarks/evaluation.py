@@ -22,7 +22,7 @@ from timing import Comparison, best_seconds, run
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import COCO_17, SIGMAS
 from hicp_lib.core.oks import oks
-from hicp_lib.evaluation.ap import cocoeval as engine
+from hicp_lib.evaluation.ap import cocoeval
 from hicp_lib.evaluation.ap.bootstrap import N_RESAMPLES, bootstrap_intervals
 from hicp_lib.evaluation.ap.evaluate import evaluate
 from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
@@ -68,8 +68,8 @@ def _pycocotools_oks(
     people: Annotations, found: dict[int, Detections], sigmas: np.ndarray
 ) -> Callable[[], object]:
     rows = (people.keypoints_px[:, COCO_17], people.visibility[:, COCO_17], people.boxes_px, people.areas_px2)
-    truth = [engine.truth_row(i, *row, False) for i, *row in zip(people.images, *rows, strict=True)]
-    results = [engine.found_row(i, person[COCO_17], 1.0) for i in found for person in found[i].keypoints_px]
+    truth = [cocoeval.truth_row(i, *row, False) for i, *row in zip(people.images, *rows, strict=True)]
+    results = [cocoeval.found_row(i, person[COCO_17], 1.0) for i in found for person in found[i].keypoints_px]
     indexed = []
     for rows in (truth, results):
         coco = COCO()

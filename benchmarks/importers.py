@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from timing import Comparison, best_seconds, run
 
-from hicp_lib.formats.annotations import Annotations, ImageInfo
-from hicp_lib.formats.importers.importing import import_predictions, write_imported
+from hicp_lib.formats.annotations import Annotations, ImageInfo, write_detections
+from hicp_lib.formats.importers.importing import import_predictions
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
 
@@ -78,7 +78,7 @@ def compare(format: str, path: Path, out: Path, annotations: Annotations) -> Ite
     ours_s, base_s = best_seconds(lambda: import_predictions(format, path, annotations), lambda: parse(path))
     yield Comparison(f"import from {format}", ours_s, "`json.loads` of the same files", base_s)
     imported = import_predictions(format, path, annotations)
-    (ours_s,) = best_seconds(lambda: write_imported(out, imported))
+    (ours_s,) = best_seconds(lambda: write_detections(out, imported.detections, imported.extras))
     content = json.loads(out.read_bytes())
     (base_s,) = best_seconds(lambda: json.dumps(content))
     yield Comparison(f"write what {format} found", ours_s, "`json.dumps` of its content", base_s)

@@ -11,6 +11,7 @@ import json
 import math
 import os
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -177,13 +178,13 @@ def _numbered_images(folder: Path) -> dict[int, Path]:
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def import_(kind: str, predictions: Path, annotations: Path, out: Path, score_scale, as_json: bool) -> None:
     """Read the predictions another tool wrote."""
-    from hicp_lib.formats.annotations import read_annotations
-    from hicp_lib.formats.importers.importing import import_predictions, write_imported
+    from hicp_lib.formats.annotations import read_annotations, write_detections
+    from hicp_lib.formats.importers.importing import import_predictions
 
     imported = import_predictions(kind, predictions, read_annotations(annotations), score_scale)
-    write_imported(out, imported)
+    write_detections(out, imported.detections, imported.extras)
     summary = imported.summary
-    click.echo(json.dumps(summary.as_dict(), indent=2) if as_json else "\n".join(summary.lines()))
+    click.echo(json.dumps(asdict(summary), indent=2) if as_json else "\n".join(summary.lines()))
 
 
 @hicp.command("export")

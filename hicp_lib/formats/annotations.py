@@ -24,9 +24,10 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS, NAMES
-from hicp_lib.formats.json_validation import PART_KEYS, Rows, shown
+from hicp_lib.formats.json_validation import PART_KEYS, Rows
 
 PERSON_CATEGORY = 1
+PERSON = {"id": PERSON_CATEGORY, "name": "person", "supercategory": "person"}
 MAX_SIDE_PX = 100_000
 _UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")  # control characters, halves of characters
 _KNOWN_KEYS = {
@@ -36,7 +37,17 @@ _KNOWN_KEYS = {
 
 @dataclass(frozen=True)
 class ImageInfo:
-    """One image of a dataset; `file_name` is relative to the folder of images."""
+    """One image of a dataset.
+
+    Attributes
+    ----------
+    id : int
+        What annotations and detections name it by.
+    file_name : str
+        Relative to the folder of images.
+    width_px, height_px : int
+        Its size.
+    """
 
     id: int
     file_name: str
@@ -50,14 +61,28 @@ class Annotations:
 
     Attributes
     ----------
-    images : image id -> ImageInfo, in the order of the file
-    ids, image_ids : arrays, shape (n,), int64
-    boxes_px : array, shape (n, 4): x, y of the top-left corner, width, height
-    areas_px2 : array, shape (n,): area of the person's segment, the s² of OKS
-    is_crowd : array, shape (n,), bool: never counted; a detection there is neither right nor wrong
-    keypoints_px : array, shape (n, 136, 2); NaN where not labelled
-    visibility : array, shape (n, 136); 0 not labelled, above 0 labelled (1 occluded, 2 visible)
-    extras : per person, the further keys of its JSON object
+    images : dict of int to ImageInfo
+        By image id, in the order of the file.
+    ids, image_ids : array of int64, shape (n,)
+        Of the people, and of the images they are in.
+    boxes_px : array, shape (n, 4)
+        x, y of the top-left corner, width, height.
+    areas_px2 : array, shape (n,)
+        Area of the person's segment, the s² of OKS.
+    is_crowd : array of bool, shape (n,)
+        Never counted; a detection there is neither right nor wrong.
+    keypoints_px : array, shape (n, 136, 2)
+        NaN where not labelled.
+    visibility : array, shape (n, 136)
+        0 not labelled, above 0 labelled (1 occluded, 2 visible).
+    extras : list of dict
+        Per person, the further keys of its JSON object.
+
+    Examples
+    --------
+    >>> nobody = Annotations.concatenate([], {7: ImageInfo(7, "a.png", 640, 480)})
+    >>> len(nobody), nobody.keypoints_px.shape
+    (0, (0, 136, 2))
     """
 
     images: dict[int, ImageInfo]
@@ -73,12 +98,16 @@ class Annotations:
     def __len__(self) -> int:
         return len(self.ids)
 
+    @property
+    def is_other(self) -> np.ndarray:
+        """Who only reaches into the crop of somebody else: array of bool, shape (n,)."""
+        return np.array([bool(extra.get("other")) for extra in self.extras], dtype=bool)
+
     def take(self, rows: np.ndarray) -> Annotations:
         """The people of some rows (indices or a mask); all images stay."""
         rows = np.arange(len(self))[rows]
-        arrays = (self.ids, self.image_ids, self.boxes_px, self.areas_px2, self.is_crowd, self.keypoints_px)
-        chosen = (array[rows] for array in (*arrays, self.visibility))
-        return Annotations(self.images, *chosen, [self.extras[i] for i in rows])
+        arrays = {name: getattr(self, name)[rows] for name in _NOBODY}
+        return replace(self, extras=[self.extras[i] for i in rows], **arrays)
 
     def of_images(self, image_ids: Collection[int]) -> Annotations:
         """The people of some images, and these images only."""
@@ -122,6 +151,15 @@ def source_images(annotations: Annotations) -> dict[int, int]:
 def read_annotations(path: str | Path) -> Annotations:
     """Read COCO, COCO-WholeBody or Halpe keypoint annotations.
 
+    Parameters
+    ----------
+    path : str or Path
+        A JSON file with `images` and `annotations`.
+
+    Returns
+    -------
+    Annotations
+
     Raises
     ------
     InputError
@@ -140,16 +178,14 @@ def read_annotations(path: str | Path) -> Annotations:
 
 def _read_images(rows: Rows) -> dict[int, ImageInfo]:
     ids = rows.unique_integers("id").tolist()
-    sides = {key: rows.integers(key) for key in ("width", "height")}
-    for key, values in sides.items():
-        for i in np.flatnonzero((values < 1) | (values > MAX_SIDE_PX))[:1]:
-            raise rows.error(i, f"{key} is {values[i]}; expected 1 to {MAX_SIDE_PX} pixels")
-    names = rows.column("file_name")
-    for i, name in enumerate(names):
-        if not _is_inside(name):
-            raise rows.error(i, f"file_name is {shown(name)}; expected a name inside the folder of images")
-    widths, heights = (values.tolist() for values in sides.values())
+    names = rows.column("file_name", _is_inside, "a name inside the folder of images")
+    widths, heights = (_sides(rows, key) for key in ("width", "height"))
     return {i: ImageInfo(i, *rest) for i, *rest in zip(ids, names, widths, heights, strict=True)}
+
+
+def _sides(rows: Rows, key: str) -> list[int]:
+    rows.integers(key)
+    return rows.column(key, lambda side: 1 <= side <= MAX_SIDE_PX, f"1 to {MAX_SIDE_PX} pixels")
 
 
 def _is_inside(name: object) -> bool:
@@ -178,16 +214,16 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo]) -> Annotations:
 
 
 def _check_references(rows: Rows, image_ids: np.ndarray, images: dict[int, ImageInfo] | None) -> None:
-    for i, image_id in enumerate(image_ids.tolist()):
+    categories = rows.column("category_id", default=PERSON_CATEGORY)
+    for i, (image_id, category) in enumerate(zip(image_ids.tolist(), categories, strict=True)):
         if images is not None and image_id not in images:
             raise rows.error(i, f"image_id {image_id} is not among the annotated images")
-        category = rows.rows[i].get("category_id", PERSON_CATEGORY)
         if type(category) is not int or category != PERSON_CATEGORY:
             raise rows.error(i, f"category_id is not {PERSON_CATEGORY} (person); leave other categories out")
 
 
 def _crowd_flags(rows: Rows) -> np.ndarray:
-    flags = [row.get("iscrowd", 0) for row in rows.rows]
+    flags = rows.column("iscrowd", default=0)
     for i, flag in enumerate(flags):
         if not isinstance(flag, int | float) or flag not in (0, 1):
             raise rows.error(i, "iscrowd is neither 0 nor 1")
@@ -200,34 +236,67 @@ def write_annotations(path: str | Path, annotations: Annotations) -> None:
     people = [
         {
             **extra, "id": i, "image_id": image, "category_id": PERSON_CATEGORY, "bbox": box, "area": area,
-            "iscrowd": crowd, "num_keypoints": count, "keypoints": keypoints,
+            "iscrowd": crowd, "num_keypoints": count, "keypoints": triples,
         }
-        for extra, i, image, box, area, crowd, count, keypoints in zip(
+        for extra, i, image, box, area, crowd, count, triples in zip(
             a.extras, a.ids.tolist(), a.image_ids.tolist(), a.boxes_px.tolist(), a.areas_px2.tolist(),
             a.is_crowd.astype(int).tolist(), (a.visibility[:, COCO_17] > 0).sum(axis=1).tolist(),
-            _triples(a.keypoints_px, a.visibility), strict=True,
+            keypoint_triples(a.keypoints_px, a.visibility).tolist(), strict=True,
         )
     ]  # fmt: skip
-    images = [
+    category = {**PERSON, "keypoints": list(NAMES)}
+    write_json(path, {"images": image_rows(a), "annotations": people, "categories": [category]})
+
+
+def image_rows(annotations: Annotations) -> list[dict]:
+    """The images as COCO has them in a file."""
+    return [
         {"id": image.id, "file_name": image.file_name, "width": image.width_px, "height": image.height_px}
-        for image in a.images.values()
+        for image in annotations.images.values()
     ]
-    category = {"id": PERSON_CATEGORY, "name": "person", "supercategory": "person", "keypoints": list(NAMES)}
-    write_json(path, {"images": images, "annotations": people, "categories": [category]})
 
 
-def _triples(keypoints_px: np.ndarray, values: np.ndarray) -> list[list[float]]:
-    """(n, 136, 2) and (n, 136) as n lists of 408 numbers, 0, 0, 0 for NaN."""
+def keypoint_triples(keypoints_px: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Keypoints as COCO has them: x, y and a value of each in one row per person.
+
+    Parameters
+    ----------
+    keypoints_px : array, shape (n, k, 2)
+        NaN where not given.
+    values : array, shape (n, k)
+        Flags or scores.
+
+    Returns
+    -------
+    array, shape (n, 3 k)
+        0, 0, 0 for a keypoint that is not given.
+
+    Examples
+    --------
+    >>> keypoint_triples(np.array([[[1.0, 2.0], [np.nan, np.nan]]]), np.array([[2.0, 0.5]]))
+    array([[1., 2., 2., 0., 0., 0.]])
+    """
     given = np.isfinite(keypoints_px).all(axis=-1)[..., None]
     triples = np.where(given, np.concatenate([keypoints_px, values[..., None]], axis=-1), 0.0)
-    return triples.reshape(len(triples), triples.shape[1] * 3).tolist()
+    return triples.reshape(len(triples), 3 * triples.shape[1])
 
 
 def read_detections(path: str | Path, annotations: Annotations | None = None) -> dict[int, Detections]:
     """Read COCO keypoint results (a list of `image_id, category_id, keypoints, score`).
 
-    With `annotations`, every image id must be among theirs, and images without a detection
-    come back with none. People keep the order of the file. An empty list is a result: nobody was found.
+    An empty list is a result: nobody was found.
+
+    Parameters
+    ----------
+    path : str or Path
+        A JSON file.
+    annotations : Annotations, optional
+        Every image id must be among theirs, and images without a detection come back with none.
+
+    Returns
+    -------
+    dict of int to Detections
+        By image id; people keep the order of the file.
 
     Raises
     ------
@@ -241,30 +310,38 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     keypoints = np.where((triples == 0).all(axis=-1, keepdims=True), np.nan, triples[..., :2])
     found = {} if annotations is None else dict.fromkeys(annotations.images, Detections.none())
     order = np.argsort(image_ids, kind="stable")
-    starts = np.flatnonzero(np.diff(image_ids[order])) + 1
-    for chosen in np.split(order, starts) if len(order) else ():
-        found[int(image_ids[chosen[0]])] = Detections(
-            keypoints[chosen], triples[chosen, :, 2], person_scores[chosen]
-        )
+    ids, starts = np.unique(image_ids[order], return_index=True)
+    for image_id, chosen in zip(ids.tolist(), np.split(order, starts[1:]), strict=False):  # none: one empty
+        found[image_id] = Detections(keypoints[chosen], triples[chosen, :, 2], person_scores[chosen])
     return found
 
 
 def write_detections(
-    path: str | Path, detections: dict[int, Detections], extras: Mapping[int, list[dict]] | None = None
+    path: str | Path, detections: Mapping[int, Detections], extras: Mapping[int, list[dict]] | None = None
 ) -> None:
     """Write detections as COCO keypoint results with 136 keypoints in Halpe's order.
 
-    `extras` are further keys of each person's JSON object, by image id; readers pass over them.
+    Parameters
+    ----------
+    path : str or Path
+        The file to write.
+    detections : mapping of int to Detections
+        By image id.
+    extras : mapping of int to list of dict, optional
+        By image id, further keys of each person's JSON object; readers pass over them.
     """
     results = [
-        {
-            **extra, "image_id": int(image_id), "category_id": PERSON_CATEGORY,
-            "keypoints": keypoints, "score": score,
-        }
+        {**extra, **result_row(image_id, triples, score)}
         for image_id, found in detections.items()
-        for keypoints, score, extra in zip(
-            _triples(found.keypoints_px, found.scores), found.person_scores.tolist(),
+        for triples, score, extra in zip(
+            keypoint_triples(found.keypoints_px, found.scores), found.person_scores,
             extras[image_id] if extras is not None else [{}] * len(found), strict=True,
         )
     ]  # fmt: skip
     write_json(path, results)
+
+
+def result_row(image_id: int, triples: np.ndarray, score: float) -> dict:
+    """A detected person as a COCO keypoint result; `triples` is a row of `keypoint_triples`."""
+    return {"image_id": int(image_id), "category_id": PERSON_CATEGORY, "keypoints": triples.tolist(),
+            "score": float(score)}  # fmt: skip

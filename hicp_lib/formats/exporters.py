@@ -25,7 +25,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import write_json
 from hicp_lib.core.keypoints import LIMBS, NAMES, TO_HALPE
-from hicp_lib.formats.annotations import PERSON_CATEGORY, Annotations
+from hicp_lib.formats.annotations import PERSON, Annotations, image_rows, keypoint_triples, result_row
 
 FORMATS = ("coco", "fiftyone")
 LAYOUTS = ("halpe136", "halpe26", "coco17", "wholebody133")
@@ -38,16 +38,27 @@ def export_detections(
     annotations: Annotations | None = None,
     layout: str = "halpe136",
 ) -> int:
-    """Write detections for another tool; the number of people written.
+    """Write detections for another tool.
 
     People without any keypoint in the layout are left out.
 
     Parameters
     ----------
-    format : one of `FORMATS`
-    out : the file to write
-    annotations : of the images; "fiftyone" needs it for their names and sizes
-    layout : one of `LAYOUTS`
+    format : {"coco", "fiftyone"}
+        What to write, as the module says.
+    detections : mapping of int to Detections
+        By image id.
+    out : str or Path
+        The file to write.
+    annotations : Annotations, optional
+        Of the images; "fiftyone" needs it for their names and sizes.
+    layout : {"halpe136", "halpe26", "coco17", "wholebody133"}
+        The keypoints written, and their order.
+
+    Returns
+    -------
+    int
+        The number of people written.
 
     Raises
     ------
@@ -57,33 +68,23 @@ def export_detections(
     for name, value, allowed in (("format", format, FORMATS), ("layout", layout, LAYOUTS)):
         if value not in allowed:
             raise InputError(f"{name} {value!r} is not known; expected one of: {', '.join(allowed)}")
+    people = list(_people(detections, TO_HALPE[layout]))
     if format == "coco":
-        people = list(_people(detections, layout))
         write_json(out, people)
     else:
         images = _images(detections, annotations)
-        people = [
-            row | {"id": i, "iscrowd": 0, **_as_labelled(row)}
-            for i, row in enumerate(_people(detections, layout), start=1)
-        ]
+        people = [row | {"id": i, "iscrowd": 0, **_as_labelled(row)} for i, row in enumerate(people, start=1)]
         write_json(out, {"images": images, "annotations": people, "categories": [_category(layout)]})
     return len(people)
 
 
-def _people(detections: Mapping[int, Detections], layout: str) -> Iterator[dict]:
+def _people(detections: Mapping[int, Detections], keypoints: np.ndarray) -> Iterator[dict]:
     """One COCO keypoint result after the other."""
-    indices = TO_HALPE[layout]
     for image_id, found in detections.items():
-        points, scores = found.keypoints_px[:, indices], found.scores[:, indices]
-        given = np.isfinite(points).all(axis=-1)
-        triples = np.where(given[..., None], np.dstack([points, scores]), 0.0)
-        for i in np.flatnonzero(given.any(axis=1)):
-            yield {
-                "image_id": int(image_id),
-                "category_id": PERSON_CATEGORY,
-                "keypoints": triples[i].ravel().tolist(),
-                "score": float(found.person_scores[i]),
-            }
+        points = found.keypoints_px[:, keypoints]
+        triples = keypoint_triples(points, found.scores[:, keypoints])
+        for i in np.flatnonzero(np.isfinite(points).all(axis=-1).any(axis=1)):
+            yield result_row(image_id, triples[i], found.person_scores[i])
 
 
 def _as_labelled(row: dict) -> dict:
@@ -108,16 +109,11 @@ def _images(detections: Mapping[int, Detections], annotations: Annotations | Non
     unknown = detections.keys() - annotations.images.keys()
     if unknown:
         raise InputError(f"detections of image {min(unknown)}: not among the annotations; give its own")
-    return [
-        {"id": image.id, "file_name": image.file_name, "width": image.width_px, "height": image.height_px}
-        for image in annotations.images.values()
-    ]
+    return image_rows(annotations)
 
 
 def _category(layout: str) -> dict:
     """The person, with keypoint names and limbs; COCO counts keypoints from 1."""
     place = {int(halpe): i for i, halpe in enumerate(TO_HALPE[layout], start=1)}
     skeleton = [[place[a], place[b]] for a, b in LIMBS if a in place and b in place]
-    names = [NAMES[i] for i in TO_HALPE[layout]]
-    return {"id": PERSON_CATEGORY, "name": "person", "supercategory": "person", "keypoints": names,
-            "skeleton": skeleton}  # fmt: skip
+    return {**PERSON, "keypoints": [NAMES[i] for i in TO_HALPE[layout]], "skeleton": skeleton}

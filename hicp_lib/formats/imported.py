@@ -22,10 +22,17 @@ def read_imported(
 
     Parameters
     ----------
-    folder : holds a folder for each detector, of the detector's name, with a file of detections for each
-        subset in it: `mmpose/basic.json`, `mmpose/headless.json`, ..., as `hicp import` and `hicp detect`
-        write them; empty text for none
-    truth : subset -> annotations
+    folder : str or Path
+        Holds a folder for each detector, of the detector's name, with a file of detections for each subset in
+        it: `mmpose/basic.json`, `mmpose/headless.json`, ..., as `hicp import` and `hicp detect` write them;
+        empty text for none.
+    truth : mapping of str to Annotations
+        By subset.
+
+    Returns
+    -------
+    dict of (str, str) to dict of int to Detections
+        By image id, of every subset and detector.
 
     Raises
     ------

@@ -20,15 +20,36 @@ MAX_INTEGER = 2**53  # every JSON reader has them exact up to here
 CONVENTIONS = {17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"}
 # COCO-WholeBody files spread their 133 keypoints over five keys, in this order.
 PART_KEYS = ("foot_kpts", "face_kpts", "lefthand_kpts", "righthand_kpts")
+_REQUIRED = object()
+_Check = Callable[[Any], bool]
 
 
 @dataclass(frozen=True)
 class Rows:
-    """The objects of one list in a file; `label` says how messages name the list.
+    """The objects of one list in a file.
 
-    `name_key` is the key that tells a reader which row is meant ("id", or "image_id").
-    Every method returns one value (or vector) per row, or raises `InputError` for the first
-    row that is not as expected.
+    Every method returns one value (or vector) per row, or raises `InputError` for the first row that is not
+    as expected.
+
+    Attributes
+    ----------
+    path : Path
+        The file, for messages.
+    label : str
+        How messages name the list.
+    rows : list of dict
+        The objects.
+    name_key : str
+        Key that tells a reader which row is meant ("id", or "image_id").
+
+    Examples
+    --------
+    >>> rows = Rows.of(Path("a.json"), "people", [{"id": 3, "area": 20.5}, {"id": 4, "area": []}])
+    >>> rows.unique_integers("id")
+    array([3, 4])
+    >>> rows.integers("area")
+    Traceback (most recent call last):
+    hicp_lib.core.errors.InputError: a.json: people[0] (id 3): area is 20.5; expected a whole number
     """
 
     path: Path
@@ -38,7 +59,23 @@ class Rows:
 
     @classmethod
     def of(cls, path: Path, label: str, value: Any, name_key: str = "id") -> Rows:
-        """Check that `value` is a list of JSON objects."""
+        """Check that a value is a list of JSON objects.
+
+        Parameters
+        ----------
+        path : Path
+            The file it was read from.
+        label : str
+            How messages name the list.
+        value : Any
+            What JSON gave.
+        name_key : str, optional
+            Key that tells a reader which row is meant.
+
+        Returns
+        -------
+        Rows
+        """
         if not isinstance(value, list):
             raise InputError(f"{path}: {label} is {shown(value)}; expected a list of objects")
         for i, row in enumerate(value):
@@ -52,20 +89,37 @@ class Rows:
         named = f" ({self.name_key} {name})" if type(name) is int and abs(name) <= MAX_INTEGER else ""
         return InputError(f"{self.path}: {self.label}[{i}]{named}: {problem}")
 
-    def column(self, key: str) -> list:
-        """The values of a key every row must have."""
-        for i, row in enumerate(self.rows):
-            if key not in row:
+    def column(
+        self, key: str, valid: _Check = lambda _: True, expected: str = "", default: Any = _REQUIRED
+    ) -> list:
+        """The values of a key.
+
+        Parameters
+        ----------
+        key : str
+            The key.
+        valid : callable, optional
+            Whether a value is as expected.
+        expected : str, optional
+            What a value should be, for the message.
+        default : Any, optional
+            Value of rows without the key; left out, every row needs one.
+
+        Returns
+        -------
+        list
+        """
+        values = [row.get(key, default) for row in self.rows]
+        for i, value in enumerate(values):
+            if value is _REQUIRED:
                 raise self.error(i, f"has no {key!r}; every row needs one")
-        return [row[key] for row in self.rows]
+            if not valid(value):
+                raise self.error(i, f"{key} is {shown(value)}; expected {expected}")
+        return values
 
     def integers(self, key: str) -> np.ndarray:
         """Whole numbers, shape (n,), int64."""
-        values = self.column(key)
-        for i, value in enumerate(values):
-            if type(value) is not int or abs(value) > MAX_INTEGER:
-                raise self.error(i, f"{key} is {shown(value)}; expected a whole number")
-        return np.array(values, dtype=np.int64)
+        return np.array(self.column(key, _is_integer, "a whole number"), dtype=np.int64)
 
     def unique_integers(self, key: str) -> np.ndarray:
         """Whole numbers that differ from row to row, shape (n,), int64."""
@@ -78,44 +132,40 @@ class Rows:
                 )
         return values
 
-    def numbers(self, key: str) -> np.ndarray:
-        """Finite numbers, shape (n,)."""
-        return self.finite([[value] for value in self.column(key)], 1, lambda j: key)[:, 0]
+    def numbers(self, key: str, default: Any = _REQUIRED) -> np.ndarray:
+        """Finite numbers, shape (n,); `default` as of `column`."""
+        return self.finite([[value] for value in self.column(key, default=default)], 1, lambda j: key)[:, 0]
 
     def vectors(self, key: str, names: Sequence[str]) -> np.ndarray:
         """Lists of finite numbers, one for each of `names`, shape (n, len(names))."""
-        values = self.column(key)
-        for i, value in enumerate(values):
-            if not isinstance(value, list) or len(value) != len(names):
-                raise self.error(i, f"{key} is {shown(value)}; expected [{', '.join(names)}]")
-        return self.finite(values, len(names), lambda j: f"{key}[{j}] ({names[j]})")
+        n = len(names)
+        values = self.column(key, lambda v: isinstance(v, list) and len(v) == n, f"[{', '.join(names)}]")
+        return self.finite(values, n, lambda j: f"{key}[{j}] ({names[j]})")
 
     def keypoints(self) -> np.ndarray:
         """Triples (x, y, v) in the Halpe-136 order, zeros where the file's convention has no such keypoint.
 
-        Accepts 17 (COCO), 26 (Halpe body), 133 (COCO-WholeBody, also spread over its five
-        keys) and 136 (Halpe) keypoints, row by row.
+        Accepts 17 (COCO), 26 (Halpe body), 133 (COCO-WholeBody, also spread over its five keys) and 136
+        (Halpe) keypoints, row by row.
 
         Returns
         -------
         array, shape (n, 136, 3)
         """
-        values = self.column("keypoints")
-        flat = [self._one_list(i, value) for i, value in enumerate(values)]
+        flat = self._keypoint_lists()
         result = np.zeros((len(flat), N_KEYPOINTS, 3))
         sizes = np.array([len(value) // 3 for value in flat])
         for count, convention in CONVENTIONS.items():
             chosen = np.flatnonzero(sizes == count)
             if len(chosen):
                 lists = [flat[i] for i in chosen]
-                triples = self.finite(lists, 3 * count, _keypoint_namer(convention), chosen)
+                triples = self.finite(lists, 3 * count, _keypoint_namer(convention), chosen.tolist())
                 result[chosen] = to_halpe(triples.reshape(-1, count, 3), convention, axis=-2, fill=0.0)
         return result
 
     def conventions(self) -> list[str]:
         """Per row, the convention its keypoints come in, a key of `hicp_lib.core.keypoints.TO_HALPE`."""
-        lists = enumerate(self.column("keypoints"))
-        return [CONVENTIONS[len(self._one_list(i, value)) // 3] for i, value in lists]
+        return [CONVENTIONS[len(value) // 3] for value in self._keypoint_lists()]
 
     def extras(self, known: Collection[str]) -> list[dict]:
         """Per row, the keys other than `known`; refused where JSON could not be written from them again."""
@@ -129,21 +179,38 @@ class Rows:
                 ) from None
         return extras
 
-    def _one_list(self, i: int, value: Any) -> list:
-        if not isinstance(value, list):
-            raise self.error(i, f"keypoints is {shown(value)}; expected a list of x, y, v per keypoint")
-        row = self.rows[i]
-        if len(value) == 51 and all(isinstance(row.get(key), list) for key in PART_KEYS):
-            value = list(chain(value, *(row[key] for key in PART_KEYS)))
-        if len(value) % 3 or len(value) // 3 not in CONVENTIONS:
-            counts = ", ".join(str(count) for count in CONVENTIONS)
-            raise self.error(i, f"keypoints has {len(value)} numbers; expected 3 per keypoint, of {counts}")
-        return value
+    def _keypoint_lists(self) -> list[list]:
+        """Each row's keypoints in one list; its length is one of `CONVENTIONS`, times 3."""
+        lists = self.column("keypoints", _is_list, "a list of x, y, v per keypoint")
+        for i, row in enumerate(self.rows):
+            if len(lists[i]) == 51 and all(isinstance(row.get(key), list) for key in PART_KEYS):
+                lists[i] = list(chain(lists[i], *(row[key] for key in PART_KEYS)))
+            n = len(lists[i])
+            if n % 3 or n // 3 not in CONVENTIONS:
+                counts = ", ".join(map(str, CONVENTIONS))
+                raise self.error(i, f"keypoints has {n} numbers; expected 3 per keypoint, of {counts}")
+        return lists
 
     def finite(
         self, lists: list[list], width: int, name: Callable[[int], str], rows: Sequence[int] | None = None
     ) -> np.ndarray:
-        """Lists of `width` numbers (of `rows`, default all) as a float array; `name` says what entry j is."""
+        """Lists of finite numbers as an array.
+
+        Parameters
+        ----------
+        lists : list of list
+            The numbers.
+        width : int
+            Length of each list.
+        name : callable
+            What messages call entry j.
+        rows : sequence of int, optional
+            The rows that the lists are of; all when left out.
+
+        Returns
+        -------
+        array, shape (len(lists), width)
+        """
         try:
             # The types first: numpy would take True for 1 and "3" for 3.
             if set(map(type, chain.from_iterable(lists))) <= {int, float}:
@@ -156,7 +223,15 @@ class Rows:
             (i, j) for i, values in enumerate(lists) for j, x in enumerate(values) if not _is_finite(x)
         )
         problem = f"{name(j)} is {shown(lists[i][j])}; expected a finite number up to {MAX_ABS:g}"
-        raise self.error(i if rows is None else int(rows[i]), problem)
+        raise self.error(i if rows is None else rows[i], problem)
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, list)
+
+
+def _is_integer(value: Any) -> bool:
+    return type(value) is int and abs(value) <= MAX_INTEGER
 
 
 def _is_finite(value: Any) -> bool:
@@ -169,7 +244,13 @@ def _keypoint_namer(convention: str) -> Callable[[int], str]:
 
 
 def shown(value: Any) -> str:
-    """A value as a short piece of one line."""
+    """A value as a short piece of one line.
+
+    Examples
+    --------
+    >>> shown(None), shown([1, 2]), shown({}), shown("a"), shown(0.5)
+    ('null', 'a list of 2', 'an object', "the text 'a'", '0.5')
+    """
     if isinstance(value, bool | None):
         return {True: "true", False: "false", None: "null"}[value]
     if isinstance(value, dict):

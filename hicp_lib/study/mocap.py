@@ -19,7 +19,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.runtime.run import detect_images
 from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_ablation
 from hicp_lib.evaluation.space.mocap_error import MIN_SCORES, TABLE_JOINTS, marker_means, mocap_errors
-from hicp_lib.evaluation.space.occlusion import lines_of_sight
+from hicp_lib.evaluation.space.occlusion import joint_occlusion
 from hicp_lib.evaluation.space.stability import POSITION, position_array
 from hicp_lib.lifting.robust import METHODS
 from hicp_lib.lifting.table import lift_found
@@ -258,7 +258,7 @@ def errors_at_joints(
     stamps_s, T_base_mocap = recording.times_s - offset_s, registered.fits[-1].T_base_mocap
     reference = marker_means(mocap, stamps_s, T_base_mocap)
     errors = mocap_errors(points, reference, read_truth(recording))
-    return errors.merge(lines_of_sight(recording, reference), on=["frame", "keypoint"])
+    return errors.merge(joint_occlusion(recording, reference), on=["frame", "keypoint"])
 
 
 def ablation(recording: Recording, stepwise: pd.DataFrame) -> pd.DataFrame | None:

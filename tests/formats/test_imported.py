@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.evaluation.ap.metric_table import compare, groups_of
+from hicp_lib.evaluation.ap.metric_table import compare
+from hicp_lib.evaluation.cases import groups_of
 from hicp_lib.formats.annotations import write_detections
 from hicp_lib.formats.imported import read_imported
 from tests.evaluation.made_people import make_annotations, make_detections

@@ -1,42 +1,47 @@
 """95 % bootstrap intervals of AP and AR: images are drawn with replacement (Efron's percentile interval).
 
-What is resampled are the matches pycocotools made, so a thousand draws cost seconds. Images
-that belong together (crops of one photograph) can be drawn together through `clusters`.
+What is resampled are the matches pycocotools made, so a thousand draws cost seconds. Images that belong
+together (crops of one photograph) can be drawn together through `clusters`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
-from hicp_lib.evaluation.ap import cocoeval as engine
+from hicp_lib.evaluation.ap import cocoeval
 from hicp_lib.evaluation.ap.evaluate import Evaluation
 from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN, PERCENTILES
 
 N_RESAMPLES = 1000
+Clusters = Mapping[int, Hashable]
 
 
 def bootstrap_intervals(
-    evaluation: Evaluation,
-    n_resamples: int = N_RESAMPLES,
-    seed: int = 0,
-    clusters: Mapping[int, Hashable] | None = None,
+    evaluation: Evaluation, n_resamples: int = N_RESAMPLES, seed: int = 0, clusters: Clusters | None = None
 ) -> pd.DataFrame:
     """Figures with their 95 % intervals.
 
     Parameters
     ----------
-    clusters : image id -> anything; images of equal value are drawn together. Default: each by itself
+    evaluation : Evaluation
+        Whose figures.
+    n_resamples : int, optional
+        Number of draws.
+    seed : int, optional
+        Of the draws.
+    clusters : mapping of int to hashable, optional
+        By image id; images of equal value are drawn together. Each by itself when left out.
 
     Returns
     -------
-    DataFrame, columns `metric, value, low, high`; NaN where nobody counts, and no interval from fewer than
-    `MIN_DRAWN` clusters
+    DataFrame
+        Columns `metric, value, low, high`; NaN where nobody counts, and no interval from fewer than
+        `MIN_DRAWN` clusters.
     """
-    samples = resample([evaluation], n_resamples, seed, clusters)[0]
-    return intervals(evaluation.metrics(), samples)
+    return intervals(evaluation.metrics(), resample([evaluation], n_resamples, seed, clusters)[0])
 
 
 def bootstrap_difference(
@@ -44,51 +49,90 @@ def bootstrap_difference(
     b: Evaluation,
     n_resamples: int = N_RESAMPLES,
     seed: int = 0,
-    clusters: Mapping[int, Hashable] | None = None,
+    clusters: Clusters | None = None,
 ) -> pd.DataFrame:
     """Differences a - b with 95 % intervals, both on the same draw of images each time.
 
-    The images are paired by their ids: two detectors on one dataset, or one detector on Basic and
-    Headless, where equal ids mean the same person. Images only one of them has are drawn, too.
-    Parameters and columns as for `bootstrap_intervals`.
+    The images are paired by their ids: two detectors on one dataset, or one detector on Basic and Headless,
+    where equal ids mean the same person. Images only one of them has are drawn, too.
+
+    Parameters
+    ----------
+    a, b : Evaluation
+        What is compared.
+    n_resamples, seed, clusters
+        As of `bootstrap_intervals`.
+
+    Returns
+    -------
+    DataFrame
+        As of `bootstrap_intervals`.
     """
-    of_a, of_b = resample([a, b], n_resamples, seed, clusters)
-    return difference(a, b, of_a, of_b)
+    return difference(a, b, *resample([a, b], n_resamples, seed, clusters))
 
 
 def difference(a: Evaluation, b: Evaluation, of_a: pd.DataFrame, of_b: pd.DataFrame) -> pd.DataFrame:
-    """As `bootstrap_difference`, from the figures of both on the same draws (`resample`)."""
+    """As `bootstrap_difference`, from the figures of both on the same draws.
+
+    Parameters
+    ----------
+    a, b : Evaluation
+        What is compared.
+    of_a, of_b : DataFrame
+        Their figures on the draws, as from one call of `resample`.
+
+    Returns
+    -------
+    DataFrame
+        As of `bootstrap_intervals`.
+    """
     others = b.metrics()
     return intervals({name: value - others[name] for name, value in a.metrics().items()}, of_a - of_b)
 
 
 def resample(
-    evaluations: list[Evaluation],
-    n_resamples: int,
-    seed: int,
-    clusters: Mapping[int, Hashable] | None = None,
+    evaluations: Sequence[Evaluation], n_resamples: int, seed: int, clusters: Clusters | None = None
 ) -> list[pd.DataFrame]:
-    """Figures on `n_resamples` draws of images, per evaluation a DataFrame with a column per metric."""
+    """Figures on draws of images that all evaluations share.
+
+    Parameters
+    ----------
+    evaluations : sequence of Evaluation
+        Paired by their image ids.
+    n_resamples, seed, clusters
+        As of `bootstrap_intervals`.
+
+    Returns
+    -------
+    list of DataFrame
+        Per evaluation `n_resamples` rows and a column per metric; no rows from fewer than `MIN_DRAWN`
+        clusters.
+    """
     image_ids = np.unique(np.concatenate([e.matches.image_ids for e in evaluations]))
     names = [i if clusters is None else clusters[i] for i in image_ids.tolist()]
-    cluster, _ = pd.factorize(np.array([*names, None], dtype=object)[:-1])
-    n_clusters = int(cluster.max(initial=-1)) + 1
+    cluster, clusters_drawn = pd.factorize(pd.Series(names, dtype=object))
+    n = len(clusters_drawn)
     places = [np.searchsorted(image_ids, e.matches.image_ids) for e in evaluations]
     rng = np.random.default_rng(seed)
     rows: list[list[dict]] = [[] for _ in evaluations]
-    for _ in range(n_resamples if n_clusters >= MIN_DRAWN else 0):
-        drawn = np.bincount(rng.integers(n_clusters, size=n_clusters), minlength=n_clusters)
-        weights = drawn[cluster]
-        for e, place, kept in zip(evaluations, places, rows, strict=True):
-            kept.append(engine.metrics(*engine.precision_recall(e.matches, weights[place])))
-    return [pd.DataFrame(kept, columns=list(engine.METRICS)) for kept in rows]
+    for _ in range(n_resamples if n >= MIN_DRAWN else 0):
+        weights = np.bincount(rng.integers(n, size=n), minlength=n)[cluster]
+        for e, place, figures in zip(evaluations, places, rows, strict=True):
+            figures.append(cocoeval.metrics(*cocoeval.precision_recall(e.matches, weights[place])))
+    return [pd.DataFrame(figures, columns=list(cocoeval.METRICS)) for figures in rows]
 
 
-def intervals(values: dict[str, float], samples: pd.DataFrame) -> pd.DataFrame:
-    """Figures by metric, with percentiles over the draws (`resample`) in which somebody counts."""
+def intervals(values: Mapping[str, float], samples: pd.DataFrame) -> pd.DataFrame:
+    """Figures by metric, with percentiles over the draws (`resample`) in which somebody counts.
+
+    Examples
+    --------
+    >>> intervals({"AP": 0.5}, pd.DataFrame({"AP": [0.4, 0.6, np.nan]})).round(3).to_dict("list")
+    {'metric': ['AP'], 'value': [0.5], 'low': [0.405], 'high': [0.595]}
+    """
     rows = []
     for name, value in values.items():
         drawn = samples[name].dropna()
         low, high = np.percentile(drawn, PERCENTILES) if len(drawn) else (np.nan, np.nan)
-        rows.append({"metric": name, "value": value, "low": low, "high": high})
-    return pd.DataFrame(rows)
+        rows.append((name, value, low, high))
+    return pd.DataFrame(rows, columns=["metric", "value", "low", "high"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib.util import find_spec, module_from_spec
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 
@@ -15,12 +15,13 @@ MAX_DETECTIONS = 20
 # Where a keypoint that is not given is put: so far off that it adds 0 to OKS. pycocotools must not
 # see NaN: comparisons with NaN fail, and then everything matches.
 _FAR_PX = -1e12
+_AT_75 = 5  # index into `OKS_THRESHOLDS`
 
 
-def _quiet(name: str) -> ModuleType:
+def _quiet(name: str) -> Any:
     """A module of pycocotools as a copy that prints nothing: the caller's standard output is left alone."""
-    spec = find_spec(f"pycocotools.{name}")
-    module = module_from_spec(spec)
+    spec: Any = find_spec(f"pycocotools.{name}")
+    module: Any = module_from_spec(spec)
     module.print = lambda *_: None
     spec.loader.exec_module(module)
     return module
@@ -35,9 +36,12 @@ class Matches:
 
     Attributes
     ----------
-    image_ids, n_people : arrays, shape (n_images,): people who count, per image
-    image_rows : array, shape (n_detections,): the detections' rows in `image_ids`
-    is_true, is_false : arrays, shape (10, n_detections), bool, per OKS threshold; both False if ignored
+    image_ids, n_people : array of int, shape (n_images,)
+        The images, and the people in each who count.
+    image_rows : array of int, shape (n_detections,)
+        The detections' rows in `image_ids`.
+    is_true, is_false : array of bool, shape (10, n_detections)
+        Per OKS threshold; both False if ignored.
     """
 
     image_ids: np.ndarray
@@ -51,7 +55,27 @@ def truth_row(
     image_id: int, keypoints_px: np.ndarray, visibility: np.ndarray, box_px: np.ndarray, area_px2: float,
     ignored: bool,
 ) -> dict:  # fmt: skip
-    """An annotated person for `run`: keypoints (k, 2) and visibility (k,) of the group."""
+    """An annotated person for `run`.
+
+    Parameters
+    ----------
+    image_id : int
+        The image.
+    keypoints_px : array, shape (k, 2)
+        Of the group.
+    visibility : array, shape (k,)
+        Above 0 where labelled.
+    box_px : array, shape (4,)
+        x, y, width, height.
+    area_px2 : float
+        The s² of OKS.
+    ignored : bool
+        Whether the person does not count.
+
+    Returns
+    -------
+    dict
+    """
     labelled = visibility > 0
     return {
         "image_id": image_id, "bbox": box_px.tolist(), "area": float(area_px2), "iscrowd": int(ignored),
@@ -60,7 +84,21 @@ def truth_row(
 
 
 def found_row(image_id: int, keypoints_px: np.ndarray, score: float) -> dict:
-    """A detection for `run`: keypoints (k, 2) of the group, NaN where not given."""
+    """A detection for `run`.
+
+    Parameters
+    ----------
+    image_id : int
+        The image.
+    keypoints_px : array, shape (k, 2)
+        Of the group; NaN where not given.
+    score : float
+        What detections are ranked by.
+
+    Returns
+    -------
+    dict
+    """
     given = np.isfinite(keypoints_px).all(axis=-1)
     # COCO ignores unmatched detections by their area; with one range over all areas any value does.
     keypoints = _triples(keypoints_px, given, _FAR_PX)
@@ -79,48 +117,53 @@ def run(
 
     Parameters
     ----------
-    image_ids : all images
-    truth, found : rows from `truth_row` and `found_row`
+    image_ids : list of int
+        All images.
+    truth, found : list of dict
+        Rows from `truth_row` and `found_row`.
     sigmas : array, shape (k,)
+        Constants of the keypoints.
 
     Returns
     -------
-    precision (10, 101), recall (10,) : per OKS threshold; NaN when nobody counts
-    Matches
+    precision : array, shape (10, 101)
+        Per OKS threshold and recall; NaN when nobody counts.
+    recall : array, shape (10,)
+        Per OKS threshold; NaN when nobody counts.
+    matches : Matches
+        Which detections are right.
     """
-    engine = COCOeval(_index(image_ids, truth), _index(image_ids, found), "keypoints")
-    engine.params.kpt_oks_sigmas = sigmas
-    engine.params.maxDets = [MAX_DETECTIONS]
-    engine.params.iouThrs, engine.params.recThrs = OKS_THRESHOLDS, RECALLS
-    engine.params.areaRng, engine.params.areaRngLbl = [[0.0, np.inf]], ["all"]
-    engine.evaluate()
-    engine.accumulate()
-    precision, recall = engine.eval["precision"][:, :, 0, 0, 0], engine.eval["recall"][:, 0, 0, 0]
-    return np.where(precision < 0, np.nan, precision), np.where(recall < 0, np.nan, recall), _matches(engine)
+    cocoeval = COCOeval(_index(image_ids, truth), _index(image_ids, found), "keypoints")
+    cocoeval.params.kpt_oks_sigmas = sigmas
+    cocoeval.params.maxDets = [MAX_DETECTIONS]
+    cocoeval.params.iouThrs, cocoeval.params.recThrs = OKS_THRESHOLDS, RECALLS
+    cocoeval.params.areaRng, cocoeval.params.areaRngLbl = [[0.0, np.inf]], ["all"]
+    cocoeval.evaluate()
+    cocoeval.accumulate()
+    precision, recall = cocoeval.eval["precision"][:, :, 0, 0, 0], cocoeval.eval["recall"][:, 0, 0, 0]
+    return (
+        np.where(precision < 0, np.nan, precision),
+        np.where(recall < 0, np.nan, recall),
+        _matches(cocoeval),
+    )
 
 
-def _index(image_ids: list[int], rows: list[dict]) -> COCO:
+def _index(image_ids: list[int], rows: list[dict]) -> Any:
     # Ids start at 1: to pycocotools a match with id 0 is no match.
     numbered = [{**row, "id": i, "category_id": 1} for i, row in enumerate(rows, start=1)]
     coco = COCO()
-    coco.dataset = {
-        "images": [{"id": i} for i in image_ids],
-        "annotations": numbered,
-        "categories": [{"id": 1}],
-    }
+    images = [{"id": i} for i in image_ids]
+    coco.dataset = {"images": images, "annotations": numbered, "categories": [{"id": 1}]}
     coco.createIndex()
     return coco
 
 
-def _matches(engine: COCOeval) -> Matches:
-    image_ids = np.array(engine.params.imgIds, dtype=np.int64)
+def _matches(cocoeval: Any) -> Matches:
+    image_ids = np.array(cocoeval.params.imgIds, dtype=np.int64)
     n_people = np.zeros(len(image_ids), dtype=int)
-    rows, scores = [np.zeros(0, dtype=int)], [np.zeros(0)]
-    right, wrong = (
-        [np.zeros((len(OKS_THRESHOLDS), 0), dtype=bool)],
-        [np.zeros((len(OKS_THRESHOLDS), 0), dtype=bool)],
-    )
-    for i, image in enumerate(engine.evalImgs):
+    none = np.zeros((len(OKS_THRESHOLDS), 0), dtype=bool)
+    rows, scores, right, wrong = [np.zeros(0, dtype=int)], [np.zeros(0)], [none], [none]
+    for i, image in enumerate(cocoeval.evalImgs):
         if image is not None:
             n_people[i] = np.count_nonzero(np.asarray(image["gtIgnore"]) == 0)
             rows.append(np.full(len(image["dtScores"]), i))
@@ -134,13 +177,23 @@ def _matches(engine: COCOeval) -> Matches:
 
 
 def precision_recall(matches: Matches, weights: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """COCO's interpolated precision and final recall when image i occurs `weights[i]` times (default once).
+    """COCO's interpolated precision and final recall when images occur several times, or not at all.
 
     With all weights 1 this repeats pycocotools to the bit.
 
+    Parameters
+    ----------
+    matches : Matches
+        Which detections are right.
+    weights : array of int, shape (n_images,), optional
+        How often each image occurs; once when left out.
+
     Returns
     -------
-    precision (10, 101), recall (10,); NaN when nobody counts
+    precision : array, shape (10, 101)
+        NaN when nobody counts.
+    recall : array, shape (10,)
+        NaN when nobody counts.
     """
     weights = np.ones(len(matches.image_ids), dtype=int) if weights is None else weights
     n_people = int((matches.n_people * weights).sum())
@@ -158,6 +211,12 @@ def precision_recall(matches: Matches, weights: np.ndarray | None = None) -> tup
 
 
 def metrics(precision: np.ndarray, recall: np.ndarray) -> dict[str, float]:
-    """AP, AP50, AP75, AR, AR50, AR75 from precision (10, 101) and recall (10,)."""
-    values = (precision.mean(), precision[0].mean(), precision[5].mean(), recall.mean(), recall[0], recall[5])
+    """AP, AP50, AP75, AR, AR50, AR75 from precision (10, 101) and recall (10,).
+
+    Examples
+    --------
+    >>> metrics(np.full((10, 101), 0.5), np.linspace(1.0, 0.1, 10))["AR75"]
+    0.5
+    """
+    values = [part.mean() for of in (precision, recall) for part in (of, of[0], of[_AT_75])]
     return dict(zip(METRICS, map(float, values), strict=True))

@@ -19,9 +19,9 @@ image take part.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Literal, get_args, get_type_hints
+from typing import Any, Literal, get_args, get_type_hints
 
 import numpy as np
 import pandas as pd
@@ -29,14 +29,28 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import GROUPS, N_KEYPOINTS, NAMES, SIGMAS
-from hicp_lib.core.oks import oks
-from hicp_lib.evaluation.ap import cocoeval as engine
+from hicp_lib.evaluation.ap import cocoeval
+from hicp_lib.evaluation.matching import best_oks
 from hicp_lib.formats.annotations import Annotations
+
+_SEGMENT_OF_BOX = 0.53  # area of a person's segment over that of the box, as tools take it
 
 
 @dataclass(frozen=True)
 class Options:
-    """The choices of an evaluation; the module's text explains them."""
+    """The choices of an evaluation; the module's text explains them.
+
+    Raises
+    ------
+    InputError
+        For a value that is not known.
+
+    Examples
+    --------
+    >>> Options(area="bbox")
+    Traceback (most recent call last):
+    hicp_lib.core.errors.InputError: option area='bbox': expected one of segment, box, box53, source
+    """
 
     sigmas: Literal["halpe", "wholebody"] = "halpe"
     area: Literal["segment", "box", "box53", "source"] = "segment"
@@ -58,13 +72,24 @@ class Evaluation:
 
     Attributes
     ----------
-    AP, AP50, AP75, AR, AR50, AR75 : floats in [0, 1]; NaN when nobody counts
-    n_people : people who count
-    n_ignored : crowds, other people, people without a labelled keypoint of the group
-    n_images, n_detections : images, and detections that take part
-    precision : array, shape (10, 101), per OKS threshold .5:.05:.95 at recall 0:.01:1
-    recall : array, shape (10,), per OKS threshold
-    matches : what the bootstrap resamples
+    group : str
+        Of keypoints.
+    options : Options
+        The choices made.
+    AP, AP50, AP75, AR, AR50, AR75 : float
+        In [0, 1]; NaN when nobody counts.
+    n_people : int
+        People who count.
+    n_ignored : int
+        Crowds, other people, people without a labelled keypoint of the group.
+    n_images, n_detections : int
+        Images, and detections that take part.
+    precision : array, shape (10, 101)
+        Per OKS threshold .5:.05:.95 at recall 0:.01:1.
+    recall : array, shape (10,)
+        Per OKS threshold.
+    matches : Matches
+        What the bootstrap resamples.
     """
 
     group: str
@@ -81,11 +106,11 @@ class Evaluation:
     n_detections: int
     precision: np.ndarray
     recall: np.ndarray
-    matches: engine.Matches
+    matches: cocoeval.Matches
 
     def metrics(self) -> dict[str, float]:
         """The six figures by name."""
-        return {name: getattr(self, name) for name in engine.METRICS}
+        return {name: getattr(self, name) for name in cocoeval.METRICS}
 
     def row(self) -> dict:
         """Group, options, figures and counts, as one row of a table."""
@@ -95,14 +120,24 @@ class Evaluation:
 
 
 def evaluate(
-    annotations: Annotations, detections: dict[int, Detections], group: str = "body", **options: str
+    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body", **options: Any
 ) -> Evaluation:
     """Evaluate detections on every annotated image; an image without an entry has none.
 
     Parameters
     ----------
-    group : "body" (the 17 keypoints all detectors share) or "hand" (42)
-    options : fields of `Options`
+    annotations : Annotations
+        The truth.
+    detections : mapping of int to Detections
+        By image id.
+    group : {"body", "hand"}
+        The 17 keypoints all detectors share, or the 42 of the hands.
+    **options : str
+        Fields of `Options`.
+
+    Returns
+    -------
+    Evaluation
 
     Raises
     ------
@@ -115,21 +150,21 @@ def evaluate(
     people = _people_seen(annotations, group, chosen)
     keypoints = GROUPS[group]
     truth = [
-        engine.truth_row(image_id, *arrays)
+        cocoeval.truth_row(image_id, *arrays)
         for image_id, *arrays in zip(
             people.image_ids.tolist(), people.keypoints_px[:, keypoints], people.visibility[:, keypoints],
             people.boxes_px, people.areas_px2, people.is_crowd, strict=True,
         )
     ]  # fmt: skip
     found = list(_detections_seen(detections, keypoints, chosen))
-    precision, recall, matches = engine.run(
+    precision, recall, matches = cocoeval.run(
         list(annotations.images), truth, found, SIGMAS[chosen.sigmas][keypoints]
     )
     n_people = int(matches.n_people.sum())
     return Evaluation(
         group=group,
         options=chosen,
-        **engine.metrics(precision, recall),
+        **cocoeval.metrics(precision, recall),
         n_people=n_people,
         n_ignored=len(people) - n_people,
         n_images=len(annotations.images),
@@ -140,23 +175,28 @@ def evaluate(
     )
 
 
-def check_detections(detections: dict[int, Detections], annotations: Annotations) -> None:
-    """Refuse what pycocotools would swallow or stumble over: see `evaluate`."""
+def check_detections(detections: Mapping[int, Detections], annotations: Annotations) -> None:
+    """Refuse what pycocotools would swallow or stumble over.
+
+    Raises
+    ------
+    InputError
+        As `evaluate`.
+    """
     for image_id, found in detections.items():
         where = f"detections of image {image_id}"
         if image_id not in annotations.images:
             raise InputError(
                 f"{where}: not among the annotated images; evaluate them on their own annotations"
             )
-        shapes = (found.keypoints_px.shape, found.scores.shape)
-        if shapes != ((len(found), N_KEYPOINTS, 2), (len(found), N_KEYPOINTS)):
+        shapes, n = (found.keypoints_px.shape, found.scores.shape), len(found)
+        if shapes != ((n, N_KEYPOINTS, 2), (n, N_KEYPOINTS)):
             raise InputError(
                 f"{where}: shapes {shapes}; expected (n, {N_KEYPOINTS}, 2) and (n, {N_KEYPOINTS})"
             )
-        for i in np.flatnonzero(~np.isfinite(found.person_scores))[:1]:
-            raise InputError(
-                f"{where}: score of person {i} is {found.person_scores[i]}; expected a finite number"
-            )
+        for i, score in enumerate(found.person_scores):
+            if not np.isfinite(score):
+                raise InputError(f"{where}: score of person {i} is {score}; expected a finite number")
         # A keypoint that is not given is NaN in both coordinates and has score 0; all others are finite.
         given = ~np.isnan(found.keypoints_px).all(axis=-1)
         sound = np.where(given, np.isfinite(found.keypoints_px).all(axis=-1), found.scores == 0)
@@ -172,7 +212,7 @@ def _people_seen(annotations: Annotations, group: str, options: Options) -> Anno
     labelled = (annotations.visibility[:, GROUPS[group]] > 0).any(axis=1)
     seen = labelled | annotations.is_crowd | (options.unlabelled == "ignore")
     if options.others == "count":
-        seen &= ~np.array([bool(extra.get("other")) for extra in annotations.extras], dtype=bool)
+        seen &= ~annotations.is_other
     people = annotations.take(seen)
     return replace(people, areas_px2=_areas(people, options.area))
 
@@ -181,7 +221,7 @@ def _areas(people: Annotations, area: str) -> np.ndarray:
     box = people.boxes_px[:, 2] * people.boxes_px[:, 3]
     if area == "source":
         return np.array([_source_area(people, i) for i in range(len(people))], dtype=float)
-    return {"segment": people.areas_px2, "box": box, "box53": 0.53 * box}[area]
+    return {"segment": people.areas_px2, "box": box, "box53": _SEGMENT_OF_BOX * box}[area]
 
 
 def _source_area(people: Annotations, i: int) -> float:
@@ -192,11 +232,11 @@ def _source_area(people: Annotations, i: int) -> float:
         raise InputError(
             f"annotation {people.ids[i]}: has no 'source_area'; area 'source' is for HiCP folders"
         )
-    return value
+    return float(value)
 
 
 def _detections_seen(
-    detections: dict[int, Detections], keypoints: np.ndarray, options: Options
+    detections: Mapping[int, Detections], keypoints: np.ndarray, options: Options
 ) -> Iterator[dict]:
     for image_id, found in detections.items():
         points = found.keypoints_px[:, keypoints]
@@ -206,48 +246,60 @@ def _detections_seen(
             scores = found.scores[:, keypoints].sum(axis=-1) / np.maximum(given.sum(axis=-1), 1)
         for person, any_given, score in zip(points, given.any(axis=-1), scores, strict=True):
             if any_given or options.absent == "count":
-                yield engine.found_row(image_id, person, score)
+                yield cocoeval.found_row(image_id, person, score)
 
 
 def person_oks(
-    annotations: Annotations, detections: dict[int, Detections], group: str = "body", **options: str
+    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body", **options: Any
 ) -> pd.DataFrame:
     """OKS of the best-fitting detection for each person who counts, 0 when nobody was found.
 
-    Parameters as for `evaluate`. Columns: `image_id, annotation_id, oks, n_labelled`.
+    Parameters
+    ----------
+    annotations, detections, group, **options
+        As of `evaluate`.
+
+    Returns
+    -------
+    DataFrame
+        Columns `image_id, annotation_id, oks, n_labelled`.
     """
     chosen = Options(**options)
     check_detections(detections, annotations)
     people = _people_seen(annotations, group, chosen)
-    keypoints, sigmas = GROUPS[group], SIGMAS[chosen.sigmas][GROUPS[group]]
-    labelled = people.visibility[:, keypoints] > 0
-    rows = []
-    for i in np.flatnonzero(labelled.any(axis=1) & ~people.is_crowd):
-        found = detections.get(int(people.image_ids[i]), Detections.none()).keypoints_px[:, keypoints]
-        truth = people.keypoints_px[i, keypoints]
-        fits = oks(truth, labelled[i], people.boxes_px[i], people.areas_px2[i], found, sigmas)
-        rows.append(
-            (int(people.image_ids[i]), int(people.ids[i]), fits.max(initial=0.0), int(labelled[i].sum()))
-        )
+    keypoints = GROUPS[group]
+    n_labelled = (people.visibility[:, keypoints] > 0).sum(axis=1)
+    rows = [
+        (people.image_ids[i], people.ids[i], fit, n_labelled[i])
+        for i, fit in best_oks(people, detections, keypoints, SIGMAS[chosen.sigmas][keypoints])
+    ]
     return pd.DataFrame(rows, columns=["image_id", "annotation_id", "oks", "n_labelled"])
 
 
 def sensitivity_table(
-    annotations: Annotations, detections: dict[int, Detections], group: str = "body"
+    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body"
 ) -> pd.DataFrame:
     """How the figures move when one option at a time leaves its default.
 
-    Columns: `changed` ("default", or e.g. "area=box"), those of `Evaluation.row`, and `AP_change` against
-    the default. Area "source" is left out where people have none.
+    Parameters
+    ----------
+    annotations, detections, group
+        As of `evaluate`.
+
+    Returns
+    -------
+    DataFrame
+        Columns `changed` ("default", or e.g. "area=box"), those of `Evaluation.row`, and `AP_change` against
+        the default. Area "source" is left out where people have none.
     """
     counted = np.flatnonzero(~annotations.is_crowd)
     has_source = all("source_area" in annotations.extras[i] for i in counted)
-    variants: list[dict[str, str]] = [{}]
+    variants: dict[str, dict[str, str]] = {"default": {}}
     for name, kind in get_type_hints(Options).items():
-        variants += [{name: value} for value in get_args(kind)[1:] if value != "source" or has_source]
-    rows = []
-    for variant in variants:
-        changed = ", ".join(f"{name}={value}" for name, value in variant.items()) or "default"
-        rows.append({"changed": changed, **evaluate(annotations, detections, group, **variant).row()})
-    table = pd.DataFrame(rows)
+        values = [value for value in get_args(kind)[1:] if value != "source" or has_source]
+        variants |= {f"{name}={value}": {name: value} for value in values}
+    table = pd.DataFrame(
+        {"changed": changed, **evaluate(annotations, detections, group, **variant).row()}
+        for changed, variant in variants.items()
+    )
     return table.assign(AP_change=table["AP"] - table["AP"].iloc[0])

@@ -7,15 +7,17 @@ of the hand alone (its labelled points, the person's area) above .5.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND, SIGMAS
-from hicp_lib.core.oks import oks
 from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals
 from hicp_lib.evaluation.ap.evaluate import check_detections, evaluate
+from hicp_lib.evaluation.cases import Found, Truth
+from hicp_lib.evaluation.matching import best_oks
 from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
 from hicp_lib.formats.annotations import Annotations, source_images
 
@@ -35,63 +37,67 @@ def hand_oks(
 ) -> pd.DataFrame:
     """OKS of each labelled hand of the people who count, with the detection that fits it best.
 
+    Parameters
+    ----------
+    annotations : Annotations
+        The truth.
+    detections : mapping of int to Detections
+        By image id.
+    sigmas : {"halpe", "wholebody"}
+        Constants of the keypoints.
+
     Returns
     -------
-    DataFrame, columns `image_id, annotation_id, side` ("left", "right"), `oks` (0 when not found)
+    DataFrame
+        Columns `image_id, annotation_id, side` ("left", "right"), `oks` (0 when not found).
 
     Raises
     ------
     InputError
         As `hicp_lib.evaluation.ap.evaluate.evaluate`.
     """
-    check_detections(dict(detections), annotations)
-    rows = []
-    for side, points in (("left", LEFT_HAND), ("right", RIGHT_HAND)):
-        labelled = annotations.visibility[:, points] > 0
-        for i in np.flatnonzero(labelled.any(axis=1) & ~annotations.is_crowd):
-            if annotations.extras[i].get("other"):
-                continue
-            image_id = int(annotations.image_ids[i])
-            fits = oks(
-                annotations.keypoints_px[i, points], labelled[i], annotations.boxes_px[i],
-                annotations.areas_px2[i], detections.get(image_id, Detections.none()).keypoints_px[:, points],
-                SIGMAS[sigmas][points],
-            )  # fmt: skip
-            rows.append((image_id, int(annotations.ids[i]), side, float(fits.max(initial=0.0))))
+    check_detections(detections, annotations)
+    people = annotations.take(~annotations.is_other)
+    rows = [
+        (people.image_ids[i], people.ids[i], side, fit)
+        for side, points in (("left", LEFT_HAND), ("right", RIGHT_HAND))
+        for i, fit in best_oks(people, detections, points, SIGMAS[sigmas][points])
+    ]
     return pd.DataFrame(rows, columns=["image_id", "annotation_id", "side", "oks"])
 
 
 def compare_hands(
-    truth: Mapping[str, Annotations],
-    found: Mapping[tuple[str, str], Mapping[int, Detections]],
-    baseline: str,
-    n_resamples: int = 1000,
-    seed: int = 0,
+    truth: Truth, found: Found, baseline: str, n_resamples: int = 1000, seed: int = 0
 ) -> pd.DataFrame:
     """Average precision of hands and hands found, against a baseline.
 
     Parameters
     ----------
-    truth : subset -> annotations
-    found : (subset, detector or variant) -> detections by image id
-    baseline : the variant that hands found are set in proportion to
+    truth : mapping of str to Annotations
+        By subset.
+    found : mapping of (str, str) to mapping of int to Detections
+        By image id, of every subset and detector or variant of one.
+    baseline : str
+        The variant that hands found are set in proportion to.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
-    DataFrame, columns `subset, variant, AP, AP_low, AP_high, n_hands, n_found, share, share_low,
-    share_high, ratio, ratio_low, ratio_high`: 95 % bootstrap intervals over source images; `ratio` is
-    the hands found per hand the baseline finds, both on the same draws
+    DataFrame
+        Columns `subset, variant, AP, AP_low, AP_high, n_hands, n_found, share, share_low, share_high, ratio,
+        ratio_low, ratio_high`: 95 % bootstrap intervals over source images; `ratio` is the hands found per
+        hand the baseline finds, both on the same draws.
     """
     rows = []
     for subset, variant in found:
         people, clusters = truth[subset], source_images(truth[subset])
-        evaluation = evaluate(people, dict(found[subset, variant]), "hand")
+        evaluation = evaluate(people, found[subset, variant], "hand")
         ap = bootstrap_intervals(evaluation, n_resamples, seed, clusters).set_index("metric").loc["AP"]
         counts = _counts(people, found[subset, variant], found[subset, baseline], clusters)
         n_hands, n_found, _ = (int(n) for n in counts.sum(axis=0))
-        shares = _with_interval(counts, 1, 0, n_resamples, seed)
-        ratios = _with_interval(counts, 1, 2, n_resamples, seed)
-        rows.append((subset, variant, *ap[["value", "low", "high"]], n_hands, n_found, *shares, *ratios))
+        found_of, ratio = (_with_interval(counts, 1, per, n_resamples, seed) for per in (0, 2))
+        rows.append((subset, variant, *ap[["value", "low", "high"]], n_hands, n_found, *found_of, *ratio))
     ends = ("", "_low", "_high")
     columns = ["subset", "variant", *(f"AP{end}" for end in ends), "n_hands", "n_found"]
     columns += [f"{name}{end}" for name in ("share", "ratio") for end in ends]
@@ -106,7 +112,9 @@ def _counts(people: Annotations, found: Mapping, baseline: Mapping, clusters: Ma
     return table.groupby(sources, sort=True)[["n", "found", "base"]].sum().to_numpy(float)
 
 
-def _with_interval(counts: np.ndarray, of: int, per: int, n_resamples: int, seed: int) -> tuple[float, ...]:
+def _with_interval(
+    counts: np.ndarray, of: int, per: int, n_resamples: int, seed: int
+) -> tuple[Any, Any, Any]:
     """Ratio of two columns' sums over the rows, with the interval from drawing rows; NaN for 0 / 0."""
     if not counts[:, per].sum():
         return np.nan, np.nan, np.nan

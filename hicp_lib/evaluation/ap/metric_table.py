@@ -1,73 +1,88 @@
-"""Detectors compared on the HiCP subsets: one tidy table of figures, and the loss without the head.
+"""Detectors compared on the HiCP subsets: one tidy table of metrics, and the loss without the head.
 
-Throughout, `truth` maps a subset's name to its annotations, and `found` maps (subset, detector) to
-detections by image id. Crops of one source image are drawn together in the bootstrap.
+Throughout, `truth` and `found` are as `hicp_lib.evaluation.cases` says. Crops of one source image are drawn
+together in the bootstrap.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 
-import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.keypoints import GROUPS, N_KEYPOINTS
-from hicp_lib.detectors.registry import DETECTORS
+from hicp_lib.core.keypoints import GROUPS
 from hicp_lib.detectors.runtime.results import Timed
 from hicp_lib.evaluation.ap.bootstrap import bootstrap_difference, difference, intervals, resample
 from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate, person_oks
-from hicp_lib.formats.annotations import Annotations, source_images
+from hicp_lib.evaluation.cases import Found, Truth, all_cases, labelled, per_case
+from hicp_lib.formats.annotations import source_images
 
-Found = Mapping[tuple[str, str], Mapping[int, Detections]]
 # (subset, detector, group) -> its evaluation, and its figures on draws that all detectors share
 Drawn = Mapping[tuple[str, str, str], tuple[Evaluation, pd.DataFrame]]
 
 
-def compare(
-    truth: Mapping[str, Annotations], found: Found, n_resamples: int = 1000, seed: int = 0
-) -> pd.DataFrame:
+def compare(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
     """AP and AR of every detector on every subset, for the groups of keypoints it gives.
+
+    Parameters
+    ----------
+    truth : mapping of str to Annotations
+        By subset.
+    found : mapping of (str, str) to mapping of int to Detections
+        By image id, of every subset and detector.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
-    DataFrame, columns `subset, group, detector, metric, value, low, high, n_people`
+    DataFrame
+        Columns `subset, group, detector, metric, value, low, high, n_people`.
     """
-    return figures(draw_cases(truth, found, n_resamples, seed))
+    return metric_table(draw_cases(truth, found, n_resamples, seed))
 
 
 def draw_cases(
-    truth: Mapping[str, Annotations],
+    truth: Truth,
     found: Found,
     n_resamples: int = 1000,
     seed: int = 0,
     groups: Collection[str] = tuple(GROUPS),
 ) -> dict[tuple[str, str, str], tuple[Evaluation, pd.DataFrame]]:
-    """Every case evaluated, as it is and on draws of source images: what `figures` and `pairs` read.
+    """Every case evaluated, as it is and on draws of source images: what `metric_table` and `pairs` read.
 
     The detectors of one subset and group are drawn together, so that they can be told apart on the same
-    images. Only `groups` of keypoints are looked at.
+    images.
+
+    Parameters
+    ----------
+    truth, found, n_resamples, seed
+        As of `compare`.
+    groups : collection of str, optional
+        Groups of keypoints that are looked at.
+
+    Returns
+    -------
+    dict of (str, str, str) to (Evaluation, DataFrame)
+        By subset, detector and group: its evaluation, and its figures on the draws.
     """
-    cases = [case for case in _cases(found) if case[-1] in groups]
-    together: dict[tuple[str, str], dict[str, Evaluation]] = {}
-    for subset, detector, group in cases:
-        evaluation = evaluate(truth[subset], found[subset, detector], group)
-        together.setdefault((subset, group), {})[detector] = evaluation
+    cases = [case for case in all_cases(found) if case[-1] in groups]
     drawn = {}
-    for (subset, group), evaluations in together.items():
-        clusters = source_images(truth[subset])
-        samples = resample(list(evaluations.values()), n_resamples, seed, clusters)
-        for (detector, evaluation), sample in zip(evaluations.items(), samples, strict=True):
-            drawn[subset, detector, group] = evaluation, sample
+    for subset, group in dict.fromkeys((subset, group) for subset, _, group in cases):
+        detectors = [case[1] for case in cases if case[::2] == (subset, group)]
+        evaluations = [evaluate(truth[subset], found[subset, detector], group) for detector in detectors]
+        samples = resample(evaluations, n_resamples, seed, source_images(truth[subset]))
+        for detector, *of_both in zip(detectors, evaluations, samples, strict=True):
+            drawn[subset, detector, group] = tuple(of_both)
     return {case: drawn[case] for case in cases}
 
 
-def figures(drawn: Drawn) -> pd.DataFrame:
-    """AP and AR of every case: what `compare` returns."""
+def metric_table(drawn: Drawn) -> pd.DataFrame:
+    """AP and AR of every case of `draw_cases`: what `compare` returns."""
     tables = []
     for (subset, detector, group), (evaluation, samples) in drawn.items():
         table = intervals(evaluation.metrics(), samples).assign(n_people=evaluation.n_people)
-        tables.append(_labelled(table, subset=subset, group=group, detector=detector))
+        tables.append(labelled(table, subset=subset, group=group, detector=detector))
     return pd.concat(tables, ignore_index=True)
 
 
@@ -77,9 +92,15 @@ def pairs(drawn: Drawn) -> pd.DataFrame:
     Two detectors stumble over the same pictures, so this says more of which is better than two intervals
     side by side.
 
+    Parameters
+    ----------
+    drawn : mapping of (str, str, str) to (Evaluation, DataFrame)
+        From `draw_cases`.
+
     Returns
     -------
-    DataFrame, columns `subset, group, detector, other, pair` ("a less b"), `metric, value, low, high`
+    DataFrame
+        Columns `subset, group, detector, other, pair` ("a less b"), `metric, value, low, high`.
     """
     columns = ["subset", "group", "detector", "other", "pair", "metric", "value", "low", "high"]
     tables = []
@@ -88,53 +109,46 @@ def pairs(drawn: Drawn) -> pd.DataFrame:
             if (its_subset, its_group) == (subset, group) and other != detector:
                 table = difference(evaluation, its, samples, of_other)
                 labels = {"detector": detector, "other": other, "pair": f"{detector} less {other}"}
-                tables.append(_labelled(table, subset=subset, group=group, **labels))
+                tables.append(labelled(table, subset=subset, group=group, **labels))
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=columns)
 
 
-def head_loss(
-    truth: Mapping[str, Annotations], found: Found, n_resamples: int = 1000, seed: int = 0
-) -> pd.DataFrame:
+def head_loss(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
     """Change of AP from Basic to Headless, on the people who are in both.
+
+    Parameters
+    ----------
+    truth, found, n_resamples, seed
+        As of `compare`; the subsets are "basic" and "headless".
 
     Returns
     -------
-    DataFrame, columns `group, detector, basic, headless, change, low, high, n_people`; the interval
-    is the change's
+    DataFrame
+        Columns `group, detector, basic, headless, change, low, high, n_people`; the interval is the change's.
     """
+    subsets = ("basic", "headless")
     shared = truth["basic"].images.keys() & truth["headless"].images.keys()
-    same = {subset: truth[subset].of_images(shared) for subset in ("basic", "headless")}
+    same = {subset: truth[subset].of_images(shared) for subset in subsets}
+    clusters = source_images(same["basic"])
     rows = []
-    for subset, detector, group in _cases(found):
+    for subset, detector, group in all_cases(found):
         if subset != "basic":
             continue
-        basic, headless = (
-            evaluate(same[s], {i: found[s, detector].get(i, Detections.none()) for i in shared}, group)
-            for s in ("basic", "headless")
-        )
-        clusters = source_images(same["basic"])
+        on = {s: {i: found[s, detector].get(i, Detections.none()) for i in shared} for s in subsets}
+        basic, headless = (evaluate(same[s], on[s], group) for s in subsets)
         change = (
             bootstrap_difference(headless, basic, n_resamples, seed, clusters).set_index("metric").loc["AP"]
         )
-        rows.append(
-            (group, detector, basic.AP, headless.AP, *change[["value", "low", "high"]], basic.n_people)
-        )
+        interval = change[["value", "low", "high"]]
+        rows.append((group, detector, basic.AP, headless.AP, *interval, basic.n_people))
     columns = ["group", "detector", "basic", "headless", "change", "low", "high", "n_people"]
     return pd.DataFrame(rows, columns=columns).sort_values("group", kind="stable", ignore_index=True)
 
 
-def people_oks(truth: Mapping[str, Annotations], found: Found) -> pd.DataFrame:
+def people_oks(truth: Truth, found: Found) -> pd.DataFrame:
     """OKS of each person's best detection: `subset, group, detector` and the columns of `person_oks`."""
-    tables = [
-        _labelled(
-            person_oks(truth[subset], found[subset, detector], group),
-            subset=subset,
-            group=group,
-            detector=detector,
-        )
-        for subset, detector, group in _cases(found)
-    ]
-    return pd.concat(tables, ignore_index=True)
+    table = per_case(person_oks, truth, found)
+    return table[["subset", "group", "detector", "image_id", "annotation_id", "oks", "n_labelled"]]
 
 
 def detection_times(runs: Mapping[tuple[str, str], Mapping[int, Timed]]) -> pd.DataFrame:
@@ -145,25 +159,3 @@ def detection_times(runs: Mapping[tuple[str, str], Mapping[int, Timed]]) -> pd.D
         for image_id, result in run.items()
     ]
     return pd.DataFrame(rows, columns=["subset", "detector", "image_id", "time_ms", "workers"])
-
-
-def groups_of(found: Found, detector: str) -> tuple[str, ...]:
-    """The keypoint groups a detector is scored on: its own, or those an imported one gives a keypoint of."""
-    if detector in DETECTORS:
-        return DETECTORS[detector].groups
-    given = np.zeros(N_KEYPOINTS, dtype=bool)
-    for (_, name), images in found.items():
-        if name == detector:
-            for people in images.values():
-                given |= np.isfinite(people.keypoints_px).all(axis=-1).any(axis=0)
-    return tuple(group for group, keypoints in GROUPS.items() if given[keypoints].any())
-
-
-def _cases(found: Found) -> Iterator[tuple[str, str, str]]:
-    for subset, detector in found:
-        for group in groups_of(found, detector):
-            yield subset, detector, group
-
-
-def _labelled(table: pd.DataFrame, **labels: str) -> pd.DataFrame:
-    return table.assign(**labels)[[*labels, *table.columns]]

@@ -23,6 +23,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
 from hicp_lib.core.keypoints import GROUPS
+from hicp_lib.evaluation.cases import labelled
 from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
 
 with needs("analysis"):
@@ -37,8 +38,16 @@ class Calibration:
 
     Attributes
     ----------
-    scores : array, shape (n,), rising
-    rates : array, shape (n,), not falling: hit rate at each of `scores`; linear between, level beyond
+    scores : array, shape (n,)
+        Rising.
+    rates : array, shape (n,)
+        Not falling: hit rate at each of `scores`; linear between, level beyond.
+
+    Examples
+    --------
+    >>> curve = Calibration.fit(np.array([0.2, 0.4, 0.6]), np.array([0, 1, 1]))
+    >>> curve(np.array([0.1, 0.3, 0.9]))
+    array([0. , 0.5, 1. ])
     """
 
     scores: np.ndarray
@@ -46,7 +55,18 @@ class Calibration:
 
     @classmethod
     def fit(cls, scores: np.ndarray, hits: np.ndarray) -> Calibration:
-        """Isotonic regression of hits (n,) on scores (n,).
+        """Isotonic regression of hits on scores.
+
+        Parameters
+        ----------
+        scores : array, shape (n,)
+            Of keypoints whose truth is known.
+        hits : array of bool, shape (n,)
+            Whether they are right.
+
+        Returns
+        -------
+        Calibration
 
         Raises
         ------
@@ -77,9 +97,24 @@ class Calibration:
 
 
 def split_half(groups: pd.Series, seed: int = 0) -> np.ndarray:
-    """A random half of the groups (source images): True for rows (n,) to fit on, False for the other half.
+    """A random half of the groups.
 
-    Rows of one group are never on both sides.
+    Parameters
+    ----------
+    groups : Series, length n
+        Source image of each row; rows of one are never on both sides.
+    seed : int, optional
+        Of the draw.
+
+    Returns
+    -------
+    array of bool, shape (n,)
+        True for rows to fit on, False for the other half.
+
+    Examples
+    --------
+    >>> split_half(pd.Series(["a", "a", "b"])).tolist() in ([True, True, False], [False, False, True])
+    True
     """
     names = np.sort(groups.unique())
     chosen = np.random.default_rng(seed).permutation(len(names)) < (len(names) + 1) // 2
@@ -93,29 +128,34 @@ def calibration_study(
 
     Parameters
     ----------
-    hits : `keypoint_hits.all_hits`, or rows of `keypoint_hits` with columns `detector, group, source_image`
+    hits : DataFrame
+        `keypoint_hits.all_hits`, or rows of `keypoint_hits` with columns `detector, group, source_image`.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they and the half are drawn with.
 
     Returns
     -------
-    errors : DataFrame, columns `detector, group, n_keypoints, n_images, hit_rate, raw, raw_low, raw_high,
-        calibrated, calibrated_low, calibrated_high, change, change_low, change_high`: expected calibration
-        errors on the half held out with 95 % bootstrap intervals over source images
-    curves : DataFrame, columns `detector, group, scores` ("raw" or "calibrated") and those of `reliability`
-    calibrations : by (detector, group)
+    errors : DataFrame
+        Columns `detector, group, n_keypoints, n_images, hit_rate, raw, raw_low, raw_high, calibrated,
+        calibrated_low, calibrated_high, change, change_low, change_high`: expected calibration errors on the
+        half held out with 95 % bootstrap intervals over source images.
+    curves : DataFrame
+        Columns `detector, group, scores` ("raw" or "calibrated") and those of `reliability`.
+    calibrations : dict of (str, str) to Calibration
+        By detector and group.
     """
     fits_on = split_half(hits["source_image"], seed)
     errors, curves, calibrations = [], [], {}
-    for case, rows in hits.groupby(["detector", "group"], sort=False):
-        to_fit = fits_on[hits.index.get_indexer(rows.index)]
-        calibration = Calibration.fit(rows["score"].to_numpy()[to_fit], rows["hit"].to_numpy()[to_fit])
-        held_out = rows[~to_fit]
+    for (detector, group), rows in hits.assign(fit=fits_on).groupby(["detector", "group"], sort=False):
+        to_fit, held_out = rows[rows["fit"]], rows[~rows["fit"]]
+        calibration = Calibration.fit(to_fit["score"].to_numpy(), to_fit["hit"].to_numpy())
         kinds = {"raw": held_out, "calibrated": held_out.assign(score=calibration(held_out["score"]))}
-        errors.append((*case, *_counts(held_out), *_errors(kinds, n_resamples, seed)))
+        counts = (len(held_out), held_out["source_image"].nunique(), held_out["hit"].mean())
+        errors.append((detector, group, *counts, *_errors(kinds, n_resamples, seed)))
         for kind, table in kinds.items():
-            labels = {"detector": case[0], "group": case[1], "scores": kind}
             curve = reliability(table["score"], table["hit"], table["source_image"], n_resamples, seed)
-            curves.append(curve.assign(**labels)[[*labels, *curve.columns]])
-        calibrations[case] = calibration
+            curves.append(labelled(curve, detector=detector, group=group, scores=kind))
+        calibrations[detector, group] = calibration
     names = ["detector", "group", "n_keypoints", "n_images", "hit_rate"] + [
         f"{kind}{end}" for kind in ("raw", "calibrated", "change") for end in ("", "_low", "_high")
     ]
@@ -140,10 +180,6 @@ def calibrations_of(table: pd.DataFrame) -> dict[tuple[str, str], Calibration]:
     }
 
 
-def _counts(rows: pd.DataFrame) -> tuple[int, int, float]:
-    return len(rows), rows["source_image"].nunique(), float(rows["hit"].mean())
-
-
 def _errors(kinds: Mapping[str, pd.DataFrame], n_resamples: int, seed: int) -> Iterator[float]:
     """Value and interval of each kind's calibration error and, on the same draws, of their difference."""
     samples = []
@@ -152,38 +188,38 @@ def _errors(kinds: Mapping[str, pd.DataFrame], n_resamples: int, seed: int) -> I
         samples.append(_error(_resampled(sums, n_resamples, seed)))
     samples.append(samples[1] - samples[0])
     for drawn in samples:
-        yield from map(float, with_interval(drawn))
-
-
-def calibration_error(scores: np.ndarray, hits: np.ndarray) -> float:
-    """Expected calibration error of scores (n,) against hits (n,), over ten bins of equal width."""
-    return float(_error(_sums(scores, hits, np.zeros(len(scores))).sum(axis=0)))
+        yield from with_interval(drawn)
 
 
 def reliability(
-    scores: np.ndarray,
-    hits: np.ndarray,
-    groups: np.ndarray,
-    n_resamples: int = 1000,
-    seed: int = 0,
+    scores: np.ndarray, hits: np.ndarray, groups: np.ndarray, n_resamples: int = 1000, seed: int = 0
 ) -> pd.DataFrame:
-    """Hit rate per bin of the score, with 95 % bootstrap intervals over groups (source images).
+    """Hit rate per bin of the score, with 95 % bootstrap intervals over groups.
+
+    Parameters
+    ----------
+    scores : array, shape (n,)
+        In [0, 1].
+    hits : array of bool, shape (n,)
+        Whether the keypoints are right.
+    groups : array, shape (n,)
+        Their source images.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
-    DataFrame, one row per bin that holds keypoints, columns `bin` (0-9), `score` (mean), `rate, low,
-    high, count`
+    DataFrame
+        One row per bin that holds keypoints, columns `bin` (0-9), `score` (mean), `rate, low, high, count`.
     """
     sums = _sums(scores, hits, groups)
     count, score_sum, _ = sums.sum(axis=0)
     drawn = _resampled(sums, n_resamples, seed)
     with np.errstate(invalid="ignore"):
         rate, low, high = with_interval(drawn[:, 2] / drawn[:, 0])
-    rows = [
-        (int(i), score_sum[i] / count[i], rate[i], low[i], high[i], int(count[i]))
-        for i in np.flatnonzero(count)
-    ]
-    return pd.DataFrame(rows, columns=["bin", "score", "rate", "low", "high", "count"])
+        columns = {"score": score_sum / count, "rate": rate, "low": low, "high": high}
+    table = pd.DataFrame({"bin": np.arange(N_BINS), **columns, "count": count.astype(int)})
+    return table[count > 0].reset_index(drop=True)
 
 
 def _sums(scores: np.ndarray, hits: np.ndarray, groups: np.ndarray) -> np.ndarray:
@@ -192,10 +228,7 @@ def _sums(scores: np.ndarray, hits: np.ndarray, groups: np.ndarray) -> np.ndarra
     group, names = pd.factorize(np.asarray(groups))
     place = group * N_BINS + np.clip((scores * N_BINS).astype(int), 0, N_BINS - 1)
     size = len(names) * N_BINS
-    sums = [
-        np.bincount(place, weights=weights, minlength=size)
-        for weights in (np.ones(len(scores)), scores, hits)
-    ]
+    sums = [np.bincount(place, weights=w, minlength=size) for w in (np.ones(len(scores)), scores, hits)]
     return np.stack(sums).reshape(3, len(names), N_BINS).swapaxes(0, 1)
 
 

@@ -21,6 +21,7 @@ from hicp_lib.evaluation.calibration.keypoint_hits import keypoint_hits
 from hicp_lib.formats.annotations import Annotations, read_detections, write_detections
 
 RAW_SCORES = "raw_keypoint_scores"
+_ROUNDING = 1e-12  # by which a rate may fall
 _COLUMNS = ["detector", "group", "score", "rate"]
 _KNOWN_KEYS = {"image_id", "category_id", "keypoints", "score"}
 
@@ -28,9 +29,25 @@ _KNOWN_KEYS = {"image_id", "category_id", "keypoints", "score"}
 def fit_calibrations(
     annotations: Annotations, detections: Mapping[int, Detections], detector: str
 ) -> tuple[pd.DataFrame, dict[str, int]]:
-    """Calibration of every group of keypoints the detections give, and the keypoints each was fitted to.
+    """Calibration of every group of keypoints the detections give.
 
     Fitted to all annotated images: do not evaluate what comes of it on the same ones.
+
+    Parameters
+    ----------
+    annotations : Annotations
+        The truth.
+    detections : mapping of int to Detections
+        By image id.
+    detector : str
+        Its name, for the table.
+
+    Returns
+    -------
+    table : DataFrame
+        As of `hicp_lib.evaluation.calibration.curves.calibration_table`.
+    counts : dict of str to int
+        By group, the keypoints its calibration was fitted to.
 
     Raises
     ------
@@ -54,7 +71,19 @@ def write_calibrations(path: str | Path, table: pd.DataFrame) -> None:
 
 
 def read_calibrations(path: str | Path, detector: str = "") -> dict[str, Calibration]:
-    """Calibrations by group, of one detector; its name may be empty where the file has no other.
+    """Read the calibrations of one detector.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV, or Parquet where the name ends in `.parquet`.
+    detector : str, optional
+        Its name; may be empty where the file has no other.
+
+    Returns
+    -------
+    dict of str to Calibration
+        By group.
 
     Raises
     ------
@@ -83,19 +112,33 @@ def _check(path: Path, table: pd.DataFrame) -> None:
         raise InputError(f"{path}: group {unknown.pop()!r} is not known; expected {', '.join(GROUPS)}")
     for group, rows in table.groupby("group"):
         values = rows[["score", "rate"]].apply(pd.to_numeric, errors="coerce").to_numpy(float)
-        steps = np.diff(values, axis=0)
-        inside = (values[:, 1] >= 0) & (values[:, 1] <= 1)
-        if not (np.isfinite(values).all() and inside.all() and (steps > (0, -1e-12)).all()):
+        rates, steps = values[:, 1], np.diff(values, axis=0)
+        proper = np.isfinite(values).all() and ((rates >= 0) & (rates <= 1)).all()
+        if not (proper and (steps > (0, -_ROUNDING)).all()):
             raise InputError(f"{path}: group {group}: expected rising scores, rates that do not fall")
 
 
 def apply_calibrations(
     detections_path: str | Path, calibrations: Mapping[str, Calibration], out: str | Path
 ) -> int:
-    """Write a result file with calibrated keypoint scores, the scores as they were beside; the people in it.
+    """Write a result file with calibrated keypoint scores, the scores as they were beside.
 
     A file that holds an importer's `raw_keypoint_scores` keeps those. Keypoints of groups without a
     calibration keep their scores, and people theirs: AP ranks people and stays as it was.
+
+    Parameters
+    ----------
+    detections_path : str or Path
+        The result file to calibrate.
+    calibrations : mapping of str to Calibration
+        By group.
+    out : str or Path
+        The result file to write.
+
+    Returns
+    -------
+    int
+        The people in it.
 
     Raises
     ------
@@ -108,9 +151,7 @@ def apply_calibrations(
         people = extras[row["image_id"]]
         raw = {RAW_SCORES: found[row["image_id"]].scores[len(people)].tolist()}
         people.append(raw | {key: value for key, value in row.items() if key not in _KNOWN_KEYS})
-    for image_id, people in found.items():
-        for group, calibration in calibrations.items():
-            people = calibration.apply(people, group)
-        found[image_id] = people
+    for group, calibration in calibrations.items():
+        found = {image_id: calibration.apply(people, group) for image_id, people in found.items()}
     write_detections(out, found, extras)
     return sum(map(len, found.values()))

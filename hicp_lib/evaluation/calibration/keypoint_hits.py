@@ -5,47 +5,46 @@ A keypoint is a *hit* when its term of OKS is at least `HIT_TERM`, if nothing el
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
+from functools import partial
 
 import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import GROUPS, SIGMAS
-from hicp_lib.core.oks import oks, oks_terms
+from hicp_lib.core.oks import oks_terms
 from hicp_lib.evaluation.ap.evaluate import check_detections
+from hicp_lib.evaluation.cases import Found, Truth, per_case
+from hicp_lib.evaluation.matching import match_best_first, pairwise_oks
 from hicp_lib.formats.annotations import Annotations
 
 HIT_TERM = 0.5
+_ANY_OKS = float(np.nextafter(0.0, 1.0))  # the least above 0
 
 
 def all_hits(
-    truth: Mapping[str, Annotations],
-    found: Mapping[tuple[str, str], Mapping[int, Detections]],
-    groups: Mapping[str, tuple[str, ...]],
-    sources: Mapping[str, Mapping[int, Hashable]],
-    min_term: float = HIT_TERM,
+    truth: Truth, found: Found, groups: Mapping[str, tuple[str, ...]], min_term: float = HIT_TERM
 ) -> pd.DataFrame:
-    """`keypoint_hits` of every case: columns `subset, detector, group, source_image` and its own.
+    """`keypoint_hits` of every case.
 
     Parameters
     ----------
-    truth : subset -> annotations
-    found : (subset, detector) -> detections by image id
-    groups : detector -> its groups of keypoints
-    sources : subset -> image id -> source image
-    min_term : a hit's least term of OKS
+    truth : mapping of str to Annotations
+        By subset.
+    found : mapping of (str, str) to mapping of int to Detections
+        By image id, of every subset and detector.
+    groups : mapping of str to tuple of str
+        The groups of keypoints of each detector that are looked at.
+    min_term : float, optional
+        A hit's least term of OKS.
+
+    Returns
+    -------
+    DataFrame
+        Columns `subset, detector, group, source_image` and those of `keypoint_hits`.
     """
-    tables = []
-    for subset, detector in found:
-        for group in groups[detector]:
-            table = keypoint_hits(truth[subset], found[subset, detector], group, min_term=min_term)
-            labels = {"subset": subset, "detector": detector, "group": group}
-            source = table["image_id"].map(sources[subset])
-            tables.append(
-                table.assign(**labels, source_image=source)[[*labels, "source_image", *table.columns]]
-            )
-    return pd.concat(tables, ignore_index=True)
+    return per_case(partial(keypoint_hits, min_term=min_term), truth, found, groups)
 
 
 def keypoint_hits(
@@ -58,66 +57,61 @@ def keypoint_hits(
     """Which found keypoints are hits, for those whose truth is known.
 
     Detections, best first, take the free annotated person they fit best by OKS. Keypoints without a label
-    there have no truth and are left out, and so are detections of people who do not count (crowds,
-    others, nobody labelled). A detection that fits nobody at all is wrong with every keypoint.
+    there have no truth and are left out, and so are detections of people who do not count (crowds, others,
+    nobody labelled). A detection that fits nobody at all is wrong with every keypoint.
+
+    Parameters
+    ----------
+    annotations : Annotations
+        The truth.
+    detections : mapping of int to Detections
+        By image id.
+    group : {"body", "hand"}
+        Of keypoints.
+    sigmas : {"halpe", "wholebody"}
+        Constants of the keypoints.
+    min_term : float, optional
+        A hit's least term of OKS.
 
     Returns
     -------
-    DataFrame, columns `image_id, keypoint` (Halpe index), `score, hit` (bool)
+    DataFrame
+        Columns `image_id, keypoint` (Halpe index), `score, hit` (bool).
 
     Raises
     ------
     InputError
         As `hicp_lib.evaluation.ap.evaluate.evaluate`.
     """
-    check_detections(dict(detections), annotations)
+    check_detections(detections, annotations)
     keypoints = GROUPS[group]
-    constants = SIGMAS[sigmas][keypoints]
-    columns: dict[str, list] = {"image_id": [], "keypoint": [], "score": [], "hit": []}
+    rows: list[tuple] = []
     for image_id, found in detections.items():
         people = annotations.take(annotations.image_ids == image_id)
-        for row, person in _pairs(people, found, keypoints, constants):
-            points_px = found.keypoints_px[row, keypoints]
-            known, terms = _terms(people, person, points_px, keypoints, constants)
-            columns["image_id"] += [image_id] * int(known.sum())
-            columns["keypoint"] += keypoints[known].tolist()
-            columns["score"] += found.scores[row, keypoints[known]].tolist()
-            columns["hit"] += (terms[known] >= min_term).tolist()
-    return pd.DataFrame(columns).astype({"image_id": int, "keypoint": int, "score": float, "hit": bool})
+        for row, known, terms in _judged(people, found, keypoints, SIGMAS[sigmas][keypoints]):
+            at = keypoints[known]
+            columns = (at.tolist(), found.scores[row, at].tolist(), (terms[known] >= min_term).tolist())
+            rows += [(image_id, *values) for values in zip(*columns, strict=True)]
+    types = {"image_id": int, "keypoint": int, "score": float, "hit": bool}
+    return pd.DataFrame(rows, columns=list(types)).astype(types)
 
 
-def _pairs(
+def _judged(
     people: Annotations, found: Detections, keypoints: np.ndarray, sigmas: np.ndarray
-) -> Iterator[tuple[int, int | None]]:
-    """Rows of detections with the row of their person; None for those that fit nobody."""
-    points = found.keypoints_px[:, keypoints]
-    labelled = people.visibility[:, keypoints] > 0
-    fit = oks(
-        people.keypoints_px[:, None, keypoints], labelled[:, None], people.boxes_px[:, None],
-        people.areas_px2[:, None], points[None], sigmas,
-    )  # fmt: skip
-    free = np.ones(len(people), dtype=bool)
-    given = np.isfinite(points).all(axis=-1).any(axis=-1)
+) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+    """Detections that give a keypoint: row, which keypoints (k,) have a known truth, their terms of OKS."""
+    points_px = found.keypoints_px[:, keypoints]
+    given = np.isfinite(points_px).all(axis=-1)
+    fit = np.where(given.any(axis=1), pairwise_oks(people, found, keypoints, sigmas), 0.0)
+    matched = match_best_first(fit, found.person_scores, _ANY_OKS)
+    person_of = {row: person for person, row in matched.items()}
+    counts = ~people.is_crowd & ~people.is_other
     for row in np.argsort(-found.person_scores, kind="stable"):
-        if given[row]:
-            fits = np.where(free, fit[:, row], 0.0)
-            person = int(fits.argmax()) if fits.max(initial=0.0) > 0 else None
-            if person is not None:
-                free[person] = False
-            yield int(row), person
-
-
-def _terms(
-    people: Annotations, person: int | None, points: np.ndarray, keypoints: np.ndarray, sigmas: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Which keypoints (k,) of a detection have a known truth, and their terms of OKS."""
-    given = np.isfinite(points).all(axis=-1)
-    if person is None:
-        return given, np.zeros(len(points))
-    labelled = (people.visibility[person, keypoints] > 0) & (not _is_ignored(people, person))
-    terms = oks_terms(people.keypoints_px[person, keypoints], points, people.areas_px2[person], sigmas)
-    return given & labelled, terms
-
-
-def _is_ignored(people: Annotations, person: int) -> bool:
-    return bool(people.is_crowd[person] or people.extras[person].get("other"))
+        person = person_of.get(int(row))
+        if person is None:
+            known, terms = given[row], np.zeros(len(keypoints))
+        else:
+            truth_px, area_px2 = people.keypoints_px[person, keypoints], people.areas_px2[person]
+            known = given[row] & (people.visibility[person, keypoints] > 0) & counts[person]
+            terms = oks_terms(truth_px, points_px[row], area_px2, sigmas)
+        yield int(row), known, terms

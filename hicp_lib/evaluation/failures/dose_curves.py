@@ -16,9 +16,11 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
+from hicp_lib.core.keypoints import COCO_17
 from hicp_lib.evaluation.ap.metric_table import compare
+from hicp_lib.evaluation.cases import Truth
 from hicp_lib.evaluation.failures.error_kinds import all_errors
-from hicp_lib.evaluation.statistics.proportions import shares
+from hicp_lib.evaluation.statistics.proportions import proportions
 from hicp_lib.formats.annotations import Annotations
 
 MEASURES = ("AP", "visible keypoints hit", "hidden keypoints hit")
@@ -35,10 +37,9 @@ OBSERVED = {
 
 def by_level(annotations: Annotations) -> dict[tuple[str, float], Annotations]:
     """The pictures of each dose and level; people carry both."""
-    images: dict[tuple[str, float], set[int]] = {}
-    for image_id, extra in zip(annotations.image_ids.tolist(), annotations.extras, strict=True):
-        images.setdefault((extra["dose"], extra["level"]), set()).add(image_id)
-    return {level: annotations.of_images(chosen) for level, chosen in images.items()}
+    table = pd.DataFrame(annotations.extras)[["dose", "level"]].assign(image_id=annotations.image_ids)
+    groups = table.groupby(["dose", "level"], sort=False)["image_id"]
+    return {level: annotations.of_images(set(image_ids)) for level, image_ids in groups}
 
 
 def dose_curves(
@@ -51,13 +52,18 @@ def dose_curves(
 
     Parameters
     ----------
-    annotations : as `doses.open_doses` writes them
-    found : detector -> detections by image id
+    annotations : Annotations
+        As `doses.open_doses` writes them.
+    found : mapping of str to mapping of int to Detections
+        By image id, of every detector.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
-    DataFrame, columns `dose, level, detector, group, measure` (one of `MEASURES`), `value, low, high, n`
-    (people, or keypoints): 95 % bootstrap intervals over people
+    DataFrame
+        Columns `dose, level, detector, group, measure` (one of `MEASURES`), `value, low, high, n` (people, or
+        keypoints): 95 % bootstrap intervals over people.
     """
     truth = {str(key): people for key, people in by_level(annotations).items()}
     cases = {
@@ -70,26 +76,29 @@ def dose_curves(
     errors = all_errors(truth, cases)
     state = np.where(errors["visibility"] >= 2, *MEASURES[1:])
     keys = ["subset", "detector", "group", "measure"]
-    table = pd.concat([ap, shares(errors.assign(measure=state), keys, "hit", n_resamples, seed)])
+    table = pd.concat([ap, proportions(errors.assign(measure=state), keys, "hit", n_resamples, seed)])
     levels = pd.DataFrame(by_level(annotations).keys(), index=list(truth), columns=["dose", "level"])
     table = table.join(levels, on="subset")
     columns = ["dose", "level", "detector", "group", "measure", "value", "low", "high", "n"]
     return table[columns].reset_index(drop=True)
 
 
-def observed_doses(
-    truth: Mapping[str, Annotations], folders: Mapping[str, Path], source: Annotations
-) -> pd.DataFrame:
+def observed_doses(truth: Truth, folders: Mapping[str, Path], source: Annotations) -> pd.DataFrame:
     """The doses of everybody who counts, as the data set has them: one row per labelled body keypoint.
 
     Parameters
     ----------
-    truth, folders : subset -> annotations, and folder with their images
-    source : the annotations the crops were made from; distances are known if people carry `distance_m`
+    truth : mapping of str to Annotations
+        By subset.
+    folders : mapping of str to Path
+        By subset, the folder with their images.
+    source : Annotations
+        What the crops were made from; distances are known if people carry `distance_m`.
 
     Returns
     -------
-    DataFrame, columns `subset, image_id, keypoint` and those of `OBSERVED` (NaN where not known)
+    DataFrame
+        Columns `subset, image_id, keypoint` and those of `OBSERVED` (NaN where not known).
     """
     distances = {
         int(i): extra.get("distance_m", np.nan) for i, extra in zip(source.ids, source.extras, strict=True)
@@ -101,25 +110,23 @@ def observed_doses(
             image = people.images[image_id]
             pixels = read_image(Path(folders[subset]) / "images" / image.file_name)
             table = _doses_of(people, row, np.array([image.width_px, image.height_px]))
-            about = people.extras[row]
-            tables.append(
-                table.assign(
-                    subset=subset, image_id=image_id, distance=distances.get(about.get("source_id"), np.nan),
-                    brightness=cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY).mean(),
-                )
-            )  # fmt: skip
+            distance = distances.get(people.extras[row].get("source_id", -1), np.nan)
+            brightness = cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY).mean()
+            labels = {"subset": subset, "image_id": image_id}
+            tables.append(table.assign(**labels, distance=distance, brightness=brightness))
     return pd.concat(tables, ignore_index=True)[["subset", "image_id", "keypoint", *OBSERVED]]
 
 
 def _doses_of(people: Annotations, row: int, size_px: np.ndarray) -> pd.DataFrame:
-    flags = people.visibility[row, :17]
-    points = people.keypoints_px[row, :17][flags > 0]
+    flags = people.visibility[row, COCO_17]
+    labelled = flags > 0
+    points = people.keypoints_px[row, COCO_17][labelled]
     gap = np.minimum(points + 0.5, size_px - points - 0.5).min(axis=1)
     return pd.DataFrame(
         {
-            "keypoint": np.flatnonzero(flags > 0),
-            "share of keypoints in the picture": (flags > 0).mean(),
-            "share of keypoints hidden": ((flags > 0) & (flags < 2)).sum() / max((flags > 0).sum(), 1),
+            "keypoint": np.flatnonzero(labelled),
+            "share of keypoints in the picture": labelled.mean(),
+            "share of keypoints hidden": (labelled & (flags < 2)).sum() / max(labelled.sum(), 1),
             "picture": np.sqrt(size_px.prod()),
             "distance to the border": gap / size_px.min(),
         }
@@ -133,19 +140,25 @@ def observed_curves(
 
     Parameters
     ----------
-    errors : `error_kinds.all_errors`
-    observed : `observed_doses`
+    errors : DataFrame
+        `error_kinds.all_errors`.
+    observed : DataFrame
+        `observed_doses`.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
-    DataFrame, columns `subset, dose, detector, level` (median of the bin), `value, low, high, n, n_images`
+    DataFrame
+        Columns `subset, dose, detector, level` (median of the bin), `value, low, high, n, n_images`.
     """
     body = errors[errors["group"] == "body"].merge(observed, on=["subset", "image_id", "keypoint"])
+    keys = ["subset", "dose", "detector", "level"]
     tables = []
     for dose in OBSERVED:
         for _, rows in body[body[dose].notna()].groupby("subset", sort=False):
             bins = pd.qcut(rows[dose], N_BINS, labels=False, duplicates="drop")
             middle = rows.groupby(bins)[dose].median()
             rows = rows.assign(dose=dose, level=bins.map(middle)).sort_values("level", kind="stable")
-            tables.append(shares(rows, ["subset", "dose", "detector", "level"], "hit", n_resamples, seed))
+            tables.append(proportions(rows, keys, "hit", n_resamples, seed))
     return pd.concat(tables, ignore_index=True)

@@ -25,32 +25,22 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import GROUPS, SIGMAS, mirror
-from hicp_lib.core.oks import oks, oks_terms
+from hicp_lib.core.oks import oks_terms
 from hicp_lib.datasets.visibility import MIN_PEOPLE
 from hicp_lib.evaluation.ap.evaluate import check_detections
-from hicp_lib.evaluation.ap.metric_table import groups_of
-from hicp_lib.formats.annotations import Annotations, source_images
+from hicp_lib.evaluation.cases import Found, Truth, per_case
+from hicp_lib.evaluation.matching import matched_people
+from hicp_lib.formats.annotations import Annotations
 
 KINDS = ("good", "jitter", "inversion", "swap", "miss", "not given", "not found")
 HITS = ("good", "jitter")
-GOOD_TERM, NEAR_TERM, MATCH_OKS = 0.85, 0.5, 0.1
+GOOD_TERM, NEAR_TERM = 0.85, 0.5
 _OTHER_SIDE = mirror("halpe136")
 
 
-def all_errors(
-    truth: Mapping[str, Annotations], found: Mapping[tuple[str, str], Mapping[int, Detections]]
-) -> pd.DataFrame:
+def all_errors(truth: Truth, found: Found) -> pd.DataFrame:
     """`keypoint_errors` of every case: columns `subset, detector, group, source_image` and its own."""
-    tables = []
-    for subset, detector in found:
-        sources = source_images(truth[subset])
-        for group in groups_of(found, detector):
-            table = keypoint_errors(truth[subset], found[subset, detector], group)
-            labels = {"subset": subset, "detector": detector, "group": group}
-            table = table.assign(**labels, source_image=table["image_id"].map(sources))
-            tables.append(table)
-    order = ["subset", "detector", "group", "source_image"]
-    return pd.concat(tables, ignore_index=True)[[*order, *tables[0].columns.drop(order)]]
+    return per_case(keypoint_errors, truth, found)
 
 
 def keypoint_errors(
@@ -58,33 +48,40 @@ def keypoint_errors(
 ) -> pd.DataFrame:
     """What became of every labelled keypoint of the people who count.
 
+    Parameters
+    ----------
+    annotations : Annotations
+        The truth.
+    detections : mapping of int to Detections
+        By image id.
+    group : {"body", "hand"}
+        Of keypoints.
+    sigmas : {"halpe", "wholebody"}
+        Constants of the keypoints.
+
     Returns
     -------
-    DataFrame, columns `image_id, annotation_id, keypoint` (Halpe index), `visibility`, `score` (NaN where
-    there is none), `term` (of OKS, 0 where there is none), `kind` (categorical, `KINDS`), `hit` (bool:
-    good or jitter)
+    DataFrame
+        Columns `image_id, annotation_id, keypoint` (Halpe index), `visibility`, `score` (NaN where there is
+        none), `term` (of OKS, 0 where there is none), `kind` (categorical, `KINDS`), `hit` (bool: good or
+        jitter).
 
     Raises
     ------
     InputError
         As `hicp_lib.evaluation.ap.evaluate.evaluate`.
     """
-    check_detections(dict(detections), annotations)
+    check_detections(detections, annotations)
     keypoints, constants = GROUPS[group], SIGMAS[sigmas][GROUPS[group]]
-    parts = []
+    parts = [pd.DataFrame(columns=list(_DTYPES)).astype(_DTYPES)]
     rows_of = pd.Series(range(len(annotations))).groupby(annotations.image_ids).indices
     for image_id, rows in rows_of.items():
         people = annotations.take(rows)
         found = detections.get(image_id, Detections.none())
         matched = matched_people(people, found, keypoints, constants)
-        for person in np.flatnonzero(_counts(people)):
-            row = matched.get(int(person))
-            match = (
-                None if row is None else (found.keypoints_px[row, keypoints], found.scores[row, keypoints])
-            )
-            parts.append(_judge(people, person, match, keypoints, constants))
-    columns = ["image_id", "annotation_id", "keypoint", "visibility", "score", "term", "kind"]
-    table = pd.concat([pd.DataFrame(columns=columns).astype(_DTYPES), *parts], ignore_index=True)
+        for person in np.flatnonzero(~people.is_crowd & ~people.is_other).tolist():
+            parts.append(_judge(people, person, found, matched.get(person), keypoints, constants))
+    table = pd.concat(parts, ignore_index=True)
     kind = pd.Categorical.from_codes(table["kind"], KINDS)
     return table.assign(kind=kind, hit=np.isin(table["kind"], [KINDS.index(name) for name in HITS]))
 
@@ -93,61 +90,23 @@ _DTYPES = {"image_id": int, "annotation_id": int, "keypoint": int, "visibility":
            "term": float, "kind": int}  # fmt: skip
 
 
-def _counts(people: Annotations) -> np.ndarray:
-    return ~people.is_crowd & ~np.array([bool(extra.get("other")) for extra in people.extras], dtype=bool)
-
-
-def matched_people(
-    people: Annotations, found: Detections, keypoints: np.ndarray, sigmas: np.ndarray
-) -> dict[int, int]:
-    """The detection of each person who has one: row of the person -> row of the detection.
-
-    Detections, best first, take the free person they fit best, with an OKS of at least .1. People without a
-    labelled keypoint take no part: anything near them would fit.
-
-    Parameters
-    ----------
-    people, found : of one image
-    keypoints, sigmas : arrays, shape (k,): Halpe indices of the group, and their constants
-    """
-    labelled = people.visibility[:, keypoints] > 0
-    fit = oks(
-        people.keypoints_px[:, None, keypoints],
-        labelled[:, None],
-        people.boxes_px[:, None],
-        people.areas_px2[:, None],
-        found.keypoints_px[None, :, keypoints],
-        sigmas,
-    )
-    fit[~labelled.any(axis=1)] = 0.0
-    matched: dict[int, int] = {}
-    for row in np.argsort(-found.person_scores, kind="stable"):
-        person = int(fit[:, row].argmax()) if len(people) else 0
-        if len(people) and fit[person, row] >= MATCH_OKS:
-            matched[person] = int(row)
-            fit[person] = 0.0
-    return matched
-
-
 def _judge(
-    people: Annotations, person: int, match: tuple | None, keypoints: np.ndarray, sigmas: np.ndarray
-) -> pd.DataFrame:
+    people: Annotations, person: int, found: Detections, row: int | None, keypoints: np.ndarray,
+    sigmas: np.ndarray,
+) -> pd.DataFrame:  # fmt: skip
+    """A person's labelled keypoints, by what detection `row` makes of them."""
     labelled = people.visibility[person, keypoints] > 0
-    n = int(labelled.sum())
+    at, n = keypoints[labelled], int(labelled.sum())
     score, term, kind = np.full(n, np.nan), np.zeros(n), np.full(n, KINDS.index("not found"))
-    if match is not None:
-        points, scores = match[0][labelled], match[1][labelled]
+    if row is not None:
+        points = found.keypoints_px[row, at]
         given = np.isfinite(points).all(axis=-1)
-        terms = np.stack(list(_similarities(people, person, points, keypoints[labelled], sigmas[labelled])))
-        term, score = terms[0], np.where(given, scores, np.nan)
-        kind = np.where(given, _kinds(*terms), KINDS.index("not given"))
-    return pd.DataFrame(
-        {
-            "image_id": int(people.image_ids[person]), "annotation_id": int(people.ids[person]),
-            "keypoint": keypoints[labelled], "visibility": people.visibility[person, keypoints[labelled]],
-            "score": score, "term": term, "kind": kind,
-        }
-    )  # fmt: skip
+        term, other_side, others = _similarities(people, person, points, at, sigmas[labelled])
+        score = np.where(given, found.scores[row, at], np.nan)
+        kind = np.where(given, _kinds(term, other_side, others), KINDS.index("not given"))
+    ids = {"image_id": int(people.image_ids[person]), "annotation_id": int(people.ids[person])}
+    columns = {"keypoint": at, "visibility": people.visibility[person, at]}
+    return pd.DataFrame({**ids, **columns, "score": score, "term": term, "kind": kind})
 
 
 def _similarities(
@@ -172,12 +131,20 @@ def _kinds(truth: np.ndarray, other_side: np.ndarray, others: np.ndarray) -> np.
     return np.select([*near, *confused], range(4), KINDS.index("miss"))
 
 
-def kind_shares(errors: pd.DataFrame, by: str) -> pd.DataFrame:
-    """Share of each kind, every one listed; NaN where there are fewer than `MIN_PEOPLE` people.
+def kind_proportions(errors: pd.DataFrame, by: str) -> pd.DataFrame:
+    """Proportion of each kind, every one listed; NaN where there are fewer than `MIN_PEOPLE` people.
+
+    Parameters
+    ----------
+    errors : DataFrame
+        `all_errors`, with the column `by`.
+    by : str
+        Column that makes the groups, besides detector and group of keypoints.
 
     Returns
     -------
-    DataFrame, columns `detector, group, BY, kind, share, n_keypoints, n_people`
+    DataFrame
+        Columns `detector, group, BY, kind, share, n_keypoints, n_people`.
 
     Raises
     ------
@@ -191,7 +158,7 @@ def kind_shares(errors: pd.DataFrame, by: str) -> pd.DataFrame:
     counts = counts.reindex(columns=KINDS, fill_value=0)
     people = errors.drop_duplicates({*keys, "subset", "image_id", "annotation_id"})
     n_people = people.groupby(keys, sort=False, observed=True).size().reindex(counts.index)
-    shares = counts.div(counts.sum(axis=1), axis=0).where(n_people >= MIN_PEOPLE, np.nan, axis=0)
-    n = pd.DataFrame({"n_keypoints": counts.sum(axis=1), "n_people": n_people}).reset_index()
-    long = shares.reset_index().melt(keys, var_name="kind", value_name="share")
-    return long.merge(n, on=keys)
+    n = pd.DataFrame({"n_keypoints": counts.sum(axis=1), "n_people": n_people})
+    share = counts.div(n["n_keypoints"], axis=0).where(n_people >= MIN_PEOPLE, np.nan, axis=0)
+    long = share.reset_index().melt(keys, var_name="kind", value_name="share")
+    return long.merge(n.reset_index(), on=keys)

@@ -13,23 +13,24 @@ What the paper says of each system in a few words becomes a measure that every d
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import INDEX, LEFT_HAND, RIGHT_HAND
-from hicp_lib.evaluation.ap.metric_table import groups_of
+from hicp_lib.evaluation.cases import Found, Truth, groups_of
 from hicp_lib.evaluation.failures.placed_keypoints import landed
-from hicp_lib.evaluation.statistics.proportions import mean_with_interval, shares
+from hicp_lib.evaluation.statistics.proportions import mean_with_interval, proportions
 from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
-from hicp_lib.formats.annotations import Annotations, source_images
+from hicp_lib.formats.annotations import source_images
 
 SURE = 0.3  # the paper's threshold
 N_BINS = 5
 _SHOULDERS = (INDEX["left_shoulder"], INDEX["right_shoulder"])
 _FIRST_BELOW_HEAD = INDEX["left_shoulder"]
+
+_NOTHING = (np.nan, np.nan, np.nan, 0)  # value, interval and number of rows where there are none
 
 # Measure: the system that the paper says it of.
 MEASURES = {
@@ -48,26 +49,30 @@ def scores_by_state(placed: pd.DataFrame, n_resamples: int = 1000, seed: int = 0
 
     Parameters
     ----------
-    placed : `placed_keypoints.placed_keypoints`
+    placed : DataFrame
+        `placed_keypoints.placed_keypoints`.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
-    DataFrame, columns `detector, state, bin, score` (mean), `value, low, high, n, n_images`, by five equal
-    bins of the score
+    DataFrame
+        Columns `detector, state, bin, score` (mean), `value, low, high, n, n_images`, by five equal bins of
+        the score.
     """
     rows = placed[placed["hit"].notna()]
     bins = np.clip((rows["score"] * N_BINS).astype(int), 0, N_BINS - 1)
-    rows = rows.assign(bin=bins).sort_values(["detector", "state", "bin"], kind="stable")
     keys = ["detector", "state", "bin"]
+    rows = rows.assign(bin=bins).sort_values(keys, kind="stable")
     means = rows.groupby(keys)["score"].mean().reset_index()
-    return means.merge(shares(rows, keys, "hit", n_resamples, seed), on=keys)
+    return means.merge(proportions(rows, keys, "hit", n_resamples, seed), on=keys)
 
 
 def paper_remarks(
     placed: pd.DataFrame,
     errors: pd.DataFrame,
-    truth: Mapping[str, Annotations],
-    found: Mapping[tuple[str, str], Mapping[int, Detections]],
+    truth: Truth,
+    found: Found,
     n_resamples: int = 1000,
     seed: int = 0,
 ) -> pd.DataFrame:
@@ -75,29 +80,35 @@ def paper_remarks(
 
     Parameters
     ----------
-    placed : `placed_keypoints.placed_keypoints`
-    errors : `error_kinds.all_errors`
+    placed : DataFrame
+        `placed_keypoints.placed_keypoints`.
+    errors : DataFrame
+        `error_kinds.all_errors`.
+    truth : mapping of str to Annotations
+        By subset.
+    found : mapping of (str, str) to mapping of int to Detections
+        By image id, of every subset and detector.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
-    DataFrame, columns `measure, said_of, detector, value, low, high, n, status` ("run" or "not run")
+    DataFrame
+        Columns `measure, said_of, detector, value, low, high, n, status` ("run" or "not run").
     """
-    rows = []
-    detectors = list(dict.fromkeys(detector for _, detector in found))
-    for detector in detectors:
-        of = [table[table["detector"] == detector] for table in (placed, errors[errors["group"] == "body"])]
+    values = {}
+    for detector in dict.fromkeys(detector for _, detector in found):
+        its_placed, its_errors = (table[table["detector"] == detector] for table in (placed, errors))
+        body = its_errors[its_errors["group"] == "body"]
         hands = _hands(detector, truth, found) if "hand" in groups_of(found, detector) else None
-        values = _values(*of, hands, n_resamples, seed)
-        rows += [(m, MEASURES[m], detector, *value, "run") for m, value in zip(MEASURES, values, strict=True)]
-    absent = {
-        name for name in MEASURES.values() if name not in detectors and f"{name}-imported" not in detectors
-    }
-    rows += [(m, s, s, np.nan, np.nan, np.nan, 0, "not run") for m, s in MEASURES.items() if s in absent]
-    table = pd.DataFrame(
-        rows, columns=["measure", "said_of", "detector", "value", "low", "high", "n", "status"]
-    )
-    order = {measure: i for i, measure in enumerate(MEASURES)}
-    return table.sort_values("measure", key=lambda names: names.map(order), kind="stable", ignore_index=True)
+        values[detector] = list(_values(its_placed, body, hands, n_resamples, seed))
+    rows: list[tuple] = []
+    for i, (measure, system) in enumerate(MEASURES.items()):
+        rows += [(measure, system, detector, *of[i], "run") for detector, of in values.items()]
+        if not {system, f"{system}-imported"} & values.keys():
+            rows.append((measure, system, system, *_NOTHING, "not run"))
+    columns = ["measure", "said_of", "detector", "value", "low", "high", "n", "status"]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def _values(
@@ -115,7 +126,7 @@ def _values(
     yield _mean(errors, sure, n_resamples, seed)
     yield _mean(errors[sure], errors["hit"][sure], n_resamples, seed)
     yield _difference(joints[shoulder], joints[~shoulder], n_resamples, seed)
-    yield (np.nan, np.nan, np.nan, 0) if hands is None else _mean(hands, ~hands["wrist"], n_resamples, seed)
+    yield _NOTHING if hands is None else _mean(hands, ~hands["wrist"], n_resamples, seed)
 
 
 def _mean(
@@ -130,7 +141,7 @@ def _difference(
     """Mean score of a less that of b, both on the same draws of source images."""
     images = np.unique(np.concatenate([a["source_image"], b["source_image"]]))
     if not len(a) or not len(b):
-        return np.nan, np.nan, np.nan, 0
+        return _NOTHING
     times = draw_counts(len(images), n_resamples, seed)
     means = []
     for rows in (a, b):
@@ -138,11 +149,10 @@ def _difference(
         sums, counts = (np.bincount(place, weights=w, minlength=len(images)) for w in (rows["score"], None))
         with np.errstate(invalid="ignore"):
             means.append(times @ sums / (times @ counts))
-    value, low, high = with_interval(means[0] - means[1])
-    return float(value), float(low), float(high), len(a)
+    return *with_interval(means[0] - means[1]), len(a)
 
 
-def _hands(detector: str, truth: Mapping, found: Mapping) -> pd.DataFrame:
+def _hands(detector: str, truth: Truth, found: Found) -> pd.DataFrame:
     """Every hand with a finger given: columns `source_image, wrist` (whether the body's wrist is given)."""
     rows = []
     for (subset, name), run in found.items():

@@ -7,8 +7,6 @@ whether that is right. Bodies only: the 17 keypoints all detectors share.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 import pandas as pd
 
@@ -16,7 +14,8 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import COCO_17, SIGMAS
 from hicp_lib.core.oks import oks_terms
 from hicp_lib.evaluation.calibration.keypoint_hits import HIT_TERM
-from hicp_lib.evaluation.failures.error_kinds import matched_people
+from hicp_lib.evaluation.cases import Found, Truth
+from hicp_lib.evaluation.matching import matched_people
 from hicp_lib.formats.annotations import Annotations, source_images
 
 # Where a keypoint truly is: in the picture and visible, in the picture but hidden, outside the picture, or
@@ -30,28 +29,28 @@ _DTYPES = {
 }  # fmt: skip
 
 
-def placed_keypoints(
-    truth: Mapping[str, Annotations],
-    found: Mapping[tuple[str, str], Mapping[int, Detections]],
-    source: Annotations,
-) -> pd.DataFrame:
-    """The 17 keypoints of every detection matched to a person who counts (`error_kinds.matched_people`).
+def placed_keypoints(truth: Truth, found: Found, source: Annotations) -> pd.DataFrame:
+    """The 17 keypoints of every detection matched to a person who counts (`matching.matched_people`).
 
     Parameters
     ----------
-    truth : subset -> annotations of crops, whose people name their `source_id` and `crop_px`
-    found : (subset, detector) -> detections by image id
-    source : the annotations that the crops were made from
+    truth : mapping of str to Annotations
+        Of crops, by subset; people name their `source_id` and `crop_px`.
+    found : mapping of (str, str) to mapping of int to Detections
+        By image id, of every subset and detector.
+    source : Annotations
+        What the crops were made from.
 
     Returns
     -------
-    DataFrame, columns `subset, detector, image_id, source_image, cut_side` (empty outside Headless),
-    `keypoint, state` (one of `STATES`), `given, score` (NaN where not given), `x, y` (where it was put, from
-    0 at the left or top border to 1 at the other), `hit` (OKS term of at least .5; NaN where not given or
-    unknown)
+    DataFrame
+        Columns `subset, detector, image_id, source_image, cut_side` (empty outside Headless), `keypoint,
+        state` (one of `STATES`), `given, score` (NaN where not given), `x, y` (where it was put, from 0 at
+        the left or top border to 1 at the other), `hit` (OKS term of at least .5; NaN where not given or
+        unknown).
     """
     source_row = {int(i): row for row, i in enumerate(source.ids)}
-    parts = [pd.DataFrame(columns=_DTYPES).astype(_DTYPES)]
+    parts = [pd.DataFrame(columns=list(_DTYPES)).astype(_DTYPES)]
     for (subset, detector), run in found.items():
         people, sources = truth[subset], source_images(truth[subset])
         rows_of = pd.Series(range(len(people))).groupby(people.image_ids).indices
@@ -60,42 +59,41 @@ def placed_keypoints(
             for person, row in matched_people(here, detections, COCO_17, _SIGMAS).items():
                 if here.is_crowd[person]:
                     continue
-                true_px, state = _truth(here, person, source, source_row)
-                part = _row_per_keypoint(here, person, detections, row, true_px, state)
+                about = here.extras[person]
+                part = _row_per_keypoint(
+                    here, person, detections, row, source, source_row[about["source_id"]]
+                )
                 labels = {"subset": subset, "detector": detector, "image_id": image_id}
-                cut_side = here.extras[person].get("cut_side", "")
-                parts.append(part.assign(**labels, source_image=sources[image_id], cut_side=cut_side))
-    return pd.concat([part[list(_DTYPES)] for part in parts if len(part)] or parts, ignore_index=True)
-
-
-def _truth(
-    people: Annotations, person: int, source: Annotations, source_row: Mapping[int, int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """True places (17, 2) in the crop's frame, also outside it, and states (17,)."""
-    flags = people.visibility[person, COCO_17]
-    about = people.extras[person]
-    row = source_row[about["source_id"]]
-    labelled = source.visibility[row, COCO_17] > 0
-    true_px = source.keypoints_px[row, COCO_17] - np.array(about["crop_px"][:2], dtype=float)
-    state = np.select([flags >= 2, flags > 0, labelled], STATES[:3], STATES[3])
-    return true_px, state
+                labels |= {"source_image": sources[image_id], "cut_side": about.get("cut_side", "")}
+                parts.append(part.assign(**labels)[list(_DTYPES)])
+    return pd.concat(parts[1:] or parts, ignore_index=True)
 
 
 def _row_per_keypoint(
-    people: Annotations, person: int, detections: Detections, row: int, true_px: np.ndarray, state: np.ndarray
+    people: Annotations, person: int, found: Detections, row: int, source: Annotations, source_row: int
 ) -> pd.DataFrame:
-    image = people.images[int(people.image_ids[person])]
-    points = detections.keypoints_px[row, COCO_17]
-    given = np.isfinite(points).all(axis=-1)
-    terms = oks_terms(true_px, points, people.areas_px2[person], _SIGMAS)
-    x, y = ((points + 0.5) / [image.width_px, image.height_px]).T
-    return pd.DataFrame(
-        {
-            "keypoint": COCO_17, "state": state, "given": given,
-            "score": np.where(given, detections.scores[row, COCO_17], np.nan), "x": x, "y": y,
-            "hit": np.where(given & (state != "unknown"), terms >= HIT_TERM, np.nan),
-        }
-    )  # fmt: skip
+    """What detection `row` makes of a person; the truth, also outside the crop, is the source's."""
+    image, flags = people.images[int(people.image_ids[person])], people.visibility[person, COCO_17]
+    known = source.visibility[source_row, COCO_17] > 0
+    state = np.select([flags >= 2, flags > 0, known], STATES[:3], STATES[3])
+    corner_px = np.array(people.extras[person]["crop_px"][:2], dtype=float)
+    points_px = found.keypoints_px[row, COCO_17]
+    given = np.isfinite(points_px).all(axis=-1)
+    true_px = source.keypoints_px[source_row, COCO_17] - corner_px
+    terms = oks_terms(true_px, points_px, people.areas_px2[person], _SIGMAS)
+    x, y = ((points_px + 0.5) / [image.width_px, image.height_px]).T
+    score = np.where(given, found.scores[row, COCO_17], np.nan)
+    hit = np.where(given & (state != "unknown"), terms >= HIT_TERM, np.nan)
+    columns = {
+        "keypoint": COCO_17,
+        "state": state,
+        "given": given,
+        "score": score,
+        "x": x,
+        "y": y,
+        "hit": hit,
+    }
+    return pd.DataFrame(columns)
 
 
 def landed(placed: pd.DataFrame) -> pd.Series:

@@ -1,4 +1,4 @@
-"""The head's part in it: what changes for each keypoint when the head is cut off, and heads made up."""
+"""The head's part in it: what changes for each keypoint when the head is cut off, and heads hallucinated."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pandas as pd
 
 from hicp_lib.core.keypoints import NAMES
 from hicp_lib.evaluation.failures.placed_keypoints import from_the_cut, landed
-from hicp_lib.evaluation.statistics.proportions import shares
+from hicp_lib.evaluation.statistics.proportions import proportions
 
 HEAD_POINTS = range(5)  # nose, eyes, ears
 
@@ -16,71 +16,74 @@ def change_per_keypoint(errors: pd.DataFrame, n_resamples: int = 1000, seed: int
 
     Parameters
     ----------
-    errors : `error_kinds.all_errors` with the subsets "basic" and "headless"
+    errors : DataFrame
+        `error_kinds.all_errors` with the subsets "basic" and "headless".
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
-    DataFrame, columns `detector, keypoint` (name), `basic, headless, change, low, high, n` (pairs),
-    `n_images`; the interval is the change's, over source images
+    DataFrame
+        Columns `detector, keypoint` (name), `basic, headless, change, low, high, n` (pairs), `n_images`; the
+        interval is the change's, over source images.
     """
-    keys = ["detector", "keypoint", "annotation_id", "source_image"]
+    by = ["detector", "keypoint"]
     body = errors[errors["group"] == "body"]
-    pairs = body[body["subset"] == "basic"].merge(
-        body[body["subset"] == "headless"], on=keys, suffixes=("_basic", "_headless")
-    )
-    pairs["change"] = pairs["hit_headless"].astype(float) - pairs["hit_basic"]
-    table = shares(
-        pairs.sort_values(["detector", "keypoint"]), ["detector", "keypoint"], "change", n_resamples, seed
-    )
-    rates = pairs.groupby(["detector", "keypoint"])[["hit_basic", "hit_headless"]].mean().reset_index()
-    table = table.rename(columns={"value": "change"}).merge(rates, on=["detector", "keypoint"])
-    table = table.rename(columns={"hit_basic": "basic", "hit_headless": "headless"})
+    basic, headless = (body[body["subset"] == subset] for subset in ("basic", "headless"))
+    same = [*by, "annotation_id", "source_image"]
+    both = basic.merge(headless, on=same, suffixes=("_basic", "_headless")).sort_values(by)
+    both["change"] = both["hit_headless"].astype(float) - both["hit_basic"]
+    rates = both.groupby(by)[["hit_basic", "hit_headless"]].mean().reset_index()
+    table = proportions(both, by, "change", n_resamples, seed).merge(rates, on=by)
     table["keypoint"] = [NAMES[k] for k in table["keypoint"]]
-    return table[["detector", "keypoint", "basic", "headless", "change", "low", "high", "n", "n_images"]]
+    table = table.rename(columns={"value": "change", "hit_basic": "basic", "hit_headless": "headless"})
+    return table[[*by, "basic", "headless", "change", "low", "high", "n", "n_images"]]
 
 
-def invented_heads(placed: pd.DataFrame) -> pd.DataFrame:
+def hallucinated_heads(placed: pd.DataFrame) -> pd.DataFrame:
     """Head keypoints given in Headless, where there are none: the rows of `placed_keypoints` for them.
 
     Further columns: `landed`, and `along`, `below` as from `from_the_cut`.
     """
-    rows = placed[(placed["subset"] == "headless") & placed["keypoint"].isin(HEAD_POINTS) & placed["given"]]
-    rows = rows[rows["state"].isin(["outside", "unknown"])]
+    rows = _missing_heads(placed)
+    rows = rows[rows["given"]]
     return rows.assign(landed=landed(rows), **from_the_cut(rows))
 
 
-def invented_shares(
+def _missing_heads(placed: pd.DataFrame) -> pd.DataFrame:
+    rows = placed[(placed["subset"] == "headless") & placed["keypoint"].isin(HEAD_POINTS)]
+    return rows[rows["state"].isin(["outside", "unknown"])]
+
+
+def hallucinated_proportions(
     placed: pd.DataFrame, min_score: float, n_resamples: int = 1000, seed: int = 0
 ) -> pd.DataFrame:
     """How many head keypoints are made up, where they go, and how surely.
 
+    Parameters
+    ----------
+    placed : DataFrame
+        `placed_keypoints.placed_keypoints`.
+    min_score : float
+        From which a keypoint counts as sure.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
+
     Returns
     -------
-    DataFrame, columns `detector, what, value, low, high, n, n_images`
+    DataFrame
+        Columns `detector, what, value, low, high, n, n_images`.
     """
-    missing = placed[(placed["subset"] == "headless") & placed["keypoint"].isin(HEAD_POINTS)]
-    missing = missing[missing["state"].isin(["outside", "unknown"])]
-    given = invented_heads(placed)
-    sure = given["score"] >= min_score
-    tables = [
-        _labelled(missing, "given at all", missing["given"], n_resamples, seed),
-        _labelled(
-            missing,
-            f"given with a score of at least {min_score}",
-            missing["score"] >= min_score,
-            n_resamples,
-            seed,
-        ),
-    ]
-    for place in ("outside", "at the border", "inside"):
-        tables.append(
-            _labelled(given, f"of those given: put {place}", given["landed"] == place, n_resamples, seed)
-        )
-    tables.append(_labelled(given[sure], "of the sure ones: right", given["hit"][sure], n_resamples, seed))
-    return pd.concat(tables, ignore_index=True)
-
-
-def _labelled(rows: pd.DataFrame, what: str, flags: pd.Series, n_resamples: int, seed: int) -> pd.DataFrame:
-    table = shares(rows.assign(flag=flags.astype(float)), ["detector"], "flag", n_resamples, seed)
-    table.insert(1, "what", what)
-    return table
+    missing, given = _missing_heads(placed), hallucinated_heads(placed)
+    sure = given[given["score"] >= min_score]
+    flags = {
+        "given at all": (missing, missing["given"]),
+        f"given with a score of at least {min_score}": (missing, missing["score"] >= min_score),
+        "of those given: put outside": (given, given["landed"] == "outside"),
+        "of those given: put at the border": (given, given["landed"] == "at the border"),
+        "of those given: put inside": (given, given["landed"] == "inside"),
+        "of the sure ones: right": (sure, sure["hit"]),
+    }
+    rows = [rows.assign(what=what, flag=flag.astype(float)) for what, (rows, flag) in flags.items()]
+    table = proportions(pd.concat(rows), ["what", "detector"], "flag", n_resamples, seed)
+    return table[["detector", "what", *table.columns[2:]]]

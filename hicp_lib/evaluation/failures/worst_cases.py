@@ -18,33 +18,31 @@ KINDS_OF_CASE = ("surest mistakes", "overlooked")
 
 
 def worst_cases(errors: pd.DataFrame, n: int = 4) -> pd.DataFrame:
-    """The `n` worst cases per detector and kind of case, bodies only.
+    """The worst cases per detector and kind of case, bodies only.
 
     Parameters
     ----------
-    errors : `error_kinds.all_errors`
+    errors : DataFrame
+        `error_kinds.all_errors`.
+    n : int, optional
+        Number of cases of each.
 
     Returns
     -------
-    DataFrame, columns `detector, case, rank` (from 1), `subset, image_id, badness`
+    DataFrame
+        Columns `detector, case, rank` (from 1), `subset, image_id, badness`.
     """
     body = errors[errors["group"] == "body"]
     mistakes = body["score"].where(body["kind"].isin(WRONG), 0.0)
     unseen = (body["kind"] == "not found") & (body["visibility"] >= 2)
     rows = body.assign(**{"surest mistakes": mistakes, "overlooked": unseen.astype(float)})
-    people = rows.groupby(["detector", "subset", "source_image", "image_id"], sort=True)[list(KINDS_OF_CASE)]
-    table = (
-        people.sum()
-        .reset_index()
-        .melt(["detector", "subset", "source_image", "image_id"], var_name="case", value_name="badness")
-    )
+    keys = ["detector", "subset", "source_image", "image_id"]
+    sums = rows.groupby(keys, sort=True)[list(KINDS_OF_CASE)].sum().reset_index()
+    table = sums.melt(keys, var_name="case", value_name="badness")
     table = table[table["badness"] > 0].sort_values("badness", ascending=False, kind="stable")
     table = table.drop_duplicates(["detector", "case", "source_image"])
     table = table.assign(rank=table.groupby(["detector", "case"]).cumcount() + 1)
-    detectors = list(dict.fromkeys(errors["detector"]))
-    place = np.lexsort(
-        (table["rank"], table["case"].map(KINDS_OF_CASE.index), table["detector"].map(detectors.index))
-    )
-    table = table.iloc[place]
+    orders = {"detector": list(dict.fromkeys(errors["detector"])), "case": list(KINDS_OF_CASE)}
+    place = table["rank"], *(table[name].map(orders[name].index) for name in ("case", "detector"))
     columns = ["detector", "case", "rank", "subset", "image_id", "badness"]
-    return table.loc[table["rank"] <= n, columns].reset_index(drop=True)
+    return table.iloc[np.lexsort(place)].query("rank <= @n")[columns].reset_index(drop=True)

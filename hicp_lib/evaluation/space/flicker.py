@@ -19,6 +19,7 @@ that find hands and faces are judged on the 17 body keypoints all detectors shar
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -35,6 +36,7 @@ MIN_SCORE = 0.3
 MAJORITY_OF = 3
 MIN_CUTOFF_HZ, BETA = 1.5, 0.02  # of the One Euro filter; beta in Hz per px/s
 MAX_GAP_S = 0.5  # over which frames still count as consecutive
+_ANY_RATE_HZ = 1.0  # the filter takes the true one from the stamps
 _BLOCK_S = 1.0  # stretches of time that are drawn together in the bootstrap
 
 
@@ -50,22 +52,31 @@ def best_person(found: Sequence[Detections], min_score: float = MIN_SCORE) -> np
 
 
 def causal_filter(tracks_px: np.ndarray, times_s: np.ndarray) -> np.ndarray:
-    """Tracks (n, k, 2) filtered as the module says, by what was seen up to each frame (times (n,))."""
-    filtered = np.full_like(tracks_px, np.nan)
-    for k in range(tracks_px.shape[1]):
-        filtered[:, k] = _filtered_keypoint(tracks_px[:, k], times_s)
-    return filtered
+    """Tracks filtered as the module says, by what was seen up to each frame.
+
+    Parameters
+    ----------
+    tracks_px : array, shape (n, k, 2)
+        NaN where not given.
+    times_s : array, shape (n,)
+        Rising.
+
+    Returns
+    -------
+    array, shape (n, k, 2)
+    """
+    return np.stack([_filtered_keypoint(track_px, times_s) for track_px in tracks_px.swapaxes(0, 1)], axis=1)
 
 
 def _filtered_keypoint(track_px: np.ndarray, times_s: np.ndarray) -> np.ndarray:
     given = np.isfinite(track_px).all(axis=-1)
     result = np.full_like(track_px, np.nan)
-    place, seen_s, axes = np.full(2, np.nan), -np.inf, ()
+    place, seen_s, axes = np.full(2, np.nan), -np.inf, list[Any]()
     for i, time_s in enumerate(times_s):
         if given[i]:
             if time_s - seen_s > MAX_GAP_S:
-                axes = tuple(OneEuroFilter(1.0, MIN_CUTOFF_HZ, BETA) for _ in range(2))
-            place = np.array([one(float(x), time_s) for one, x in zip(axes, track_px[i], strict=True)])
+                axes = [OneEuroFilter(_ANY_RATE_HZ, MIN_CUTOFF_HZ, BETA) for _ in range(2)]
+            place = np.array([axis(float(x), time_s) for axis, x in zip(axes, track_px[i], strict=True)])
             seen_s = time_s
         recent = given[max(0, i + 1 - MAJORITY_OF) : i + 1]
         if 2 * recent.sum() > len(recent):
@@ -74,7 +85,26 @@ def _filtered_keypoint(track_px: np.ndarray, times_s: np.ndarray) -> np.ndarray:
 
 
 def latency_s(tracks_px: np.ndarray, filtered_px: np.ndarray, times_s: np.ndarray) -> float:
-    """By how much filtered tracks lag behind the unfiltered ones; NaN where nothing moves."""
+    """By how much filtered tracks lag behind the unfiltered ones.
+
+    Parameters
+    ----------
+    tracks_px, filtered_px : array, shape (n, k, 2)
+        NaN where not given.
+    times_s : array, shape (n,)
+        Rising.
+
+    Returns
+    -------
+    float
+        NaN where nothing moves.
+
+    Examples
+    --------
+    >>> moving_px = np.arange(10.0)[:, None, None] * [[3.0, 4.0]]
+    >>> round(latency_s(moving_px[1:], moving_px[:-1], np.arange(9) / 10), 3)
+    0.1
+    """
     steps = np.diff(times_s)[:, None, None]
     velocity = np.diff(tracks_px, axis=0) / steps
     behind = (tracks_px - filtered_px)[1:]
@@ -94,15 +124,21 @@ def flicker(
 
     Parameters
     ----------
-    found : detector -> detections of each frame
-    times_s : array, shape (n,), rising
-    min_score : from which a keypoint is given
+    found : mapping of str to sequence of Detections
+        Of each frame, by detector.
+    times_s : array, shape (n,)
+        Rising.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
+    min_score : float, optional
+        From which a keypoint is given.
 
     Returns
     -------
-    DataFrame, columns `detector, tracks` ("as detected", "filtered"), `measure` ("flicker rate", "jitter
-    [px]", "latency [s]"), `value, low, high, n`: 95 % intervals from drawing stretches of a second; none
-    for the latency
+    DataFrame
+        Columns `detector, tracks` ("as detected", "filtered"), `measure` ("flicker rate", "jitter [px]",
+        "latency [s]"), `value, low, high, n`: 95 % intervals from drawing stretches of a second; none for the
+        latency.
     """
     rows = []
     for detector, run in found.items():
@@ -122,6 +158,7 @@ def _measures(tracks_px: np.ndarray, times_s: np.ndarray) -> dict[str, tuple[np.
     given = np.isfinite(tracks_px).all(axis=-1)
     close = (np.diff(times_s) <= MAX_GAP_S)[:, None]
     either = (given[1:] | given[:-1]) & close
+    # 6 is the sum of the squares of 1, -2, 1: of the second difference.
     jumps = np.linalg.norm(np.diff(tracks_px, n=2, axis=0), axis=-1) / np.sqrt(6)
     jumped = np.isfinite(jumps) & close[1:] & close[:-1]
     at_s = np.broadcast_to(times_s[:, None], given.shape)

@@ -38,15 +38,19 @@ def lifting_ablation(points: pd.DataFrame, truth: pd.DataFrame, min_score: float
 
     Parameters
     ----------
-    points : one detector's keypoints as `lift_found` gives them with `N_STEPS`
-    truth : as `recording.read_truth` gives it
-    min_score : detected keypoints count from this score
+    points : DataFrame
+        One detector's keypoints as `lift_found` gives them with `N_STEPS`.
+    truth : DataFrame
+        As `recording.read_truth` gives it.
+    min_score : float, optional
+        Detected keypoints count from this score.
 
     Returns
     -------
-    DataFrame, one row per group x method, columns group, method, n_detected, n_lifted, n_compared (lifted
-        by this and by the paper's method), median_m, p95_m (95th percentile), p95_change (against the
-        paper's: -0.4 is 40 % less)
+    DataFrame
+        One row per group x method, columns `group, method, n_detected, n_lifted, n_compared` (lifted by this
+        and by the paper's method), `median_m, p95_m` (95th percentile), `p95_change` (against the paper's:
+        -0.4 is 40 % less).
     """
     return summary(lifting_errors(points, truth, min_score))
 
@@ -54,12 +58,16 @@ def lifting_ablation(points: pd.DataFrame, truth: pd.DataFrame, min_score: float
 def lifting_errors(points: pd.DataFrame, truth: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
     """Distance of every detected keypoint of `GROUPS` from its true position, by every method.
 
-    Parameters as of `lifting_ablation`.
+    Parameters
+    ----------
+    points, truth, min_score
+        As of `lifting_ablation`.
 
     Returns
     -------
-    DataFrame, one row per keypoint detected with `min_score` or more, columns frame, keypoint, group, and one
-        per method in metres, NaN where it does not lift; those of several recordings may be put together
+    DataFrame
+        One row per keypoint detected with `min_score` or more, columns `frame, keypoint, group`, and one per
+        method in metres, NaN where it does not lift; those of several recordings may be put together.
     """
     group_of = {name: group for group, names in GROUPS.items() for name in names}
     counts = (points["person"] == 0) & (points["score"] >= min_score) & points["keypoint"].isin(group_of)
@@ -74,18 +82,12 @@ def lifting_errors(points: pd.DataFrame, truth: pd.DataFrame, min_score: float =
 
 def summary(errors: pd.DataFrame) -> pd.DataFrame:
     """The table of `lifting_ablation` from errors of `lifting_errors`."""
-    rows = [
-        {"group": group, "method": method, **_row(of_group, method)}
-        for group, of_group in errors.groupby(pd.Categorical(errors["group"], list(GROUPS)), observed=True)
-        for method in N_STEPS
-    ]
+    rows = []
+    for group, of_group in errors.groupby(pd.Categorical(errors["group"], list(GROUPS)), observed=True):
+        for method in N_STEPS:
+            both = of_group[of_group[["paper", method]].notna().all(axis=1)]
+            counts = (len(of_group), of_group[method].count(), len(both))
+            p95_m, paper_m = (both[name].quantile(0.95) for name in (method, "paper"))
+            rows.append((group, method, *counts, both[method].median(), p95_m, p95_m / paper_m - 1))
     columns = ["group", "method", "n_detected", "n_lifted", "n_compared", "median_m", "p95_m", "p95_change"]
     return pd.DataFrame(rows, columns=columns)
-
-
-def _row(errors: pd.DataFrame, method: str) -> dict[str, float]:
-    both = errors[["paper", method]].notna().all(axis=1)
-    compared = errors.loc[both, method]
-    row = {"n_detected": len(errors), "n_lifted": errors[method].count(), "n_compared": len(compared)}
-    p95_m, paper_m = compared.quantile(0.95), errors.loc[both, "paper"].quantile(0.95)
-    return row | {"median_m": compared.median(), "p95_m": p95_m, "p95_change": p95_m / paper_m - 1}

@@ -16,6 +16,7 @@ import pandas as pd
 
 from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
+from hicp_lib.evaluation.cases import labelled
 from hicp_lib.evaluation.space.stability import THRESHOLDS_M
 from hicp_lib.evaluation.statistics.resampling import weighted_median, with_interval
 from hicp_lib.evaluation.statistics.time_blocks import block_length, draw_blocks
@@ -45,31 +46,38 @@ def marker_means(
 
     Parameters
     ----------
-    stamps_s : array, shape (n,), on the motion capture's clock
+    mocap : MotionCapture
+        With two markers per joint (`MARKERS`).
+    stamps_s : array, shape (n,)
+        On the motion capture's clock.
     T_base_mocap : array, shape (4, 4)
+        Takes the motion capture's coordinates to the base frame.
+    joints : sequence of str, optional
+        Keys of `MARKERS`.
 
     Returns
     -------
-    DataFrame, n rows per joint, columns `frame, keypoint, x_m, y_m, z_m` (base frame); NaN where one of
-    the two markers is missing
+    DataFrame
+        n rows per joint, columns `frame, keypoint, x_m, y_m, z_m` (base frame); NaN where one of the two
+        markers is missing.
 
     Raises
     ------
     InputError
         If a joint's markers are not among the names.
     """
-    missing = [name for joint in joints for name in MARKERS[joint] if name not in mocap.names]
+    names = [name for joint in joints for name in MARKERS[joint]]
+    missing = [name for name in names if name not in mocap.names]
     if missing:
         raise InputError(
-            f"motion capture has no marker {missing[0]!r}; name the markers {MARKERS['left_elbow'][0]}, "
-            f"{MARKERS['left_elbow'][1]} and so on, two per joint"
+            f"motion capture has no marker {missing[0]!r}; name the markers "
+            f"{', '.join(MARKERS['left_elbow'])} and so on, two per joint"
         )
-    columns = [mocap.names.index(name) for joint in joints for name in MARKERS[joint]]
+    columns = [mocap.names.index(name) for name in names]
     points_m = interpolate_mocap(mocap.times_s, mocap.points_m[:, columns], stamps_s)
     means_m = transform(T_base_mocap, points_m.reshape(len(stamps_s), -1, 2, 3).mean(axis=2))
-    frame, joint = np.divmod(np.arange(means_m.shape[0] * len(joints)), len(joints))
-    table = pd.DataFrame(means_m.reshape(-1, 3), columns=POSITION)
-    return table.assign(frame=frame, keypoint=np.array(joints)[joint])[["frame", "keypoint", *POSITION]]
+    index = pd.MultiIndex.from_product([range(len(stamps_s)), joints], names=["frame", "keypoint"])
+    return pd.DataFrame(means_m.reshape(-1, 3), index, POSITION).reset_index()
 
 
 def mocap_errors(
@@ -79,20 +87,24 @@ def mocap_errors(
 
     Parameters
     ----------
-    points : `lift_recording`'s table with columns `detector, method` before its own; the person with the
-        best score of a frame counts
-    reference : as from `marker_means`
-    truth : as from `read_truth`; None where it is not known
+    points : DataFrame
+        `lift_recording`'s table with columns `detector, method` before its own; the person with the best
+        score of a frame counts.
+    reference : DataFrame
+        As from `marker_means`.
+    truth : DataFrame, optional
+        As from `read_truth`; None where it is not known.
 
     Returns
     -------
-    DataFrame, a row per detector, method and row of `reference`: columns `detector, method, frame,
-    keypoint, x_m, y_m, z_m, score` (0 where not detected), `reference_x_m, reference_y_m, reference_z_m,
-    error_m` (NaN where not lifted or the reference is missing), `centre_error_m` (NaN without truth)
+    DataFrame
+        A row per detector, method and row of `reference`: columns `detector, method, frame, keypoint, x_m,
+        y_m, z_m, score` (0 where not detected), `reference_x_m, reference_y_m, reference_z_m, error_m` (NaN
+        where not lifted or the reference is missing), `centre_error_m` (NaN without truth).
     """
     keys = ["frame", "keypoint"]
-    at = reference.rename(columns={name: f"reference_{name}" for name in POSITION})
     centres = pd.DataFrame(columns=[*keys, *POSITION]) if truth is None else truth[[*keys, *POSITION]]
+    at = reference.rename(columns={name: f"reference_{name}" for name in POSITION})
     at = at.merge(centres.rename(columns={name: f"centre_{name}" for name in POSITION}), on=keys, how="left")
     tables = []
     for (detector, method), rows in points[points["person"] == 0].groupby(["detector", "method"], sort=False):
@@ -101,35 +113,40 @@ def mocap_errors(
             other = table[[f"{name}_{axis}" for axis in POSITION]].to_numpy(float)
             table[column] = np.linalg.norm(table[POSITION].to_numpy(float) - other, axis=1)
         table = table.drop(columns=[f"centre_{axis}" for axis in POSITION])
-        tables.append(table.assign(detector=detector, method=method))
-    result = pd.concat(tables, ignore_index=True)
-    return result[["detector", "method", *result.columns.drop(["detector", "method"])]]
+        tables.append(labelled(table, detector=detector, method=method))
+    return pd.concat(tables, ignore_index=True)
 
 
 def median_errors(
-    errors: pd.DataFrame,
-    min_scores: Sequence[float] = MIN_SCORES,
-    n_resamples: int = 1000,
-    seed: int = 0,
+    errors: pd.DataFrame, min_scores: Sequence[float] = MIN_SCORES, n_resamples: int = 1000, seed: int = 0
 ) -> pd.DataFrame:
     """Count and median distance of the keypoints above a score: Tables III and IV.
 
+    Parameters
+    ----------
+    errors : DataFrame
+        `mocap_errors`.
+    min_scores : sequence of float, optional
+        Keypoints above each count.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
+
     Returns
     -------
-    DataFrame, columns `detector, method, keypoint, min_score, count` (frames with the keypoint above the
-    score, lifted, and motion capture), `n_frames` (with motion capture), `median_m, low_m, high_m` (95 %
-    moving block bootstrap), `centre_median_m` (against the joint's centre), `block_frames`
+    DataFrame
+        Columns `detector, method, keypoint, min_score, count` (frames with the keypoint above the score,
+        lifted, and motion capture), `n_frames` (with motion capture), `median_m, low_m, high_m` (95 % moving
+        block bootstrap), `centre_median_m` (against the joint's centre), `block_frames`.
     """
     rows = []
     length = _block_length(errors)
     for case, part in errors.groupby(_CASE, sort=False):
         weights = draw_blocks(len(part), length, n_resamples, seed)
         for min_score in min_scores:
-            values = np.where(part["score"] > min_score, part["error_m"], np.nan)
-            centre = part.loc[part["score"] > min_score, "centre_error_m"].median()
-            numbers = with_interval(weighted_median(values, weights))
-            counts = (int(np.isfinite(values).sum()), int(part["reference_x_m"].notna().sum()))
-            rows.append((*case, min_score, *counts, *map(float, numbers), centre, length))
+            found = part.where(part["score"] > min_score)
+            numbers = with_interval(weighted_median(found["error_m"].to_numpy(), weights))
+            counts = (found["error_m"].count(), part["reference_x_m"].count())
+            rows.append((*case, min_score, *counts, *numbers, found["centre_error_m"].median(), length))
     columns = [*_CASE, "min_score", "count", "n_frames", "median_m", "low_m", "high_m"]
     return pd.DataFrame(rows, columns=[*columns, "centre_median_m", "block_frames"])
 
@@ -143,10 +160,21 @@ def fractions_within(
 ) -> pd.DataFrame:
     """Fraction of the frames with motion capture in which a joint was found within a distance of it.
 
+    Parameters
+    ----------
+    errors : DataFrame
+        `mocap_errors`.
+    min_score : float, optional
+        Keypoints above it count as found.
+    thresholds_m : sequence of float, optional
+        The distances.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
+
     Returns
     -------
-    DataFrame, columns `detector, method, keypoint, threshold_m, value, low, high` (95 % moving block
-    bootstrap)
+    DataFrame
+        Columns `detector, method, keypoint, threshold_m, value, low, high` (95 % moving block bootstrap).
     """
     rows = []
     length = _block_length(errors)
@@ -155,26 +183,38 @@ def fractions_within(
         total = np.maximum(weights.sum(axis=1), 1)
         found_m = np.where(part["score"] > min_score, part["error_m"], np.nan)
         for threshold_m in thresholds_m:
-            shares = (weights * (found_m <= threshold_m)).sum(axis=1) / total
-            rows.append((*case, threshold_m, *map(float, with_interval(shares))))
+            fractions = (weights * (found_m <= threshold_m)).sum(axis=1) / total
+            rows.append((*case, threshold_m, *with_interval(fractions)))
     return pd.DataFrame(rows, columns=[*_CASE, "threshold_m", "value", "low", "high"])
 
 
 def errors_by(
     errors: pd.DataFrame, column: str, edges: Sequence[float] | None = None, min_score: float = 0.1
 ) -> pd.DataFrame:
-    """Median and quartiles of the error by another column: distance, score, sight.
+    """Median and quartiles of the error by another column: distance, score, occlusion.
 
     Parameters
     ----------
-    edges : bins of a number, each closed on the left; None where the column holds labels
+    errors : DataFrame
+        `mocap_errors`, with the column.
+    column : str
+        What the error is grouped by.
+    edges : sequence of float, optional
+        Bins of a number, each closed on the left; None where the column holds labels.
+    min_score : float, optional
+        Keypoints above it count as found.
 
     Returns
     -------
-    DataFrame, columns `detector, method, part` ("elbow", both sides together), `by` (the column), `bin`
-    (as text), `middle` (of the bin; NaN for labels), `n, median_m, lower_m, upper_m`
+    DataFrame
+        Columns `detector, method, part` ("elbow", both sides together), `by` (the column), `bin` (as text),
+        `middle` (of the bin; NaN for labels), `n, median_m, lower_m, upper_m`; no rows where nothing was
+        found.
     """
+    columns = ["detector", "method", "part", "by", "bin", "middle", "n", "median_m", "lower_m", "upper_m"]
     found = errors[(errors["score"] > min_score) & errors["error_m"].notna()]
+    if found.empty:
+        return pd.DataFrame(columns=columns)
     part = found["keypoint"].str.split("_").str[1].rename("part")
     bins = found[column] if edges is None else pd.cut(found[column], list(edges), right=False)
     keys = [found["detector"], found["method"], part, bins.rename("bin")]
@@ -183,14 +223,24 @@ def errors_by(
     table = table.assign(n=grouped.size(), by=column).reset_index().sort_values("bin", kind="stable")
     table["middle"] = np.nan if edges is None else np.array([b.mid for b in table["bin"]], dtype=float)
     table["bin"] = [str(b) if edges is None else f"{b.left:g} to {b.right:g}" for b in table["bin"]]
-    columns = ["detector", "method", "part", "by", "bin", "middle", "n", "median_m", "lower_m", "upper_m"]
     return table[columns].sort_values(["detector", "method", "part"], kind="stable", ignore_index=True)
 
 
 def error_dependence(errors: pd.DataFrame, min_score: float = 0.1) -> pd.DataFrame:
-    """`errors_by` distance, score and line of sight, one after the other.
+    """`errors_by` distance, score and occlusion, one after the other.
 
-    `errors` with the columns `distance_m, sight` of `hicp_lib.evaluation.space.occlusion.lines_of_sight`.
+    Parameters
+    ----------
+    errors : DataFrame
+        `mocap_errors`, with the columns `distance_m, sight` of
+        `hicp_lib.evaluation.space.occlusion.joint_occlusion`.
+    min_score : float, optional
+        Keypoints above it count as found.
+
+    Returns
+    -------
+    DataFrame
+        As of `errors_by`.
     """
     return pd.concat([errors_by(errors, column, edges, min_score) for column, edges in _BINS.items()])
 

@@ -9,13 +9,16 @@ import pandas as pd
 
 from hicp_lib.core.camera import project, transform
 from hicp_lib.core.extras import needs
-from hicp_lib.mocap.registration import Registration
+from hicp_lib.mocap.registration import CAMERA_MARKER, Registration
 from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import Recording
 
 with needs("analysis"):
     from scipy.spatial.transform import Rotation
+
+
+_COLUMNS = ["method", "n_points", "rms_m", "leave_one_out_m", "turned_rad", "added_m", "worst_m"]
 
 
 def compare_registrations(
@@ -25,34 +28,33 @@ def compare_registrations(
 
     Parameters
     ----------
-    T_base_mocap : the exact transform, shape (4, 4); None where it is not known
+    registrations : sequence of Registration
+        What is compared.
+    mocap : MotionCapture
+        Its markers.
+    T_base_mocap : array, shape (4, 4), or None
+        The exact transform; None where it is not known.
 
     Returns
     -------
-    DataFrame, columns `method, n_points, rms_m, leave_one_out_m`, and against the exact transform
-    `turned_rad` (angle between the rotations), `added_m` and `worst_m` (median and largest displacement
-    of the markers on the person, all frames); NaN where it is not known
+    DataFrame
+        Columns `method, n_points, rms_m, leave_one_out_m`, and against the exact transform `turned_rad`
+        (angle between the rotations), `added_m` and `worst_m` (median and largest displacement of the markers
+        on the person, all frames); NaN where it is not known.
     """
-    on_person = [k for k, name in enumerate(mocap.names) if name != "camera"]
+    on_person = [k for k, name in enumerate(mocap.names) if name != CAMERA_MARKER]
     markers_m = mocap.points_m[:, on_person].reshape(-1, 3)
     markers_m = markers_m[np.isfinite(markers_m).all(axis=1)]
     rows = []
     for one in registrations:
-        row = {"method": one.method, "n_points": one.n_points, "rms_m": one.rms_m}
-        row |= {
-            "leave_one_out_m": one.leave_one_out_m,
-            "turned_rad": np.nan,
-            "added_m": np.nan,
-            "worst_m": np.nan,
-        }
+        errors: tuple[float, float, float] = (np.nan, np.nan, np.nan)
         if T_base_mocap is not None:
             R = one.T_base_mocap[:3, :3].T @ T_base_mocap[:3, :3]
             moved_m = transform(one.T_base_mocap, markers_m) - transform(T_base_mocap, markers_m)
             distances_m = np.linalg.norm(moved_m, axis=1)
-            row["turned_rad"] = float(Rotation.from_matrix(R).magnitude())
-            row |= {"added_m": float(np.median(distances_m)), "worst_m": float(distances_m.max())}
-        rows.append(row)
-    return pd.DataFrame(rows)
+            errors = Rotation.from_matrix(R).magnitude(), np.median(distances_m), distances_m.max()
+        rows.append((one.method, one.n_points, one.rms_m, one.leave_one_out_m, *errors))
+    return pd.DataFrame(rows, columns=_COLUMNS)
 
 
 def marker_pixels(
@@ -66,12 +68,21 @@ def marker_pixels(
 
     Parameters
     ----------
-    frames : of the images; a number may come more than once
-    offset_s : to add to the motion capture's stamps to have them on the camera's clock
+    recording : Recording
+        The images.
+    mocap : MotionCapture
+        The markers.
+    registrations : sequence of Registration
+        What is compared.
+    frames : iterable of int
+        Of the images; a number may come more than once.
+    offset_s : float, optional
+        To add to the motion capture's stamps to have them on the camera's clock.
 
     Returns
     -------
-    DataFrame, columns `method, frame, marker, u_px, v_px`; NaN where a marker was not measured
+    DataFrame
+        Columns `method, frame, marker, u_px, v_px`; NaN where a marker was not measured.
     """
     frames = sorted(set(frames))
     measured_m = interpolate_mocap(mocap.times_s, mocap.points_m, recording.times_s[frames] - offset_s)

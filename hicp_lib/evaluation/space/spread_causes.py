@@ -55,30 +55,44 @@ def spread_causes(
 
     Parameters
     ----------
-    found : (view, detector) -> detections of each frame; the best person counts
-    points : the same lifted by `method`, as `hicp_lib.study.relative.lift_views` does
-    joint_error_rad : standard deviation of the error of every joint of torso and neck
+    views : mapping of str to Recording
+        By view.
+    found : mapping of (str, str) to sequence of Detections
+        Of each frame, by view and detector; the best person counts.
+    points : DataFrame
+        The same lifted by `method`, as `hicp_lib.study.relative.lift_views` does.
+    method : str, optional
+        Of lifting.
+    min_score : float, optional
+        Keypoints above it count.
+    joint_error_rad : float, optional
+        Standard deviation of the error of every joint of torso and neck.
+    seed : int, optional
+        Of the joints' errors.
 
     Returns
     -------
-    DataFrame, columns `view, detector, part, cause` (one of `CAUSES`), `n` (images x keypoints), `spread_m`
-    (median distance to the median position), `p90_m` (90th percentile) and `bias_m` (the median position's
-    distance to the truth), each the mean over a part's keypoints, and over 20 draws of the joints' errors.
-    No rows for views that are not simulated
+    DataFrame
+        Columns `view, detector, part, cause` (one of `CAUSES`), `n` (images x keypoints), `spread_m` (median
+        distance to the median position), `p90_m` (90th percentile) and `bias_m` (the median position's
+        distance to the truth), each the mean over a part's keypoints, and over `N_DRAWS` draws of the joints'
+        errors. No rows for views that are not simulated.
 
     Raises
     ------
     InputError
         If a recording's joints do not give its camera poses.
     """
-    rows = []
+    rows: list[tuple] = []
     for view, recording in views.items():
-        if not is_simulated(recording):
-            continue
         truth = read_truth(recording)
+        if truth is None or not is_simulated(recording):
+            continue
         # The face decides on no other keypoint's depth.
         true = true_detections(truth[~truth["keypoint"].isin(_FACE)], len(recording))
-        exact = _lifted(_exact(recording), {_TRUE: true} | found_in(found, view), method)
+        exact_paths = [recording.folder / EXACT_DEPTH_DIR / path.name for path in recording.depth_paths]
+        exactly = replace(recording, depth_paths=exact_paths)
+        exact = _lifted(exactly, {_TRUE: true} | found_in(found, view), method)
         known = {VIEWPOINT: counted(exact[_TRUE], 0.0)}
         known[DEPTH] = counted(_lifted(recording, {_TRUE: true}, method)[_TRUE], 0.0)
         of_view = points[(points["view"] == view) & (points["method"] == method)]
@@ -95,8 +109,8 @@ def spread_causes(
 
 def is_simulated(recording: Recording) -> bool:
     """Whether a recording has truth, depth without errors and joints, as simulated ones have."""
-    exact = recording.folder / EXACT_DEPTH_DIR
-    return exact.is_dir() and read_truth(recording) is not None and read_joints(recording) is not None
+    tables = (read_truth(recording), read_joints(recording))
+    return (recording.folder / EXACT_DEPTH_DIR).is_dir() and all(table is not None for table in tables)
 
 
 def true_detections(truth: pd.DataFrame, n_frames: int) -> list[Detections]:
@@ -112,9 +126,21 @@ def wrong_poses(
 ) -> dict[str, np.ndarray]:
     """Camera poses in the base frame as wrong joint readings give them.
 
+    Parameters
+    ----------
+    recording : Recording
+        With joints.
+    joint_error_rad : float, optional
+        Standard deviation of the error of every joint of torso and neck.
+    n_draws : int, optional
+        Number of draws of the errors.
+    seed : int, optional
+        Of the draws.
+
     Returns
     -------
-    `JOINT_OFFSET` and `JOINT_NOISE` -> array, shape (n_draws, n_frames, 4, 4)
+    dict of str to array, shape (n_draws, n_frames, 4, 4)
+        T_base_cam of `JOINT_OFFSET` and `JOINT_NOISE`.
 
     Raises
     ------
@@ -140,19 +166,13 @@ def _mount(icub: ICub, angles_rad: np.ndarray, recording: Recording) -> str:
     """The camera holder with which the joints give the recorded poses."""
     for mount in icub.T_head_camera:
         T_base_cam = icub.T_root_camera(angles_rad, mount)
-        if T_base_cam.shape == recording.T_base_cam.shape:
-            if np.abs(T_base_cam - recording.T_base_cam).max() < _SAME_POSE_M:
-                return mount
+        same_shape = T_base_cam.shape == recording.T_base_cam.shape
+        if same_shape and np.abs(T_base_cam - recording.T_base_cam).max() < _SAME_POSE_M:
+            return mount
     raise InputError(
         f"{recording.folder / JOINTS_FILE}: the joints do not give the camera poses with any of the holders "
         f"{', '.join(icub.T_head_camera)}; record both with the same robot model"
     )
-
-
-def _exact(recording: Recording) -> Recording:
-    """The recording with depth that has no error."""
-    paths = [recording.folder / EXACT_DEPTH_DIR / path.name for path in recording.depth_paths]
-    return replace(recording, depth_paths=paths)
 
 
 def _lifted(
@@ -166,27 +186,25 @@ def _part_rows(
     recording: Recording,
     truth: pd.DataFrame,
     lifted: Mapping[str, pd.DataFrame],
-    poses: Mapping[str, np.ndarray],
-) -> Iterator[tuple[str, str, int, float, float, float]]:
+    poses: dict[str, np.ndarray],
+) -> Iterator[tuple]:
     """Part, cause, number, spread, 90th percentile and bias."""
+    n, recorded = len(recording), recording.T_base_cam[None]
+    poses = poses | {TOGETHER: poses[JOINT_OFFSET]}
     for part, keypoints in PARTS.items():
-        true = position_array(truth, keypoints, len(recording))
+        true = position_array(truth, keypoints, n)
         in_camera = {
-            cause: position_array(rows, keypoints, len(recording), _CAMERA_POSITION)
-            for cause, rows in lifted.items()
+            cause: position_array(rows, keypoints, n, _CAMERA_POSITION) for cause, rows in lifted.items()
         }
         shared = np.all([np.isfinite(array).all(axis=-1) for array in in_camera.values()], axis=0)
         if not shared.any():
             continue
         for cause in CAUSES:
-            at = in_camera[cause if cause in in_camera else VIEWPOINT]
-            T_base_cam = (
-                poses[JOINT_OFFSET] if cause == TOGETHER else poses.get(cause, recording.T_base_cam[None])
-            )
-            yield part, cause, int(shared.sum()), *_spread(transform(T_base_cam, at), true, shared)
+            at = transform(poses.get(cause, recorded), in_camera.get(cause, in_camera[VIEWPOINT]))
+            yield part, cause, int(shared.sum()), *_spread(at, true, shared)
 
 
-def _spread(positions_m: np.ndarray, true_m: np.ndarray, shared: np.ndarray) -> tuple[float, float, float]:
+def _spread(positions_m: np.ndarray, true_m: np.ndarray, shared: np.ndarray) -> tuple[float, ...]:
     """Median and 90th percentile of the distance to the median, and its bias; mean over keypoints and draws.
 
     `positions_m` has the shape (draws, n_frames, n_keypoints, 3); `shared` says which count.
@@ -197,8 +215,7 @@ def _spread(positions_m: np.ndarray, true_m: np.ndarray, shared: np.ndarray) -> 
         distances = np.linalg.norm(chosen_m - np.median(chosen_m, axis=1, keepdims=True), axis=-1)
         bias = np.linalg.norm(np.median(chosen_m - true, axis=1), axis=-1)
         numbers.append([*np.percentile(distances, (50, 90), axis=1).mean(axis=1), bias.mean()])
-    spread, p90, bias = np.mean(numbers, axis=0)
-    return float(spread), float(p90), float(bias)
+    return tuple(np.mean(numbers, axis=0))
 
 
 def found_in(

@@ -27,6 +27,8 @@ POSITION = ["x_m", "y_m", "z_m"]
 THRESHOLDS_M = (0.025, 0.05, 0.1)
 MIN_SCORE = 0.1
 
+_Truth = Mapping[str, pd.DataFrame]  # view -> true positions
+
 # What the paper reports. All 21 keypoints of a hand count, each against its own median position.
 PARTS: dict[str, tuple[str, ...]] = {
     f"{side} {part}": keypoints
@@ -37,7 +39,14 @@ PARTS: dict[str, tuple[str, ...]] = {
 
 
 def counted(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
-    """The rows that count: the best person of an image, score above `min_score`, lifted."""
+    """The rows that count: the best person of an image, score above `min_score`, lifted.
+
+    Examples
+    --------
+    >>> rows = pd.DataFrame({"person": [0, 1, 0], "score": [0.9, 0.9, 0.1]}).assign(x_m=0.0, y_m=0.0, z_m=1.0)
+    >>> counted(rows).index.tolist()
+    [0]
+    """
     lifted = points[POSITION].notna().all(axis=1)
     return points[(points["person"] == 0) & (points["score"] > min_score) & lifted]
 
@@ -47,18 +56,18 @@ def median_positions(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.D
 
     Returns
     -------
-    DataFrame, columns `view, detector, method, keypoint, n, x_m, y_m, z_m`; `n` is the number of images
+    DataFrame
+        Columns `view, detector, method, keypoint, n, x_m, y_m, z_m`; `n` is the number of images.
     """
     groups = counted(points, min_score).groupby([*CASE, "keypoint"], sort=False)
-    return (
-        groups[POSITION].median().assign(n=groups.size()).reset_index()[[*CASE, "keypoint", "n", *POSITION]]
-    )
+    table = groups[POSITION].median().assign(n=groups.size()).reset_index()
+    return table[[*CASE, "keypoint", "n", *POSITION]]
 
 
 def within_distance(
     points: pd.DataFrame,
     n_frames: Mapping[str, int],
-    truth: Mapping[str, pd.DataFrame] | None = None,
+    truth: _Truth | None = None,
     thresholds_m: Sequence[float] = THRESHOLDS_M,
     min_score: float = MIN_SCORE,
     n_resamples: int = 1000,
@@ -71,27 +80,39 @@ def within_distance(
 
     Parameters
     ----------
-    truth : view -> table with `frame, keypoint, x_m, y_m, z_m`. Given, distances are to the true
-        positions; None, to the median over the images, taken anew in every draw of the bootstrap
+    points : DataFrame
+        What was lifted, as the module says.
+    n_frames : mapping of str to int
+        Number of images, by view.
+    truth : mapping of str to DataFrame, optional
+        By view, a table with `frame, keypoint, x_m, y_m, z_m`. Given, distances are to the true positions;
+        None, to the median over the images, taken anew in every draw of the bootstrap.
+    thresholds_m : sequence of float, optional
+        The distances.
+    min_score : float, optional
+        Keypoints above it count.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
-    DataFrame, columns `view, detector, method, part, reference` ("median" or "truth"), `threshold_m, value,
-    low, high` (95 % percentile bootstrap over images), `found` (fraction of images, at any distance)
+    DataFrame
+        Columns `view, detector, method, part, reference` ("median" or "truth"), `threshold_m, value, low,
+        high` (95 % percentile bootstrap over images), `found` (fraction of images, at any distance).
     """
-    rows = []
+    rows: list[tuple] = []
     reference = "median" if truth is None else "truth"
     weights_of = {n: draw_counts(n, n_resamples, seed) for n in set(n_frames.values())}
     for case, part, found_m, true_m in _cases(points, n_frames, truth, min_score):
         weights = weights_of[len(found_m)]
-        shares = np.zeros((len(weights), len(thresholds_m)))
+        fractions = np.zeros((len(weights), len(thresholds_m)))
         for k in range(found_m.shape[1]):
             distances = _distances(found_m[:, k], None if true_m is None else true_m[:, k], weights)
             for j, threshold_m in enumerate(thresholds_m):
-                shares[:, j] += np.einsum("dn,dn->d", weights, distances <= threshold_m) / found_m.size * 3
-        found = float(np.isfinite(found_m[..., 0]).mean())
-        for threshold_m, *numbers in zip(thresholds_m, *with_interval(shares), strict=True):
-            rows.append((*case, part, reference, threshold_m, *numbers, found))
+                fractions[:, j] += np.einsum("dn,dn->d", weights, distances <= threshold_m) / found_m.size * 3
+        found = np.isfinite(found_m[..., 0]).mean()
+        bounds = zip(thresholds_m, *with_interval(fractions), strict=True)
+        rows += [(*case, part, reference, *numbers, found) for numbers in bounds]
     columns = [*CASE, "part", "reference", "threshold_m", "value", "low", "high", "found"]
     return pd.DataFrame(rows, columns=columns)
 
@@ -99,31 +120,33 @@ def within_distance(
 def spread_and_bias(
     points: pd.DataFrame,
     n_frames: Mapping[str, int],
-    truth: Mapping[str, pd.DataFrame] | None = None,
+    truth: _Truth | None = None,
     min_score: float = MIN_SCORE,
     n_resamples: int = 1000,
     seed: int = 0,
 ) -> pd.DataFrame:
     """Stability and accuracy as distances, over the images in which a keypoint was found.
 
+    Parameters
+    ----------
+    points, n_frames, truth, min_score, n_resamples, seed
+        As of `within_distance`.
+
     Returns
     -------
-    DataFrame, columns `view, detector, method, part, n_images` (in which it was found), then in metres, each
-    with `_low` and `_high` beside it: `spread_m`, the median distance to the median position; with `truth`
-    also `bias_m`, how far the median position is from the true one, and `error_m`, the median distance to
-    the truth. For a hand, the mean of each over its keypoints; NaN where nothing was found
+    DataFrame
+        Columns `view, detector, method, part, n_images` (in which it was found), then in metres, each with
+        `_low` and `_high` beside it: `spread_m`, the median distance to the median position; with `truth`
+        also `bias_m`, how far the median position is from the true one, and `error_m`, the median distance to
+        the truth. For a hand, the mean of each over its keypoints; NaN where nothing was found.
     """
     rows = []
     weights_of = {n: draw_counts(n, n_resamples, seed) for n in set(n_frames.values())}
     for case, part, found_m, true_m in _cases(points, n_frames, truth, min_score):
-        weights = weights_of[len(found_m)]
-        row = dict(zip(CASE, case, strict=True)) | {
-            "part": part,
-            "n_images": float(np.isfinite(found_m[..., 0]).sum(axis=0).mean()),
-        }
-        for name, draws in _distances_drawn(found_m, true_m, weights).items():
-            value, low, high = with_interval(draws)
-            row |= {name: value, f"{name}_low": low, f"{name}_high": high}
+        n_images = np.isfinite(found_m[..., 0]).sum(axis=0).mean()
+        row = dict(zip([*CASE, "part", "n_images"], (*case, part, n_images), strict=True))
+        for name, draws in _distances_drawn(found_m, true_m, weights_of[len(found_m)]).items():
+            row |= zip((name, f"{name}_low", f"{name}_high"), with_interval(draws), strict=True)
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -131,7 +154,24 @@ def spread_and_bias(
 def position_array(
     rows: pd.DataFrame, keypoints: Sequence[str], n_frames: int, columns: Sequence[str] = POSITION
 ) -> np.ndarray:
-    """Positions of one case as an array, shape (n_frames, len(keypoints), 3), metres; NaN where not found."""
+    """Positions of one case as an array.
+
+    Parameters
+    ----------
+    rows : DataFrame
+        Columns `frame, keypoint` and `columns`.
+    keypoints : sequence of str
+        Their names.
+    n_frames : int
+        Number of images.
+    columns : sequence of str, optional
+        The three coordinates, metres.
+
+    Returns
+    -------
+    array, shape (n_frames, len(keypoints), 3)
+        Metres; NaN where not found.
+    """
     result = np.full((n_frames, len(keypoints), 3), np.nan)
     place = {name: k for k, name in enumerate(keypoints)}
     rows = rows[rows["keypoint"].isin(place)]
@@ -140,10 +180,7 @@ def position_array(
 
 
 def _cases(
-    points: pd.DataFrame,
-    n_frames: Mapping[str, int],
-    truth: Mapping[str, pd.DataFrame] | None,
-    min_score: float,
+    points: pd.DataFrame, n_frames: Mapping[str, int], truth: _Truth | None, min_score: float
 ) -> Iterator[tuple[tuple[str, str, str], str, np.ndarray, np.ndarray | None]]:
     """Case, part, positions found and true positions (None without truth) of every part a detector gives."""
     given = {
@@ -178,15 +215,14 @@ def _distances_drawn(
     found_m: np.ndarray, true_m: np.ndarray | None, weights: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Spread, bias and error in every draw, shape (draws,), mean over the keypoints found."""
-    names = ("spread_m",) if true_m is None else ("spread_m", "bias_m", "error_m")
-    draws: dict[str, list[np.ndarray]] = {name: [] for name in names}
+    draws: dict[str, list[np.ndarray]] = {"spread_m": [], "bias_m": [], "error_m": []}
     for k in np.flatnonzero(np.isfinite(found_m[..., 0]).any(axis=0)):
-        found, spread = found_m[:, k], _distances(found_m[:, k], None, weights)
-        draws["spread_m"].append(weighted_median(spread, weights))
+        found = found_m[:, k]
+        draws["spread_m"].append(weighted_median(_distances(found, None, weights), weights))
         if true_m is not None:
-            bias = np.linalg.norm(_median_position(found - true_m[:, k], weights), axis=1)
-            draws["bias_m"].append(bias)
-            error = _distances(found, true_m[:, k], weights)
-            draws["error_m"].append(weighted_median(error, weights))
+            true = true_m[:, k]
+            draws["bias_m"].append(np.linalg.norm(_median_position(found - true, weights), axis=1))
+            draws["error_m"].append(weighted_median(_distances(found, true, weights), weights))
+    names = ("spread_m",) if true_m is None else tuple(draws)
     nothing = [np.full(len(weights), np.nan)]
-    return {name: np.mean(columns or nothing, axis=0) for name, columns in draws.items()}
+    return {name: np.mean(draws[name] or nothing, axis=0) for name in names}

@@ -1,4 +1,4 @@
-"""Shares of rows that are something, with intervals from drawing whole source images."""
+"""Proportions of rows that are something, with intervals from drawing whole source images."""
 
 from __future__ import annotations
 
@@ -6,42 +6,71 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
 
 
-def shares(
+def proportions(
     rows: pd.DataFrame, by: Sequence[str], of: str, n_resamples: int = 1000, seed: int = 0
 ) -> pd.DataFrame:
     """Mean of a column per group of rows, with its 95 % bootstrap interval over source images.
 
     Parameters
     ----------
-    rows : has a column `source_image`; rows of one source image are drawn together
-    by : columns that make the groups
-    of : column of booleans or numbers; rows where it is missing are left out
+    rows : DataFrame
+        Has a column `source_image`; rows of one source image are drawn together.
+    by : sequence of str
+        Columns that make the groups.
+    of : str
+        Column of booleans or numbers; rows where it is missing are left out.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
-    DataFrame, columns `by, value, low, high, n` (rows), `n_images` (source images), groups in the order
-    they first occur
+    DataFrame
+        Columns `by, value, low, high, n` (rows), `n_images` (source images), groups in the order they first
+        occur; no interval from fewer than `MIN_DRAWN` source images.
+
+    Examples
+    --------
+    >>> rows = pd.DataFrame({"part": list("aab"), "source_image": [1, 1, 2], "hit": [True, False, True]})
+    >>> proportions(rows, ["part"], "hit")[["part", "value", "n", "n_images"]].to_dict("list")
+    {'part': ['a', 'b'], 'value': [0.5, 1.0], 'n': [2, 1], 'n_images': [1, 1]}
     """
     rows = rows[rows[of].notna()]
     table = []
     for group, part in rows.groupby(list(by), sort=False, observed=True):
-        value, low, high = mean_with_interval(part[of], part["source_image"], n_resamples, seed)
-        table.append((*group, value, low, high, len(part), part["source_image"].nunique()))
+        images = part["source_image"]
+        interval = mean_with_interval(part[of], images, n_resamples, seed)
+        table.append((*group, *interval, len(part), images.nunique()))
     return pd.DataFrame(table, columns=[*by, "value", "low", "high", "n", "n_images"])
 
 
 def mean_with_interval(
-    values: np.ndarray, clusters: np.ndarray, n_resamples: int = 1000, seed: int = 0
+    values: ArrayLike, clusters: ArrayLike, n_resamples: int = 1000, seed: int = 0
 ) -> tuple[float, float, float]:
-    """Mean of values (n,), and its 95 % percentile interval from drawing clusters (n,); NaN for none."""
+    """Mean, and its 95 % percentile interval from drawing clusters.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        What is averaged.
+    clusters : array, shape (n,)
+        Values of equal cluster are drawn together.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
+
+    Returns
+    -------
+    value, low, high : float
+        NaN where there are no values; no interval from fewer than `MIN_DRAWN` clusters.
+    """
+    values = np.asarray(values, float)
     if not len(values):
         return np.nan, np.nan, np.nan
     cluster, names = pd.factorize(np.asarray(clusters))
-    sums = np.bincount(cluster, weights=np.asarray(values, float), minlength=len(names))
+    sums = np.bincount(cluster, weights=values, minlength=len(names))
     times = draw_counts(len(names), n_resamples, seed)
-    value, low, high = with_interval(times @ sums / (times @ np.bincount(cluster, minlength=len(names))))
-    return float(value), float(low), float(high)
+    return with_interval(times @ sums / (times @ np.bincount(cluster, minlength=len(names))))

@@ -5,6 +5,8 @@ The first draw is the sample itself, each image once; the others are the bootstr
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 PERCENTILES = (2.5, 97.5)  # of 95 % intervals
@@ -12,20 +14,51 @@ MIN_DRAWN = 10  # a percentile interval from fewer covers far less than 95 %, an
 
 
 def draw_counts(n: int, n_resamples: int, seed: int) -> np.ndarray:
-    """How often each of `n` images is drawn, shape (1 + n_resamples, n); the first row is once each.
+    """How often each image is drawn.
 
-    Fewer than `MIN_DRAWN` images are not drawn again: the first row is all, and there is no interval.
+    Parameters
+    ----------
+    n : int
+        Number of images. Fewer than `MIN_DRAWN` are not drawn again: there is no interval.
+    n_resamples : int
+        Number of draws.
+    seed : int
+        Of the draws.
+
+    Returns
+    -------
+    array of int, shape (1 + n_resamples, n)
+        The first row is the sample itself, each once.
+
+    Examples
+    --------
+    >>> draw_counts(3, 1000, seed=0)
+    array([[1, 1, 1]])
+    >>> draw_counts(10, 1000, seed=0).sum(axis=1).min()
+    np.int64(10)
     """
     n_resamples = n_resamples if n >= MIN_DRAWN else 0
     drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), size=n_resamples)
     return np.concatenate([np.ones((1, n), dtype=int), drawn])
 
 
-def with_interval(draws: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def with_interval(draws: np.ndarray) -> tuple[Any, Any, Any]:
     """The value in the first draw, and the bounds of the 95 % percentile interval of the others.
 
-    `draws` has the draws along its first axis. Draws in which nothing counts (NaN) are left out; NaN where
-    no draw is left.
+    Parameters
+    ----------
+    draws : array, shape (n_draws, ...)
+        Draws in which nothing counts (NaN) are left out.
+
+    Returns
+    -------
+    value, low, high : float or array, shape (...)
+        NaN where no draw is left.
+
+    Examples
+    --------
+    >>> [float(x) for x in with_interval(np.array([0.5, 0.0, 1.0, np.nan]))]
+    [0.5, 0.025, 0.975]
     """
     others = draws[1:]
     bounds = np.full((2, *draws.shape[1:]), np.nan)
@@ -39,12 +72,20 @@ def weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    values : array, shape (n,), or (draws, n) when every draw has its own
-    weights : array, shape (draws, n), whole numbers
+    values : array, shape (n,) or (draws, n)
+        One row per draw when every draw has its own.
+    weights : array of int, shape (draws, n)
+        How often each counts.
 
     Returns
     -------
-    array, shape (draws,): what `np.nanmedian` of the repeated values is; NaN where none was drawn
+    array, shape (draws,)
+        What `np.nanmedian` of the repeated values is; NaN where none was drawn.
+
+    Examples
+    --------
+    >>> weighted_median(np.array([1.0, 2.0, np.nan, 9.0]), np.array([[1, 1, 1, 1], [2, 0, 5, 0]]))
+    array([2., 1.])
     """
     rows = np.atleast_2d(values)
     some = np.flatnonzero(np.isfinite(rows).any(axis=0))

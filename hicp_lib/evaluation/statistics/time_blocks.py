@@ -10,6 +10,9 @@ import numpy as np
 
 from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN
 
+_LEAST_BLOCKS = 4  # a recording is made of
+_MAX_CORRELATION = 0.999
+
 
 def block_length(errors: np.ndarray) -> int:
     """Length of the blocks, in frames, for medians and fractions of `errors`.
@@ -22,30 +25,51 @@ def block_length(errors: np.ndarray) -> int:
 
     Parameters
     ----------
-    errors : array, shape (n_frames, n_series), NaN where missing; their correlations are averaged
+    errors : array, shape (n_frames, n_series)
+        NaN where missing; their correlations are averaged.
 
     Returns
     -------
-    From 1 to a quarter of the frames
+    int
+        From 1 to a quarter of the frames.
+
+    Examples
+    --------
+    >>> block_length(np.sin(np.arange(400) / 20)[:, None])
+    100
     """
     n = len(errors)
-    if n < 8:
+    if n < 2 * _LEAST_BLOCKS:
         return 1
     seen = np.isfinite(errors)
-    some = seen.sum(axis=0) >= 2
-    signs = np.where(seen, np.sign(errors - _medians(errors, some)), 0.0)
+    medians = np.nanmedian(np.where(seen.any(axis=0), errors, 0.0), axis=0)
+    signs = np.where(seen, np.sign(errors - medians), 0.0)
     together = signs[1:] * signs[:-1]
     count = (seen[1:] & seen[:-1]).sum()
-    rho = np.clip(np.sin(np.pi / 2 * together.sum() / max(count, 1)), 0.0, 0.999)
+    rho = np.clip(np.sin(np.pi / 2 * together.sum() / max(count, 1)), 0.0, _MAX_CORRELATION)
     length = n ** (1 / 3) * (np.sqrt(6) * rho / (1 - rho**2)) ** (2 / 3)
-    return int(np.clip(np.ceil(length), 1, n // 4))
+    return int(np.clip(np.ceil(length), 1, n // _LEAST_BLOCKS))
 
 
 def draw_blocks(n_frames: int, length: int, n_resamples: int, seed: int) -> np.ndarray:
-    """How often each frame is drawn, shape (1 + n_resamples, n_frames); the first row is once each.
+    """How often each frame is drawn.
 
-    Every other row is made of blocks of `length` frames that start anywhere, the last one cut so that
-    as many frames are drawn as there are. Fewer than `resampling.MIN_DRAWN` blocks are not drawn again.
+    Parameters
+    ----------
+    n_frames : int
+        Frames of the recording.
+    length : int
+        Of the blocks, in frames. Fewer than `resampling.MIN_DRAWN` of them are not drawn again.
+    n_resamples : int
+        Number of draws.
+    seed : int
+        Of the draws.
+
+    Returns
+    -------
+    array of int, shape (1 + n_resamples, n_frames)
+        The first row is the recording itself, each frame once. Every other row is made of blocks that start
+        anywhere, the last one cut so that as many frames are drawn as there are.
     """
     rng = np.random.default_rng(seed)
     n_blocks = -(-n_frames // length)
@@ -56,9 +80,3 @@ def draw_blocks(n_frames: int, length: int, n_resamples: int, seed: int) -> np.n
     counts[0] = 1
     np.add.at(counts, (np.arange(1, 1 + n_resamples)[:, None], frames), 1)
     return counts
-
-
-def _medians(errors: np.ndarray, some: np.ndarray) -> np.ndarray:
-    medians = np.zeros(errors.shape[1])
-    medians[some] = np.nanmedian(errors[:, some], axis=0)
-    return medians

@@ -1,13 +1,14 @@
 """Predictions of other tools, from their own files to `Detections` by image id.
 
 `read_*` of each format gives people and the names of their images; here they meet the annotated images,
-scores come into [0, 1], and what belonged where is summed up.
+scores come into [0, 1], and what belonged where is summed up. `hicp_lib.formats.annotations.write_detections`
+writes the detections with the tool's own scores and keys (`Imported.extras`) beside them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +16,13 @@ import numpy as np
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import inside
-from hicp_lib.formats.annotations import Annotations, write_detections
+from hicp_lib.formats.annotations import Annotations
 from hicp_lib.formats.importers.matching import match_images
 from hicp_lib.formats.importers.mmpose import read_mmpose
 from hicp_lib.formats.importers.openpose import read_openpose, refuse_other_size
 from hicp_lib.formats.importers.people import People
 from hicp_lib.formats.importers.results import ALPHAPOSE, COCO, DETECTRON2, read_results
-from hicp_lib.formats.importers.scores import score_scale, to_unit
+from hicp_lib.formats.importers.scores import score_scale
 
 READERS: dict[str, Callable[[Path], People]] = {
     "openpose": read_openpose,
@@ -38,15 +39,28 @@ class Summary:
 
     Attributes
     ----------
-    n_images : annotated images
-    n_with_people, n_without_people : images the files speak of, with somebody and with nobody
-    n_not_mentioned : images the files say nothing of; nobody was found there, or the tool did not see them
-    unmatched : images of the files that are not annotated; their people are left out
-    n_people : people imported
-    conventions : people per keypoint convention, unmatched ones included
-    score_range : lowest, median and highest keypoint score as the tool wrote them
-    score_scale : what they were divided by; `n_cut` of them were then cut to 1
-    n_keypoints, n_outside : keypoints given, and those outside their image
+    format : str
+        The tool's.
+    n_images : int
+        Annotated images.
+    n_with_people, n_without_people : int
+        Images the files speak of, with somebody and with nobody.
+    n_not_mentioned : int
+        Images the files say nothing of; nobody was found there, or the tool did not see them.
+    unmatched : tuple of str
+        Images of the files that are not annotated; their people are left out.
+    n_people : int
+        People imported.
+    conventions : dict of str to int
+        People per keypoint convention, unmatched ones included.
+    score_range : tuple of float
+        Lowest, median and highest keypoint score as the tool wrote them.
+    score_scale : float
+        What they were divided by.
+    n_cut : int
+        How many of them were then cut to 1.
+    n_keypoints, n_outside : int
+        Keypoints given, and those outside their image.
     """
 
     format: str
@@ -62,10 +76,6 @@ class Summary:
     n_cut: int
     n_keypoints: int
     n_outside: int
-
-    def as_dict(self) -> dict:
-        """For JSON."""
-        return asdict(self)
 
     def lines(self) -> list[str]:
         """For people."""
@@ -89,10 +99,14 @@ class Imported:
 
     Attributes
     ----------
-    detections : image id -> Detections, in the order of the annotations; keypoint scores in [0, 1],
-        person scores the tool's own
-    extras : image id -> per person `raw_keypoint_scores` (136 in Halpe's order, 0 where not given) and
-        the further keys of the tool's file, such as its box
+    detections : dict of int to Detections
+        By image id, in the order of the annotations; keypoint scores in [0, 1], divided by the scale and cut,
+        person scores the tool's own.
+    extras : dict of int to list of dict
+        By image id, per person `raw_keypoint_scores` (136 in Halpe's order, 0 where not given) and the
+        further keys of the tool's file, such as its box.
+    summary : Summary
+        What belonged to which image.
     """
 
     detections: dict[int, Detections]
@@ -107,10 +121,18 @@ def import_predictions(
 
     Parameters
     ----------
-    format : a key of `READERS`
-    path : the folder or file the tool wrote
-    annotations : of the images the tool ran on
-    scale : what keypoint scores are divided by; None for the format's own, see `scores`
+    format : str
+        A key of `READERS`.
+    path : str or Path
+        The folder or file the tool wrote.
+    annotations : Annotations
+        Of the images the tool ran on.
+    scale : float, optional
+        What keypoint scores are divided by; the format's own when left out, see `scores`.
+
+    Returns
+    -------
+    Imported
 
     Raises
     ------
@@ -127,24 +149,20 @@ def import_predictions(
         raise InputError(f"{path}: holds no people; check the run, or leave this detector out")
     matched = match_images(people, annotations.images)
     scale = score_scale(format, people) if scale is None else scale
-    image_of = np.array([-1 if image is None else i for i, image in enumerate(matched)])[people.source_of]
-    rows = np.flatnonzero(image_of >= 0)
-    sizes = np.array([_size(annotations, matched[s]) for s in people.source_of[rows]]).reshape(-1, 2)
+    images = [annotations.images.get(image) for image in matched]  # None where not annotated
+    rows = np.flatnonzero([images[s] is not None for s in people.source_of])
+    shown = [images[s] for s in people.source_of[rows]]
+    sizes = np.array([(image.width_px, image.height_px) for image in shown]).reshape(-1, 2)
     if format == "openpose":
         refuse_other_size(people.path, people.keypoints_px[rows], sizes)
     detections, extras = _by_image(people, matched, annotations, scale)
     return Imported(detections, extras, _summary(format, people, matched, annotations, rows, sizes, scale))
 
 
-def _size(annotations: Annotations, image_id: int) -> tuple[int, int]:
-    image = annotations.images[image_id]
-    return image.width_px, image.height_px
-
-
 def _by_image(
     people: People, matched: list[int | None], annotations: Annotations, scale: float
 ) -> tuple[dict[int, Detections], dict[int, list[dict]]]:
-    scores = to_unit(people.raw_scores, scale)
+    scores = np.clip(people.raw_scores / scale, 0.0, 1.0)
     raw = people.raw_scores.tolist()
     detections = dict.fromkeys(annotations.images, Detections.none())
     extras: dict[int, list[dict]] = {image: [] for image in annotations.images}
@@ -152,9 +170,8 @@ def _by_image(
     starts = np.searchsorted(people.source_of[order], np.arange(1, len(matched)))
     for image, rows in zip(matched, np.split(order, starts), strict=True):
         if image is not None:
-            detections[image] = Detections(
-                people.keypoints_px[rows], scores[rows], people.person_scores[rows]
-            )
+            points = people.keypoints_px[rows]
+            detections[image] = Detections(points, scores[rows], people.person_scores[rows])
             extras[image] = [people.extras[i] | {"raw_keypoint_scores": raw[i]} for i in rows.tolist()]
     return detections, extras
 
@@ -183,8 +200,3 @@ def _summary(
         n_keypoints=int(given.sum()),
         n_outside=int(outside.sum()),
     )
-
-
-def write_imported(path: str | Path, imported: Imported) -> None:
-    """Write imported detections as COCO keypoint results, the tool's own scores and keys beside them."""
-    write_detections(path, imported.detections, imported.extras)

@@ -3,26 +3,44 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+from operator import attrgetter
 from pathlib import PurePosixPath
+from typing import Any
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.formats.annotations import ImageInfo
 from hicp_lib.formats.importers.people import People
 
 _LAST_NUMBER = re.compile(r"(\d+)\D*$", re.ASCII)
+_MAX_DIGITS = 18  # of a number that is an id; 64 bits hold it
+_name, _stem = attrgetter("name"), attrgetter("stem")
+_Table = Mapping[Any, list[int]]
 
 
 def match_images(people: People, images: dict[int, ImageInfo]) -> list[int | None]:
     """The image of each of `people.sources`, None where there is none.
+
+    Parameters
+    ----------
+    people : People
+        What was predicted; `named_by` says how its sources name images.
+    images : dict of int to ImageInfo
+        The annotated images, by id.
+
+    Returns
+    -------
+    list of int or None
+        Image ids.
 
     Raises
     ------
     InputError
         If no source has an image, or one could be several, or two are the same.
     """
-    find = _Finder(people, images)
-    matched = [find(source) for source in people.sources]
+    tables = {key: _table(key, images) for key in (str, _name, _stem, _last_number)}
+    matched = [_image_of(source, people, images, tables) for source in people.sources]
     first: dict[int, str | int] = {}
     for source, image in zip(people.sources, matched, strict=True):
         if image is not None and first.setdefault(image, source) != source:
@@ -32,59 +50,46 @@ def match_images(people: People, images: dict[int, ImageInfo]) -> list[int | Non
             )
     if not first:
         example = next(iter(images.values())).file_name if images else "no image"
+        its_example = repr(people.sources[0])[:80] if people.sources else "none"
         raise InputError(
-            f"{people.path}: none of its {len(people.sources)} images is annotated; it has "
-            f"{_example(people)}, the annotations {example}; give the annotations of the images the tool saw"
+            f"{people.path}: none of its {len(people.sources)} images is annotated; it has {its_example}, "
+            f"the annotations {example}; give the annotations of the images the tool saw"
         )
     return matched
 
 
-def _example(people: People) -> str:
-    return repr(people.sources[0])[:80] if people.sources else "none"
+def _path(name: str) -> PurePosixPath:
+    return PurePosixPath(name.replace("\\", "/"))
 
 
-class _Finder:
-    """Looks up a source as `People.named_by` says."""
+def _last_number(path: PurePosixPath) -> int | None:
+    found = _LAST_NUMBER.search(path.stem)
+    return int(found[1]) if found and len(found[1]) <= _MAX_DIGITS else None
 
-    def __init__(self, people: People, images: dict[int, ImageInfo]) -> None:
-        self._path, self._named_by, self._images = people.path, people.named_by, images
-        self._names = self._table(lambda path: str(path))
-        self._base_names = self._table(lambda path: path.name)
-        self._stems = self._table(lambda path: path.stem)
-        self._numbers = self._table(lambda path: _last_number(path.stem))
 
-    def _table(self, key: Callable[[PurePosixPath], str | int | None]) -> dict[str | int | None, list[int]]:
-        table: dict[str | int | None, list[int]] = {}
-        for image in self._images.values():
-            table.setdefault(key(PurePosixPath(image.file_name.replace("\\", "/"))), []).append(image.id)
-        return table
+def _table(key: Callable, images: dict[int, ImageInfo]) -> _Table:
+    table: defaultdict = defaultdict(list)
+    for image in images.values():
+        table[key(_path(image.file_name))].append(image.id)
+    return dict(table)
 
-    def __call__(self, source: str | int) -> int | None:
-        candidates = self._number(source) if isinstance(source, int) else self._name(source)
-        if len(candidates) > 1:
-            names = " and ".join(self._images[i].file_name for i in candidates[:2])
-            raise InputError(
-                f"{self._path}: {source!r} could be {names}; give the images names that differ, and run again"
-            )
-        return candidates[0] if candidates else None
 
-    def _name(self, name: str) -> list[int]:
-        if self._named_by == "stem":
-            return self._stems.get(name, [])
-        path = PurePosixPath(name.replace("\\", "/"))
-        for table, key in ((self._names, str(path)), (self._base_names, path.name), (self._stems, path.stem)):
-            if key in table:
-                return table[key]
-        return []
-
-    def _number(self, number: int) -> list[int]:
-        by_id = [number] if number in self._images else []
-        if self._named_by == "id":
-            return by_id
+def _image_of(
+    source: str | int, people: People, images: dict[int, ImageInfo], tables: Mapping[Callable, _Table]
+) -> int | None:
+    """The image that a source names, as `People.named_by` says."""
+    if isinstance(source, int):
         # Tools take the number from the file's name; where it is also the id of another image, ask.
-        return sorted({*self._numbers.get(number, []), *by_id})
-
-
-def _last_number(stem: str) -> int | None:
-    found = _LAST_NUMBER.search(stem)
-    return int(found[1]) if found and len(found[1]) < 19 else None
+        by_number = [] if people.named_by == "id" else tables[_last_number].get(source, [])
+        candidates = sorted({*by_number, *([source] if source in images else [])})
+    elif people.named_by == "stem":
+        candidates = tables[_stem].get(source, [])
+    else:
+        path = _path(source)
+        candidates = next((tables[k][k(path)] for k in (str, _name, _stem) if k(path) in tables[k]), [])
+    if len(candidates) > 1:
+        names = " and ".join(images[i].file_name for i in candidates[:2])
+        raise InputError(
+            f"{people.path}: {source!r} could be {names}; give the images names that differ, and run again"
+        )
+    return candidates[0] if candidates else None

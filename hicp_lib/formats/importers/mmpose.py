@@ -32,6 +32,15 @@ _COUNTED_FROM = 0.2
 def read_mmpose(path: Path) -> People:
     """Read the folder MMPoseInferencer wrote with `pred_out_dir`.
 
+    Parameters
+    ----------
+    path : Path
+        The folder.
+
+    Returns
+    -------
+    People
+
     Raises
     ------
     InputError
@@ -44,8 +53,9 @@ def read_mmpose(path: Path) -> People:
     counted = scores > _COUNTED_FROM
     means = np.where(counted, scores, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
     return People(
-        path, "stem", list(files), source_of, keypoints, scores, _box_scores(rows) * means, conventions,
-        _extras(rows),
+        path, "stem", list(files), source_of, keypoints, scores,
+        rows.numbers("bbox_score", default=1.0) * means,  # 1 where a bottom-up model gave no box
+        conventions, _extras(rows),
     )  # fmt: skip
 
 
@@ -57,36 +67,33 @@ def _instances(file: Path) -> list[dict]:
 
 
 def _triples(rows: FileRows) -> tuple[np.ndarray, Counter[str]]:
-    points, scores = rows.column("keypoints"), rows.column("keypoint_scores")
+    scores = rows.column("keypoint_scores")
+    points = rows.column("keypoints", _is_points, "one [x, y] per keypoint")
     flat = {i: _flat(rows, i, *both) for i, both in enumerate(zip(points, scores, strict=True))}
-    triples, conventions = np.zeros((len(flat), N_KEYPOINTS, 3)), Counter()
+    triples, conventions = np.zeros((len(flat), N_KEYPOINTS, 3)), Counter[str]()
     for count, convention in CONVENTIONS.items():
         chosen = {i: xy for i, xy in flat.items() if len(xy) == 2 * count}
         if chosen:
             conventions[convention] = len(chosen)
             index = list(chosen)
             triples[index, :, :2] = rows.points("keypoints", convention, chosen, width=2)
-            values = {i: scores[i] for i in index}
-            triples[index, :, 2:] = rows.points("keypoint_scores", convention, values, width=1)
+            its_scores = {i: scores[i] for i in index}
+            triples[index, :, 2:] = rows.points("keypoint_scores", convention, its_scores, width=1)
     return triples, conventions
 
 
-def _flat(rows: FileRows, i: int, points: Any, scores: Any) -> list:
-    """One person's [[x, y], ...] as a flat list, once the shapes of it and of the scores are right."""
-    if not isinstance(points, list) or set(map(type, points)) != {list} or set(map(len, points)) != {2}:
-        raise rows.error(i, f"keypoints is {shown(points)}; expected one [x, y] per keypoint")
+def _is_points(value: Any) -> bool:
+    return isinstance(value, list) and set(map(type, value)) == {list} and set(map(len, value)) == {2}
+
+
+def _flat(rows: FileRows, i: int, points: list, scores: Any) -> list:
+    """One person's [[x, y], ...] as a flat list, once the number of them and of the scores is right."""
     if len(points) not in CONVENTIONS:
         counts = ", ".join(map(str, CONVENTIONS))
         raise rows.error(i, f"keypoints has {len(points)} points; expected a whole person's {counts}")
     if not isinstance(scores, list) or len(scores) != len(points):
         raise rows.error(i, f"keypoint_scores is {shown(scores)}; expected {len(points)} numbers")
     return list(chain.from_iterable(points))
-
-
-def _box_scores(rows: FileRows) -> np.ndarray:
-    """Shape (n,); 1 where a bottom-up model gave no box."""
-    complete = [{"bbox_score": 1.0, **row} for row in rows.rows]
-    return FileRows(rows.path, rows.label, complete, places=rows.places).numbers("bbox_score")
 
 
 def _extras(rows: FileRows) -> list[dict]:

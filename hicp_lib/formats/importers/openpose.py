@@ -24,21 +24,33 @@ from hicp_lib.core.files import read_json
 from hicp_lib.core.keypoints import BODY, N_KEYPOINTS
 from hicp_lib.formats.importers.people import FileRows, People, json_files, split
 from hicp_lib.formats.importers.results import OPENPOSE, read_results
-from hicp_lib.formats.json_validation import Rows, shown
+from hicp_lib.formats.json_validation import Rows
 
 _ENDING = "_keypoints.json"
+_BODY = "pose_keypoints_2d"
 # Key -> what its list may be, by length.
 _PARTS = {
-    "pose_keypoints_2d": {75: "openpose_body25", 54: "openpose_coco18"},
+    _BODY: {75: "openpose_body25", 54: "openpose_coco18"},
     "face_keypoints_2d": {210: "openpose_face70"},
     "hand_left_keypoints_2d": {63: "left_hand21"},
     "hand_right_keypoints_2d": {63: "right_hand21"},
 }
 _RUN_AGAIN = "run OpenPose with --keypoint_scale 0 (source pixels)"
+_PADDING = 0.05  # of an image's side: padding to the network's input may leave a few just beyond the edge
+_MOST_OUTSIDE = 0.1  # of the body parts
 
 
 def read_openpose(path: Path) -> People:
     """Read a `--write_json` folder, or a `--write_coco_json` file.
+
+    Parameters
+    ----------
+    path : Path
+        The folder, or the file.
+
+    Returns
+    -------
+    People
 
     Raises
     ------
@@ -80,7 +92,7 @@ def _triples(rows: FileRows) -> tuple[np.ndarray, Counter[str], np.ndarray]:
             if chosen:
                 conventions[convention] = len(chosen)
                 points = rows.points(key, convention, chosen)
-                if key == "pose_keypoints_2d":
+                if key == _BODY:
                     n_parts[list(chosen)] = length // 3
                     points[..., :2] -= OPENPOSE.offset_px * (points[..., 2:] > 0)
                 triples[list(chosen)] += points
@@ -89,12 +101,11 @@ def _triples(rows: FileRows) -> tuple[np.ndarray, Counter[str], np.ndarray]:
 
 def _lists(rows: FileRows, key: str, by_length: dict[int, str]) -> dict[int, list]:
     """The rows that have this part. Only the body's key must be there."""
-    values = rows.column(key) if key == "pose_keypoints_2d" else [row.get(key, []) for row in rows.rows]
-    for i, value in enumerate(values):
-        if not isinstance(value, list) or len(value) not in (0, *by_length):
-            found = f"a list of {len(value)}" if isinstance(value, list) else shown(value)
-            expected = ", ".join(f"{length} ({name})" for length, name in by_length.items())
-            raise rows.error(i, f"{key} is {found}; expected x, y, c per part: {expected}, or 0 numbers")
+    names = ", ".join(f"{length} ({name})" for length, name in by_length.items())
+    needed = {} if key == _BODY else {"default": []}
+    allowed = (0, *by_length)
+    expected = f"x, y, c per part: {names}, or 0 numbers"
+    values = rows.column(key, lambda v: isinstance(v, list) and len(v) in allowed, expected, **needed)
     return {i: value for i, value in enumerate(values) if value}
 
 
@@ -110,14 +121,22 @@ def refuse_other_size(path: Path, keypoints_px: np.ndarray, sizes_px: np.ndarray
 
     Parameters
     ----------
+    path : Path
+        What was read, for the message.
     keypoints_px : array, shape (n, 136, 2)
-    sizes_px : array, shape (n, 2): width and height of each person's image
+        Of all people.
+    sizes_px : array, shape (n, 2)
+        Width and height of each person's image.
+
+    Raises
+    ------
+    InputError
+        If more than a tenth of the body parts lie outside.
     """
     body = keypoints_px[:, BODY]
     given = np.isfinite(body).all(axis=-1)
-    # Padding to the network's input may leave a few just beyond the edge.
-    outside = given & (body > 1.05 * sizes_px[:, None]).any(axis=-1)
-    if outside.sum() > 0.1 * given.sum():
+    outside = given & (body > (1 + _PADDING) * sizes_px[:, None]).any(axis=-1)
+    if outside.sum() > _MOST_OUTSIDE * given.sum():
         raise InputError(
             f"{path}: {outside.sum()} of {given.sum()} body parts lie outside their images; "
             f"expected source pixels of the annotated images, {_RUN_AGAIN} on these images"

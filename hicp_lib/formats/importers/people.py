@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.keypoints import N_KEYPOINTS, TO_HALPE
+from hicp_lib.core.keypoints import TO_HALPE, to_halpe
 from hicp_lib.formats.json_validation import Rows
 
 
@@ -21,16 +21,25 @@ class People:
 
     Attributes
     ----------
-    path : the file or folder that was read
-    named_by : what `sources` are: "stem" (a file name without suffix), "id" (an image id, or a file
-        name where it is text), "number" (as "id", but a number is the one at the end of a file name)
-    sources : the images the files speak of, each once, also those without people
-    source_of : array, shape (n,): index into `sources`
-    keypoints_px : array, shape (n, 136, 2); NaN where not given
-    raw_scores : array, shape (n, 136): the tool's own keypoint scores; 0 where not given
-    person_scores : array, shape (n,): what people are ranked by
-    conventions : how many people come in each convention, keys of `hicp_lib.core.keypoints.TO_HALPE`
-    extras : per person, what else the file says
+    path : Path
+        The file or folder that was read.
+    named_by : {"stem", "id", "number"}
+        What `sources` are: "stem" (a file name without suffix), "id" (an image id, or a file name where it is
+        text), "number" (as "id", but a number is the one at the end of a file name).
+    sources : list of str or int
+        The images the files speak of, each once, also those without people.
+    source_of : array of int, shape (n,)
+        Index into `sources`.
+    keypoints_px : array, shape (n, 136, 2)
+        NaN where not given.
+    raw_scores : array, shape (n, 136)
+        The tool's own keypoint scores; 0 where not given.
+    person_scores : array, shape (n,)
+        What people are ranked by.
+    conventions : Counter of str
+        How many people come in each convention, keys of `hicp_lib.core.keypoints.TO_HALPE`.
+    extras : list of dict
+        Per person, what else the file says.
     """
 
     path: Path
@@ -54,13 +63,35 @@ def split(triples: np.ndarray, given: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 @dataclass(frozen=True)
 class FileRows(Rows):
-    """Objects from many files checked as one list; `places` says which file and entry each came from."""
+    """Objects from many files checked as one list.
+
+    Attributes
+    ----------
+    places : list of (Path, int)
+        Which file and entry each came from.
+    """
 
     places: list[tuple[Path, int]] = field(default_factory=list)
 
     @classmethod
     def joined(cls, folder: Path, label: str, by_file: dict[Path, list[dict]]) -> tuple[FileRows, np.ndarray]:
-        """The objects of each file one after the other, and the index of each one's file, shape (n,)."""
+        """The objects of each file one after the other.
+
+        Parameters
+        ----------
+        folder : Path
+            What was read, for messages.
+        label : str
+            How messages name the lists.
+        by_file : dict of Path to list of dict
+            The objects.
+
+        Returns
+        -------
+        rows : FileRows
+        source_of : array of int, shape (n,)
+            The index of each one's file.
+        """
         objects = [row for rows in by_file.values() for row in rows]
         places = [(file, i) for file, rows in by_file.items() for i in range(len(rows))]
         counts = [len(rows) for rows in by_file.values()]
@@ -75,28 +106,45 @@ class FileRows(Rows):
 
         Parameters
         ----------
-        lists : row -> list, of the convention's length times `width`
+        key : str
+            For messages.
+        convention : str
+            A key of `hicp_lib.core.keypoints.TO_HALPE`.
+        lists : dict of int to list
+            By row; of the convention's length times `width`.
+        width : int, optional
+            Numbers per keypoint.
 
         Returns
         -------
-        array, shape (len(lists), 136, width); 0 where the convention has no such keypoint
+        array, shape (len(lists), 136, width)
+            0 where the convention has no such keypoint.
         """
-        indices = TO_HALPE[convention]
-        values = self.finite(
-            list(lists.values()), width * len(indices), lambda j: f"{key}[{j}]", list(lists)
-        ).reshape(-1, len(indices), width)
-        result = np.zeros((len(lists), N_KEYPOINTS, width))
-        result[:, indices[indices >= 0]] = values[:, indices >= 0]
-        return result
+        n = len(TO_HALPE[convention])
+        values = self.finite(list(lists.values()), width * n, lambda j: f"{key}[{j}]", list(lists))
+        return to_halpe(values.reshape(-1, n, width), convention, axis=-2, fill=0.0)
 
 
 def json_files(folder: Path, ending: str, what: str) -> dict[str, Path]:
     """Files of a folder by their name without `ending`, in the order of names.
 
+    Parameters
+    ----------
+    folder : Path
+        Where they are.
+    ending : str
+        How their names end.
+    what : str
+        Which folder to give, for messages.
+
+    Returns
+    -------
+    dict of str to Path
+
     Raises
     ------
     InputError
-        If it is no folder, or holds no such file; `what` says which folder to give.
+        If it is no folder, or holds no such file.
     """
     try:
         names = sorted(entry.name for entry in os.scandir(folder) if entry.name.endswith(ending))

@@ -28,6 +28,7 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
+from hicp_lib.formats.annotations import PERSON_CATEGORY
 from hicp_lib.formats.importers.people import People, split
 from hicp_lib.formats.json_validation import PART_KEYS, Rows, shown
 
@@ -40,12 +41,18 @@ class Dialect:
 
     Attributes
     ----------
-    tool : for messages
-    file_name : looked for when a folder is given
-    named_by : what a number as `image_id` is, see `People`
-    absent : a keypoint is not given when all three numbers are 0, or when its score is not positive
-    categories : ids that mean a person
-    offset_px : what its coordinates exceed those with pixel centres at integers by
+    tool : str
+        For messages.
+    file_name : str
+        Looked for when a folder is given.
+    named_by : {"id", "number"}
+        What a number as `image_id` is, see `People`.
+    absent : {"zeros", "score"}
+        A keypoint is not given when all three numbers are 0, or when its score is not positive.
+    categories : tuple of int
+        Ids that mean a person.
+    offset_px : float
+        What its coordinates exceed those with pixel centres at integers by.
     """
 
     tool: str
@@ -66,6 +73,17 @@ OPENPOSE = Dialect("OpenPose", "coco.json", named_by="number", offset_px=0.5)
 def read_results(path: Path, dialect: Dialect) -> People:
     """Read a list of COCO keypoint results, or the one of the tool's own name in a folder.
 
+    Parameters
+    ----------
+    path : Path
+        The file, or a folder with a file of the tool's name.
+    dialect : Dialect
+        The tool's way.
+
+    Returns
+    -------
+    People
+
     Raises
     ------
     InputError
@@ -74,8 +92,7 @@ def read_results(path: Path, dialect: Dialect) -> People:
     path = path / dialect.file_name if path.is_dir() else path
     rows = Rows.of(path, "results", _checked_list(path, read_json(path), dialect), name_key="image_id")
     sources, source_of = _sources(rows)
-    for i, row in enumerate(rows.rows):
-        category = row.get("category_id", 1)
+    for i, category in enumerate(rows.column("category_id", default=PERSON_CATEGORY)):
         if type(category) is not int or category not in dialect.categories:
             raise rows.error(i, f"category_id is {shown(category)}; expected 1 (person), leave others out")
     triples = rows.keypoints()
@@ -95,11 +112,12 @@ def _checked_list(path: Path, value: Any, dialect: Dialect) -> list:
     return value
 
 
+def _is_image_id(value: Any) -> bool:
+    return (type(value) is int and abs(value) < 2**63) or (isinstance(value, str) and value != "")
+
+
 def _sources(rows: Rows) -> tuple[list[str | int], np.ndarray]:
     """The images in the order of the file, and the index of each row's."""
-    keys = rows.column("image_id")
-    for i, key in enumerate(keys):
-        if not (type(key) is int and abs(key) < 2**63) and not (isinstance(key, str) and key):
-            raise rows.error(i, f"image_id is {shown(key)}; expected a whole number or a file name")
+    keys = rows.column("image_id", _is_image_id, "a whole number or a file name")
     index = {key: i for i, key in enumerate(dict.fromkeys(keys))}
     return list(index), np.array([index[key] for key in keys], dtype=int)

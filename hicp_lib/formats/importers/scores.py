@@ -1,7 +1,8 @@
 """Keypoint scores of other tools brought into [0, 1], in order.
 
-A score is divided by its format's scale and cut to [0, 1]; the tool's own score stays beside it. This
-makes ranges equal, not meanings: 0.3 of one tool is still not 0.3 of another.
+A score is divided by its format's scale and cut to [0, 1], where order is kept, though what was cut becomes
+equal; the tool's own score stays beside it. This makes ranges equal, not meanings: 0.3 of one tool is still
+not 0.3 of another.
 
 - OpenPose, AlphaPose, Detectron2: scale 1. OpenPose's confidences lie in [0, 1]; heat-map maxima and
   Detectron2's softmax mass can pass 1 by a little.
@@ -10,8 +11,6 @@ makes ranges equal, not meanings: 0.3 of one tool is still not 0.3 of another.
 """
 
 from __future__ import annotations
-
-import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.formats.importers.people import People
@@ -22,6 +21,17 @@ _RTMW_SCALE, _RTMW_FROM, _RTMW_UP_TO = 10.0, 2.0, 20.0
 
 def score_scale(format: str, people: People) -> float:
     """What keypoint scores of this format are divided by.
+
+    Parameters
+    ----------
+    format : str
+        The tool's.
+    people : People
+        All that it found.
+
+    Returns
+    -------
+    float
 
     Raises
     ------
@@ -35,8 +45,3 @@ def score_scale(format: str, people: People) -> float:
             "or give --score-scale, the score that is to become 1"
         )
     return _RTMW_SCALE if format in _WITH_RTMW and highest > _RTMW_FROM else 1.0
-
-
-def to_unit(raw_scores: np.ndarray, scale: float) -> np.ndarray:
-    """Scores divided by `scale` and cut to [0, 1]; order is kept, though what was cut becomes equal."""
-    return np.clip(raw_scores / scale, 0.0, 1.0)

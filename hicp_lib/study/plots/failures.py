@@ -122,7 +122,7 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
     Parameters
     ----------
     table : DataFrame
-        As from `kind_shares`, of one group of keypoints.
+        As from `kind_proportions`, of one group of keypoints.
     by : str
         Its column that names the bars.
     note : str
@@ -172,7 +172,7 @@ def head_change(table: pd.DataFrame, note: str) -> Figure:
 
 @in_style
 def hallucinated_heads(table: pd.DataFrame, note: str) -> Figure:
-    """Where keypoints of the head are given that was cut off; `table` from `without_head.invented_heads`."""
+    """Where keypoints of the head are given that was cut off; `table` is evaluation's `hallucinated_heads`."""
     figure, axes, panels = _detector_panels(table, 4.0, 4.4, sharex=True)
     for axis, detector, rows in panels:
         dots = axis.scatter(rows["along"], rows["below"], c=rows["score"], s=14, vmin=0, vmax=1, alpha=0.8)

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hicp_lib.evaluation.ap import bootstrap
-from hicp_lib.evaluation.ap import cocoeval as engine
+from hicp_lib.evaluation.ap import bootstrap, cocoeval
 from hicp_lib.evaluation.ap.bootstrap import bootstrap_difference, bootstrap_intervals, resample
 from hicp_lib.evaluation.ap.evaluate import evaluate
 
@@ -15,9 +14,9 @@ from hicp_lib.evaluation.ap.evaluate import evaluate
 @pytest.mark.parametrize("seed", range(4))
 def test_drawing_every_image_once_is_pycocotools_to_the_bit(scene, group, seed):
     evaluation = evaluate(*scene(seed), group)
-    precision, recall = engine.precision_recall(evaluation.matches)
+    precision, recall = cocoeval.precision_recall(evaluation.matches)
     assert np.array_equal(precision, evaluation.precision) and np.array_equal(recall, evaluation.recall)
-    assert engine.metrics(precision, recall) == evaluation.metrics()
+    assert cocoeval.metrics(precision, recall) == evaluation.metrics()
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -36,7 +35,7 @@ def test_a_draw_is_pycocotools_on_the_images_drawn(scene, seed):
         annotations.take(rows), images=images, ids=np.arange(len(rows)) + 1, image_ids=np.concatenate(copies)
     )
     expected = evaluate(doubled, {new: detections[old] for new, old in enumerate(drawn.tolist())})
-    ours = engine.metrics(*engine.precision_recall(evaluate(annotations, detections).matches, weights))
+    ours = cocoeval.metrics(*cocoeval.precision_recall(evaluate(annotations, detections).matches, weights))
     assert ours == pytest.approx(expected.metrics(), abs=1e-12)
 
 

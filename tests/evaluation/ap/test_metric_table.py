@@ -10,8 +10,8 @@ from hicp_lib.evaluation.ap.evaluate import evaluate
 from hicp_lib.evaluation.ap.metric_table import (
     compare,
     draw_cases,
-    figures,
     head_loss,
+    metric_table,
     pairs,
     people_oks,
 )
@@ -82,7 +82,7 @@ def test_two_detectors_are_compared_on_the_same_draws(study):
     assert gain["value"] == pytest.approx(3 / 60) and 0 <= gain["low"] < gain["value"] < gain["high"] < 0.12
     back = table.loc["mmpose", ["value", "low", "high"]].astype(float)
     assert back.tolist() == pytest.approx((-gain[["value", "high", "low"]].astype(float)).tolist())
-    alone = figures(drawn).query("group == 'body' and metric == 'AR'").set_index("detector")
+    alone = metric_table(drawn).query("group == 'body' and metric == 'AR'").set_index("detector")
     assert alone.loc["mediapipe", "low"] < alone.loc["mmpose", "high"]
 
 

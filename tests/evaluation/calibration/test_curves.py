@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.calibration.curves import (
     Calibration,
-    calibration_error,
     calibration_study,
     calibration_table,
     calibrations_of,
@@ -85,9 +84,15 @@ def test_no_source_image_is_on_both_sides_of_the_split(groups, seed):
 
 
 def test_calibration_error_by_hand():
-    scores, hits = np.array([0.95, 0.95, 0.15, 0.15]), np.array([1, 0, 0, 0])
-    assert calibration_error(scores, hits) == pytest.approx((2 * 0.45 + 2 * 0.15) / 4)
-    assert calibration_error(np.array([1.0, 0.0]), np.array([1, 0])) == 0
+    """Of the half held out: bins .9 to 1 and .1 to .2, hit rates 1/2 and 0."""
+    scores, hits = np.tile([0.95, 0.95, 0.15, 0.15], 30), np.tile([1, 0, 0, 0], 30)
+    table = pd.DataFrame({"detector": "a", "group": "body", "source_image": np.repeat(range(30), 4)})
+    errors, _, _ = calibration_study(table.assign(score=scores, hit=hits.astype(bool)), n_resamples=50)
+    row = errors.iloc[0]
+    assert row["raw"] == pytest.approx((2 * 0.45 + 2 * 0.15) / 4)
+    assert row["calibrated"] == pytest.approx(0, abs=1e-12)
+    assert row["change"] == pytest.approx(row["calibrated"] - row["raw"])
+    assert (row["n_keypoints"], row["n_images"], row["hit_rate"]) == (60, 15, 0.25)
 
 
 def test_reliability_has_a_row_per_bin_in_use():

@@ -6,7 +6,7 @@ import pytest
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import COCO_17, INDEX, SIGMAS
-from hicp_lib.evaluation.failures.error_kinds import KINDS, all_errors, keypoint_errors, kind_shares
+from hicp_lib.evaluation.failures.error_kinds import KINDS, all_errors, keypoint_errors, kind_proportions
 from tests.evaluation.made_people import make_annotations, make_detections
 
 AREA = 20_000.0
@@ -105,7 +105,7 @@ def shares_of_four_in(n: int):
     found[::4, WRIST] += 500
     run = {i: make_detections(found[i : i + 1]) for i in range(n) if i % 4 < 3}
     errors = all_errors({"basic": make_annotations(points, range(n))}, {("basic", "mediapipe-pose"): run})
-    return kind_shares(errors, "subset").set_index("kind")
+    return kind_proportions(errors, "subset").set_index("kind")
 
 
 def test_shares_of_kinds_add_up_to_one():
@@ -134,4 +134,4 @@ def test_a_detection_goes_to_whom_it_fits_and_not_to_those_nothing_is_known_of()
 
 def test_shares_by_what_is_no_column_are_refused():
     with pytest.raises(InputError, match="by 'classes': expected one of"):
-        kind_shares(pd.DataFrame({"detector": [], "group": [], "kind": []}), "classes")
+        kind_proportions(pd.DataFrame({"detector": [], "group": [], "kind": []}), "classes")

@@ -6,7 +6,11 @@ import pytest
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.evaluation.failures.error_kinds import all_errors
 from hicp_lib.evaluation.failures.placed_keypoints import placed_keypoints
-from hicp_lib.evaluation.failures.without_head import change_per_keypoint, invented_heads, invented_shares
+from hicp_lib.evaluation.failures.without_head import (
+    change_per_keypoint,
+    hallucinated_heads,
+    hallucinated_proportions,
+)
 from tests.evaluation.made_people import POINTS, make_annotations, make_detections
 
 
@@ -15,8 +19,8 @@ def test_heads_made_up_are_counted_and_placed(world):
     found["headless", "mediapipe-pose"][5].keypoints_px[0, 4] = np.nan
     found["headless", "mediapipe-pose"][5].scores[0, 4] = 0
     placed = placed_keypoints(truth, found, source)
-    assert sorted(invented_heads(placed)["keypoint"]) == [0, 1, 2, 3]
-    shares = invented_shares(placed, 0.3, n_resamples=5).set_index("what")["value"]
+    assert sorted(hallucinated_heads(placed)["keypoint"]) == [0, 1, 2, 3]
+    shares = hallucinated_proportions(placed, 0.3, n_resamples=5).set_index("what")["value"]
     assert shares["given at all"] == pytest.approx(4 / 5)
     assert shares["of those given: put outside"] == 1 and shares["of the sure ones: right"] == 1
 

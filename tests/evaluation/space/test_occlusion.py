@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from hicp_lib.core.camera import Camera, transform
-from hicp_lib.evaluation.space.occlusion import SIGHTS, lines_of_sight
+from hicp_lib.evaluation.space.occlusion import OCCLUSIONS, joint_occlusion
 from hicp_lib.recordings.recording import open_recording
 from hicp_lib.recordings.writer import RecordingWriter
 
@@ -41,9 +41,9 @@ def test_positions_are_clear_hidden_outside_or_without_depth(recording):
         ignore_index=True,
     )
     both = both.sample(frac=1, random_state=0)
-    result = lines_of_sight(recording, both)
+    result = joint_occlusion(recording, both)
     assert result.index.equals(both.index) and result["frame"].equals(both["frame"])
-    assert set(result["sight"]) == set(SIGHTS)
+    assert set(result["sight"]) == set(OCCLUSIONS)
     for row in result.itertuples():
         point, sight = SIGHT_OF[row.keypoint.removeprefix("left_elbow_")]
         assert row.sight == sight
@@ -54,4 +54,4 @@ def test_how_much_may_be_in_front_depends_on_the_joint(recording):
     point = transform(T_BASE_CAM, np.array([[0.0, 0.0, 1.08]]))
     joints = pd.DataFrame(np.repeat(point, 3, axis=0), columns=["x_m", "y_m", "z_m"])
     joints = joints.assign(frame=0, keypoint=["left_wrist", "left_elbow", "left_shoulder"])
-    assert lines_of_sight(recording, joints)["sight"].tolist() == ["hidden", "clear", "clear"]
+    assert joint_occlusion(recording, joints)["sight"].tolist() == ["hidden", "clear", "clear"]

@@ -4,12 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.evaluation.statistics.proportions import mean_with_interval, shares
+from hicp_lib.evaluation.statistics.proportions import mean_with_interval, proportions
 
 
 def test_shares_are_means_of_what_is_known():
     rows = pd.DataFrame({"who": ["b", "a", "a", "a"], "source_image": [1, 1, 2, 3], "hit": [1, 0, 1, np.nan]})
-    table = shares(rows, ["who"], "hit", n_resamples=50)
+    table = proportions(rows, ["who"], "hit", n_resamples=50)
     assert table["who"].tolist() == ["b", "a"] and table["value"].tolist() == [1, 0.5]
     assert table["n"].tolist() == [1, 2] and table["n_images"].tolist() == [1, 2]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from hicp_lib.evaluation.ap.evaluate import evaluate
-from hicp_lib.formats.annotations import read_annotations, read_detections
-from hicp_lib.formats.importers.importing import READERS, import_predictions, write_imported
+from hicp_lib.formats.annotations import read_annotations, read_detections, write_detections
+from hicp_lib.formats.importers.importing import READERS, import_predictions
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "data" / "examples" / "native"
@@ -29,7 +29,7 @@ def test_every_example_goes_from_import_to_evaluation(tmp_path, format):
     summary = imported.summary
     assert (summary.n_people, summary.n_with_people, len(summary.unmatched)) == (3, 2, 1)
     assert summary.score_scale == (10 if format == "mmpose" else 1)
-    write_imported(tmp_path / "d.json", imported)
+    write_detections(tmp_path / "d.json", imported.detections, imported.extras)
     found = read_detections(tmp_path / "d.json", people)
     # Some six pixels off on people 400 px high: found at OKS .5 all, and nobody else.
     body = evaluate(people, found, "body")

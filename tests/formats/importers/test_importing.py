@@ -1,6 +1,7 @@
 """What comes out of another tool's files is who was put in, to the format's precision."""
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,8 @@ from native_files import (
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.evaluation.ap.evaluate import check_detections
-from hicp_lib.formats.annotations import read_detections
-from hicp_lib.formats.importers.importing import import_predictions, write_imported
+from hicp_lib.formats.annotations import read_detections, write_detections
+from hicp_lib.formats.importers.importing import import_predictions
 from tests.formats.importers.native_people import NAMES, annotated, make_person
 
 IDS = {name: i for i, name in NAMES.items()}
@@ -67,7 +68,7 @@ def test_everybody_comes_back(tmp_path, images, found, format, name, write, how,
 def test_the_written_file_is_read_by_the_library(tmp_path, images, found, format, name, write, how, layout):
     write(tmp_path / name, found, **how)
     imported = import_predictions(format, tmp_path / name, images)
-    write_imported(tmp_path / "d.json", imported)
+    write_detections(tmp_path / "d.json", imported.detections, imported.extras)
     again = read_detections(tmp_path / "d.json", images)
     for image_id, people in imported.detections.items():
         for part in ("keypoints_px", "scores", "person_scores"):
@@ -201,7 +202,7 @@ def test_the_summary_says_what_matched(tmp_path, images, found):
     assert summary.n_outside == 0 and summary.n_keypoints == 2 * 135
     text = "\n".join(summary.lines())
     assert "2 people in 1 of 3 images" in text and "elsewhere" in text and "openpose_body25 3" in text
-    json.dumps(summary.as_dict(), allow_nan=False)
+    json.dumps(asdict(summary), allow_nan=False)
 
 
 def test_keypoints_outside_the_image_are_counted(tmp_path, images):

@@ -19,7 +19,8 @@ from native_files import (
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.ap.evaluate import check_detections
-from hicp_lib.formats.importers.importing import import_predictions, write_imported
+from hicp_lib.formats.annotations import write_detections
+from hicp_lib.formats.importers.importing import import_predictions
 from tests.formats.importers.native_people import NAMES, annotated, make_person
 
 IDS = {name: i for i, name in NAMES.items()}
@@ -238,7 +239,7 @@ def test_nothing_else_escapes(sound, kind, data):
         assert ((people.scores >= 0) & (people.scores <= 1)).all()
     for line in imported.summary.lines():
         assert line.encode() and line.isprintable()
-    write_imported(folder / "out" / "d.json", imported)
+    write_detections(folder / "out" / "d.json", imported.detections, imported.extras)
 
 
 @settings(max_examples=40, deadline=None)

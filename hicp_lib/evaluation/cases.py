@@ -1,0 +1,90 @@
+"""What is judged: every detector on every subset, for the groups of keypoints it gives.
+
+`Truth` is annotations by subset, `Found` detections by image id, of every (subset, detector). A *case* is a
+subset, a detector and a group of keypoints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import GROUPS, N_KEYPOINTS
+from hicp_lib.detectors.registry import DETECTORS
+from hicp_lib.formats.annotations import Annotations, source_images
+
+Truth = Mapping[str, Annotations]
+Found = Mapping[tuple[str, str], Mapping[int, Detections]]
+
+
+def groups_of(found: Found, detector: str) -> tuple[str, ...]:
+    """The keypoint groups a detector is scored on: its own, or those an imported one gives a keypoint of.
+
+    Examples
+    --------
+    >>> groups_of({}, "mediapipe"), groups_of({("basic", "mine"): {1: Detections.none()}}, "mine")
+    (('body', 'hand'), ())
+    """
+    if detector in DETECTORS:
+        return DETECTORS[detector].groups
+    given = np.zeros(N_KEYPOINTS, dtype=bool)
+    for (_, name), images in found.items():
+        if name == detector:
+            for people in images.values():
+                given |= np.isfinite(people.keypoints_px).all(axis=-1).any(axis=0)
+    return tuple(group for group, keypoints in GROUPS.items() if given[keypoints].any())
+
+
+def all_cases(found: Found) -> Iterator[tuple[str, str, str]]:
+    """Subset, detector and group of every case."""
+    for subset, detector in found:
+        for group in groups_of(found, detector):
+            yield subset, detector, group
+
+
+def labelled(table: pd.DataFrame, **labels: object) -> pd.DataFrame:
+    """The table with columns before its own, each of one value.
+
+    Examples
+    --------
+    >>> labelled(pd.DataFrame({"oks": [0.5]}), group="body").to_dict("list")
+    {'group': ['body'], 'oks': [0.5]}
+    """
+    return table.assign(**labels)[[*labels, *table.columns]]
+
+
+def per_case(
+    measure: Callable[[Annotations, Mapping[int, Detections], str], pd.DataFrame],
+    truth: Truth,
+    found: Found,
+    groups: Mapping[str, tuple[str, ...]] | None = None,
+) -> pd.DataFrame:
+    """A measure of every case, one below the other.
+
+    Parameters
+    ----------
+    measure : callable
+        Table with a column `image_id` from annotations, detections and a group.
+    truth : mapping of str to Annotations
+        By subset.
+    found : mapping of (str, str) to mapping of int to Detections
+        By image id, of every subset and detector.
+    groups : mapping of str to tuple of str, optional
+        The groups of each detector; those it gives when left out.
+
+    Returns
+    -------
+    DataFrame
+        Columns `subset, detector, group, source_image` and the measure's own.
+    """
+    tables = []
+    for subset, detector in found:
+        sources = source_images(truth[subset])
+        for group in groups_of(found, detector) if groups is None else groups[detector]:
+            table = measure(truth[subset], found[subset, detector], group)
+            labels = {"subset": subset, "detector": detector, "group": group}
+            tables.append(labelled(table, **labels, source_image=table["image_id"].map(sources)))
+    return pd.concat(tables, ignore_index=True)

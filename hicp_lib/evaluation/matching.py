@@ -1,0 +1,131 @@
+"""Which detection is of which person, by object keypoint similarity (OKS)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.oks import oks
+from hicp_lib.formats.annotations import Annotations
+
+MATCH_OKS = 0.1  # least similarity of a detection to a person it is said to be of (Ronchi and Perona 2017)
+
+
+def pairwise_oks(
+    people: Annotations, found: Detections, keypoints: np.ndarray, sigmas: np.ndarray
+) -> np.ndarray:
+    """OKS of all people of an image and all detections in it.
+
+    Parameters
+    ----------
+    people : Annotations
+        Of one image.
+    found : Detections
+        In the same image.
+    keypoints : array of int, shape (k,)
+        Halpe indices of the group.
+    sigmas : array, shape (k,)
+        Their constants.
+
+    Returns
+    -------
+    array, shape (n_people, n_detections)
+        In [0, 1].
+    """
+    return oks(
+        people.keypoints_px[:, None, keypoints], people.visibility[:, None, keypoints] > 0,
+        people.boxes_px[:, None], people.areas_px2[:, None], found.keypoints_px[None, :, keypoints], sigmas,
+    )  # fmt: skip
+
+
+def best_oks(
+    people: Annotations, found: Mapping[int, Detections], keypoints: np.ndarray, sigmas: np.ndarray
+) -> Iterator[tuple[int, float]]:
+    """How well everybody who counts and has a labelled keypoint of a group is found.
+
+    Parameters
+    ----------
+    people : Annotations
+        Of any images; crowds do not count.
+    found : mapping of int to Detections
+        By image id.
+    keypoints : array of int, shape (k,)
+        Halpe indices of the group.
+    sigmas : array, shape (k,)
+        Their constants.
+
+    Yields
+    ------
+    row : int
+        The person's, in `people`.
+    oks : float
+        Of the detection that fits best, 0 where there is none.
+    """
+    labelled = people.visibility[:, keypoints] > 0
+    for i in np.flatnonzero(labelled.any(axis=1) & ~people.is_crowd).tolist():
+        points = found.get(int(people.image_ids[i]), Detections.none()).keypoints_px[:, keypoints]
+        truth = people.keypoints_px[i, keypoints]
+        fits = oks(truth, labelled[i], people.boxes_px[i], people.areas_px2[i], points, sigmas)
+        yield i, float(fits.max(initial=0.0))
+
+
+def match_best_first(fit: np.ndarray, scores: np.ndarray, least: float = MATCH_OKS) -> dict[int, int]:
+    """Detections, best first, take the free person they fit best.
+
+    Parameters
+    ----------
+    fit : array, shape (n_people, n_detections)
+        Similarity of each pair.
+    scores : array, shape (n_detections,)
+        What detections are ranked by; of equal ones the first comes first.
+    least : float, optional
+        Similarity that is asked for.
+
+    Returns
+    -------
+    dict of int to int
+        Row of the person to row of the detection.
+
+    Examples
+    --------
+    >>> match_best_first(np.array([[0.9, 0.8], [0.3, 0.7]]), np.array([0.5, 0.6]))
+    {0: 1, 1: 0}
+    """
+    fit = fit.copy()
+    matched: dict[int, int] = {}
+    for row in np.argsort(-scores, kind="stable").tolist() if len(fit) else ():
+        person = int(fit[:, row].argmax())
+        if fit[person, row] >= least:
+            matched[person] = row
+            fit[person] = 0.0
+    return matched
+
+
+def matched_people(
+    people: Annotations, found: Detections, keypoints: np.ndarray, sigmas: np.ndarray
+) -> dict[int, int]:
+    """The detection of each person who has one, with an OKS of at least `MATCH_OKS`.
+
+    People without a labelled keypoint take no part: anything near them would fit.
+
+    Parameters
+    ----------
+    people : Annotations
+        Of one image.
+    found : Detections
+        In the same image.
+    keypoints : array of int, shape (k,)
+        Halpe indices of the group.
+    sigmas : array, shape (k,)
+        Their constants.
+
+    Returns
+    -------
+    dict of int to int
+        Row of the person to row of the detection.
+    """
+    fit = pairwise_oks(people, found, keypoints, sigmas)
+    fit[~(people.visibility[:, keypoints] > 0).any(axis=1)] = 0.0
+    return match_best_first(fit, found.person_scores)
