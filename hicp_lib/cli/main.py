@@ -257,7 +257,7 @@ def report(profile: str, pairs: tuple[tuple[str, str], ...], only: str | None, r
     """Run the notebooks and build the book; what has not changed is not done again."""
     from hicp_lib.core.checkout import sources, working_folder
     from hicp_lib.report.build import make_report
-    from hicp_lib.report.runs import RunError
+    from hicp_lib.report.run import RunError
 
     try:
         make_report(profile, list(pairs), click.echo, sources(), root or working_folder(), only)

@@ -15,7 +15,8 @@ from typing import Any
 from hicp_lib.core.files import sha256_file, write_json
 from hicp_lib.report.checks import book_problems
 from hicp_lib.report.prose import Results, render_page
-from hicp_lib.report.runs import Folders, RunError, read_stamp
+from hicp_lib.report.run import Folders, RunError
+from hicp_lib.report.runs import read_stamp
 from hicp_lib.report.sphinx_extension import PLOTLY_PATH, SCRIPTS_DIR
 from hicp_lib.study import provenance
 

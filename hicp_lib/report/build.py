@@ -11,7 +11,8 @@ from pathlib import Path
 from hicp_lib.core.errors import InputError
 from hicp_lib.report.book import build_book
 from hicp_lib.report.notebooks import parse_overrides, read_notebooks, read_profile
-from hicp_lib.report.runs import Folders, Run, run_all
+from hicp_lib.report.run import Folders, Run
+from hicp_lib.report.runs import run_all
 
 
 def make_report(
@@ -73,14 +74,12 @@ def _plan(profile: str, pairs: list[tuple[str, str]], folder: Path, only: str | 
         raise InputError(f"--only {only}: there is no such notebook; choose one of {', '.join(names)}")
     chosen = read_profile(folder / "profiles.toml", profile, notebooks)
     overrides = parse_overrides(pairs, notebooks)
-    return [
-        Run(
-            notebook,
-            notebook.defaults | chosen.parameters.get(notebook.name, {}) | overrides[notebook.name],
-            tuple(chosen.after.get(notebook.name, ())),
-        )
-        for notebook in notebooks
-    ]
+    runs = []
+    for notebook in notebooks:
+        name = notebook.name
+        parameters = notebook.defaults | chosen.parameters.get(name, {}) | overrides[name]
+        runs.append(Run(notebook, parameters, chosen.after.get(name, [])))
+    return runs
 
 
 @contextmanager

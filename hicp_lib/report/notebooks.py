@@ -50,14 +50,12 @@ class Profile:
 
     Attributes
     ----------
-    name : str
     parameters : dict of str to dict
         Per notebook, the parameters that differ from the defaults.
     after : dict of str to list of str
         Per notebook, those whose results it reads or whose work it shares.
     """
 
-    name: str
     parameters: dict[str, dict[str, Any]]
     after: dict[str, list[str]]
 
@@ -167,7 +165,7 @@ def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
         key: check_parameters(known[key], given, f"{path}, [{name}.{key}]")
         for key, given in content[name].items()
     }
-    return Profile(name, parameters, after)
+    return Profile(parameters, after)
 
 
 def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import html
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +31,11 @@ from hicp_lib.core.files import read_json
 NOT_RUN = "not run"
 
 
+@dataclass(frozen=True)
 class Results:
     """The result files of one profile, as the pages see them.
 
-    Parameters
+    Attributes
     ----------
     folder : Path
         Holds a folder of results per notebook.
@@ -41,13 +43,12 @@ class Results:
         Its name, as in the book's links to files.
     """
 
-    def __init__(self, folder: Path, profile: str):
-        self._folder = folder
-        self._profile = profile
+    folder: Path
+    profile: str
 
     def notebooks(self) -> list[str]:
         """Names of the notebooks that were run."""
-        return sorted(path.parent.name for path in self._folder.glob("*/values.json"))
+        return sorted(path.parent.name for path in self.folder.glob("*/values.json"))
 
     def value(self, notebook: str, name: str, digits: int | None = None) -> str:
         """A recorded value as text; "not run" when the notebook recorded None.
@@ -63,7 +64,7 @@ class Results:
         InputError
             If the notebook recorded no such value.
         """
-        value = self._entry(notebook, "values.json", name)
+        value = self.raw(notebook, name)
         if value is None:
             return NOT_RUN
         return f"{value:.{digits}f}" if digits is not None else str(value)
@@ -88,7 +89,7 @@ class Results:
         InputError
             If the notebook saved no such table.
         """
-        path = self._folder / notebook / f"{name}.parquet"
+        path = self.folder / notebook / f"{name}.parquet"
         if not path.is_file():
             raise InputError(f"{path}: a page of the book needs this table; save it in the notebook")
         table = pd.read_parquet(path)
@@ -97,7 +98,7 @@ class Results:
     def figure(self, notebook: str, name: str) -> str:
         """A saved figure as HTML, with a link to the notebook that made it."""
         texts = self._entry(notebook, "captions.json", name)
-        source = f"results/{self._profile}/{notebook}/{texts['file']}"
+        source = f"results/{self.profile}/{notebook}/{texts['file']}"
         return (
             f'<figure class="hicp"><img src="{source}" alt="{html.escape(texts["alt"])}">'
             f"<figcaption>{html.escape(texts['caption'])} "
@@ -106,10 +107,10 @@ class Results:
 
     def stamp(self, notebook: str) -> dict[str, Any]:
         """What a notebook was made with."""
-        return read_json(self._folder / notebook / "provenance.json")
+        return read_json(self.folder / notebook / "provenance.json")
 
     def _entry(self, notebook: str, file: str, name: str) -> Any:
-        path = self._folder / notebook / file
+        path = self.folder / notebook / file
         entries = read_json(path)
         if name not in entries:
             known = ", ".join(entries) or "none"
@@ -160,17 +161,11 @@ def render_page(source: Path, results: Results, profile: str) -> str:
         If the page uses a name that does not exist, or is not a valid template.
     """
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    names = {name: getattr(results, name) for name in ("value", "raw", "table", "figure", "stamp")}
+    names |= {"data": lambda name: json.loads((DATA_DIR / name).read_text())}
+    names |= {"profile": profile, "notebooks": results.notebooks()}
     try:
-        return environment.from_string(source.read_text()).render(
-            value=results.value,
-            raw=results.raw,
-            table=results.table,
-            figure=results.figure,
-            data=lambda name: json.loads((DATA_DIR / name).read_text()),
-            stamp=results.stamp,
-            profile=profile,
-            notebooks=results.notebooks(),
-        )
+        return environment.from_string(source.read_text()).render(names)
     except jinja2.TemplateError as error:
         line = f", line {error.lineno}" if isinstance(error, jinja2.TemplateSyntaxError) else ""
         raise InputError(f"{source}{line}: {error.message}; correct the page") from None

@@ -11,81 +11,26 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import Any
 
 import nbformat
 import psutil
 
 from hicp_lib.core.cache import code, digest, input_sha256
-from hicp_lib.core.checkout import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, sha256_file, write_json
-from hicp_lib.report.notebooks import Notebook, is_path
+from hicp_lib.report.notebooks import is_path
+from hicp_lib.report.run import WALL_LIMIT_S, Children, Folders, Run, RunError
 from hicp_lib.report.schedule import needed, run_when_ready
 from hicp_lib.study import provenance
 
-WALL_LIMIT_S = 2 * 3600
 MEMORY_PER_RUN_BYTES = 2 * 10**9
 """What one notebook may need with its workers; the study's largest takes 0.7 GB without them."""
-
-
-class RunError(RuntimeError):
-    """A notebook failed. The message is one line that says where and where its copy lies."""
-
-
-@dataclass(frozen=True)
-class Folders:
-    """Where the runs of one profile come from and go to.
-
-    Attributes
-    ----------
-    sources : Path
-        Holds `notebooks` and `book`.
-    root : Path
-        Results and the built book go below it.
-    profile : str
-        Its name.
-    """
-
-    sources: Path
-    root: Path
-    profile: str
-
-    @property
-    def executed(self) -> Path:
-        """Executed notebooks and their stamps."""
-        return self.root / "_build" / "notebooks" / self.profile
-
-    @property
-    def results(self) -> Path:
-        """One folder of results per notebook."""
-        return self.root / "results" / self.profile
-
-
-@dataclass(frozen=True)
-class Run:
-    """One notebook with everything it runs with.
-
-    Attributes
-    ----------
-    notebook : Notebook
-    parameters : dict of str to object
-        Every parameter's value by its name.
-    after : tuple of str
-        Names of the notebooks that come before it.
-    """
-
-    notebook: Notebook
-    parameters: dict[str, Any]
-    after: tuple[str, ...] = ()
 
 
 def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None], only: str | None = None) -> None:
@@ -121,7 +66,7 @@ def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None], only:
         if stamp.stem not in named:
             _discard(stamp.stem, folders)
     n_workers = n_parallel()
-    with ThreadPoolExecutor(n_workers) as pool, _Children() as children:
+    with ThreadPoolExecutor(n_workers) as pool, Children() as children:
 
         def job(name: str, before: list[Future]) -> str:
             return _bring_up_to_date(named[name], before, folders, children, log)
@@ -142,7 +87,7 @@ class _SkippedError(Exception):
     """A notebook that was not run because one before it failed."""
 
 
-def _bring_up_to_date(run: Run, before: list[Future], folders: Folders, children: _Children, log) -> str:
+def _bring_up_to_date(run: Run, before: list[Future], folders: Folders, children: Children, log) -> str:
     """Run the notebook unless it is fresh; its key's digest."""
     if any(future.exception() for future in before):
         raise _SkippedError
@@ -237,7 +182,7 @@ def _outputs(name: str, folders: Folders) -> dict[str, str]:
     return {path.relative_to(folders.root).as_posix(): sha256_file(path) for path in paths if path.is_file()}
 
 
-def run_notebook(run: Run, key: dict[str, Any], folders: Folders, children: _Children) -> None:
+def run_notebook(run: Run, key: dict[str, Any], folders: Folders, children: Children) -> None:
     """Run a notebook and put its outcome in place of the last one.
 
     Parameters
@@ -246,7 +191,7 @@ def run_notebook(run: Run, key: dict[str, Any], folders: Folders, children: _Chi
     key : dict of str to str
         As from `run_key`: what its stamp will say.
     folders : Folders
-    children : _Children
+    children : Children
         Runs it, and ends it when the report ends.
 
     Raises
@@ -255,10 +200,8 @@ def run_notebook(run: Run, key: dict[str, Any], folders: Folders, children: _Chi
         If a cell failed, wrote to stderr or took too long, or the results are not those of this run.
     """
     name = run.notebook.name
-    prefix = f".run-{name}-"
-    with tempfile.TemporaryDirectory(
-        prefix=prefix, dir=folders.executed, ignore_cleanup_errors=True
-    ) as temporary:
+    prefix, parent = f".run-{name}-", folders.executed
+    with tempfile.TemporaryDirectory(prefix=prefix, dir=parent, ignore_cleanup_errors=True) as temporary:
         staging = Path(temporary)
         copy = staging / f"{name}.ipynb"
         try:
@@ -328,82 +271,3 @@ def first_problem(executed: Path) -> str | None:
         if cell.metadata.get("papermill", {}).get("status") != "completed":
             return f"{place} did not complete"
     return None
-
-
-class _Children:
-    """The running processes; leaving the context for any reason ends them all."""
-
-    def __init__(self) -> None:
-        self._pipes: set[IO[bytes]] = set()
-        self._ended = False
-
-    def __enter__(self) -> _Children:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._ended = True
-        for pipe in list(self._pipes):
-            pipe.close()
-
-    def execute(self, run: Run, copy: Path, staging: Path, folders: Folders) -> int | None:
-        """Run the notebook into `copy`; the exit code, or None when it hit the wall limit.
-
-        Parameters
-        ----------
-        run : Run
-        copy : Path
-            The executed notebook to write.
-        staging : Path
-            An empty folder for its job, log and results.
-        folders : Folders
-
-        Raises
-        ------
-        RunError
-            If the report is being stopped.
-        """
-        if self._ended:
-            raise RunError("was not run, the report was stopped")
-        folder = run.notebook.path.parent.resolve()
-        defaults = run.notebook.defaults
-        changed = {name: value for name, value in run.parameters.items() if value != defaults[name]}
-        job = {"notebook": str(run.notebook.path), "output": str(copy), "folder": str(folder)}
-        write_json(staging / "job.json", job | {"parameters": changed})
-        command = [sys.executable, "-m", "hicp_lib.report.execute", str(staging / "job.json")]
-        with open(staging / "log.txt", "wb") as log, tempfile.TemporaryDirectory(prefix="hicp-") as private:
-            streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": log, "stderr": log}
-            environment = _environment(staging, folders, private)
-            # In a session of its own: what ends the report's whole process group must not end this one
-            # before it has ended the kernel's workers.
-            process = subprocess.Popen(command, **streams, env=environment, start_new_session=True)
-            pipe = cast(IO[bytes], process.stdin)
-            self._pipes.add(pipe)
-            try:
-                return process.wait(WALL_LIMIT_S)
-            except subprocess.TimeoutExpired:
-                return None
-            finally:
-                pipe.close()
-                process.wait()
-                self._pipes.discard(pipe)
-
-
-def _environment(staging: Path, folders: Folders, private: str) -> dict[str, str]:
-    """A kernel's environment: nothing of the user's own set-up may move a number or a pixel."""
-    import matplotlib
-
-    return os.environ | {
-        RESULTS_VARIABLE: str(staging / "results"),
-        EARLIER_RESULTS_VARIABLE: str(folders.results.resolve()),
-        PROFILE_VARIABLE: folders.profile,
-        "IPYTHONDIR": private,
-        "JUPYTER_RUNTIME_DIR": private,
-        "JUPYTER_PREFER_ENV_PATH": "1",
-        "MATPLOTLIBRC": str(Path(matplotlib.get_data_path(), "matplotlibrc")),
-        "MPLBACKEND": "module://matplotlib_inline.backend_inline",
-        "OMP_NUM_THREADS": "1",
-        "OPENBLAS_NUM_THREADS": "1",
-        "PYTHONHASHSEED": "0",
-        "PYTHONNOUSERSITE": "1",
-        "TQDM_DISABLE": "1",
-    }

@@ -60,7 +60,7 @@ def test_what_cannot_be_written_is_told_in_one_line(capsys, monkeypatch):
 
 def test_a_failed_notebook_is_another_exit_code(capsys, monkeypatch):
     import hicp_lib.report.build
-    from hicp_lib.report.runs import RunError
+    from hicp_lib.report.run import RunError
 
     def fail(*arguments, **keywords):
         raise RunError("05_tiny: In [3] failed")

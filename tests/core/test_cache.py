@@ -19,7 +19,8 @@ from hicp_lib.core.cache import LIBRARY_DIR, code, imports_of, key
 from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.report.notebooks import read_notebooks
-from hicp_lib.report.runs import Run, run_key
+from hicp_lib.report.run import Run
+from hicp_lib.report.runs import run_key
 
 # What makes each kind of cached result, and the modules where its code ends.
 KINDS = {

@@ -9,7 +9,7 @@ import pytest
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.report.build import make_report
-from hicp_lib.report.runs import Folders, RunError
+from hicp_lib.report.run import Folders, RunError
 
 
 def test_report_of_two_notebooks(study):

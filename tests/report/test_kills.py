@@ -17,7 +17,8 @@ import pytest
 
 from hicp_lib.core.files import sha256_file
 from hicp_lib.report import runs
-from hicp_lib.report.runs import Folders, Run, run_all, run_key, why_stale
+from hicp_lib.report.run import Folders, Run
+from hicp_lib.report.runs import run_all, run_key, why_stale
 from tests.report.tiny_study import FINISH, MEASURE, START, pretend_to_execute, tiny_run
 
 _REPORT = """
@@ -104,7 +105,7 @@ def _publish(run: Run, folders: Folders, limit: int | None = None) -> int:
         return counted
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(runs._Children, "execute", pretend_to_execute)
+        patch.setattr(runs.Children, "execute", pretend_to_execute)
         for module, name in [(os, "replace"), (shutil, "rmtree"), (Path, "unlink"), (Path, "mkdir")]:
             patch.setattr(module, name, step(getattr(module, name)))
         run_all([run], folders, print)

@@ -8,7 +8,8 @@ from hicp_lib.cli import main as cli
 from hicp_lib.core.errors import InputError
 from hicp_lib.report import build, runs
 from hicp_lib.report.build import make_report
-from hicp_lib.report.runs import Folders, RunError, _Children, n_parallel
+from hicp_lib.report.run import Children, Folders, RunError
+from hicp_lib.report.runs import n_parallel
 from hicp_lib.study import provenance
 from tests.report.tiny_study import FINISH, START, pretend_to_execute, write_notebook
 
@@ -17,7 +18,7 @@ from tests.report.tiny_study import FINISH, START, pretend_to_execute, write_not
 def lines(study, monkeypatch) -> list[str]:
     """What the report says; a third notebook waits for nothing, and none is truly executed."""
     write_notebook(study / "notebooks" / "02_third.ipynb", START, FINISH)
-    monkeypatch.setattr(_Children, "execute", pretend_to_execute)
+    monkeypatch.setattr(Children, "execute", pretend_to_execute)
     return []
 
 
@@ -104,7 +105,7 @@ def test_a_report_that_fails_says_so_for_one_notebook_too(study, lines, monkeypa
         (staging / "log.txt").write_text("no kernel")
         return 1
 
-    monkeypatch.setattr(_Children, "execute", fail)
+    monkeypatch.setattr(Children, "execute", fail)
     with pytest.raises(RunError, match="00_first: did not run: no kernel; see "):
         make_report("quick", [], lines.append, study, study, only="01_second")
     assert ran(lines) == ["00_first"]

@@ -11,7 +11,8 @@ from hicp_lib.core import cache
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_file
 from hicp_lib.report.notebooks import read_notebook
-from hicp_lib.report.runs import Run, RunError, _Children, run_all, run_key, why_stale
+from hicp_lib.report.run import Children, Run, RunError
+from hicp_lib.report.runs import run_all, run_key, why_stale
 from hicp_lib.study import provenance
 from tests.report.tiny_study import FINISH, MEASURE, START, pretend_to_execute, tiny_run, write_notebook
 
@@ -142,14 +143,14 @@ def test_a_library_edited_during_the_run_is_not_stamped(tmp_path, monkeypatch, l
         (library / "study" / "page.py").write_text("a = 2")
         return pretend_to_execute(*arguments)
 
-    monkeypatch.setattr(_Children, "execute", edit)
+    monkeypatch.setattr(Children, "execute", edit)
     with pytest.raises(RunError, match="hicp_lib was changed while it ran"):
         run_all([run], folders, print)
     assert not folders.results.exists()
 
 
 def test_an_input_that_is_not_there_is_told_before_anything_runs(tmp_path, monkeypatch):
-    monkeypatch.setattr(_Children, "execute", pretend_to_execute)
+    monkeypatch.setattr(Children, "execute", pretend_to_execute)
     first, folders = tiny_run(tmp_path / "first", START, FINISH)
     run, _ = tiny_run(tmp_path / "second", START, FINISH, images="/nowhere/images")
     with pytest.raises(InputError, match="/nowhere/images: does not exist; parameter 'images'"):

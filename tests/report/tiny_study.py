@@ -9,7 +9,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from hicp_lib.core.files import write_json
 from hicp_lib.report.notebooks import read_notebook
-from hicp_lib.report.runs import Folders, Run
+from hicp_lib.report.run import Folders, Run
 
 PARAMETERS = 'seed = 0\nscale = 1.5\ndetectors = ["a", "b"]\nimages = ""'
 START = """from hicp_lib.study.page import Study
@@ -38,7 +38,7 @@ def tiny_run(folder: Path, *cells: str, **parameters) -> tuple[Run, Folders]:
 
 
 def pretend_to_execute(children, run: Run, copy: Path, staging: Path, folders: Folders) -> int:
-    """In place of `_Children.execute`: leaves what a run leaves, without starting a kernel."""
+    """In place of `Children.execute`: leaves what a run leaves, without starting a kernel."""
     notebook = read(run.notebook.path, as_version=4)
     for cell in notebook.cells:
         cell.metadata["papermill"] = {"status": "completed"}
