@@ -6,9 +6,9 @@ import ast
 import subprocess
 
 import pytest
+from mutate import PACKAGES, all_mutants, main, mutants
 
 from hicp_lib.core.checkout import CHECKOUT
-from tools.mutate import PACKAGES, all_mutants, main, mutants
 
 SOURCE = '''"""Ünïcode - 1."""
 
