@@ -35,7 +35,8 @@ def study(tmp_path: Path) -> Path:
     )
     book = tmp_path / "book"
     book.mkdir()
-    shutil.copytree(CHECKOUT / "book" / "_static", book / "_static")
+    for name in ("_ext", "_static"):
+        shutil.copytree(CHECKOUT / "book" / name, book / name)
     shutil.copy(CHECKOUT / "book" / "_config.yml", book)
     (book / "_toc.yml").write_text(
         "format: jb-book\nroot: index\nchapters:\n- file: notebooks/00_first\n- file: notebooks/01_second\n"
