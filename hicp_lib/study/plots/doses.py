@@ -134,21 +134,21 @@ def flicker_rates(table: pd.DataFrame, note: str) -> Figure:
     measures = ("flicker rate", "jitter [px]")
     detectors = list(table["detector"].unique())[::-1]
     figure, axes = new_figure(1, len(measures), 9.0, 1.3 + 0.55 * len(detectors), sharey=True)
-    cases = table.set_index(["tracks", "measure", "detector"])
+    cases = {case: rows.set_index("detector") for case, rows in table.groupby(["tracks", "measure"])}
     for axis, measure in zip(axes, measures, strict=True):
         for k, tracks in enumerate(("filtered", "as detected")):
             for y, detector in enumerate(detectors):
-                case, colour = cases.loc[[(tracks, measure, detector)]], detector_colour(detector)
+                case, colour = cases[tracks, measure].loc[[detector]], detector_colour(detector)
                 fill = colour if tracks == "as detected" else "white"
                 pen = {"xerr": marks.whiskers(case), "fmt": "o", "color": colour, "mfc": fill, "capsize": 2}
                 axis.errorbar(case["value"], y + marks.offset(k, 2, 0.26), **pen)
         axis.set(xlabel=measure, xlim=(0, None), ylim=(-0.5, len(detectors) - 0.5))
     axes[0].set(yticks=range(len(detectors)), yticklabels=detectors)
-    lag_ms = 1000 * cases.loc[("filtered", "latency [s]"), "value"]
+    lag_ms = 1000 * cases["filtered", "latency [s]"]["value"]
     caption = (
         "Keypoints that come and go between consecutive frames, and how far they jump, as detected "
         f"(filled) and through a causal filter (open), with 95 % bootstrap intervals over seconds: {note}. "
         f"Delay of the filter: {series_text(lag_ms, '{} {:.0f} ms')}."
     )
-    said = series_text(cases.loc[("as detected", "flicker rate"), "value"], "{} {:.3f}")
+    said = series_text(cases["as detected", "flicker rate"]["value"], "{} {:.3f}")
     return Figure(figure, caption, f"Dots with whiskers. Flicker rate as detected: {said}.", table)

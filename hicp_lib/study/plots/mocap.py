@@ -79,7 +79,7 @@ def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: fl
     found = errors[(errors["score"] > min_score) & errors["error_m"].notna()]
     joints = [joint for joint in TABLE_JOINTS if joint in set(errors["keypoint"])]
     detectors, named = (list(table["detector"].unique()) for table in (errors, paper))
-    paper = paper[paper["min_score"] == min_score].set_index(["detector", "keypoint"])
+    paper = paper[paper["min_score"] == min_score].set_index(["detector", "keypoint"]).sort_index()
     figure, axes = _joint_axes(joints, 4.6, 0.9 + 0.26 * (len(detectors) + len(named)))
     labels = [*detectors, *(f"{name} (paper)" for name in named)]
     for joint, axis in axes.items():
