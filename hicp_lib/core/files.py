@@ -54,6 +54,15 @@ def write_json(path: str | Path, value: Any, *, indent: int | None = None) -> No
 def read_json(path: str | Path) -> Any:
     """Read JSON from outside.
 
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    Any
+
     Raises
     ------
     InputError
@@ -78,7 +87,13 @@ def read_json(path: str | Path) -> Any:
 
 
 def sha256_bytes(content: bytes) -> str:
-    """SHA-256 of `content` in hexadecimal."""
+    """SHA-256 of `content` in hexadecimal.
+
+    Examples
+    --------
+    >>> sha256_bytes(b"")[:8]
+    'e3b0c442'
+    """
     return hashlib.sha256(content).hexdigest()
 
 
