@@ -72,11 +72,11 @@ def key(entry_points: Sequence[Any], *, without: Sequence[str] = (), **inputs: A
 
     Parameters
     ----------
-    entry_points : sequence of callables, modules or module names
+    entry_points : sequence of callable or module or str
         What makes the result. All code is counted that they import, and all that imports in turn.
     without : sequence of str
         Names of modules where that stops: what they do to the result is said by `inputs`.
-    **inputs
+    **inputs : any
         What the code is given, by any names: plain values, arrays, tables, dataclasses of these; a path
         counts by the names, sizes and times of its files.
 
@@ -164,7 +164,7 @@ def content(value: Any) -> Any:
 
     Parameters
     ----------
-    value : Any
+    value : any
         As inputs of `key`.
 
     Returns

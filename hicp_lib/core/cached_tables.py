@@ -30,7 +30,7 @@ def cached(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> 
     ----------
     make : callable
         A function of `hicp_lib` whose result follows from its inputs.
-    *arguments, **named
+    *arguments, **named : any
         Its inputs, as `hicp_lib.core.cache.key` takes them.
 
     Returns

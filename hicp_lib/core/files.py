@@ -46,7 +46,22 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 
 
 def write_json(path: str | Path, value: Any, *, indent: int | None = None) -> None:
-    """Write `value` as strict JSON (NaN and infinity are refused), whole or not at all."""
+    """Write strict JSON, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file to write.
+    value : any
+        Without NaN and infinity, which are refused.
+    indent : int, optional
+        Spaces per level; all in one line when left out.
+
+    Raises
+    ------
+    ValueError
+        For NaN and infinity.
+    """
     text = json.dumps(value, indent=indent, allow_nan=False)
     write_bytes(path, (text + "\n").encode())
 

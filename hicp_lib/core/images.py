@@ -23,7 +23,7 @@ def read_image(path: str | Path) -> np.ndarray:
 
     Returns
     -------
-    array of uint8, shape (height, width, 3)
+    array, shape (height, width, 3), dtype uint8
         RGB.
 
     Raises

@@ -32,8 +32,8 @@ def bootstrap_intervals(
         Number of draws.
     seed : int, optional
         Of the draws.
-    clusters : mapping of int to hashable, optional
-        By image id; images of equal value are drawn together. Each by itself when left out.
+    clusters : Clusters, optional
+        Anything by image id; images of equal value are drawn together. Each by itself when left out.
 
     Returns
     -------
@@ -60,7 +60,9 @@ def bootstrap_difference(
     ----------
     a, b : Evaluation
         What is compared.
-    n_resamples, seed, clusters
+    n_resamples, seed : int
+        Number of draws, and what they are drawn with.
+    clusters : Clusters, optional
         As of `bootstrap_intervals`.
 
     Returns
@@ -99,7 +101,9 @@ def resample(
     ----------
     evaluations : sequence of Evaluation
         Paired by their image ids.
-    n_resamples, seed, clusters
+    n_resamples, seed : int
+        Number of draws, and what they are drawn with.
+    clusters : Clusters, optional
         As of `bootstrap_intervals`.
 
     Returns

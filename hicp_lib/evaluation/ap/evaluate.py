@@ -88,7 +88,7 @@ class Evaluation:
         Per OKS threshold .5:.05:.95 at recall 0:.01:1.
     recall : array, shape (10,)
         Per OKS threshold.
-    matches : Matches
+    matches : cocoeval.Matches
         What the bootstrap resamples.
     """
 
@@ -256,8 +256,14 @@ def person_oks(
 
     Parameters
     ----------
-    annotations, detections, group, **options
-        As of `evaluate`.
+    annotations : Annotations
+        The truth.
+    detections : mapping of int to Detections
+        By image id.
+    group : {"body", "hand"}
+        Of keypoints.
+    **options : str
+        Fields of `Options`.
 
     Returns
     -------
@@ -283,8 +289,12 @@ def sensitivity_table(
 
     Parameters
     ----------
-    annotations, detections, group
-        As of `evaluate`.
+    annotations : Annotations
+        The truth.
+    detections : mapping of int to Detections
+        By image id.
+    group : {"body", "hand"}
+        Of keypoints.
 
     Returns
     -------

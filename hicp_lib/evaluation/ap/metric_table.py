@@ -6,7 +6,7 @@ together in the bootstrap.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
@@ -27,9 +27,9 @@ def compare(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) 
 
     Parameters
     ----------
-    truth : mapping of str to Annotations
+    truth : Truth
         By subset.
-    found : mapping of (str, str) to mapping of int to Detections
+    found : Found
         By image id, of every subset and detector.
     n_resamples, seed : int, optional
         Number of bootstrap draws, and what they are drawn with.
@@ -47,7 +47,7 @@ def draw_cases(
     found: Found,
     n_resamples: int = 1000,
     seed: int = 0,
-    groups: Collection[str] = tuple(GROUPS),
+    groups: Sequence[str] = tuple(GROUPS),
 ) -> dict[tuple[str, str, str], tuple[Evaluation, pd.DataFrame]]:
     """Every case evaluated, as it is and on draws of source images: what `metric_table` and `pairs` read.
 
@@ -56,9 +56,13 @@ def draw_cases(
 
     Parameters
     ----------
-    truth, found, n_resamples, seed
-        As of `compare`.
-    groups : collection of str, optional
+    truth : Truth
+        By subset.
+    found : Found
+        By image id, of every subset and detector.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
+    groups : sequence of str, optional
         Groups of keypoints that are looked at.
 
     Returns
@@ -94,7 +98,7 @@ def pairs(drawn: Drawn) -> pd.DataFrame:
 
     Parameters
     ----------
-    drawn : mapping of (str, str, str) to (Evaluation, DataFrame)
+    drawn : Drawn
         From `draw_cases`.
 
     Returns
@@ -118,8 +122,12 @@ def head_loss(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0
 
     Parameters
     ----------
-    truth, found, n_resamples, seed
-        As of `compare`; the subsets are "basic" and "headless".
+    truth : Truth
+        By subset, "basic" and "headless".
+    found : Found
+        By image id, of every subset and detector.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------

@@ -60,8 +60,12 @@ def lifting_errors(points: pd.DataFrame, truth: pd.DataFrame, min_score: float =
 
     Parameters
     ----------
-    points, truth, min_score
-        As of `lifting_ablation`.
+    points : DataFrame
+        One detector's keypoints as `lift_found` gives them with `N_STEPS`.
+    truth : DataFrame
+        As `recording.read_truth` gives it.
+    min_score : float, optional
+        Detected keypoints count from this score.
 
     Returns
     -------
