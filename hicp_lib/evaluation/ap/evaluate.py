@@ -157,9 +157,8 @@ def evaluate(
         )
     ]  # fmt: skip
     found = list(_detections_seen(detections, keypoints, chosen))
-    precision, recall, matches = cocoeval.run(
-        list(annotations.images), truth, found, SIGMAS[chosen.sigmas][keypoints]
-    )
+    matches = cocoeval.run(list(annotations.images), truth, found, SIGMAS[chosen.sigmas][keypoints])
+    precision, recall = cocoeval.precision_recall(matches)
     n_people = int(matches.n_people.sum())
     return Evaluation(
         group=group,

@@ -13,7 +13,7 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import GROUPS
 from hicp_lib.detectors.runtime.results import Timed
-from hicp_lib.evaluation.ap.bootstrap import bootstrap_difference, difference, intervals, resample
+from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
 from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate, person_oks
 from hicp_lib.evaluation.cases import Found, Truth, all_cases, labelled, per_case
 from hicp_lib.formats.annotations import source_images
@@ -144,11 +144,9 @@ def head_loss(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0
             continue
         on = {s: {i: found[s, detector].get(i, Detections.none()) for i in shared} for s in subsets}
         basic, headless = (evaluate(same[s], on[s], group) for s in subsets)
-        change = (
-            bootstrap_difference(headless, basic, n_resamples, seed, clusters).set_index("metric").loc["AP"]
-        )
-        interval = change[["value", "low", "high"]]
-        rows.append((group, detector, basic.AP, headless.AP, *interval, basic.n_people))
+        drawn = resample([headless, basic], n_resamples, seed, clusters)
+        change = difference(headless, basic, *drawn).set_index("metric").loc["AP", ["value", "low", "high"]]
+        rows.append((group, detector, basic.AP, headless.AP, *change, basic.n_people))
     columns = ["group", "detector", "basic", "headless", "change", "low", "high", "n_people"]
     return pd.DataFrame(rows, columns=columns).sort_values("group", kind="stable", ignore_index=True)
 
