@@ -78,7 +78,7 @@ def lifting_errors(points: pd.DataFrame, truth: pd.DataFrame, min_score: float =
     both = points[counts].merge(truth[[*_KEY, *POSITION]], on=_KEY, suffixes=("", "_true"))
     offset = both[POSITION].to_numpy() - both[[f"{axis}_true" for axis in POSITION]].to_numpy()
     errors = both.assign(error_m=np.linalg.norm(offset, axis=1))
-    errors = errors.pivot(index=_KEY, columns="method", values="error_m")[list(N_STEPS)]
+    errors = errors.pivot(index=_KEY, columns="method", values="error_m").reindex(columns=list(N_STEPS))
     errors = errors.rename_axis(columns=None).reset_index()
     errors.insert(2, "group", errors["keypoint"].map(group_of))
     return errors

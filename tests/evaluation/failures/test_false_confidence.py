@@ -53,7 +53,7 @@ def test_what_is_sure_begins_at_three_tenths_and_bins_at_fifths(world):
     )
     assert run_rows.loc["labelled keypoints given with a score of at least 0.3", "n"] == 11
     below = run_rows.loc["outside the picture: mean score, less that of visible keypoints"]
-    assert below["n"] == 5 and below["value"] == pytest.approx(scores.mean() - (0.6 + 7 * 0.5) / 9)
+    assert below["n"] == 5 and below["value"] == pytest.approx(scores.mean() - (0.6 + 8 * 0.5) / 10)
 
 
 def test_nobody_is_not_run_under_whichever_name_the_detections_came(world):

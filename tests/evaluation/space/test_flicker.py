@@ -117,7 +117,7 @@ def test_the_filter_takes_a_keypoint_as_given_by_the_majority_of_three():
         False,
         False,
     ]
-    assert (filtered[np.isfinite(filtered)] == 5).all()
+    np.testing.assert_allclose(filtered[np.isfinite(filtered)], 5)
 
 
 def test_after_half_a_second_the_filter_starts_anew():
