@@ -16,17 +16,15 @@ COCO_NAMES = (
     "nose left_eye right_eye left_ear right_ear left_shoulder right_shoulder left_elbow right_elbow "
     "left_wrist right_wrist left_hip right_hip left_knee right_knee left_ankle right_ankle"
 ).split()
-_BODY_NAMES = (
-    COCO_NAMES
-    + (
-        "head_top neck mid_hip left_big_toe right_big_toe left_small_toe right_small_toe left_heel right_heel"
-    ).split()
-)
+_HALPE_BODY_NAMES = (
+    "head_top neck mid_hip left_big_toe right_big_toe left_small_toe right_small_toe left_heel right_heel"
+).split()
 HAND_NAMES = ["hand_root"] + [
     f"{finger}_{joint}" for finger in ("thumb", "index", "middle", "ring", "little") for joint in (1, 2, 3, 4)
 ]
 NAMES: tuple[str, ...] = (
-    *_BODY_NAMES,
+    *COCO_NAMES,
+    *_HALPE_BODY_NAMES,
     *(f"face_{i}" for i in range(68)),
     *(f"left_{name}" for name in HAND_NAMES),
     *(f"right_{name}" for name in HAND_NAMES),

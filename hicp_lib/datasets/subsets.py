@@ -156,8 +156,9 @@ def crop_annotations(annotations: Annotations, table: pd.DataFrame, subset: str)
         others_about = [{"other": True, "source_id": i} for i in people.ids[1:].tolist()]
         ids = np.r_[person_id, next_id : next_id + len(others_about)]
         next_id += len(others_about)
-        of_crop = {"ids": ids, "image_ids": np.full(len(people), person_id), "is_crowd": ids != person_id}
-        parts.append(replace(people, **of_crop, extras=[about, *others_about]))
+        image_ids, is_crowd = np.full(len(people), person_id), ids != person_id
+        extras = [about, *others_about]
+        parts.append(replace(people, ids=ids, image_ids=image_ids, is_crowd=is_crowd, extras=extras))
     return Annotations.concatenate(parts, images)
 
 

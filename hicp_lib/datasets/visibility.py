@@ -71,7 +71,7 @@ def visible_parts(visibility: np.ndarray) -> dict[str, np.ndarray]:
     dict of str to array of bool, shape (n,)
         By name of the part.
     """
-    parts = {name: (visibility[:, points] > 0).any(axis=1) for name, points in _PART_KEYPOINTS.items()}
+    parts = {name: np.any(visibility[:, points] > 0, axis=1) for name, points in _PART_KEYPOINTS.items()}
     for side in ("left", "right"):
         elbow, wrist = parts[f"{side}_elbow"], parts[f"{side}_wrist"]
         parts |= {f"{side}_arm": elbow | wrist, f"whole_{side}_arm": elbow & wrist}

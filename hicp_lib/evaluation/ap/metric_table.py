@@ -76,8 +76,8 @@ def draw_cases(
         detectors = [case[1] for case in cases if case[::2] == (subset, group)]
         evaluations = [evaluate(truth[subset], found[subset, detector], group) for detector in detectors]
         samples = resample(evaluations, n_resamples, seed, source_images(truth[subset]))
-        for detector, *of_both in zip(detectors, evaluations, samples, strict=True):
-            drawn[subset, detector, group] = tuple(of_both)
+        for detector, evaluation, sample in zip(detectors, evaluations, samples, strict=True):
+            drawn[subset, detector, group] = evaluation, sample
     return {case: drawn[case] for case in cases}
 
 
