@@ -37,7 +37,7 @@ import hicp_lib
 WORDS = frozenset(
     "any array bool bytes callable character class complex dataclass decorator dict file float frozenset "
     "function generator image int iterable iterator key list mapping module number object path scalar "
-    "sequence set slice str table text tuple type None True False".split()
+    "sequence set slice str table text tuple type None True False DataFrame Series".split()
 )
 PLURALS = frozenset(f"{word}s" for word in WORDS) | {"classes", "bytes", "None"}
 # Of numpydoc's own checks: sections known and in order; parameters that exist, in order, with a type.

@@ -19,12 +19,16 @@ class RigidFit:
 
     Attributes
     ----------
-    T_b_a : array, shape (4, 4); takes coordinates in a to coordinates in b
-    residuals_m : array, shape (n,); distance of each point in b from where the fit puts its partner
-    leave_one_out_m : array, shape (n,); the same under the fit of all *other* points, which the point
-        itself did not pull towards it; NaN where the others do not determine a transform
-    spread_ratio : second over first singular value of the centred points, the smaller of a's and b's;
-        0 for points on a line
+    T_b_a : array, shape (4, 4)
+        Takes coordinates in a to coordinates in b.
+    residuals_m : array, shape (n,)
+        Distance of each point in b from where the fit puts its partner.
+    leave_one_out_m : array, shape (n,)
+        The same under the fit of all *other* points, which the point itself did not pull towards it; NaN
+        where the others do not determine a transform.
+    spread_ratio : float
+        Second over first singular value of the centred points, the smaller of a's and b's; 0 for points on a
+        line.
     """
 
     T_b_a: np.ndarray
@@ -46,12 +50,23 @@ def arun(points_a_m: np.ndarray, points_b_m: np.ndarray) -> RigidFit:
 
     Parameters
     ----------
-    points_a_m, points_b_m : arrays, shape (n, 3); row i of one is row i of the other; n >= 3
+    points_a_m, points_b_m : array, shape (n, 3)
+        Row i of one is row i of the other; n >= 3.
+
+    Returns
+    -------
+    RigidFit
 
     Raises
     ------
     InputError
         If the points are fewer than three, not finite, or on a line (`MIN_SPREAD_RATIO`).
+
+    Examples
+    --------
+    >>> corners_m = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    >>> arun(corners_m, corners_m + [0, 0, 2]).T_b_a[:3, 3].round(9)
+    array([0., 0., 2.])
     """
     a, b = np.asarray(points_a_m, dtype=float), np.asarray(points_b_m, dtype=float)
     if a.shape != b.shape or a.ndim != 2 or a.shape[1] != 3:

@@ -37,6 +37,7 @@ _DISTRIBUTIONS = {
     "pinocchio": ("pin",),
 }
 _NAMED = re.compile(r'"(hicp_lib(?:\.\w+)+)"')  # modules that are imported by name, or run as programs
+_IMPORT = re.compile(r"^\s*from [\w.]+ import (?:\([^)]*\)|.*)$", re.MULTILINE)
 _DATA = re.compile(r'\bDATA_DIR\b(?:\s*/\s*"([^"]+)")?')
 ALL_DATA = "**/*"
 
@@ -71,11 +72,11 @@ def key(entry_points: Sequence[Any], *, without: Sequence[str] = (), **inputs: A
 
     Parameters
     ----------
-    entry_points : sequence of callables, modules or module names
+    entry_points : sequence of callable or module or str
         What makes the result. All code is counted that they import, and all that imports in turn.
     without : sequence of str
         Names of modules where that stops: what they do to the result is said by `inputs`.
-    **inputs
+    **inputs : any
         What the code is given, by any names: plain values, arrays, tables, dataclasses of these; a path
         counts by the names, sizes and times of its files.
 
@@ -147,13 +148,28 @@ def code(
     )
 
 
-def imports_of(source: str) -> frozenset[str]:
-    """Names of what Python code imports, wherever in it; not what it imports for type checks alone."""
+def imports_of(source: str | bytes) -> frozenset[str]:
+    """Names of what Python code imports, wherever in it; not what it imports for type checks alone.
+
+    Examples
+    --------
+    >>> sorted(imports_of("import os.path\\nfrom json import loads"))
+    ['json', 'json.loads', 'os.path']
+    """
     return frozenset(name for statement in _imports(ast.parse(source)) for name in _imported(statement))
 
 
 def content(value: Any) -> Any:
-    """What JSON can hold and differs where `value` differs.
+    """What JSON can hold and differs where a value differs.
+
+    Parameters
+    ----------
+    value : any
+        As inputs of `key`.
+
+    Returns
+    -------
+    Any
 
     Raises
     ------
@@ -183,7 +199,13 @@ def content(value: Any) -> Any:
 
 
 def digest(value: Any) -> str:
-    """SHA-256 of a JSON-able value, independent of the order of its keys."""
+    """SHA-256 of a JSON-able value, independent of the order of its keys.
+
+    Examples
+    --------
+    >>> digest({"a": 1, "b": 2}) == digest({"b": 2, "a": 1})
+    True
+    """
     return sha256_bytes(json.dumps(value, sort_keys=True, ensure_ascii=False).encode())
 
 
@@ -232,18 +254,11 @@ def _path(name: str, library: Path) -> Path | None:
 def _read(path: Path, *state: int) -> _Module:
     """A module's file; `state` differs when it was written anew."""
     source = path.read_bytes()
-    statements = list(_imports(ast.parse(source)))
-    names = {name for statement in statements for name in _imported(statement)}
-    names |= set(_NAMED.findall(source.decode()))
-    lines = source.decode().splitlines()
-    for statement in statements:
-        lines[statement.lineno - 1 : statement.end_lineno] = [""] * (
-            statement.end_lineno - statement.lineno + 1
-        )
-    data = frozenset(name or ALL_DATA for name in _DATA.findall("\n".join(lines)))
+    names = imports_of(source) | set(_NAMED.findall(source.decode()))
+    data = frozenset(name or ALL_DATA for name in _DATA.findall(_IMPORT.sub("", source.decode())))
     if path.name == "datafiles.py":  # defines the folder, and names no file of it
         data = frozenset()
-    return _Module(sha256_bytes(source), frozenset(names), data)
+    return _Module(sha256_bytes(source), names, data)
 
 
 def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
@@ -258,7 +273,7 @@ def _imports(tree: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
 
 def _imported(statement: ast.Import | ast.ImportFrom) -> Iterator[str]:
     if isinstance(statement, ast.ImportFrom):
-        yield statement.module
+        yield str(statement.module)
         yield from (f"{statement.module}.{alias.name}" for alias in statement.names)
     else:
         yield from (alias.name for alias in statement.names)

@@ -1,4 +1,4 @@
-"""Tables kept on disk: what was made once of the same inputs with the same code is read, not made again.
+"""Tables cached on disk: what was made once of the same inputs with the same code is read, not made again.
 
 A notebook that is opened after a report so shows the report's numbers, and soon, whatever threads its
 process has.
@@ -19,8 +19,8 @@ from hicp_lib.core.cache import key
 from hicp_lib.core.files import cache_dir, sha256_bytes, write_bytes
 
 
-def kept(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> pd.DataFrame:
-    """The table ``make(*arguments, **named)``, made only if it is not in the cache.
+def cached(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> pd.DataFrame:
+    """The table ``make(*arguments, **named)``, made only if it is not there.
 
     The key is all it depends on (`hicp_lib.core.cache.key`): the function and what it imports, and its
     inputs. A damaged file is never an answer: the table is made again. What is returned was read from the
@@ -28,7 +28,14 @@ def kept(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> pd
 
     Parameters
     ----------
-    make : a function of `hicp_lib` whose result follows from its inputs
+    make : callable
+        A function of `hicp_lib` whose result follows from its inputs.
+    *arguments, **named : any
+        Its inputs, as `hicp_lib.core.cache.key` takes them.
+
+    Returns
+    -------
+    DataFrame
 
     Raises
     ------
@@ -37,7 +44,7 @@ def kept(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> pd
     """
     given = inspect.signature(make).bind(*arguments, **named)
     given.apply_defaults()
-    result_key = key([make, kept], function=make.__qualname__, arguments=given.arguments)
+    result_key = key([make, cached], function=make.__qualname__, arguments=given.arguments)
     path = cache_dir() / "tables" / make.__name__ / f"{result_key[:32]}.bin"
     table = _read(path)
     if table is None:

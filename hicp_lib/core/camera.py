@@ -8,13 +8,36 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hicp_lib.core.images import inside
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera without distortion: image size, focal lengths and principal point."""
+    """A pinhole camera without distortion.
+
+    Attributes
+    ----------
+    width_px, height_px : int
+        Size of the image.
+    fx_px, fy_px : float
+        Focal lengths.
+    cx_px, cy_px : float
+        Principal point.
+
+    Examples
+    --------
+    >>> camera = Camera(640, 480, 500.0, 500.0, 319.5, 239.5)
+    >>> pixels_px = project(camera, np.array([[0.1, 0.0, 1.0], [0.0, 0.0, -1.0]]))
+    >>> pixels_px
+    array([[369.5, 239.5],
+           [  nan,   nan]])
+    >>> camera.contains(pixels_px)
+    array([ True, False])
+    >>> deproject(camera, pixels_px[0], 1.0).round(9)
+    array([0.1, 0. , 1. ])
+    """
 
     width_px: int
     height_px: int
@@ -29,7 +52,20 @@ class Camera:
 
 
 def project(intrinsics: Camera, points_cam_m: np.ndarray) -> np.ndarray:
-    """Pixels (u, v), shape (..., 2), of camera-frame points (..., 3); NaN when not in front (z <= 0)."""
+    """Pixels of camera-frame points.
+
+    Parameters
+    ----------
+    intrinsics : Camera
+        The camera.
+    points_cam_m : array, shape (..., 3)
+        In its frame.
+
+    Returns
+    -------
+    array, shape (..., 2)
+        (u, v); NaN when not in front (z <= 0).
+    """
     x, y, z = np.moveaxis(np.asarray(points_cam_m, float), -1, 0)
     z = np.where(z > 0, z, np.nan)
     u = x / z * intrinsics.fx_px + intrinsics.cx_px
@@ -37,19 +73,24 @@ def project(intrinsics: Camera, points_cam_m: np.ndarray) -> np.ndarray:
     return np.stack([u, v], axis=-1)
 
 
-def deproject(intrinsics: Camera, pixels_px: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
+def deproject(intrinsics: Camera, pixels_px: np.ndarray, depth_m: ArrayLike) -> np.ndarray:
     """Camera-frame points seen at pixels, at a depth along the camera's z axis.
 
     The paper's equations (section III-B): x = z (u - cx) / fx, y = z (v - cy) / fy.
 
     Parameters
     ----------
-    pixels_px : array, shape (..., 2), (u, v)
+    intrinsics : Camera
+        The camera.
+    pixels_px : array, shape (..., 2)
+        (u, v).
     depth_m : array, shape (...)
+        Along the z axis.
 
     Returns
     -------
-    array, shape (..., 3), metres; NaN where pixel or depth is
+    array, shape (..., 3)
+        Metres; NaN where pixel or depth is.
     """
     u, v = np.moveaxis(np.asarray(pixels_px, float), -1, 0)
     z = np.asarray(depth_m, float)
@@ -63,13 +104,22 @@ def transform(T: np.ndarray, points: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    T : array, shape (..., 4, 4), rigid transforms
-    points : array, shape (..., n, 3) with the leading axes of T (or what broadcasts with them);
-        or (3,) with a single T
+    T : array, shape (..., 4, 4)
+        Rigid transforms.
+    points : array, shape (..., n, 3) or (3,)
+        With the leading axes of T, or what broadcasts with them; (3,) with a single T.
 
     Returns
     -------
-    array, of the points' shape, broadcast with T's leading axes
+    array
+        Of the points' shape, broadcast with T's leading axes.
+
+    Examples
+    --------
+    >>> T_b_a = np.eye(4)
+    >>> T_b_a[:3, 3] = [0, 0, 2]
+    >>> transform(T_b_a, np.array([1.0, 0.0, 0.0]))
+    array([1., 0., 2.])
     """
     T, points = np.asarray(T, float), np.asarray(points, float)
     rows = np.atleast_2d(points)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Protocol
 
 import numpy as np
@@ -23,6 +23,12 @@ class Detections:
         Keypoint confidence in [0, 1]; 0 where the keypoint is NaN.
     person_scores : array, shape (n_persons,)
         What people are ranked by in AP.
+
+    Examples
+    --------
+    >>> nobody = Detections.none()
+    >>> len(nobody), nobody.keypoints_px.shape
+    (0, (0, 136, 2))
     """
 
     keypoints_px: np.ndarray
@@ -30,8 +36,8 @@ class Detections:
     person_scores: np.ndarray
 
     def __post_init__(self) -> None:
-        for name in ("keypoints_px", "scores", "person_scores"):  # as files keep them, found anew or not
-            object.__setattr__(self, name, np.asarray(getattr(self, name), float))
+        for field in fields(self):  # as files keep them, found anew or not
+            object.__setattr__(self, field.name, np.asarray(getattr(self, field.name), float))
 
     @classmethod
     def none(cls) -> Detections:
@@ -51,8 +57,13 @@ class Detections:
         scores : array, shape (n, k)
             In [0, 1].
         person_scores : array, shape (n,)
+            What people are ranked by.
         convention : str
             A key of `hicp_lib.core.keypoints.TO_HALPE`.
+
+        Returns
+        -------
+        Detections
         """
         scores = np.where(np.isnan(positions_px).any(axis=-1), 0.0, scores)
         return cls(
@@ -61,13 +72,10 @@ class Detections:
             person_scores,
         )
 
-    def and_also(self, more: Detections) -> Detections:
+    def concatenate(self, more: Detections) -> Detections:
         """These people, then others in the same image."""
-        return Detections(
-            np.concatenate([self.keypoints_px, more.keypoints_px]),
-            np.concatenate([self.scores, more.scores]),
-            np.concatenate([self.person_scores, more.person_scores]),
-        )
+        names = [field.name for field in fields(self)]
+        return Detections(*(np.concatenate([getattr(self, name), getattr(more, name)]) for name in names))
 
     def __len__(self) -> int:
         return len(self.person_scores)
@@ -76,13 +84,18 @@ class Detections:
 class Detector(Protocol):
     """A keypoint detector, ready to run.
 
-    `settings` (JSON-able: weights' SHA-256, thresholds, versions that matter) identifies
-    its results: two detectors with equal name and settings give equal detections. A detector
-    with a true attribute `takes_boxes` is given the people's boxes, `detect(image, boxes_px)`.
-    One that is made of others has them in a dictionary `parts` and asks them there, so that
-    their answers can be kept (see `hicp_lib.detectors.runtime.cached_parts`). One whose first call would
-    take longer than the others, since something is started for it, starts that in a method `start()` too, if
-    it is called before.
+    A detector with a true attribute `takes_boxes` is given the people's boxes, `detect(image, boxes_px)`. One
+    that is made of others has them in a dictionary `parts` and asks them there, so that their answers can be
+    cached (see `hicp_lib.detectors.runtime.cached_parts`). One whose first call would take longer than the
+    others, since something is started for it, starts that in a method `start()` too, if it is called before.
+
+    Attributes
+    ----------
+    name : str
+        Of its results.
+    settings : dict
+        JSON-able (weights' SHA-256, thresholds, versions that matter); identifies its results: two detectors
+        with equal name and settings give equal detections.
     """
 
     name: str

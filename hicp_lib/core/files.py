@@ -46,13 +46,37 @@ def write_bytes(path: str | Path, content: bytes) -> None:
 
 
 def write_json(path: str | Path, value: Any, *, indent: int | None = None) -> None:
-    """Write `value` as strict JSON (NaN and infinity are refused), whole or not at all."""
+    """Write strict JSON, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file to write.
+    value : any
+        Without NaN and infinity, which are refused.
+    indent : int, optional
+        Spaces per level; all in one line when left out.
+
+    Raises
+    ------
+    ValueError
+        For NaN and infinity.
+    """
     text = json.dumps(value, indent=indent, allow_nan=False)
     write_bytes(path, (text + "\n").encode())
 
 
 def read_json(path: str | Path) -> Any:
     """Read JSON from outside.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    Any
 
     Raises
     ------
@@ -78,7 +102,13 @@ def read_json(path: str | Path) -> Any:
 
 
 def sha256_bytes(content: bytes) -> str:
-    """SHA-256 of `content` in hexadecimal."""
+    """SHA-256 of `content` in hexadecimal.
+
+    Examples
+    --------
+    >>> sha256_bytes(b"")[:8]
+    'e3b0c442'
+    """
     return hashlib.sha256(content).hexdigest()
 
 

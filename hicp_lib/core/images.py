@@ -14,7 +14,17 @@ Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom ex
 
 
 def read_image(path: str | Path) -> np.ndarray:
-    """Read an image as RGB, shape (height, width, 3), uint8; EXIF rotation is not applied.
+    """Read an image; EXIF rotation is not applied.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file that OpenCV can decode.
+
+    Returns
+    -------
+    array, shape (height, width, 3), dtype uint8
+        RGB.
 
     Raises
     ------
@@ -30,9 +40,9 @@ def read_image(path: str | Path) -> np.ndarray:
 
 def decode_image(content: bytes | np.ndarray, path: str | Path) -> np.ndarray:
     """An image out of a file's content, as `read_image` does; `path` is for the error's message."""
-    content = np.frombuffer(content, dtype=np.uint8)
+    coded = np.frombuffer(content, dtype=np.uint8)
     flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-    bgr = cv2.imdecode(content, flags) if content.size else None
+    bgr = cv2.imdecode(coded, flags) if coded.size else None
     if bgr is None:
         raise InputError(f"{path}: is not an image (PNG, JPEG, ...) or is cut off; replace the file")
     return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)

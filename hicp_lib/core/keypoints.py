@@ -16,17 +16,15 @@ COCO_NAMES = (
     "nose left_eye right_eye left_ear right_ear left_shoulder right_shoulder left_elbow right_elbow "
     "left_wrist right_wrist left_hip right_hip left_knee right_knee left_ankle right_ankle"
 ).split()
-_BODY_NAMES = (
-    COCO_NAMES
-    + (
-        "head_top neck mid_hip left_big_toe right_big_toe left_small_toe right_small_toe left_heel right_heel"
-    ).split()
-)
+_HALPE_BODY_NAMES = (
+    "head_top neck mid_hip left_big_toe right_big_toe left_small_toe right_small_toe left_heel right_heel"
+).split()
 HAND_NAMES = ["hand_root"] + [
     f"{finger}_{joint}" for finger in ("thumb", "index", "middle", "ring", "little") for joint in (1, 2, 3, 4)
 ]
 NAMES: tuple[str, ...] = (
-    *_BODY_NAMES,
+    *COCO_NAMES,
+    *_HALPE_BODY_NAMES,
     *(f"face_{i}" for i in range(68)),
     *(f"left_{name}" for name in HAND_NAMES),
     *(f"right_{name}" for name in HAND_NAMES),
@@ -50,13 +48,10 @@ _BODY_LIMBS = [
     (6, 8), (8, 10), (0, 1), (0, 2), (1, 3), (2, 4),
     (15, 20), (15, 22), (15, 24), (16, 21), (16, 23), (16, 25),
 ]  # fmt: skip
-_FINGERS = [
+HAND_LIMBS: list[tuple[int, int]] = [
     (0 if joint == 1 else 4 * f + joint - 1, 4 * f + joint) for f in range(5) for joint in (1, 2, 3, 4)
 ]
-HAND_LIMBS: list[tuple[int, int]] = _FINGERS
-LIMBS: list[tuple[int, int]] = (
-    _BODY_LIMBS + [(94 + a, 94 + b) for a, b in _FINGERS] + [(115 + a, 115 + b) for a, b in _FINGERS]
-)
+LIMBS: list[tuple[int, int]] = _BODY_LIMBS + [(w + a, w + b) for w in (94, 115) for a, b in HAND_LIMBS]
 
 _BODY_SIGMAS = [
     0.026, 0.025, 0.025, 0.035, 0.035, 0.079, 0.079, 0.072, 0.072,
@@ -90,7 +85,6 @@ SIGMAS: dict[str, np.ndarray] = {
 }
 
 # Maps onto Halpe-136: source index -> Halpe index, -1 where Halpe has no counterpart.
-_FACE_70 = [*range(26, 94), -1, -1]
 TO_HALPE: dict[str, np.ndarray] = {
     name: np.array(indices)
     for name, indices in {
@@ -104,7 +98,7 @@ TO_HALPE: dict[str, np.ndarray] = {
         "openpose_body25": [
             0, 18, 6, 8, 10, 5, 7, 9, 19, 12, 14, 16, 11, 13, 15, 2, 1, 4, 3, 20, 22, 24, 21, 23, 25,
         ],  # fmt: skip
-        "openpose_face70": _FACE_70,
+        "openpose_face70": [*range(26, 94), -1, -1],
         # MediaPipe's foot index approximates the big toe; neck and mid-hip would only be mid-points.
         "mediapipe_pose33": [
             0, -1, 1, -1, -1, 2, -1, 3, 4, -1, -1, 5, 6, 7, 8, 9, 10, -1, -1, -1, -1, -1, -1,
@@ -123,13 +117,23 @@ def to_halpe(values: np.ndarray, convention: str, axis: int, fill: float = np.na
     ----------
     values : array
         Anything per keypoint (coordinates, scores) with the keypoints along `axis`.
-    convention : a key of `TO_HALPE`
-    axis : the keypoint axis, e.g. -2 for (n, n_source, 2) coordinates, -1 for (n, n_source) scores
-    fill : value of Halpe keypoints without counterpart
+    convention : str
+        A key of `TO_HALPE`.
+    axis : int
+        The keypoint axis, e.g. -2 for (n, n_source, 2) coordinates, -1 for (n, n_source) scores.
+    fill : float, optional
+        Value of Halpe keypoints without counterpart.
 
     Returns
     -------
-    array, float, 136 long along `axis`
+    array
+        136 long along `axis`.
+
+    Examples
+    --------
+    >>> scores = to_halpe(np.arange(1.0, 18.0), "coco17", axis=-1, fill=0.0)
+    >>> scores.shape, scores[INDEX["right_ankle"]], scores[INDEX["neck"]]
+    ((136,), np.float64(17.0), np.float64(0.0))
     """
     indices = TO_HALPE[convention]
     source = np.moveaxis(np.asarray(values, dtype=float), axis, -1)
@@ -168,11 +172,18 @@ def mirror(convention: str) -> np.ndarray:
 
     Parameters
     ----------
-    convention : a key of `TO_HALPE` whose keypoints all have a Halpe counterpart
+    convention : str
+        A key of `TO_HALPE` whose keypoints all have a Halpe counterpart.
 
     Returns
     -------
-    array of indices, shape (n_source,)
+    array of int, shape (n_source,)
+        Indices.
+
+    Examples
+    --------
+    >>> mirror("coco17")[:5]
+    array([0, 2, 1, 4, 3])
     """
     indices = TO_HALPE[convention]
     place = {int(halpe): i for i, halpe in enumerate(indices)}

@@ -22,23 +22,38 @@ def memoised(maxsize: int | None = None) -> Callable[[_Function], _Function]:
 
     Parameters
     ----------
-    maxsize : how many results are kept; all when left out
+    maxsize : int, optional
+        How many results are cached; all when left out.
+
+    Returns
+    -------
+    callable
+        The decorator; what it makes has `cache_info` and `cache_clear` of `functools.lru_cache`.
+
+    Examples
+    --------
+    >>> @memoised()
+    ... def squares(n: int) -> np.ndarray:
+    ...     return np.arange(n) ** 2
+    >>> squares(3) is squares(np.int64(3)), squares(3).flags.writeable
+    (True, False)
     """
 
     def decorate(function: _Function) -> _Function:
         @lru_cache(maxsize, typed=True)
         @wraps(function)
-        def kept(*arguments, **named):
+        def cached(*arguments, **named):
             result = function(*arguments, **named)
             _freeze(result)
             return result
 
         @wraps(function)
         def called(*arguments, **named):
-            return kept(*map(plain, arguments), **{name: plain(value) for name, value in named.items()})
+            return cached(*map(plain, arguments), **{name: plain(value) for name, value in named.items()})
 
-        called.cache_info, called.cache_clear = kept.cache_info, kept.cache_clear
-        return called
+        decorated: Any = called
+        decorated.cache_info, decorated.cache_clear = cached.cache_info, cached.cache_clear
+        return decorated
 
     return decorate
 

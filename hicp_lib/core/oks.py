@@ -19,13 +19,23 @@ def oks_terms(
 
     Parameters
     ----------
-    truth_px, found_px : arrays, shapes (..., k, 2), broadcast against each other
+    truth_px, found_px : array, shape (..., k, 2)
+        Broadcast against each other.
     areas_px2 : array, shape (...)
+        The s² of each person.
     sigmas : array, shape (k,)
+        Constants of the keypoints.
 
     Returns
     -------
-    array, shape (..., k), in [0, 1]; 0 where either point is NaN
+    array, shape (..., k)
+        In [0, 1]; 0 where either point is NaN.
+
+    Examples
+    --------
+    >>> truth_px, found_px = np.array([[10.0, 10.0], [20.0, 10.0]]), np.array([[10.0, 10.0], [30.0, 10.0]])
+    >>> oks_terms(truth_px, found_px, np.array(100.0), np.array([0.1, 0.5])).round(3)
+    array([1.   , 0.607])
     """
     offset = found_px - truth_px
     return _similarity((offset**2).sum(axis=-1), areas_px2, sigmas)
@@ -52,15 +62,22 @@ def oks(
     Parameters
     ----------
     truth_px : array, shape (..., k, 2)
-    labelled : array, shape (..., k), bool
-    boxes_px : array, shape (..., 4): x, y, width, height of the annotated people
+        Of the annotated people.
+    labelled : array of bool, shape (..., k)
+        Which keypoints count.
+    boxes_px : array, shape (..., 4)
+        x, y, width, height of the annotated people.
     areas_px2 : array, shape (...)
-    found_px : array, shape (..., k, 2); NaN where the detection gives no keypoint
+        The s² of each person.
+    found_px : array, shape (..., k, 2)
+        NaN where the detection gives no keypoint.
     sigmas : array, shape (k,)
+        Constants of the keypoints.
 
     Returns
     -------
-    array, shape (...), in [0, 1]
+    array, shape (...)
+        In [0, 1].
     """
     terms = np.where(labelled, oks_terms(truth_px, found_px, areas_px2, sigmas), 0.0)
     count = labelled.sum(axis=-1)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import cos, sin, sqrt
 
 import numpy as np
-from numpy.typing import ArrayLike
+
+_PARALLEL = 1e-9  # sine of the angle below which two directions are one, or opposite
 
 
 def rotations_from_vectors(vectors: np.ndarray) -> np.ndarray:
@@ -17,7 +19,7 @@ def rotations_from_vectors(vectors: np.ndarray) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
-def rotation(vector: ArrayLike) -> np.ndarray:
+def rotation(vector: Iterable[float]) -> np.ndarray:
     """Rotation matrix (3, 3) of one rotation vector (3,) in radians."""
     # Written out: poses are made of thousands of single rotations, and arrays of three are slow.
     x, y, z = map(float, vector)
@@ -35,7 +37,13 @@ def rotation(vector: ArrayLike) -> np.ndarray:
 
 
 def about(axis: int, angle_rad: float) -> np.ndarray:
-    """Rotation (3, 3) about a coordinate axis: 0, 1 or 2 for x, y or z."""
+    """Rotation (3, 3) about a coordinate axis: 0, 1 or 2 for x, y or z.
+
+    Examples
+    --------
+    >>> about(2, np.pi / 2).round(9) @ [1, 0, 0]
+    array([0., 1., 0.])
+    """
     c, s = cos(angle_rad), sin(angle_rad)
     if axis == 0:
         return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
@@ -46,6 +54,6 @@ def between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The smallest rotation from unit vector `a` to unit vector `b`."""
     axis = np.cross(a, b)
     sine = np.linalg.norm(axis)
-    if sine < 1e-9:
+    if sine < _PARALLEL:
         return np.eye(3) if a @ b > 0 else rotation(np.pi * np.cross(a, np.eye(3)[np.argmin(np.abs(a))]))
     return rotation(axis / sine * np.arctan2(sine, a @ b))

@@ -14,15 +14,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from hicp_lib.core.cache import key
 from hicp_lib.core.files import cache_dir, sha256_file
-from hicp_lib.core.images import read_image, write_png
+from hicp_lib.core.images import Box, read_image, write_png
 from hicp_lib.core.keypoints import HEAD, INDEX, LEFT_HAND, RIGHT_HAND
-from hicp_lib.datasets.crops import Box, crop_people, n_pixels, whole_pixel_boxes
+from hicp_lib.datasets.crops import crop_people, image_name, n_pixels, whole_pixel_boxes
 from hicp_lib.datasets.visibility import visibility_class
 from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
 
@@ -51,9 +52,16 @@ def open_close(basic: Path, n_per_class: int = 30, min_pixels: int = 5_000) -> P
 
     Parameters
     ----------
-    basic : dataset folder (`images/`, `annotations.json`) that `create_hicp` wrote
-    n_per_class : most crops per class
-    min_pixels : least size of a crop
+    basic : Path
+        Dataset folder (`images/`, `annotations.json`) that `create_hicp` wrote.
+    n_per_class : int, optional
+        Most crops per class.
+    min_pixels : int, optional
+        Least size of a crop.
+
+    Returns
+    -------
+    Path
     """
     of_basic = {"annotations": sha256_file(basic / "annotations.json"), "basic": str(basic.resolve())}
     result_key = key([open_close], **of_basic, n_per_class=n_per_class, min_pixels=min_pixels)
@@ -61,40 +69,24 @@ def open_close(basic: Path, n_per_class: int = 30, min_pixels: int = 5_000) -> P
     if (folder / "annotations.json").is_file():
         return folder
     source = read_annotations(basic / "annotations.json")
-    parts = []
-    for aim in AIMS:
-        parts += _crops_of(source, aim, n_per_class, min_pixels)
-    for number, (image_id, box, _) in enumerate(parts, start=1):
-        left, top, right, bottom = box
+    parts = [part for aim in AIMS for part in islice(_crops_of(source, aim, min_pixels), n_per_class)]
+    for number, (image_id, (left, top, right, bottom), _) in enumerate(parts, start=1):
         pixels = read_image(basic / "images" / source.images[image_id].file_name)
-        write_png(folder / "images" / _file_name(number), pixels[top:bottom, left:right])
+        write_png(folder / "images" / image_name(number), pixels[top:bottom, left:right])
     write_annotations(folder / "annotations.json", _joined(source, parts))
     return folder
 
 
-def _crops_of(
-    source: Annotations, aim: str, most: int, min_pixels: int
-) -> list[tuple[int, Box, Annotations]]:
-    """The first crops that show what is aimed at: image id in Basic, box, people."""
-    kept: list[tuple[int, Box, Annotations]] = []
-    for rows in _people_by_image(source):
-        people = source.take(rows)
-        box = _box_around(people, AIMS[aim], source.images[int(people.image_ids[0])])
-        if box is None or n_pixels(box) < min_pixels:
-            continue
-        shown = crop_people(people, np.arange(len(people)), box)
-        if not shown.is_crowd[0] and visibility_class(shown.visibility[:1])[0] == aim:
-            kept.append((int(people.image_ids[0]), box, shown))
-        if len(kept) == most:
-            break
-    return kept
-
-
-def _people_by_image(source: Annotations) -> Iterator[np.ndarray]:
-    """Rows of each crop's people, whoever counts first."""
-    for image_id in source.images:
-        rows = np.flatnonzero(source.image_ids == image_id)
-        yield rows[np.argsort(source.is_crowd[rows], kind="stable")]
+def _crops_of(source: Annotations, aim: str, min_pixels: int) -> Iterator[tuple[int, Box, Annotations]]:
+    """The crops that show what is aimed at: image id in Basic, box, people, whoever counts first."""
+    for image_id, image in source.images.items():
+        people = source.take(source.image_ids == image_id)
+        people = people.take(np.argsort(people.is_crowd, kind="stable"))
+        box = _box_around(people, AIMS[aim], image)
+        if box is not None and n_pixels(box) >= min_pixels:
+            shown = crop_people(people, np.arange(len(people)), box)
+            if not shown.is_crowd[0] and visibility_class(shown.visibility[:1])[0] == aim:
+                yield image_id, box, shown
 
 
 def _box_around(people: Annotations, keypoints: np.ndarray, image: ImageInfo) -> Box | None:
@@ -106,23 +98,17 @@ def _box_around(people: Annotations, keypoints: np.ndarray, image: ImageInfo) ->
     margin = MARGIN * (high - low).max()
     box = np.r_[low - margin, high - low + 2 * margin][None]
     crop = whole_pixel_boxes(box, np.array([image.width_px]), np.array([image.height_px]))[0]
-    return tuple(int(edge) for edge in crop)
-
-
-def _file_name(number: int) -> str:
-    return f"{number:012d}.png"
+    left, top, right, bottom = crop.tolist()
+    return left, top, right, bottom
 
 
 def _joined(source: Annotations, parts: list[tuple[int, Box, Annotations]]) -> Annotations:
     """The crops as one data set; image ids count from 1, and people say where they come from."""
-    origins = {
-        int(image_id): extra
-        for image_id, extra in zip(source.image_ids, source.extras, strict=True)
-        if not extra.get("other")
-    }
+    own = source.take(~source.is_other)
+    origins = dict(zip(own.image_ids.tolist(), own.extras, strict=True))
     images, pieces = {}, []
     for number, (image_id, box, people) in enumerate(parts, start=1):
-        images[number] = ImageInfo(number, _file_name(number), box[2] - box[0], box[3] - box[1])
+        images[number] = ImageInfo(number, image_name(number), box[2] - box[0], box[3] - box[1])
         left, top = origins[image_id]["crop_px"][:2]
         in_source = [box[0] + left, box[1] + top, box[2] + left, box[3] + top]
         about = origins[image_id] | {"subset": "close", "crop_px": in_source}

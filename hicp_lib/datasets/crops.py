@@ -40,9 +40,12 @@ class HeadCut:
 
     Attributes
     ----------
-    head_px, body_px : arrays, shape (2,): the two centres
-    side : the side of the crop that is removed
-    kept_px : left, top, right, bottom of what remains, whole pixels, right and bottom exclusive
+    head_px, body_px : array, shape (2,)
+        The two centres.
+    side : {"left", "top", "right", "bottom"}
+        The side of the crop that is removed.
+    kept_px : tuple of int
+        Left, top, right, bottom of what remains, right and bottom exclusive.
     """
 
     head_px: np.ndarray
@@ -56,13 +59,21 @@ def whole_pixel_boxes(boxes_px: np.ndarray, widths_px: np.ndarray, heights_px: n
 
     Parameters
     ----------
-    boxes_px : array, shape (n, 4): x, y, width, height
-    widths_px, heights_px : arrays, shape (n,): sizes of the images
+    boxes_px : array, shape (n, 4)
+        x, y, width, height.
+    widths_px, heights_px : array, shape (n,)
+        Sizes of the images.
 
     Returns
     -------
-    array, shape (n, 4), int: left, top, right, bottom, the last two exclusive. Right <= left
-    or bottom <= top where a box is empty or lies outside its image.
+    array of int, shape (n, 4)
+        Left, top, right, bottom, the last two exclusive. Right <= left or bottom <= top where a box is empty
+        or lies outside its image.
+
+    Examples
+    --------
+    >>> whole_pixel_boxes(np.array([[-3.5, 2.2, 10, 5]]), np.array([640]), np.array([480]))
+    array([[0, 2, 7, 8]])
     """
     limits = np.stack([widths_px, heights_px], axis=-1)
     start, end = boxes_px[:, :2], boxes_px[:, :2] + boxes_px[:, 2:]
@@ -77,13 +88,17 @@ def headless_cut(keypoints_px: np.ndarray, visibility: np.ndarray, crop_px: Box)
     Parameters
     ----------
     keypoints_px : array, shape (136, 2)
-    visibility : array, shape (136,); only keypoints above 0 and inside the crop count
-    crop_px : left, top, right, bottom of the crop, in the keypoints' frame
+        In Halpe's order.
+    visibility : array, shape (136,)
+        Only keypoints above 0 and inside the crop count.
+    crop_px : tuple of int
+        Left, top, right, bottom of the crop, in the keypoints' frame.
 
     Returns
     -------
-    HeadCut, or None when no head keypoint or no other body keypoint is labelled. Nothing may
-    remain (an empty `kept_px`) when the head reaches the far side of the crop.
+    HeadCut or None
+        None when no head keypoint or no other body keypoint is labelled. Nothing may remain (an empty
+        `kept_px`) when the head reaches the far side of the crop.
     """
     labelled = (visibility > 0) & inside(keypoints_px, crop_px)
     head, body = (keypoints_px[part[labelled[part]]] for part in (HEAD, TRUNK))
@@ -93,13 +108,15 @@ def headless_cut(keypoints_px: np.ndarray, visibility: np.ndarray, crop_px: Box)
     away = head_px - body_px
     axis = 0 if abs(away[0]) > abs(away[1]) else 1
     reach = np.concatenate([head, _assumed_chin(keypoints_px, labelled)])[:, axis]
-    kept = [int(edge) for edge in crop_px]
-    if away[axis] > 0:  # the head is at the larger coordinates: to the right, or below
-        kept[axis + 2] = int(np.floor(reach.min() + 0.5))
-    else:
-        kept[axis] = int(np.floor(reach.max() + 0.5)) + 1
-    side = (("left", "right"), ("top", "bottom"))[axis][int(away[axis] > 0)]
-    return HeadCut(head_px, body_px, side, tuple(kept))
+    left, top, right, bottom = (int(edge) for edge in crop_px)
+    before, after = int(np.floor(reach.min() + 0.5)), int(np.floor(reach.max() + 0.5)) + 1
+    cuts: dict[tuple[int, bool], tuple[Side, Box]] = {  # by axis, and whether the head is further along it
+        (0, False): ("left", (after, top, right, bottom)),
+        (0, True): ("right", (left, top, before, bottom)),
+        (1, False): ("top", (left, after, right, bottom)),
+        (1, True): ("bottom", (left, top, right, before)),
+    }
+    return HeadCut(head_px, body_px, *cuts[axis, bool(away[axis] > 0)])
 
 
 def _assumed_chin(keypoints_px: np.ndarray, labelled: np.ndarray) -> np.ndarray:
@@ -111,24 +128,42 @@ def _assumed_chin(keypoints_px: np.ndarray, labelled: np.ndarray) -> np.ndarray:
 
 
 def n_pixels(crop_px: Box) -> int:
-    """Pixels of a crop; 0 when it is empty."""
+    """Pixels of a crop; 0 when it is empty.
+
+    Examples
+    --------
+    >>> n_pixels((10, 10, 30, 20)), n_pixels((10, 10, 5, 20))
+    (200, 0)
+    """
     left, top, right, bottom = (int(edge) for edge in crop_px)
     return max(right - left, 0) * max(bottom - top, 0)
 
 
 def crop_people(annotations: Annotations, rows: np.ndarray, crop_px: Box) -> Annotations:
-    """Move people of one image (the annotated `rows`) into a crop of it.
+    """Move people of one image into a crop of it.
 
-    Keypoints outside become unlabelled, boxes are clipped, areas shrink with the boxes. People
-    whose box does not reach into the crop are left out. `images` and `image_ids` stay the
-    source's: the caller names the crop.
+    Keypoints outside become unlabelled, boxes are clipped, areas shrink with the boxes.
+
+    Parameters
+    ----------
+    annotations : Annotations
+        What is annotated.
+    rows : array of int
+        The people, of one image.
+    crop_px : tuple of int
+        Left, top, right, bottom.
+
+    Returns
+    -------
+    Annotations
+        Without people whose box does not reach into the crop. `images` and `image_ids` stay the source's: the
+        caller names the crop.
     """
     people = annotations.take(rows)
     image = annotations.images[int(people.image_ids[0])]
     in_image = clip_boxes(people.boxes_px, (0, 0, image.width_px, image.height_px))
     boxes = clip_boxes(people.boxes_px, crop_px)
     area, of_area = (part[:, 2] * part[:, 3] for part in (boxes, in_image))
-    reaches = np.flatnonzero(area > 0)
     shown = inside(people.keypoints_px, crop_px)
     offset = np.array(crop_px[:2], dtype=float)
     moved = replace(
@@ -138,12 +173,17 @@ def crop_people(annotations: Annotations, rows: np.ndarray, crop_px: Box) -> Ann
         keypoints_px=np.where(shown[..., None], people.keypoints_px - offset, np.nan),
         visibility=np.where(shown, people.visibility, 0.0),
     )
-    return moved.take(reaches)
+    return moved.take(area > 0)
 
 
 def clip_boxes(boxes_px: np.ndarray, limits_px: Box) -> np.ndarray:
     """Boxes (n, 4) as x, y, width, height, cut down to left, top, right, bottom; width 0 when outside."""
-    left_top, right_bottom = np.array(limits_px[:2], dtype=float), np.array(limits_px[2:], dtype=float)
-    first = np.clip(boxes_px[:, :2], left_top, right_bottom)
-    past = np.clip(boxes_px[:, :2] + boxes_px[:, 2:], left_top, right_bottom)
+    limits = np.array(limits_px, dtype=float).reshape(2, 2)
+    first = np.clip(boxes_px[:, :2], *limits)
+    past = np.clip(boxes_px[:, :2] + boxes_px[:, 2:], *limits)
     return np.concatenate([first, past - first], axis=-1)
+
+
+def image_name(number: int) -> str:
+    """Of a crop's image, by its image id."""
+    return f"{number:012d}.png"

@@ -1,6 +1,6 @@
 """HiCP: the Basic and Headless datasets of people close by, from any annotated images.
 
-The rules are those of `hicp_crops`; about people, where the paper is silent:
+The rules are those of `hicp_lib.datasets.crops`; about people, where the paper is silent:
 
 - Crowds, and people of whom the crop shows no labelled keypoint, are left out of both.
 - People without a labelled head keypoint in the crop are not part of Headless: their head may be in
@@ -15,8 +15,6 @@ the same person is found in both datasets, whatever the rules select.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import shutil
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -27,14 +25,16 @@ import numpy as np
 import pandas as pd
 from tqdm import tqdm
 
+from hicp_lib.core.cache import content, digest
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
-from hicp_lib.core.images import read_image, write_png
+from hicp_lib.core.images import Box, inside, read_image, write_png
 from hicp_lib.core.keypoints import HEAD
-from hicp_lib.datasets.crops import TRUNK, crop_people, headless_cut, inside, n_pixels, whole_pixel_boxes
+from hicp_lib.datasets.crops import TRUNK, crop_people, headless_cut, image_name, n_pixels, whole_pixel_boxes
 from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
 
 SUBSETS = ("basic", "headless")
+_Crop = tuple[Path, Box]  # the file to write, and what of the image goes into it
 _EDGES = ("left", "top", "right", "bottom")
 
 
@@ -43,29 +43,37 @@ def plan(annotations: Annotations, min_pixels: int = 20_000, headless_min_pixels
 
     Parameters
     ----------
-    min_pixels : least size of a Basic crop
-    headless_min_pixels : least size of a Headless crop. The paper's counts, 1624 and 1608, differ too
-        little for its limit to have been asked again after the cut
+    annotations : Annotations
+        The people.
+    min_pixels : int, optional
+        Least size of a Basic crop.
+    headless_min_pixels : int, optional
+        Least size of a Headless crop. The paper's counts, 1624 and 1608, differ too little for its limit to
+        have been asked again after the cut.
 
     Returns
     -------
-    DataFrame, one row per annotated person in the order of `annotations`: `annotation_id, image_id,
-    file_name`; what becomes of the person, `basic` and `headless`: "kept" or the reason why
-    not; and in pixels of the source image, NaN where undefined: `<box>_left_px, _top_px, _right_px,
-    _bottom_px` for the boxes basic_crop, headless_crop (right and bottom exclusive), head and
-    body (extent of the labelled keypoints), the centres `head_u_px, head_v_px, body_u_px,
-    body_v_px`, and `cut_side`, the side of the crop that is removed.
+    DataFrame
+        One row per annotated person in the order of `annotations`: `annotation_id, image_id, file_name`; what
+        becomes of the person, `basic` and `headless`: "kept" or the reason why not; and in pixels of the
+        source image, NaN where undefined: `<box>_left_px, _top_px, _right_px, _bottom_px` for the boxes
+        basic_crop, headless_crop (right and bottom exclusive), head and body (extent of the labelled
+        keypoints), the centres `head_u_px, head_v_px, body_u_px, body_v_px`, and `cut_side`, the side of the
+        crop that is removed.
     """
     least = (min_pixels, headless_min_pixels)
     images = [annotations.images[i] for i in annotations.image_ids.tolist()]
     sizes = np.array([(image.width_px, image.height_px) for image in images]).reshape(-1, 2)
     crops = whole_pixel_boxes(annotations.boxes_px, *sizes.T)
+    people = zip(annotations.keypoints_px, annotations.visibility, crops, annotations.is_crowd, strict=True)
     rows = [
-        {"annotation_id": i, "image_id": image.id, "file_name": image.file_name}
-        | _plan_person(annotations.keypoints_px[k], annotations.visibility[k], crops[k], crowd, least)
-        for k, (i, image, crowd) in enumerate(
-            zip(annotations.ids.tolist(), images, annotations.is_crowd, strict=True)
-        )
+        {
+            "annotation_id": i,
+            "image_id": image.id,
+            "file_name": image.file_name,
+            **_plan_person(*person, least),
+        }
+        for i, image, person in zip(annotations.ids.tolist(), images, people, strict=True)
     ]
     return pd.DataFrame(rows, columns=_columns())
 
@@ -76,8 +84,10 @@ def _columns() -> list[str]:
     return ["annotation_id", "image_id", "file_name", *SUBSETS, "cut_side", *boxes, *centres]
 
 
-def _plan_person(keypoints_px, visibility, crop, is_crowd, least) -> dict:
-    row = {"basic": "kept", "headless": "not in Basic", **_named("basic_crop", crop)}
+def _plan_person(
+    keypoints_px: np.ndarray, visibility: np.ndarray, crop: Box, is_crowd: bool, least: tuple[int, int]
+) -> dict:
+    row: dict = {"basic": "kept", "headless": "not in Basic", **_named("basic_crop", crop)}
     labelled = (visibility > 0) & inside(keypoints_px, crop)
     if is_crowd:
         return row | {"basic": "crowd"}
@@ -91,8 +101,10 @@ def _plan_person(keypoints_px, visibility, crop, is_crowd, least) -> dict:
             return row | {"headless": f"no {name} labelled"}
         row |= _named(name, np.concatenate([points.min(axis=0), points.max(axis=0)]))
     cut = headless_cut(keypoints_px, visibility, crop)
-    row |= {f"{part}_{axis}_px": value for part, centre in (("head", cut.head_px), ("body", cut.body_px))
-            for axis, value in zip("uv", centre.tolist(), strict=True)}  # fmt: skip
+    assert cut is not None  # both parts are labelled
+    row |= zip(
+        ("head_u_px", "head_v_px", "body_u_px", "body_v_px"), [*cut.head_px, *cut.body_px], strict=True
+    )
     fate = "kept" if n_pixels(cut.kept_px) >= max(least[1], 1) else "too small"
     return row | {"headless": fate, "cut_side": cut.side, **_named("headless_crop", cut.kept_px)}
 
@@ -101,7 +113,7 @@ def _named(box: str, edges: Iterable) -> dict[str, float]:
     return {f"{box}_{edge}_px": float(value) for edge, value in zip(_EDGES, edges, strict=True)}
 
 
-def crop_boxes(table: pd.DataFrame, subset: str) -> dict[int, tuple[int, int, int, int]]:
+def crop_boxes(table: pd.DataFrame, subset: str) -> dict[int, Box]:
     """The crops of a subset of a plan: row number -> left, top, right, bottom."""
     kept = np.flatnonzero(table[subset] == "kept")
     edges = table[[f"{subset}_crop_{edge}_px" for edge in _EDGES]].to_numpy()[kept].astype(int)
@@ -109,18 +121,29 @@ def crop_boxes(table: pd.DataFrame, subset: str) -> dict[int, tuple[int, int, in
 
 
 def crop_annotations(annotations: Annotations, table: pd.DataFrame, subset: str) -> Annotations:
-    """The annotations of a subset's crops, by the plan `table` made from `annotations`.
+    """The annotations of a subset's crops.
 
-    Further keys of a person: `source_id, source_image_id, source_file, source_area` (before any
-    cut), `crop_px` (left, top, right, bottom in the source image), `subset`, and `cut_side` in
-    Headless.
+    Parameters
+    ----------
+    annotations : Annotations
+        The people.
+    table : DataFrame
+        Their plan, from `plan`.
+    subset : {"basic", "headless"}
+        Which crops.
+
+    Returns
+    -------
+    Annotations
+        Further keys of a person: `source_id, source_image_id, source_file, source_area` (before any cut),
+        `crop_px` (left, top, right, bottom in the source image), `subset`, and `cut_side` in Headless.
     """
     in_image = pd.Series(range(len(annotations))).groupby(annotations.image_ids).indices
     next_id = int(annotations.ids.max(initial=0)) + 1
     images, parts = {}, []
     for row, box in crop_boxes(table, subset).items():
         person_id, source_id = int(annotations.ids[row]), int(annotations.image_ids[row])
-        images[person_id] = ImageInfo(person_id, _file_name(person_id), box[2] - box[0], box[3] - box[1])
+        images[person_id] = ImageInfo(person_id, image_name(person_id), box[2] - box[0], box[3] - box[1])
         others = [k for k in in_image[source_id] if k != row]
         people = crop_people(annotations, np.array([row, *others]), box)
         about = {
@@ -133,20 +156,10 @@ def crop_annotations(annotations: Annotations, table: pd.DataFrame, subset: str)
         others_about = [{"other": True, "source_id": i} for i in people.ids[1:].tolist()]
         ids = np.r_[person_id, next_id : next_id + len(others_about)]
         next_id += len(others_about)
-        parts.append(
-            replace(
-                people,
-                ids=ids,
-                image_ids=np.full(len(people), person_id),
-                is_crowd=np.arange(len(people)) > 0,
-                extras=[about, *others_about],
-            )
-        )
+        image_ids, is_crowd = np.full(len(people), person_id), ids != person_id
+        extras = [about, *others_about]
+        parts.append(replace(people, ids=ids, image_ids=image_ids, is_crowd=is_crowd, extras=extras))
     return Annotations.concatenate(parts, images)
-
-
-def _file_name(annotation_id: int) -> str:
-    return f"{annotation_id:012d}.png"
 
 
 def summary(table: pd.DataFrame) -> dict:
@@ -157,23 +170,22 @@ def summary(table: pd.DataFrame) -> dict:
 
 def count_sensitivity(annotations: Annotations, min_pixels: int = 20_000) -> pd.DataFrame:
     """How the choices the paper leaves open move the counts: columns `rule, basic, headless` (people)."""
-    rules = {
+    rules: dict[str, dict[str, int]] = {
         f"as here: Basic at least {min_pixels} pixels, Headless of any size": {},
         f"both at least {min_pixels} pixels": {"headless_min_pixels": min_pixels},
         f"Basic at least {min_pixels // 2} pixels": {"min_pixels": min_pixels // 2},
         f"Basic at least {min_pixels * 2} pixels": {"min_pixels": min_pixels * 2},
     }
-    tables = {
-        rule: plan(annotations, **({"min_pixels": min_pixels} | options)) for rule, options in rules.items()
-    }
-    rows = [(rule, *(int((table[s] == "kept").sum()) for s in SUBSETS)) for rule, table in tables.items()]
-    base = tables[next(iter(tables))]
-    rows.append((
-        "people without keypoints kept, people without labelled head kept in Headless",
-        int(base["basic"].isin(["kept", "no keypoints"]).sum()),
-        int((base["headless"].isin(["kept", "no head labelled"]) | (base["basic"] == "no keypoints")).sum()),
-    ))  # fmt: skip
-    return pd.DataFrame(rows, columns=["rule", *SUBSETS])
+    tables = [plan(annotations, **{"min_pixels": min_pixels} | options) for options in rules.values()]
+    counts = [(table[list(SUBSETS)] == "kept").sum() for table in tables]
+    basic, headless = tables[0]["basic"], tables[0]["headless"]
+    without = "people without keypoints kept, people without labelled head kept in Headless"
+    in_headless = headless.isin(["kept", "no head labelled"]) | (basic == "no keypoints")
+    counts.append(
+        pd.Series({"basic": basic.isin(["kept", "no keypoints"]).sum(), "headless": in_headless.sum()})
+    )
+    table = pd.DataFrame(counts, index=pd.Index([*rules, without], name="rule"))
+    return table.reset_index()
 
 
 def create_hicp(
@@ -189,9 +201,23 @@ def create_hicp(
     Crops keep the original pixels (PNG). Interrupted, it goes on with the next call; crops of
     other sources or rules are replaced.
 
+    Parameters
+    ----------
+    annotations_path : str or Path
+        COCO, COCO-WholeBody or Halpe annotations.
+    images_dir : str or Path
+        Folder of the annotated images.
+    out : str or Path
+        Folder to write to.
+    min_pixels, headless_min_pixels : int, optional
+        As of `plan`.
+    progress : bool, optional
+        Whether a bar is shown.
+
     Returns
     -------
-    dict as from `summary`
+    dict
+        As from `summary`.
 
     Raises
     ------
@@ -220,20 +246,14 @@ def _digest(table: pd.DataFrame, boxes: dict, images_dir: Path) -> str:
     """What the pixels of the crops depend on."""
     names = sorted({table["file_name"].iloc[row] for kept in boxes.values() for row in kept})
     try:
-        files = [(name, *_size_and_time(images_dir / name)) for name in names]
+        files = [(name, content(images_dir / name)) for name in names]
     except OSError as error:
         raise InputError(
             f"{error.filename}: an annotated image cannot be read; give the folder that holds the images"
         ) from None
-    crops = {
-        s: [(int(table["annotation_id"].iloc[row]), box) for row, box in boxes[s].items()] for s in boxes
-    }
-    return hashlib.sha256(json.dumps([files, crops, str(images_dir.resolve())]).encode()).hexdigest()
-
-
-def _size_and_time(path: Path) -> tuple[int, int]:
-    status = path.stat()
-    return status.st_size, status.st_mtime_ns
+    ids = table["annotation_id"].tolist()
+    crops = {subset: [(ids[row], box) for row, box in kept.items()] for subset, kept in boxes.items()}
+    return digest([files, crops, str(images_dir.resolve())])
 
 
 def _claim(out: Path, digest: str) -> None:
@@ -250,17 +270,17 @@ def _claim(out: Path, digest: str) -> None:
     write_json(marker, {"digest": digest})
 
 
-def _jobs(annotations: Annotations, boxes: dict, out: Path) -> dict[ImageInfo, list[tuple[Path, tuple]]]:
-    """Per source image, the crops to write: file and box."""
-    jobs: dict[ImageInfo, list[tuple[Path, tuple]]] = {}
+def _jobs(annotations: Annotations, boxes: dict[str, dict], out: Path) -> dict[ImageInfo, list[_Crop]]:
+    """Per source image, the crops to write."""
+    jobs: dict[ImageInfo, list[_Crop]] = {}
     for subset, kept in boxes.items():
         for row, box in kept.items():
-            path = out / subset / "images" / _file_name(int(annotations.ids[row]))
+            path = out / subset / "images" / image_name(int(annotations.ids[row]))
             jobs.setdefault(annotations.images[int(annotations.image_ids[row])], []).append((path, box))
     return jobs
 
 
-def _write_crops(images_dir: Path, image: ImageInfo, crops: list[tuple[Path, tuple]]) -> None:
+def _write_crops(images_dir: Path, image: ImageInfo, crops: list[_Crop]) -> None:
     missing = [(path, box) for path, box in crops if not path.exists()]
     if not missing:
         return

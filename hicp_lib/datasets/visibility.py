@@ -59,19 +59,47 @@ _PART_KEYPOINTS = {
 
 
 def visible_parts(visibility: np.ndarray) -> dict[str, np.ndarray]:
-    """Which parts are in the picture: name -> bool (n,), from visibility flags (n, 136)."""
-    parts = {name: (visibility[:, points] > 0).any(axis=1) for name, points in _PART_KEYPOINTS.items()}
+    """Which parts are in the picture.
+
+    Parameters
+    ----------
+    visibility : array, shape (n, 136)
+        Flags; above 0 is in the picture.
+
+    Returns
+    -------
+    dict of str to array of bool, shape (n,)
+        By name of the part.
+    """
+    parts = {name: np.any(visibility[:, points] > 0, axis=1) for name, points in _PART_KEYPOINTS.items()}
     for side in ("left", "right"):
         elbow, wrist = parts[f"{side}_elbow"], parts[f"{side}_wrist"]
         parts |= {f"{side}_arm": elbow | wrist, f"whole_{side}_arm": elbow & wrist}
-    either = {
-        part: parts[f"left_{part}"] | parts[f"right_{part}"] for part in ("shoulder", "arm", "hip", "leg")
-    }
-    return parts | either
+    for part in ("shoulder", "arm", "hip", "leg"):
+        parts[part] = parts[f"left_{part}"] | parts[f"right_{part}"]
+    return parts
 
 
 def visibility_class(visibility: np.ndarray) -> np.ndarray:
-    """The class of each person, a name of `CLASSES`, shape (n,), from visibility flags (n, 136)."""
+    """The class of each person.
+
+    Parameters
+    ----------
+    visibility : array, shape (n, 136)
+        Flags; above 0 is in the picture.
+
+    Returns
+    -------
+    array of str, shape (n,)
+        Names of `CLASSES`.
+
+    Examples
+    --------
+    >>> flags = np.zeros((2, 136))
+    >>> flags[0, INDEX["left_wrist"]] = 2
+    >>> visibility_class(flags).tolist()
+    ['only left arm', 'none of these']
+    """
     parts = visible_parts(visibility)
     fits = [
         np.logical_and.reduce([*(parts[name] for name in seen), *(~parts[name] for name in unseen)])
@@ -85,14 +113,20 @@ def people_classes(truth: Mapping[str, Annotations]) -> pd.DataFrame:
     tables = []
     for subset, of_subset in truth.items():
         people = of_subset.take(~of_subset.is_crowd)
-        names = visibility_class(people.visibility)
-        ids = {"image_id": people.image_ids, "annotation_id": people.ids}
-        tables.append(pd.DataFrame({"subset": subset, **ids, "class": names}))
+        columns = {"subset": subset, "image_id": people.image_ids, "annotation_id": people.ids}
+        tables.append(pd.DataFrame({**columns, "class": visibility_class(people.visibility)}))
     return pd.concat(tables, ignore_index=True)
 
 
 def class_counts(classes: pd.DataFrame) -> pd.DataFrame:
-    """People per class: columns `class`, one per subset, `people`, `judged` ("yes" or "too few")."""
+    """People per class: columns `class`, one per subset, `people`, `judged` ("yes" or "too few").
+
+    Examples
+    --------
+    >>> people = pd.DataFrame({"subset": "basic", "class": ["no head"] * 20 + ["only legs"] * 19})
+    >>> class_counts(people).set_index("class").loc[["no head", "only legs"], "judged"].tolist()
+    ['yes', 'too few']
+    """
     counts = pd.crosstab(classes["class"], classes["subset"]).reindex(CLASSES, fill_value=0)
     counts = counts[list(dict.fromkeys(classes["subset"]))]
     total = counts.sum(axis=1)

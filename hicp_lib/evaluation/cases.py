@@ -68,9 +68,9 @@ def per_case(
     ----------
     measure : callable
         Table with a column `image_id` from annotations, detections and a group.
-    truth : mapping of str to Annotations
+    truth : Truth
         By subset.
-    found : mapping of (str, str) to mapping of int to Detections
+    found : Found
         By image id, of every subset and detector.
     groups : mapping of str to tuple of str, optional
         The groups of each detector; those it gives when left out.

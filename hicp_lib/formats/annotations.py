@@ -63,7 +63,7 @@ class Annotations:
     ----------
     images : dict of int to ImageInfo
         By image id, in the order of the file.
-    ids, image_ids : array of int64, shape (n,)
+    ids, image_ids : array, shape (n,), dtype int64
         Of the people, and of the images they are in.
     boxes_px : array, shape (n, 4)
         x, y of the top-left corner, width, height.
@@ -342,6 +342,20 @@ def write_detections(
 
 
 def result_row(image_id: int, triples: np.ndarray, score: float) -> dict:
-    """A detected person as a COCO keypoint result; `triples` is a row of `keypoint_triples`."""
+    """A detected person as a COCO keypoint result.
+
+    Parameters
+    ----------
+    image_id : int
+        The image.
+    triples : array, shape (3 k,)
+        A row of `keypoint_triples`.
+    score : float
+        The person's.
+
+    Returns
+    -------
+    dict
+    """
     return {"image_id": int(image_id), "category_id": PERSON_CATEGORY, "keypoints": triples.tolist(),
             "score": float(score)}  # fmt: skip

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.cached_tables import kept
+from hicp_lib.core.cached_tables import cached
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.runtime.run import detect_images
@@ -105,7 +105,7 @@ def lift_frames(
         `ablation`).
     """
     n_steps = METHODS if read_truth(recording) is None else METHODS | N_STEPS
-    table = kept(lift_found, recording, found, n_steps)
+    table = cached(lift_found, recording, found, n_steps)
     return table[table["method"].isin(METHODS)], table[table["detector"] == next(iter(found))]
 
 

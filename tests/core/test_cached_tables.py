@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from hicp_lib.core import cached_tables as kept_tables
-from hicp_lib.core.cached_tables import kept
+from hicp_lib.core.cached_tables import cached
 from hicp_lib.core.detections import Detections
 
 CALLS: list[str] = []
@@ -35,10 +35,10 @@ def one_person(u_px: float = 1.0) -> Detections:
 
 
 def test_a_table_is_made_once_and_the_same_to_the_last_bit(folder):
-    first = kept(table_of, {"a": [one_person()]}, scale=0.7)
+    first = cached(table_of, {"a": [one_person()]}, scale=0.7)
     pd.testing.assert_frame_equal(first, table_of(None, 0.7), check_exact=True)
     CALLS.clear()
-    pd.testing.assert_frame_equal(kept(table_of, {"a": (one_person(),)}, 0.7), first, check_exact=True)
+    pd.testing.assert_frame_equal(cached(table_of, {"a": (one_person(),)}, 0.7), first, check_exact=True)
     assert CALLS == []
     assert len(list(folder.iterdir())) == 1
 
@@ -54,7 +54,7 @@ INPUTS = [
 
 def test_other_inputs_make_other_tables(folder):
     for value in INPUTS:
-        kept(table_of, value)
+        cached(table_of, value)
     assert len(CALLS) == len(INPUTS) == len(list(folder.iterdir()))
 
 
@@ -64,25 +64,25 @@ def test_files_count_by_what_the_system_says_of_them(tmp_path):
     path.write_bytes(b"depth")
     for source in (path, path.parent):
         os.utime(path, (1, 1))
-        kept(table_of, source)
+        cached(table_of, source)
         os.utime(path, (2, 2))
-        kept(table_of, source)
+        cached(table_of, source)
     assert len(CALLS) == 4
 
 
 def test_a_damaged_table_and_one_of_other_code_are_made_again(folder, monkeypatch):
-    whole = kept(table_of, 1)
+    whole = cached(table_of, 1)
     (path,) = folder.iterdir()
     content = bytearray(path.read_bytes())
     content[10] ^= 1
     for damaged in (bytes(content), content[:-9], b""):
         path.write_bytes(damaged)
-        pd.testing.assert_frame_equal(kept(table_of, 1), whole, check_exact=True)
+        pd.testing.assert_frame_equal(cached(table_of, 1), whole, check_exact=True)
     monkeypatch.setattr(kept_tables, "key", lambda *_, **__: "of other code")
-    kept(table_of, 1)
+    cached(table_of, 1)
     assert len(CALLS) == 5
 
 
 def test_what_is_not_known_by_content_is_refused():
     with pytest.raises(TypeError, match="content of function is not known"):
-        kept(table_of, table_of)
+        cached(table_of, table_of)

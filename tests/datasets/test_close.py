@@ -72,3 +72,19 @@ def test_small_crops_are_left_out(basic):
 def test_no_crop_at_all_is_an_empty_data_set(basic):
     people = read_annotations(open_close(basic, min_pixels=500_000) / "annotations.json")
     assert len(people) == len(people.images) == 0
+
+
+def test_a_crop_is_the_parts_extent_grown_by_a_tenth_of_its_larger_side(basic):
+    folder = open_close(basic, n_per_class=1, min_pixels=500)
+    people = read_annotations(folder / "annotations.json")
+    row = visibility_class(people.visibility).tolist().index("only legs")
+    # Knees and ankles: 140 to 260 wide, 330 to 390 high; 12 pixels more on every side.
+    left, top, right, bottom = np.array(people.extras[row]["crop_px"]) - [*ORIGIN, *ORIGIN]
+    assert (left, top, right, bottom) == (128, 318, 272, 402)
+
+
+def test_a_crop_of_just_the_least_size_is_taken(basic):
+    n_pixels = (272 - 128) * (402 - 318)
+    for least, n in ((n_pixels, 4), (n_pixels + 1, 0)):
+        people = read_annotations(open_close(basic, min_pixels=least) / "annotations.json")
+        assert (visibility_class(people.visibility) == "only legs").sum() == n

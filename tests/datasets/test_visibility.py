@@ -1,6 +1,7 @@
 """Classes of what a picture shows, on hand-made skeletons."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -111,3 +112,10 @@ def test_classes_are_evaluated_apart_and_small_ones_not_at_all():
     assert table["n_people"].to_dict() == {"only head": 2 * MIN_PEOPLE, "only legs": 2}
     assert table.loc["only head", "value"] == pytest.approx(0.5)
     assert np.isnan(table.loc["only legs", ["value", "low", "high"]].astype(float)).all()
+
+
+def test_twenty_people_are_judged_and_nineteen_are_not():
+    assert MIN_PEOPLE == 20
+    people = pd.DataFrame({"subset": "basic", "class": ["no head"] * 20 + ["only legs"] * 19})
+    judged = class_counts(people).set_index("class")["judged"]
+    assert judged["no head"] == "yes" and judged["only legs"] == judged["only head"] == "too few"

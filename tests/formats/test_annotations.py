@@ -15,6 +15,7 @@ from hicp_lib.core.keypoints import INDEX, TO_HALPE
 from hicp_lib.datasets.subsets import SUBSETS, crop_annotations, plan
 from hicp_lib.evaluation.ap.evaluate import evaluate
 from hicp_lib.formats.annotations import (
+    Annotations,
     read_annotations,
     read_detections,
     write_annotations,
@@ -354,3 +355,29 @@ def test_bytes_that_are_no_file_are_refused(tmp_path, content):
     for read in (read_annotations, read_detections):
         with pytest.raises(InputError):
             read(path)
+
+
+def test_values_up_to_the_limits_are_read_and_none_beyond(tmp_path):
+    image = {"id": 2**53, "file_name": "a.png", "width": 100_000, "height": 1}
+    person = {"id": 1, "image_id": 2**53, "bbox": [-1e9, 0, 1e9, 0], "area": 0, "keypoints": [1e9, 0, 1] * 17}
+    fine = {"images": [image], "annotations": [person]}
+    wrong = {
+        "id is 9007199254740993": {"images": [image | {"id": 2**53 + 1}], "annotations": []},
+        "width is 100001; expected 1 to 100000": {"images": [image | {"width": 100_001}], "annotations": []},
+        "height is 0; expected 1 to 100000": {"images": [image | {"height": 0}], "annotations": []},
+        r"bbox\[2\] \(width\)": {"images": [image], "annotations": [person | {"bbox": [0, 0, 1.1e9, 0]}]},
+        "negative width": {"images": [image], "annotations": [person | {"bbox": [0, 0, 1, -0.1]}]},
+        "area is -1": {"images": [image], "annotations": [person | {"area": -1}]},
+    }
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps(fine))
+    assert read_annotations(path).boxes_px.tolist() == [[-1e9, 0, 1e9, 0]]
+    for message, data in wrong.items():
+        path.write_text(json.dumps(data))
+        with pytest.raises(InputError, match=message):
+            read_annotations(path)
+
+
+def test_of_nobody_nobody_is_another():
+    people = Annotations.concatenate([], {})
+    assert people.is_other.dtype == bool and len(people.is_other) == 0

@@ -92,7 +92,7 @@ class Combined:
         hands = merge_duplicates(Hands.together(seen), self._rule.same_hand)
         chosen = assign(distances(arms, hands, self._rule))
         strangers = hands.take(~self._within_reach(arms, hands))
-        return give_hands(bodies, hands, chosen).and_also(without_body(strangers))
+        return give_hands(bodies, hands, chosen).concatenate(without_body(strangers))
 
     def _within_reach(self, arms: Arms, hands: Hands) -> np.ndarray:
         """Which hands (n,) some body could have, were the rest of its arms unknown."""
@@ -112,7 +112,7 @@ class Combined:
         hands = Hands.together(seen + self._elsewhere(image))
         chosen = nearest_first(arms.wrists_px, hands, chosen)
         rest = np.setdiff1d(np.arange(len(hands)), chosen)
-        return give_hands(bodies, hands, chosen).and_also(without_body(hands.take(rest)))
+        return give_hands(bodies, hands, chosen).concatenate(without_body(hands.take(rest)))
 
     def _at_wrists(self, image: np.ndarray, arms: Arms) -> list[tuple[int, int, Hands]]:
         if "wrists" not in self._looks:

@@ -140,7 +140,7 @@ def attach_hands(bodies: Detections, found: Detections) -> Detections:
     hands = Hands.of(found)
     chosen = nearest_first(bodies.keypoints_px[:, _WRISTS], hands, np.full((len(bodies), 2), -1))
     rest = np.setdiff1d(np.arange(len(hands)), chosen)
-    return give_hands(bodies, hands, chosen).and_also(in_pairs(hands.take(rest)))
+    return give_hands(bodies, hands, chosen).concatenate(in_pairs(hands.take(rest)))
 
 
 def _process(

@@ -32,8 +32,8 @@ def bootstrap_intervals(
         Number of draws.
     seed : int, optional
         Of the draws.
-    clusters : mapping of int to hashable, optional
-        By image id; images of equal value are drawn together. Each by itself when left out.
+    clusters : Clusters, optional
+        Anything by image id; images of equal value are drawn together. Each by itself when left out.
 
     Returns
     -------
@@ -44,35 +44,11 @@ def bootstrap_intervals(
     return intervals(evaluation.metrics(), resample([evaluation], n_resamples, seed, clusters)[0])
 
 
-def bootstrap_difference(
-    a: Evaluation,
-    b: Evaluation,
-    n_resamples: int = N_RESAMPLES,
-    seed: int = 0,
-    clusters: Clusters | None = None,
-) -> pd.DataFrame:
+def difference(a: Evaluation, b: Evaluation, of_a: pd.DataFrame, of_b: pd.DataFrame) -> pd.DataFrame:
     """Differences a - b with 95 % intervals, both on the same draw of images each time.
 
     The images are paired by their ids: two detectors on one dataset, or one detector on Basic and Headless,
     where equal ids mean the same person. Images only one of them has are drawn, too.
-
-    Parameters
-    ----------
-    a, b : Evaluation
-        What is compared.
-    n_resamples, seed, clusters
-        As of `bootstrap_intervals`.
-
-    Returns
-    -------
-    DataFrame
-        As of `bootstrap_intervals`.
-    """
-    return difference(a, b, *resample([a, b], n_resamples, seed, clusters))
-
-
-def difference(a: Evaluation, b: Evaluation, of_a: pd.DataFrame, of_b: pd.DataFrame) -> pd.DataFrame:
-    """As `bootstrap_difference`, from the figures of both on the same draws.
 
     Parameters
     ----------
@@ -99,7 +75,9 @@ def resample(
     ----------
     evaluations : sequence of Evaluation
         Paired by their image ids.
-    n_resamples, seed, clusters
+    n_resamples, seed : int
+        Number of draws, and what they are drawn with.
+    clusters : Clusters, optional
         As of `bootstrap_intervals`.
 
     Returns

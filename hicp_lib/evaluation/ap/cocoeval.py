@@ -110,9 +110,7 @@ def _triples(keypoints_px: np.ndarray, given: np.ndarray, otherwise: float) -> l
     return np.concatenate([points, given[:, None]], axis=-1).ravel().tolist()
 
 
-def run(
-    image_ids: list[int], truth: list[dict], found: list[dict], sigmas: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, Matches]:
+def run(image_ids: list[int], truth: list[dict], found: list[dict], sigmas: np.ndarray) -> Matches:
     """Match detections to people by OKS.
 
     Parameters
@@ -126,12 +124,7 @@ def run(
 
     Returns
     -------
-    precision : array, shape (10, 101)
-        Per OKS threshold and recall; NaN when nobody counts.
-    recall : array, shape (10,)
-        Per OKS threshold; NaN when nobody counts.
-    matches : Matches
-        Which detections are right.
+    Matches
     """
     cocoeval = COCOeval(_index(image_ids, truth), _index(image_ids, found), "keypoints")
     cocoeval.params.kpt_oks_sigmas = sigmas
@@ -139,13 +132,7 @@ def run(
     cocoeval.params.iouThrs, cocoeval.params.recThrs = OKS_THRESHOLDS, RECALLS
     cocoeval.params.areaRng, cocoeval.params.areaRngLbl = [[0.0, np.inf]], ["all"]
     cocoeval.evaluate()
-    cocoeval.accumulate()
-    precision, recall = cocoeval.eval["precision"][:, :, 0, 0, 0], cocoeval.eval["recall"][:, 0, 0, 0]
-    return (
-        np.where(precision < 0, np.nan, precision),
-        np.where(recall < 0, np.nan, recall),
-        _matches(cocoeval),
-    )
+    return _matches(cocoeval)
 
 
 def _index(image_ids: list[int], rows: list[dict]) -> Any:

@@ -88,7 +88,7 @@ class Evaluation:
         Per OKS threshold .5:.05:.95 at recall 0:.01:1.
     recall : array, shape (10,)
         Per OKS threshold.
-    matches : Matches
+    matches : cocoeval.Matches
         What the bootstrap resamples.
     """
 
@@ -157,9 +157,8 @@ def evaluate(
         )
     ]  # fmt: skip
     found = list(_detections_seen(detections, keypoints, chosen))
-    precision, recall, matches = cocoeval.run(
-        list(annotations.images), truth, found, SIGMAS[chosen.sigmas][keypoints]
-    )
+    matches = cocoeval.run(list(annotations.images), truth, found, SIGMAS[chosen.sigmas][keypoints])
+    precision, recall = cocoeval.precision_recall(matches)
     n_people = int(matches.n_people.sum())
     return Evaluation(
         group=group,
@@ -256,8 +255,14 @@ def person_oks(
 
     Parameters
     ----------
-    annotations, detections, group, **options
-        As of `evaluate`.
+    annotations : Annotations
+        The truth.
+    detections : mapping of int to Detections
+        By image id.
+    group : {"body", "hand"}
+        Of keypoints.
+    **options : str
+        Fields of `Options`.
 
     Returns
     -------
@@ -283,8 +288,12 @@ def sensitivity_table(
 
     Parameters
     ----------
-    annotations, detections, group
-        As of `evaluate`.
+    annotations : Annotations
+        The truth.
+    detections : mapping of int to Detections
+        By image id.
+    group : {"body", "hand"}
+        Of keypoints.
 
     Returns
     -------

@@ -73,9 +73,9 @@ def compare_hands(
 
     Parameters
     ----------
-    truth : mapping of str to Annotations
+    truth : Truth
         By subset.
-    found : mapping of (str, str) to mapping of int to Detections
+    found : Found
         By image id, of every subset and detector or variant of one.
     baseline : str
         The variant that hands found are set in proportion to.

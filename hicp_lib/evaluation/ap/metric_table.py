@@ -6,14 +6,14 @@ together in the bootstrap.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import GROUPS
 from hicp_lib.detectors.runtime.results import Timed
-from hicp_lib.evaluation.ap.bootstrap import bootstrap_difference, difference, intervals, resample
+from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
 from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate, person_oks
 from hicp_lib.evaluation.cases import Found, Truth, all_cases, labelled, per_case
 from hicp_lib.formats.annotations import source_images
@@ -27,9 +27,9 @@ def compare(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) 
 
     Parameters
     ----------
-    truth : mapping of str to Annotations
+    truth : Truth
         By subset.
-    found : mapping of (str, str) to mapping of int to Detections
+    found : Found
         By image id, of every subset and detector.
     n_resamples, seed : int, optional
         Number of bootstrap draws, and what they are drawn with.
@@ -47,7 +47,7 @@ def draw_cases(
     found: Found,
     n_resamples: int = 1000,
     seed: int = 0,
-    groups: Collection[str] = tuple(GROUPS),
+    groups: Sequence[str] = tuple(GROUPS),
 ) -> dict[tuple[str, str, str], tuple[Evaluation, pd.DataFrame]]:
     """Every case evaluated, as it is and on draws of source images: what `metric_table` and `pairs` read.
 
@@ -56,9 +56,13 @@ def draw_cases(
 
     Parameters
     ----------
-    truth, found, n_resamples, seed
-        As of `compare`.
-    groups : collection of str, optional
+    truth : Truth
+        By subset.
+    found : Found
+        By image id, of every subset and detector.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
+    groups : sequence of str, optional
         Groups of keypoints that are looked at.
 
     Returns
@@ -72,8 +76,8 @@ def draw_cases(
         detectors = [case[1] for case in cases if case[::2] == (subset, group)]
         evaluations = [evaluate(truth[subset], found[subset, detector], group) for detector in detectors]
         samples = resample(evaluations, n_resamples, seed, source_images(truth[subset]))
-        for detector, *of_both in zip(detectors, evaluations, samples, strict=True):
-            drawn[subset, detector, group] = tuple(of_both)
+        for detector, evaluation, sample in zip(detectors, evaluations, samples, strict=True):
+            drawn[subset, detector, group] = evaluation, sample
     return {case: drawn[case] for case in cases}
 
 
@@ -94,7 +98,7 @@ def pairs(drawn: Drawn) -> pd.DataFrame:
 
     Parameters
     ----------
-    drawn : mapping of (str, str, str) to (Evaluation, DataFrame)
+    drawn : Drawn
         From `draw_cases`.
 
     Returns
@@ -118,8 +122,12 @@ def head_loss(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0
 
     Parameters
     ----------
-    truth, found, n_resamples, seed
-        As of `compare`; the subsets are "basic" and "headless".
+    truth : Truth
+        By subset, "basic" and "headless".
+    found : Found
+        By image id, of every subset and detector.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
@@ -136,11 +144,9 @@ def head_loss(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0
             continue
         on = {s: {i: found[s, detector].get(i, Detections.none()) for i in shared} for s in subsets}
         basic, headless = (evaluate(same[s], on[s], group) for s in subsets)
-        change = (
-            bootstrap_difference(headless, basic, n_resamples, seed, clusters).set_index("metric").loc["AP"]
-        )
-        interval = change[["value", "low", "high"]]
-        rows.append((group, detector, basic.AP, headless.AP, *interval, basic.n_people))
+        drawn = resample([headless, basic], n_resamples, seed, clusters)
+        change = difference(headless, basic, *drawn).set_index("metric").loc["AP", ["value", "low", "high"]]
+        rows.append((group, detector, basic.AP, headless.AP, *change, basic.n_people))
     columns = ["group", "detector", "basic", "headless", "change", "low", "high", "n_people"]
     return pd.DataFrame(rows, columns=columns).sort_values("group", kind="stable", ignore_index=True)
 

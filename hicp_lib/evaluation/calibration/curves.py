@@ -101,7 +101,7 @@ def split_half(groups: pd.Series, seed: int = 0) -> np.ndarray:
 
     Parameters
     ----------
-    groups : Series, length n
+    groups : Series, shape (n,)
         Source image of each row; rows of one are never on both sides.
     seed : int, optional
         Of the draw.

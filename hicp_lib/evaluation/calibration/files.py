@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.files import read_json, write_bytes
 from hicp_lib.core.keypoints import GROUPS
 from hicp_lib.evaluation.calibration.curves import Calibration, calibration_table, calibrations_of
@@ -94,7 +94,7 @@ def read_calibrations(path: str | Path, detector: str = "") -> dict[str, Calibra
     try:
         table = pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
     except (OSError, ValueError) as error:
-        problem = getattr(error, "strerror", None) or " ".join(str(error).split())[:150]
+        problem = getattr(error, "strerror", None) or one_line(error)
         raise InputError(f"{path}: cannot be read as a table ({problem}); give calibrations") from None
     if list(table.columns) != _COLUMNS:
         raise InputError(f"{path}: has not the columns {', '.join(_COLUMNS)}; write it with calibration fit")
@@ -148,9 +148,9 @@ def apply_calibrations(
     found = read_detections(detections_path)
     extras: dict[int, list[dict]] = {image_id: [] for image_id in found}
     for row in read_json(detections_path):
-        people = extras[row["image_id"]]
-        raw = {RAW_SCORES: found[row["image_id"]].scores[len(people)].tolist()}
-        people.append(raw | {key: value for key, value in row.items() if key not in _KNOWN_KEYS})
+        of_image = extras[row["image_id"]]
+        raw = {RAW_SCORES: found[row["image_id"]].scores[len(of_image)].tolist()}
+        of_image.append(raw | {key: value for key, value in row.items() if key not in _KNOWN_KEYS})
     for group, calibration in calibrations.items():
         found = {image_id: calibration.apply(people, group) for image_id, people in found.items()}
     write_detections(out, found, extras)

@@ -30,9 +30,9 @@ def all_hits(
 
     Parameters
     ----------
-    truth : mapping of str to Annotations
+    truth : Truth
         By subset.
-    found : mapping of (str, str) to mapping of int to Detections
+    found : Found
         By image id, of every subset and detector.
     groups : mapping of str to tuple of str
         The groups of keypoints of each detector that are looked at.

@@ -21,9 +21,9 @@ def compare_classes(truth: Truth, found: Found, n_resamples: int = 1000, seed: i
 
     Parameters
     ----------
-    truth : mapping of str to Annotations
+    truth : Truth
         By subset.
-    found : mapping of (str, str) to mapping of int to Detections
+    found : Found
         By image id, of every subset and detector.
     n_resamples, seed : int, optional
         Number of bootstrap draws, and what they are drawn with.
@@ -55,9 +55,9 @@ def pooled(truth: Truth, found: Found) -> tuple[Annotations, dict[str, dict[int,
 
     Parameters
     ----------
-    truth : mapping of str to Annotations
+    truth : Truth
         By subset.
-    found : mapping of (str, str) to mapping of int to Detections
+    found : Found
         By image id, of every subset and detector.
 
     Returns

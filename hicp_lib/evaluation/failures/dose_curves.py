@@ -88,7 +88,7 @@ def observed_doses(truth: Truth, folders: Mapping[str, Path], source: Annotation
 
     Parameters
     ----------
-    truth : mapping of str to Annotations
+    truth : Truth
         By subset.
     folders : mapping of str to Path
         By subset, the folder with their images.

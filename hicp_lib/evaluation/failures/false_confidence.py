@@ -84,9 +84,9 @@ def paper_remarks(
         `placed_keypoints.placed_keypoints`.
     errors : DataFrame
         `error_kinds.all_errors`.
-    truth : mapping of str to Annotations
+    truth : Truth
         By subset.
-    found : mapping of (str, str) to mapping of int to Detections
+    found : Found
         By image id, of every subset and detector.
     n_resamples, seed : int, optional
         Number of bootstrap draws, and what they are drawn with.

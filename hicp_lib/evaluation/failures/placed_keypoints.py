@@ -34,9 +34,9 @@ def placed_keypoints(truth: Truth, found: Found, source: Annotations) -> pd.Data
 
     Parameters
     ----------
-    truth : mapping of str to Annotations
+    truth : Truth
         Of crops, by subset; people name their `source_id` and `crop_px`.
-    found : mapping of (str, str) to mapping of int to Detections
+    found : Found
         By image id, of every subset and detector.
     source : Annotations
         What the crops were made from.

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.keypoints import HANDS, NAMES
+from hicp_lib.evaluation.space.stability import POSITION
 from hicp_lib.lifting.robust import STEPS
 
 GROUPS: dict[str, tuple[str, ...]] = {
@@ -30,7 +31,6 @@ N_STEPS = {
 
 MIN_SCORE = 0.3
 _KEY = ["frame", "keypoint"]
-_POSITION = ["x_m", "y_m", "z_m"]
 
 
 def lifting_ablation(points: pd.DataFrame, truth: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
@@ -60,8 +60,12 @@ def lifting_errors(points: pd.DataFrame, truth: pd.DataFrame, min_score: float =
 
     Parameters
     ----------
-    points, truth, min_score
-        As of `lifting_ablation`.
+    points : DataFrame
+        One detector's keypoints as `lift_found` gives them with `N_STEPS`.
+    truth : DataFrame
+        As `recording.read_truth` gives it.
+    min_score : float, optional
+        Detected keypoints count from this score.
 
     Returns
     -------
@@ -71,10 +75,10 @@ def lifting_errors(points: pd.DataFrame, truth: pd.DataFrame, min_score: float =
     """
     group_of = {name: group for group, names in GROUPS.items() for name in names}
     counts = (points["person"] == 0) & (points["score"] >= min_score) & points["keypoint"].isin(group_of)
-    both = points[counts].merge(truth[[*_KEY, *_POSITION]], on=_KEY, suffixes=("", "_true"))
-    offset = both[_POSITION].to_numpy() - both[[f"{axis}_true" for axis in _POSITION]].to_numpy()
+    both = points[counts].merge(truth[[*_KEY, *POSITION]], on=_KEY, suffixes=("", "_true"))
+    offset = both[POSITION].to_numpy() - both[[f"{axis}_true" for axis in POSITION]].to_numpy()
     errors = both.assign(error_m=np.linalg.norm(offset, axis=1))
-    errors = errors.pivot(index=_KEY, columns="method", values="error_m")[list(N_STEPS)]
+    errors = errors.pivot(index=_KEY, columns="method", values="error_m").reindex(columns=list(N_STEPS))
     errors = errors.rename_axis(columns=None).reset_index()
     errors.insert(2, "group", errors["keypoint"].map(group_of))
     return errors

@@ -17,7 +17,7 @@ import pandas as pd
 from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.cases import labelled
-from hicp_lib.evaluation.space.stability import THRESHOLDS_M
+from hicp_lib.evaluation.space.stability import POSITION, THRESHOLDS_M
 from hicp_lib.evaluation.statistics.resampling import weighted_median, with_interval
 from hicp_lib.evaluation.statistics.time_blocks import block_length, draw_blocks
 from hicp_lib.mocap.synchronisation import interpolate_mocap
@@ -30,7 +30,6 @@ MARKERS: dict[str, tuple[str, str]] = {
     joint: (f"{part}_{side}_1", f"{part}_{side}_2") for joint in JOINTS for side, part in [joint.split("_")]
 }
 MIN_SCORES = (0.3, 0.1)
-POSITION = ["x_m", "y_m", "z_m"]
 _CASE = ["detector", "method", "keypoint"]
 _BINS: dict[str, list[float] | None] = {
     "distance_m": [0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.5, 3.0, 4.0],

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.camera import project, transform
+from hicp_lib.evaluation.space.stability import POSITION
 from hicp_lib.recordings.recording import Recording, read_depth_m
 
 OCCLUSIONS = ("clear", "hidden", "outside", "no depth", "unknown")
@@ -16,7 +17,6 @@ OCCLUSIONS = ("clear", "hidden", "outside", "no depth", "unknown")
 # the limb and its sleeve.
 IN_FRONT_M = {"wrist": 0.06, "elbow": 0.09, "shoulder": 0.13}
 _HALF_WINDOW_PX = 2
-_POSITION = ["x_m", "y_m", "z_m"]
 
 
 def joint_occlusion(recording: Recording, positions: pd.DataFrame) -> pd.DataFrame:
@@ -38,7 +38,7 @@ def joint_occlusion(recording: Recording, positions: pd.DataFrame) -> pd.DataFra
     """
     frames = positions["frame"].to_numpy()
     T_cam_base = np.linalg.inv(recording.T_base_cam)[frames]
-    points_m = transform(T_cam_base, positions[_POSITION].to_numpy(float)[:, None])[:, 0]
+    points_m = transform(T_cam_base, positions[POSITION].to_numpy(float)[:, None])[:, 0]
     margins_m = positions["keypoint"].str.split("_").str[1].map(IN_FRONT_M).to_numpy(float)
     pixels_px = project(recording.intrinsics, points_m)
     in_image = recording.intrinsics.contains(pixels_px)  # not where NaN: behind the camera

@@ -32,7 +32,7 @@ def compare_registrations(
         What is compared.
     mocap : MotionCapture
         Its markers.
-    T_base_mocap : array, shape (4, 4), or None
+    T_base_mocap : array or None, shape (4, 4)
         The exact transform; None where it is not known.
 
     Returns

@@ -99,10 +99,9 @@ def spread_causes(
         measured = dict(list(of_view.groupby("detector")))
         poses = wrong_poses(recording, joint_error_rad, N_DRAWS, seed)
         for detector in found_in(found, view):
-            lifted = known | {
-                PIXEL: counted(exact.get(detector, points[:0]), min_score),
-                TOGETHER: counted(measured.get(detector, points[:0]), min_score),
-            }
+            lifted = dict(known)
+            for cause, of_all in ((PIXEL, exact), (TOGETHER, measured)):
+                lifted[cause] = counted(of_all.get(detector, points[:0]), min_score)
             rows += [(view, detector, *row) for row in _part_rows(recording, truth, lifted, poses)]
     return pd.DataFrame(rows, columns=_COLUMNS)
 

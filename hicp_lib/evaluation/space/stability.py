@@ -129,8 +129,16 @@ def spread_and_bias(
 
     Parameters
     ----------
-    points, n_frames, truth, min_score, n_resamples, seed
-        As of `within_distance`.
+    points : DataFrame
+        What was lifted, as the module says.
+    n_frames : mapping of str to int
+        Number of images, by view.
+    truth : mapping of str to DataFrame, optional
+        By view, a table with `frame, keypoint, x_m, y_m, z_m`.
+    min_score : float, optional
+        Keypoints above it count.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------

@@ -149,9 +149,8 @@ def import_predictions(
         raise InputError(f"{path}: holds no people; check the run, or leave this detector out")
     matched = match_images(people, annotations.images)
     scale = score_scale(format, people) if scale is None else scale
-    images = [annotations.images.get(image) for image in matched]  # None where not annotated
-    rows = np.flatnonzero([images[s] is not None for s in people.source_of])
-    shown = [images[s] for s in people.source_of[rows]]
+    rows = np.flatnonzero([matched[s] is not None for s in people.source_of])
+    shown = [annotations.images[i] for s in people.source_of if (i := matched[s]) is not None]
     sizes = np.array([(image.width_px, image.height_px) for image in shown]).reshape(-1, 2)
     if format == "openpose":
         refuse_other_size(people.path, people.keypoints_px[rows], sizes)

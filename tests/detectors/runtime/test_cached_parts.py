@@ -62,7 +62,7 @@ class Both:
     def detect(self, image):
         self._clock.now_s += OWN_S
         body, hands = (part.detect(image) for part in self.parts.values())
-        return body.and_also(hands)
+        return body.concatenate(hands)
 
 
 class Detectors:

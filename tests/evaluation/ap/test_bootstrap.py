@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 
 from hicp_lib.evaluation.ap import bootstrap, cocoeval
-from hicp_lib.evaluation.ap.bootstrap import bootstrap_difference, bootstrap_intervals, resample
+from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals, difference, resample
 from hicp_lib.evaluation.ap.evaluate import evaluate
 
 
 @pytest.mark.parametrize("group", ["body", "hand"])
 @pytest.mark.parametrize("seed", range(4))
-def test_drawing_every_image_once_is_pycocotools_to_the_bit(scene, group, seed):
+def test_precision_and_recall_are_pycocotools_to_the_bit(scene, group, seed, monkeypatch):
+    runs, matches_of = [], cocoeval._matches
+    monkeypatch.setattr(cocoeval, "_matches", lambda run: runs.append(run) or matches_of(run))
     evaluation = evaluate(*scene(seed), group)
-    precision, recall = cocoeval.precision_recall(evaluation.matches)
-    assert np.array_equal(precision, evaluation.precision) and np.array_equal(recall, evaluation.recall)
-    assert cocoeval.metrics(precision, recall) == evaluation.metrics()
+    runs[0].accumulate()
+    assert np.array_equal(runs[0].eval["precision"][:, :, 0, 0, 0], evaluation.precision)
+    assert np.array_equal(runs[0].eval["recall"][:, 0, 0, 0], evaluation.recall)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -71,7 +73,7 @@ def test_images_of_a_cluster_are_drawn_together(annotated, detected):
 
 def test_a_detector_does_not_differ_from_itself(scene):
     evaluation = evaluate(*scene(0))
-    table = bootstrap_difference(evaluation, evaluation, n_resamples=50)
+    table = difference(evaluation, evaluation, *resample([evaluation] * 2, 50, seed=0))
     assert (table[["value", "low", "high"]] == 0).all(axis=None)
 
 
@@ -79,7 +81,7 @@ def test_pairing_takes_the_images_share_out_of_a_difference(annotated, detected)
     found = np.arange(300) % 2 == 0
     all_but_ten = found & (np.arange(300) >= 20)
     a, b = (found_or_not(annotated, detected, f) for f in (found, all_but_ten))
-    row = bootstrap_difference(a, b, seed=1).set_index("metric").loc["AR"]
+    row = difference(a, b, *resample([a, b], 1000, seed=1)).set_index("metric").loc["AR"]
     assert row["value"] == pytest.approx(10 / 300)
     # A share of 10 in 300, not the difference of two independent halves (half width .08).
     assert row["low"] > 0.01 and row["high"] < 0.06

@@ -1,9 +1,11 @@
 """Hands found, one by one, and set in proportion to a baseline."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND
+from hicp_lib.evaluation.ap import hands
 from hicp_lib.evaluation.ap.evaluate import evaluate
 from hicp_lib.evaluation.ap.hands import INGREDIENTS, compare_hands, hand_oks
 from tests.evaluation.made_people import make_annotations, make_detections
@@ -67,3 +69,12 @@ def test_against_a_baseline_that_finds_nothing_there_is_no_ratio():
 
 def test_the_last_ingredient_is_the_combination_as_it_is():
     assert list(INGREDIENTS.values())[-1] == {}
+
+
+def test_a_hand_is_found_above_one_half(monkeypatch):
+    people = make_annotations(POINTS, range(N))
+    halves = {"image_id": range(N), "annotation_id": range(1, N + 1), "side": "left"}
+    for oks, found in ((0.5, 0), (np.nextafter(0.5, 1), N)):
+        monkeypatch.setattr(hands, "hand_oks", lambda *_, oks=oks: pd.DataFrame(halves | {"oks": oks}))
+        table = compare_hands({"basic": people}, {("basic", "d"): detections(range(4))}, "d", n_resamples=5)
+        assert table["n_found"].tolist() == [found] and table["n_hands"].tolist() == [N]

@@ -35,3 +35,30 @@ def test_every_remark_of_the_paper_is_measured_and_what_was_not_run_is_said(worl
     assert value["labelled keypoints given with a score of at least 0.3"] == pytest.approx(8 / 11)
     absent = table[table["status"] == "not run"]
     assert set(absent["detector"]) == set(MEASURES.values()) and absent["value"].isna().all()
+
+
+def test_what_is_sure_begins_at_three_tenths_and_bins_at_fifths(world):
+    source, truth, found = world
+    run = found["headless", "mediapipe-pose"][5]
+    scores = np.array([0.19, 0.2, 0.39, 0.4, 1.0])
+    run.scores[0, :5] = scores  # outside the picture
+    run.scores[0, 7:9] = 0.3, np.nextafter(0.3, 0)
+    placed, errors = placed_keypoints(truth, found, source), all_errors(truth, found)
+    bins = scores_by_state(placed, n_resamples=5).query("state == 'outside'")
+    assert bins.set_index("bin")["n"].to_dict() == {0: 1, 1: 2, 2: 1, 4: 1}
+    table = paper_remarks(placed, errors, truth, found, n_resamples=5).set_index("measure")
+    run_rows = table[table["status"] == "run"]
+    assert run_rows.loc["labelled keypoints given with a score of at least 0.3", "value"] == pytest.approx(
+        10 / 11
+    )
+    assert run_rows.loc["labelled keypoints given with a score of at least 0.3", "n"] == 11
+    below = run_rows.loc["outside the picture: mean score, less that of visible keypoints"]
+    assert below["n"] == 5 and below["value"] == pytest.approx(scores.mean() - (0.6 + 8 * 0.5) / 10)
+
+
+def test_nobody_is_not_run_under_whichever_name_the_detections_came(world):
+    source, truth, found = world
+    found = {("headless", "mmpose-imported"): found["headless", "mediapipe-pose"]}
+    placed, errors = placed_keypoints(truth, found, source), all_errors(truth, found)
+    absent = paper_remarks(placed, errors, truth, found, n_resamples=5).query("status == 'not run'")
+    assert set(absent["detector"]) == set(MEASURES.values()) - {"mmpose"} and (absent["n"] == 0).all()

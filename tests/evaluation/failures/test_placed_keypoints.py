@@ -63,3 +63,19 @@ def test_pictures_are_turned_so_that_the_cut_is_above(world, side, place):
     table = placed_keypoints(world[1], world[2], world[0]).iloc[:1]
     turned = from_the_cut(table.assign(x=place[0], y=place[1], cut_side=side))
     assert turned.to_numpy()[0] == pytest.approx([0.3, -0.1])
+
+
+def test_the_border_is_a_twentieth_of_the_picture_and_its_edge_belongs_to_it(world):
+    table = placed_keypoints(world[1], world[2], world[0]).iloc[:5].assign(given=True, y=0.5)
+    x = [0.0, -1e-9, np.nextafter(0.05, 0), 0.05, 1 - 0.049]
+    assert landed(table.assign(x=x)).tolist() == [
+        "at the border", "outside", "at the border", "inside", "at the border",
+    ]  # fmt: skip
+
+
+def test_places_are_shares_of_the_picture_from_its_outer_edge(world):
+    source, truth, found = world
+    found["headless", "mediapipe-pose"][5].keypoints_px[0, :2] = [[-0.5, -0.5], [639.5, 479.5]]
+    table = placed_keypoints(truth, found, source).set_index("keypoint")
+    assert table.loc[[0, 1], ["x", "y"]].to_numpy().tolist() == [[0, 0], [1, 1]]
+    assert table.loc[0, "cut_side"] == "top" and table.loc[0, "source_image"] == 7

@@ -19,3 +19,14 @@ def test_worst_cases_are_the_surest_mistakes_and_the_overlooked():
         ["surest mistakes", 1, 0], ["surest mistakes", 2, 1], ["overlooked", 1, 2],
     ]  # fmt: skip
     assert table["badness"].tolist() == pytest.approx([1.0, 0.5, 17])
+
+
+def test_only_visible_keypoints_are_overlooked_and_an_image_counts_once():
+    flags = np.full((3, 136), 2.0)
+    flags[1, 5:] = 1
+    extras = [{"source_image_id": 0}, {"source_image_id": 1}, {"source_image_id": 1}]
+    people = make_annotations(np.stack([POINTS] * 3), [0, 1, 2], visibility=flags, extras=extras)
+    errors = all_errors({"basic": people}, {("basic", "mediapipe-pose"): {}})
+    table = worst_cases(errors, n=4)
+    assert table[["rank", "image_id", "badness"]].to_numpy().tolist() == [[1, 0, 17], [2, 2, 17]]
+    assert worst_cases(errors, n=1)["image_id"].tolist() == [0]

@@ -97,3 +97,57 @@ def test_a_threshold_decides_which_keypoints_are_given():
         for min_score in (0.4, 0.6)
     }
     assert rates == {0.4: 0.0, 0.6: 1.0}
+
+
+def track(given):
+    """A keypoint that rests, given in some frames."""
+    return np.where(np.array(given, bool)[:, None, None], 5.0, np.nan) * np.ones((1, 1, 2))
+
+
+def test_the_filter_takes_a_keypoint_as_given_by_the_majority_of_three():
+    filtered = causal_filter(track([1, 0, 0, 1, 1, 0, 1, 0, 0]), TIMES_S[:9])
+    assert np.isfinite(filtered[:, 0, 0]).tolist() == [
+        True,
+        False,
+        False,
+        False,
+        True,
+        True,
+        True,
+        False,
+        False,
+    ]
+    np.testing.assert_allclose(filtered[np.isfinite(filtered)], 5)
+
+
+def test_after_half_a_second_the_filter_starts_anew():
+    for gap_s, carried in ((0.5, True), (0.51, False)):
+        tracks = np.array([0.0, 0.0, 100.0])[:, None, None] * np.ones((1, 1, 2))
+        filtered = causal_filter(tracks, np.array([0.0, 0.1, 0.1 + gap_s]))
+        assert (filtered[2, 0, 0] < 99) == carried and filtered[2, 0, 0] > 50
+
+
+def test_jitter_of_an_error_in_one_frame():
+    shift = np.zeros((100, 2))
+    shift[50] = [3, 4]
+    found = flicker({"d": frames(shift)}, TIMES_S, n_resamples=2).set_index(["tracks", "measure"])
+    row = found.loc[("as detected", "jitter [px]")]
+    # The second difference is 5, 10 and 5 long in three of 98 frames.
+    assert row["value"] == pytest.approx(20 / np.sqrt(6) / 98) and row["n"] == 98 * 17
+
+
+def test_half_a_second_still_counts_as_consecutive():
+    given = np.array([1, 0, 1, 1], bool)
+    for step_s, n in ((0.5, 3), (0.51, 0)):
+        found = flicker({"d": frames(np.zeros((4, 2)), given)}, np.arange(4) * step_s, n_resamples=2)
+        assert found.loc[found["measure"] == "flicker rate", "n"].iloc[0] == n * 17
+
+
+def test_intervals_are_over_stretches_of_a_second():
+    """Half of twelve seconds flicker throughout: as wide as twelve draws are, not 240."""
+    times_s = np.arange(240) / 20
+    given = (np.arange(240) % 2 == 0) | (times_s < 6)
+    row = flicker({"d": frames(np.zeros((240, 2)), given)}, times_s, n_resamples=500).iloc[0]
+    assert 0.3 < row["high"] - row["low"] < 0.75
+    few = flicker({"d": frames(np.zeros((180, 2)), given[:180])}, times_s[:180], n_resamples=500).iloc[0]
+    assert np.isnan([few["low"], few["high"]]).all()  # nine stretches

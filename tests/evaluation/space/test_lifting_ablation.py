@@ -81,3 +81,10 @@ def test_only_what_both_lift_is_compared():
 
 def test_fingers_are_all_joints_of_both_hands():
     assert len(GROUPS["fingers"]) == 40 and "left_hand_root" not in GROUPS["fingers"]
+
+
+def test_a_score_just_at_the_limit_counts_and_another_person_does_not(points, truth):
+    assert len(lifting_errors(points, truth, min_score=0.8)) == 4
+    assert len(lifting_errors(points.assign(score=0.3), truth)) == 6
+    assert len(lifting_errors(points.assign(score=np.nextafter(0.3, 0)), truth)) == 0
+    assert len(lifting_errors(points.assign(person=1), truth)) == 0

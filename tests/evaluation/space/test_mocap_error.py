@@ -131,3 +131,38 @@ def test_errors_are_grouped_by_labels(reference):
     table = me.errors_by(errors, "sight").query("part == 'elbow'").set_index("bin")
     assert table.loc["clear", ["n", "median_m"]].tolist() == pytest.approx([100, 0.01])
     assert table.loc["hidden", ["n", "median_m"]].tolist() == pytest.approx([20, 0.11])
+
+
+def test_scores_must_be_above_and_distances_at_most_the_limit(reference):
+    errors = me.mocap_errors(lifted(reference, score=0.3), reference).assign(error_m=0.05)
+    medians = me.median_errors(errors, n_resamples=5).set_index("min_score")["count"]
+    assert set(medians[0.3]) == {0} and set(medians[0.1]) == {N}
+    within = me.fractions_within(errors, 0.1, (np.nextafter(0.05, 0), 0.05), n_resamples=5)
+    assert within.groupby("threshold_m")["value"].max().tolist() == [0, 1]
+    assert me.fractions_within(errors, 0.3, (0.05,), n_resamples=5)["value"].eq(0).all()
+
+
+def test_bins_are_closed_on_the_left_and_a_score_of_one_has_its_own(reference):
+    errors = me.mocap_errors(lifted(reference, 0.01), reference).query("keypoint == 'left_wrist'")
+    scores = np.resize([0.3, 0.5, 0.7, 0.9, 1.0], len(errors))
+    errors = errors.assign(score=scores, distance_m=np.resize([0.4, 0.79, 0.8, 1.0, 3.99], N), sight="clear")
+    table = me.error_dependence(errors, 0.1)
+    of_score = table[table["by"] == "score"].set_index("bin")["n"]
+    assert of_score.to_dict() == {"0.3 to 0.5": 12, "0.5 to 0.7": 12, "0.7 to 0.9": 12, "0.9 to 1.001": 24}
+    of_distance = table[table["by"] == "distance_m"].set_index("bin")["n"]
+    assert of_distance.to_dict() == {
+        "0.4 to 0.6": 12, "0.6 to 0.8": 12, "0.8 to 1": 12, "1 to 1.2": 12, "3 to 4": 12,
+    }  # fmt: skip
+    assert table.loc[table["by"] == "sight", ["bin", "n"]].to_numpy().tolist() == [["clear", N]]
+
+
+def test_quartiles_of_the_error(reference):
+    errors = me.mocap_errors(lifted(reference, 0.001 * reference["frame"]), reference).assign(sight="clear")
+    row = me.errors_by(errors.query("keypoint == 'left_wrist'"), "sight").iloc[0]
+    quartiles = np.quantile(0.001 * np.arange(N), [0.25, 0.5, 0.75])
+    assert row[["lower_m", "median_m", "upper_m"]].tolist() == pytest.approx(quartiles.tolist())
+
+
+def test_where_nothing_was_found_the_error_depends_on_nothing(reference):
+    errors = me.mocap_errors(lifted(reference, score=0.05), reference).assign(distance_m=1.0, sight="clear")
+    assert me.error_dependence(errors).empty and "median_m" in me.error_dependence(errors)

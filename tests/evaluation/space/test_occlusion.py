@@ -55,3 +55,24 @@ def test_how_much_may_be_in_front_depends_on_the_joint(recording):
     joints = pd.DataFrame(np.repeat(point, 3, axis=0), columns=["x_m", "y_m", "z_m"])
     joints = joints.assign(frame=0, keypoint=["left_wrist", "left_elbow", "left_shoulder"])
     assert joint_occlusion(recording, joints)["sight"].tolist() == ["hidden", "clear", "clear"]
+
+
+@pytest.mark.parametrize(("joint", "margin_m"), [("wrist", 0.06), ("elbow", 0.09), ("shoulder", 0.13)])
+def test_a_joint_is_hidden_by_what_is_nearer_than_its_margin(recording, joint, margin_m):
+    """The post is 1 m away; depth is kept in millimetres."""
+    points = transform(T_BASE_CAM, np.array([[0.0, 0.0, 1.0 + margin_m + off] for off in (-0.002, 0.002)]))
+    joints = pd.DataFrame(points, columns=["x_m", "y_m", "z_m"]).assign(frame=0, keypoint=f"left_{joint}")
+    assert joint_occlusion(recording, joints)["sight"].tolist() == ["clear", "hidden"]
+
+
+def test_the_depth_is_the_median_of_five_by_five_pixels(recording):
+    """Columns 28 to 36 are the post: at column 27 two of five show it, at 28 three."""
+    points = np.array([[(u - 31.5) / 50 * 1.5, 0.0, 1.5] for u in (26.0, 27.0)])
+    joints = pd.DataFrame(transform(T_BASE_CAM, points), columns=["x_m", "y_m", "z_m"])
+    found = joint_occlusion(recording, joints.assign(frame=0, keypoint="left_wrist"))
+    assert found["sight"].tolist() == ["clear", "clear"]
+    points = np.array([[(28.0 - 31.5) / 50 * 1.5, 0.0, 1.5]])
+    joints = pd.DataFrame(transform(T_BASE_CAM, points), columns=["x_m", "y_m", "z_m"])
+    assert joint_occlusion(recording, joints.assign(frame=0, keypoint="left_wrist"))["sight"].tolist() == [
+        "hidden"
+    ]

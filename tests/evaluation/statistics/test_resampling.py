@@ -51,3 +51,7 @@ def test_the_interval_of_a_mean_is_as_wide_as_theory_says():
     weights = draw_counts(400, 2000, seed=0)
     _, low, high = with_interval(weights @ values / 400)
     np.testing.assert_allclose(high - low, 2 * 1.96 * values.std() / 20, rtol=0.06)
+
+
+def test_ten_images_are_drawn_again():
+    assert draw_counts(10, 50, seed=3).shape == (51, 10)

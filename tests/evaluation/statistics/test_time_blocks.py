@@ -62,3 +62,20 @@ def test_intervals_of_lasting_errors_cover_the_mean_where_single_frames_do_not()
             low, high = np.percentile(weights @ series / 480, [2.5, 97.5])
             covered[length] += low <= 0 <= high
     assert covered[40] > 45 and covered[1] < 35
+
+
+def test_blocks_are_as_long_as_the_rule_says():
+    """Sherman, Speed and Speed's length of an autoregressive process, from the signs' correlation."""
+    signs = np.sign(autoregressive(0.6, 480) - np.median(autoregressive(0.6, 480), axis=0))
+    rho = np.sin(np.pi / 2 * (signs[1:] * signs[:-1]).mean())
+    expected = 480 ** (1 / 3) * (np.sqrt(6) * rho / (1 - rho**2)) ** (2 / 3)
+    assert block_length(autoregressive(0.6, 480)) == np.ceil(expected)
+
+
+def test_eight_frames_are_the_fewest_and_a_quarter_of_them_the_longest():
+    rising = np.arange(100.0)[:, None]
+    assert [block_length(rising[:n]) for n in (7, 8, 100)] == [1, 2, 25]
+
+
+def test_ten_blocks_are_drawn_again_and_nine_are_not():
+    assert len(draw_blocks(100, 10, 5, 0)) == 6 and len(draw_blocks(90, 10, 5, 0)) == 1
