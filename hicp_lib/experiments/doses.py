@@ -33,6 +33,7 @@ from hicp_lib.experiments.laboratory import PHOTOGRAPHIC, adult, facing_robot, f
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.simulation.appearance import materials as m
 from hicp_lib.simulation.appearance.people import dress
+from hicp_lib.simulation.batch import worker_pool
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
 from hicp_lib.simulation.rendering import mesh as g
@@ -40,7 +41,6 @@ from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at
 from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
 from hicp_lib.simulation.rendering.render import Frame, World, render
 from hicp_lib.simulation.rendering.surfaces import Surface
-from hicp_lib.simulation.world.scenes import worker_pool
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
 LEVELS: dict[str, tuple[float, ...]] = {

@@ -30,7 +30,7 @@ from hicp_lib.experiments.avoidance.closed_loop import Trial, TrueKeypoints, sim
 from hicp_lib.experiments.avoidance.head_camera import Album, DetectorEyes, Sight
 from hicp_lib.experiments.avoidance.reaching import in_root, script
 from hicp_lib.robot.controller import PUBLISHED
-from hicp_lib.simulation.world.scenes import worker_pool
+from hicp_lib.simulation.batch import worker_pool
 
 NO_AVOIDANCE, TRUE_KEYPOINTS = "no avoidance", "ground truth"
 PUBLISHED_GAINS = "ground truth, published gains"

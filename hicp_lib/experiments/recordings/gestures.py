@@ -15,7 +15,7 @@ from hicp_lib.simulation.body.joints import pose_from_joints, within_limits
 from hicp_lib.simulation.body.model import Body, PosedBody, pose_body
 from hicp_lib.simulation.body.poses import sample_joints
 from hicp_lib.simulation.body.reach import reach
-from hicp_lib.simulation.body.self_collision import clearance_m, outline
+from hicp_lib.simulation.body.self_collision import collision_model, self_collision_distance_m
 
 Rng = np.random.Generator
 
@@ -40,7 +40,7 @@ class Mover:
 
     def __init__(self, rng: Rng, body: Body, shape: np.ndarray):
         self.rng, self.body, self.shape = rng, body, shape
-        self.person = outline(body, shape)
+        self.person = collision_model(body, shape)
         self.place_m = (0.0, DISTANCE_M)
         self.legs = {
             name: angle
@@ -134,7 +134,7 @@ class Mover:
         """Whether the person can go to a posture without running through themselves."""
         ways = [between(self.now, posture, share).joints for share in np.linspace(0.125, 1, 8)]
         return within_limits(posture.joints) and all(
-            clearance_m(self.body, self.person, pose_from_joints(way)) > -_PENETRATION_M for way in ways
+            self_collision_distance_m(self.body, self.person, pose_from_joints(way)) > -_PENETRATION_M for way in ways
         )
 
 

@@ -16,16 +16,24 @@ from hicp_lib.simulation.rendering.surfaces import Surface
 with with_variables(OPEN3D_DISABLE_WEB_VISUALIZER="true"):
     import open3d as o3d
 
+DEPTH_STEP = 0.03  # neighbours whose depths differ by a larger share lie on different surfaces
 N_THREADS = 1  # frames are rendered in parallel by processes; one scene takes calls from one thread only
 
 
 @dataclass(frozen=True)
 class Trace:
-    """The first thing each ray met; every array has n rows.
+    """The first thing each of n rays met.
 
-    `depth_m` is the ray parameter (infinite: nothing hit), `triangle` the triangle's number in
-    the whole scene (-1: nothing), `surface` the surface's number (-1: nothing), `barycentric`
-    the weights of the triangle's second and third corner.
+    Attributes
+    ----------
+    depth_m : array of float32, shape (n,)
+        The ray parameter; infinite: nothing was hit.
+    triangle : array of int32, shape (n,)
+        Number of the triangle in the whole scene; -1: nothing.
+    surface : array of int16, shape (n,)
+        Number of the surface; -1: nothing.
+    barycentric : array of float32, shape (n, 2)
+        Weights of the triangle's second and third corner.
     """
 
     depth_m: np.ndarray
@@ -35,7 +43,21 @@ class Trace:
 
 
 class RayScene:
-    """Surfaces that rays can be cast at."""
+    """Surfaces that rays can be cast at.
+
+    Parameters
+    ----------
+    surfaces : list of Surface
+
+    Examples
+    --------
+    >>> from hicp_lib.simulation.appearance.materials import plain
+    >>> from hicp_lib.simulation.rendering.mesh import box
+    >>> scene = RayScene([Surface(box([-1, 2, -1], [1, 3, 1]), plain(np.zeros(3)))])
+    >>> rays = np.array([[0, 0, 0, 0, 1, 0], [0, 0, 0, 0, -1, 0]], np.float32)
+    >>> scene.trace(rays).depth_m, scene.trace(rays).surface
+    (array([ 2., inf], dtype=float32), array([ 0, -1], dtype=int16))
+    """
 
     def __init__(self, surfaces: list[Surface]):
         self.surfaces = surfaces
@@ -101,11 +123,24 @@ def trace_image(scene: RayScene, centre_m: np.ndarray, directions: np.ndarray, f
 
     Every second row and column is traced. Between four of those that meet one and the same
     triangle the rest is known: 1 / depth is linear over a plane's image. Everything else is
-    traced as well, and so is all that lies near surfaces with a true `fine` (one per surface).
-    Rows of the answer are the image's pixels; `barycentric` is left undefined between traced ones.
+    traced as well.
+
+    Parameters
+    ----------
+    scene : RayScene
+    centre_m : array, shape (3,)
+        Where the rays begin.
+    directions : array, shape (3, height, width)
+    fine : array of bool, shape (n_surfaces,)
+        Near which surfaces all is traced.
+
+    Returns
+    -------
+    Trace
+        Its rows are the image's pixels; `barycentric` is left undefined between traced ones.
     """
     height, width = directions.shape[1:]
-    every_second = (slice(None, None, 2), slice(None, None, 2))
+    every_second = np.s_[::2, ::2]
     coarse = scene.trace(join_rays(centre_m, directions[:, ::2, ::2].reshape(3, -1)))
     coarse_shape = (-(-height // 2), -(-width // 2))
     triangle = coarse.triangle.reshape(coarse_shape)

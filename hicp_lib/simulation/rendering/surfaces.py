@@ -20,8 +20,10 @@ class Hits:
 
     Attributes
     ----------
-    footprint_m : how wide one pixel is at the hit, (n,)
-    interpolate : gives the mesh's coords at the hits
+    footprint_m : array, shape (n,)
+        How wide one pixel is at the hit.
+    interpolate : callable
+        Gives the mesh's coords at the hits, (n_coords, n).
     """
 
     footprint_m: np.ndarray
@@ -39,12 +41,18 @@ class Look:
 
     Attributes
     ----------
-    albedo : linear RGB, (3, n), or (3, 1) where it is the same all over
-    height_m : bump height that tilts the normal, (n,) or 0
-    gloss : strength of the highlight, (n,) or a number; 0.04 is a dielectric's
-    roughness : of the highlight, (n,) or a number in (0, 1]
-    softness : how far light creeps past the terminator, as in skin, (n,) or a number
-    glow : light given off, linear RGB, (3, n), (3, 1) or 0
+    albedo : array, shape (3, n) or (3, 1)
+        Linear RGB; one column where it is the same all over.
+    height_m : array, shape (n,), or float
+        Bump height that tilts the normal.
+    gloss : array, shape (n,), or float
+        Strength of the highlight; 0.04 is a dielectric's.
+    roughness : array, shape (n,), or float
+        Of the highlight, in (0, 1].
+    softness : array, shape (n,), or float
+        How far light creeps past the terminator, as in skin.
+    glow : array, shape (3, n) or (3, 1), or float
+        Light given off, linear RGB.
     """
 
     albedo: np.ndarray
@@ -60,7 +68,18 @@ Material = Callable[[Hits], Look]
 
 @dataclass(frozen=True)
 class Surface:
-    """A mesh with a material. `person` is whose it is (-1: nobody's), `parts` the body part per triangle."""
+    """A mesh with a material.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    material : callable
+        Tells what it looks like where it is hit.
+    person : int
+        Whose it is; -1: nobody's.
+    parts : array of int16, shape (n_triangles,), or None
+        Body part per triangle.
+    """
 
     mesh: Mesh
     material: Material
