@@ -18,10 +18,18 @@ def open_experiment(
 
     Parameters
     ----------
-    scenario : "relative-upper", "relative-lower" or "mocap"; simulated when no folder is given
-    recording : folder of a lab's own recording
-    n_frames : how many frames, from the first; all of them when left out
-    seed : of the simulation
+    scenario : str
+        "relative-upper", "relative-lower" or "mocap"; simulated when no folder is given.
+    recording : str or Path, optional
+        Folder of a lab's own recording.
+    n_frames : int, optional
+        How many frames, from the first; all of them when left out.
+    seed : int, optional
+        Of the simulation.
+
+    Returns
+    -------
+    Recording
 
     Raises
     ------

@@ -66,7 +66,7 @@ def count_seeing(scene: RayScene, points_m: np.ndarray, cameras_m: np.ndarray) -
     return (~hidden).reshape(m, c).sum(axis=1)
 
 
-def watch(
+def track_markers(
     person_at: Callable[[float], PosedBody],
     vertices: np.ndarray,
     fixed_m: np.ndarray,
