@@ -15,8 +15,6 @@ The area in the annotations, the s² of OKS, is that of the whole unhidden perso
 that the same error in body sizes counts the same at every level.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial

@@ -5,8 +5,6 @@ backward, y to its right, z up) lies above the world's origin, as high as when a
 on its stand: 0.6 m above the floor is assumed. The robot itself is not drawn.
 """
 
-from __future__ import annotations
-
 from dataclasses import astuple
 from itertools import product
 

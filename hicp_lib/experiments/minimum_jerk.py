@@ -5,8 +5,6 @@ from rest to rest, and how people's arms move (Flash and Hogan, *The Coordinatio
 J. Neuroscience 1985). Joints stay within the ranges of the postures, so within their limits.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field

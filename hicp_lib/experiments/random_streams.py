@@ -4,8 +4,6 @@ A stream is the seed and numbers after it, which `numpy.random.SeedSequence` mix
 photographs put their own number or name there; whole scenes the number of a stream below.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 SEATED_PERSON = 1

@@ -1,7 +1,5 @@
 """Many results at once: processes that simulate, and the folders they write to."""
 
-from __future__ import annotations
-
 import multiprocessing
 import multiprocessing.pool
 import os

@@ -4,8 +4,6 @@ Time advances in the controller's periods. Joints follow their velocities exactl
 camera's rate, but only when the one before is done with; what was perceived reaches the loop after a delay.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Protocol
 

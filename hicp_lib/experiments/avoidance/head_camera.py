@@ -4,8 +4,6 @@ The camera sits on the moving robot and sees the robot's own arms; keypoints on 
 where the robot is, is known.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import MutableMapping
 from dataclasses import dataclass, field

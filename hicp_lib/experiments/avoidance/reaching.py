@@ -6,8 +6,6 @@ far again. Unless the robot gives way, the person's skin comes within `CONTACT_M
 the hand: where they go is decided beforehand.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 

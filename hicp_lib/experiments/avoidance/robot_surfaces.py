@@ -1,7 +1,5 @@
 """The robot's torso and arms as surfaces to render: its own camera sees them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

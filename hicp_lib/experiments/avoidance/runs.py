@@ -4,8 +4,6 @@ A run is cached under a key of all it depends on: trial, condition, delay, the d
 weights, and the code and data of simulation, lifting, robot and detectors.
 """
 
-from __future__ import annotations
-
 import math
 import multiprocessing
 from collections.abc import Iterable

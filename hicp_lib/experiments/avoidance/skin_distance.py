@@ -4,8 +4,6 @@ The robot is its taxels, and its arms as thick lines; the person is the skin of 
 clothes and hair. Fingers of the robot are not modelled.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import cKDTree
 

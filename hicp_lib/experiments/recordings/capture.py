@@ -4,8 +4,6 @@ The system has a clock and a world frame of its own: it starts before the camera
 clock shows something else. What both truly are goes into `simulation.json`, for comparison only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

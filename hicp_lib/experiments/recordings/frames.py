@@ -1,7 +1,5 @@
 """One frame of a simulated recording: colour, depth as it is measured and as it is, where the person is."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hicp_lib.core.memo import memoised

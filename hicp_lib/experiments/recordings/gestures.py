@@ -2,8 +2,6 @@
 the table between them, steps aside.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np

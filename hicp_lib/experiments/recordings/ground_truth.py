@@ -1,7 +1,5 @@
 """What makes finished frames a simulated recording: truth and joints as tables, settings, the lists."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 

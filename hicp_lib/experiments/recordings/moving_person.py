@@ -1,7 +1,5 @@
 """A person who moves before the robot, watched by motion capture; the robot stands still."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

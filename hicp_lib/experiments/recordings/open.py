@@ -1,7 +1,5 @@
 """The recordings the study's notebooks look at: a lab's own, or simulated once and kept in the cache."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The recordings that can be simulated: who is before the robot, and how either of them moves."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

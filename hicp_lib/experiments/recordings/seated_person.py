@@ -3,8 +3,6 @@
 The person sits at one place in one posture for the whole recording; only the robot moves.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hicp_lib.experiments.laboratory import chair, facing_robot, furnished, random_adult, table

@@ -4,8 +4,6 @@ Frame k depends on scenario, seed and k only, so the number of processes changes
 longer recording begins with the shorter one.
 """
 
-from __future__ import annotations
-
 import shutil
 from functools import partial
 from pathlib import Path

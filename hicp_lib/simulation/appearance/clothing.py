@@ -5,8 +5,6 @@ On a posed body, the cut's vertices are smoothed as cloth bridges hollows, kept 
 thickness away from the skin, and folded.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Fabrics: patterns that follow the cloth, weave, folds and seams."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

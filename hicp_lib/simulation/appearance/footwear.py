@@ -1,7 +1,5 @@
 """Shoes: a closed tube around each foot, which hides the toes, on a sole."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ rounded bundle of strands. They grow on the body at rest and are then carried al
 head and, further down, by the back.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

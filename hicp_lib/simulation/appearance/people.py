@@ -1,7 +1,5 @@
 """People: a posed body with skin, hair and clothes, as surfaces to render."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, replace
 

@@ -3,8 +3,6 @@
 They return None where the limits of the joints do not allow what was drawn; draw again.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

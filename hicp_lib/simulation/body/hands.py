@@ -1,7 +1,5 @@
 """Hands: open, relaxed, gripping, as a fist, pointing, spread."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hicp_lib.simulation.body.joints import FINGERS, LIMITS_DEG

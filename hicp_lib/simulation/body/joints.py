@@ -7,8 +7,6 @@ middle), inward rotation (the toes or the bent forearm turn to the middle), supi
 palm turns forward), deviation towards the thumb, a turn or bend to the person's left.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

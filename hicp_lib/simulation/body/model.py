@@ -11,8 +11,6 @@ shape. The mesh is skinned linearly. `tools/bake_body.py` makes the data from An
 names sources and licences.
 """
 
-from __future__ import annotations
-
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -363,30 +361,26 @@ def _unpack(stored) -> Body:
     np.put_along_axis(skin, bones, weights, axis=1)
     keypoints = np.zeros((N_KEYPOINTS, n_v + n_bones), np.float32)
     keypoints[stored["keypoint_rows"], stored["keypoint_columns"]] = stored["keypoint_values"]
-    arrays = dict(
+    return Body(
         vertices_m=vertices,
-        heads_m=stored["heads_m"].astype(float),
-        to_reference=stored["to_reference"].astype(float),
-        bone_parents=stored["bone_parents"].astype(int),
         skin_weights=skin / skin.sum(axis=1, keepdims=True),
-        triangles=stored["triangles"].astype(np.int32),
         keypoint_weights=keypoints / keypoints.sum(axis=1, keepdims=True),
-        regions=stored["regions"].astype(int),
-        fields=stored["fields"].astype(np.float32),
+        **{name: stored[name].astype(kind) for name, kind in _STORED.items()},
+        **{name: tuple(map(str, stored[name])) for name in ("shape_names", "bone_names")},
     )
-    names = {key: tuple(str(n) for n in stored[key]) for key in ("shape_names", "bone_names")}
-    return Body(**arrays, **names)
+
+
+_STORED = {"heads_m": float, "to_reference": float, "bone_parents": int, "triangles": np.int32,
+           "regions": int, "fields": np.float32}  # fmt: skip
 
 
 def _check(body: Body, path: Path) -> None:
     n_v, n_bones = body.skin_weights.shape
+    numbers = (body.vertices_m, body.heads_m, body.skin_weights, body.keypoint_weights, body.fields)
     problems = {
         "triangles name missing vertices": body.triangles.min() < 0 or body.triangles.max() >= n_v,
         "bones do not follow their parents": (body.bone_parents >= np.arange(n_bones)).any(),
-        "numbers are not finite": not all(
-            np.isfinite(a).all()
-            for a in (body.vertices_m, body.heads_m, body.skin_weights, body.keypoint_weights, body.fields)
-        ),
+        "numbers are not finite": not all(np.isfinite(array).all() for array in numbers),
         "regions are unknown": body.regions.min() < 0 or body.regions.max() >= len(REGIONS),
         "fields do not match": body.fields.shape != (n_v, len(FIELDS)),
     }

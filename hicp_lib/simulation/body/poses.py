@@ -5,8 +5,6 @@ degrees, arms that go to a place are solved by `reach`, and a pose in which the 
 itself is drawn again with more room for the arms.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

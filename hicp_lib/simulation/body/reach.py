@@ -1,7 +1,5 @@
 """Bringing a wrist to a point: inverse kinematics of an arm of two segments."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

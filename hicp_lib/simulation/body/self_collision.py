@@ -4,8 +4,6 @@ A cheap test on the bones alone, for rejecting poses in which the body runs thro
 trunk is a stack of elliptic slices, the head an ellipsoid, limbs are rows of spheres.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

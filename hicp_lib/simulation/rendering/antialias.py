@@ -7,8 +7,6 @@ points of a rotated square, mirrored from pixel to pixel so that neighbours shar
 counts as a fifth sample.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hicp_lib.simulation.rendering.camera import PlacedCamera, join_rays, ray_parts

@@ -1,7 +1,5 @@
 """A pinhole camera: rays through pixels, and points onto pixels."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

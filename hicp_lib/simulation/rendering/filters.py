@@ -1,7 +1,5 @@
 """Image-space steps of the renderer: bumps from heights, and sums that do not cross edges."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The G-buffer: geometry and material of what each pixel shows, where its ray met it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from functools import partial
 
@@ -41,7 +39,7 @@ class GBuffer:
     @classmethod
     def of(
         cls, trace: Trace, centre_m: np.ndarray, directions: np.ndarray, part: tuple[slice, slice], wanted
-    ) -> GBuffer:
+    ) -> "GBuffer":
         """Some rows and columns of an image, and of these what is wanted.
 
         Parameters
@@ -91,7 +89,7 @@ class Shading:
     roughness: np.ndarray
     softness: np.ndarray
 
-    def part(self, block: slice) -> Shading:
+    def part(self, block: slice) -> "Shading":
         """Some of the pixels."""
         return Shading(*(getattr(self, field.name)[..., block] for field in fields(self)))
 

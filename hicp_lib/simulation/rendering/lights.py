@@ -7,8 +7,6 @@ sampling: Keller and Heidrich, 2001). Highlights are Cook-Torrance with the GGX 
 Vectors have their components first, (3, n).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

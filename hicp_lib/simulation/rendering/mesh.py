@@ -1,7 +1,5 @@
 """Triangle meshes: normals, cuts, hems and the simple solids furniture is made of."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

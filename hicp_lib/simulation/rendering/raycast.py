@@ -1,7 +1,5 @@
 """Rays against surfaces, through Open3D's RaycastingScene."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

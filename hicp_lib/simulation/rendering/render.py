@@ -1,7 +1,5 @@
 """From surfaces, lights and a camera to what the camera sees: colour, depth, people and parts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """How much of each light every pixel sees: one ray towards a point of each light, then a filter."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hicp_lib.simulation.rendering import lights

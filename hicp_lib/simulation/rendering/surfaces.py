@@ -1,7 +1,5 @@
 """What a renderer needs to know of things: surfaces, the hits of rays on them, their looks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

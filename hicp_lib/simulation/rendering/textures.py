@@ -4,8 +4,6 @@ A tile holds mixing weights or a height, not colours: a scene chooses the colour
 tile serves every paint, wood and cloth. Tiles are made once per process from fixed seeds.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

@@ -1,7 +1,5 @@
 """Markers as someone would click them: where they are in the image, with the error of a hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 
@@ -28,13 +26,22 @@ def simulate_clicks(
 
     Parameters
     ----------
-    T_base_mocap : array, shape (4, 4); the true one
-    noise_px : standard deviation of a click in u and in v
-    offset_s : to add to the motion capture's stamps to have them on the camera's clock; the true one
+    recording : Recording
+        A simulated one.
+    mocap : MotionCapture
+    T_base_mocap : array, shape (4, 4)
+        The true one.
+    n_images : int
+    noise_px : float
+        Standard deviation of a click in u and in v.
+    offset_s : float, optional
+        To add to the motion capture's stamps to have them on the camera's clock; the true one.
+    seed : int, optional
 
     Returns
     -------
-    DataFrame, columns as `hicp_lib.mocap.clicking.read_clicks`
+    DataFrame
+        Columns as `hicp_lib.mocap.clicking.read_clicks`.
     """
     rng = np.random.default_rng(seed)
     tables = []
@@ -45,11 +52,9 @@ def simulate_clicks(
         points_m = transform(T_cam_mocap, markers_m)
         pixels_px = project(recording.intrinsics, points_m)
         seen = _is_seen(pixels_px, points_m[:, 2], read_exact_depth_m(recording, int(frame)))
-        clicked_px = pixels_px + rng.normal(0, noise_px, pixels_px.shape)
-        table = pd.DataFrame(clicked_px, columns=["u_px", "v_px"])
-        table.insert(0, "marker", list(mocap.names))
-        table.insert(0, "frame", int(frame))
-        tables.append(table[seen])
+        u_px, v_px = (pixels_px + rng.normal(0, noise_px, pixels_px.shape)).T
+        columns = {"frame": int(frame), "marker": list(mocap.names), "u_px": u_px, "v_px": v_px}
+        tables.append(pd.DataFrame(columns)[seen])
     return pd.concat(tables, ignore_index=True)
 
 

@@ -7,8 +7,6 @@ Sweetser, Woodfill) for the noise, the D435's data sheet for geometry and invali
 for units, range and alignment; the book's page on simulated sensors has the formulas.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import cv2
@@ -36,20 +34,36 @@ class DepthCamera:
 
     Attributes
     ----------
-    width_px, height_px, focal_px : of the left imager; its principal point is the middle
-    baseline_m : from the left to the right imager
-    colour_offset_m : from the colour camera to the left imager
-    subpixel_rms_px : standard deviation of disparity; z**2 * subpixel_rms_px / (f B) in depth
-    window_px : side of the matching window, odd; noise is correlated over about this much
-    edge_px : width of the slope of flying pixels between two depths; 0 makes depth steps sharp
-    edge_holes : share of that slope that gets no depth
-    disparity_step_px : what disparity is a multiple of
-    depth_units_per_m : what depth is a multiple of
-    searched_px : largest disparity that is searched; nearer than f B / searched_px there is no depth
-    max_range_m : no depth beyond
-    left_band : no depth where the right imager's image ends, at the left edge
-    shadow : no depth where something hides the surface from the right imager
-    hair_holes : share of hair that gives no depth
+    width_px, height_px : int
+        Of the left imager; its principal point is the middle.
+    focal_px : float
+        Of the left imager.
+    baseline_m : float
+        From the left to the right imager.
+    colour_offset_m : float
+        From the colour camera to the left imager.
+    subpixel_rms_px : float
+        Standard deviation of disparity; z**2 * subpixel_rms_px / (f B) in depth.
+    window_px : int
+        Side of the matching window, odd; noise is correlated over about this much.
+    edge_px : float
+        Width of the slope of flying pixels between two depths; 0 makes depth steps sharp.
+    edge_holes : float
+        Share of that slope that gets no depth.
+    disparity_step_px : float
+        What disparity is a multiple of.
+    depth_units_per_m : float
+        What depth is a multiple of.
+    searched_px : float
+        Largest disparity that is searched; nearer than f B / searched_px there is no depth.
+    max_range_m : float
+        No depth beyond.
+    left_band : bool
+        No depth where the right imager's image ends, at the left edge.
+    shadow : bool
+        No depth where something hides the surface from the right imager.
+    hair_holes : float
+        Share of hair that gives no depth.
     """
 
     width_px: int = 848

@@ -1,7 +1,5 @@
 """Furniture and clutter, built of boxes and turned shapes; floor at z = 0, metres."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from itertools import product
 
@@ -126,7 +124,7 @@ def _boxes(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
         a, b, h = rng.uniform([0.15, 0.12, 0.12], [0.3, 0.25, 0.4])
         mesh = g.box(place + [-a, -b, z], place + [a, b, z + h], yaw + rng.normal(0, 0.15))
         colour = np.array([0.42, 0.28, 0.15]) if rng.random() < 0.6 else m.any_colour(rng)
-        surfaces.append(Surface(mesh, m.paint(rng, colour, 0.1)))
+        surfaces.append(Surface(mesh, m.paint(colour, 0.1)))
         z += h
     return surfaces
 

@@ -3,8 +3,6 @@
 World frame: z up, floor at z = 0, metres. The room is a box around the origin.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -104,7 +102,7 @@ def _shell(rng: Rng, half: np.ndarray, height: float, walls: list[_Wall]) -> lis
     if rng.random() < 0.5:
         floor = g.quad([x, -y, 0], [0, 2 * y, 0], [-2 * x, 0, 0])
     ceiling = g.quad([-x, y, height], [2 * x, 0, 0], [0, -2 * y, 0])
-    surfaces = [Surface(floor, m.random_floor(rng)), Surface(ceiling, m.paint(rng, m.off_white(rng), 0.03))]
+    surfaces = [Surface(floor, m.random_floor(rng)), Surface(ceiling, m.paint(m.off_white(rng), 0.03))]
     paint = m.random_wall(rng)
     accent = int(rng.integers(0, 8))  # often, one wall differs
     for number, wall in enumerate(walls):

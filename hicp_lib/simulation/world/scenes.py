@@ -5,8 +5,6 @@ image would be five times as large and tell no more. Image k depends on the seed
 the number of worker processes changes nothing, and a larger data set contains the smaller one.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Staging: who stands where, in what room and light, and where the photograph is taken from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import chain
 

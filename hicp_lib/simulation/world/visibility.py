@@ -1,7 +1,5 @@
 """Which keypoints a camera sees."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hicp_lib.core.keypoints import HANDS, INDEX, N_KEYPOINTS
