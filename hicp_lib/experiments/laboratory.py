@@ -144,7 +144,20 @@ def table(rng: Rng, low_m: tuple[float, float], high_m: tuple[float, float], hei
 
 
 def chair(rng: Rng, middle_m: tuple[float, float], seat_m: float) -> list[Surface]:
-    """A chair that faces the robot: its seat's middle (x, y) and height; the back is behind it."""
+    """A chair that faces the robot.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    middle_m : tuple of 2 float
+        Of its seat (x, y); the back is behind it.
+    seat_m : float
+        Height of its seat.
+
+    Returns
+    -------
+    list of Surface
+    """
     x, y = middle_m
     half, back, below_m, top_m = 0.215, y + 0.2, seat_m - 0.045, seat_m + 0.42
     inset = (-half + 0.03, half - 0.03)

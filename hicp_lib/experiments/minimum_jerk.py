@@ -31,7 +31,19 @@ class Move:
 
 
 def between(a: Posture, b: Posture, share: float) -> Posture:
-    """The posture a share (0 to 1) of the way from `a` to `b`; joints one of them lacks are at zero there."""
+    """The posture a share of the way from one to another.
+
+    Parameters
+    ----------
+    a, b : Posture
+        Joints that one of them lacks are at zero there.
+    share : float
+        0 to 1.
+
+    Returns
+    -------
+    Posture
+    """
     names = [*a.joints | b.joints]  # in the same order in every process, as those of a set are not
     start, end = (np.array([p.joints.get(name, 0.0) for name in names]) for p in (a, b))
     place = np.array(a.place_m) + share * (np.array(b.place_m) - a.place_m)

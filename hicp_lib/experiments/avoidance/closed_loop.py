@@ -124,6 +124,19 @@ def simulate(
 def next_image_s(taken_s: float, delay_s: float, camera_hz: float) -> float:
     """When the next image is taken: the camera's first one after the last is done with.
 
+    Parameters
+    ----------
+    taken_s : float
+        When the last image was taken.
+    delay_s : float
+        How long it is worked on.
+    camera_hz : float
+
+    Returns
+    -------
+    float
+        Seconds.
+
     Examples
     --------
     >>> next_image_s(1.0, delay_s=0.15, camera_hz=10.0)

@@ -19,6 +19,7 @@ from hicp_lib.core.cache import key
 from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import atomic_path, cache_dir
+from hicp_lib.core.images import decode_image
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.results import identity
@@ -138,10 +139,10 @@ def choose(runs: Iterable[Run], name: str, condition: str) -> Run:
 
 def image(frame: pd.Series) -> tuple[np.ndarray, Detections]:
     """The picture of a row of `Run.frames`, RGB uint8, and what was detected, in the picture's pixels."""
-    bgr = cv2.imdecode(np.frombuffer(frame["jpeg"], np.uint8), cv2.IMREAD_COLOR)
     keypoints_px = (_array(frame["keypoints_px"], 2) + 0.5) * (_SHOWN_PX[0] / COLOUR.width_px) - 0.5
     scores = _array(frame["scores"], 1)[..., 0]
-    return np.ascontiguousarray(bgr[..., ::-1]), Detections(keypoints_px, scores, np.ones(len(scores)))
+    rgb = decode_image(frame["jpeg"], _TABLES[1])
+    return rgb, Detections(keypoints_px, scores, np.ones(len(scores)))
 
 
 def keypoints_m(frame: pd.Series) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -89,7 +89,20 @@ def capture(
 
 
 def marker_balls(person: PosedBody, vertices: np.ndarray, number: int) -> list[Surface]:
-    """The markers on person `number` as grey balls; each counts as the part of the body it is taped to."""
+    """The markers on a person as grey balls; each counts as the part of the body it is taped to.
+
+    Parameters
+    ----------
+    person : PosedBody
+    vertices : array of int, shape (12,)
+        See `sensors.markers.marker_vertices`.
+    number : int
+        Of the person.
+
+    Returns
+    -------
+    list of Surface
+    """
     parts = part_of_vertices(load_body())[vertices]
     balls = [_ball(centre_m) for centre_m in markers_m(person, vertices)]
     owner = np.repeat(parts, [len(ball.triangles) for ball in balls])

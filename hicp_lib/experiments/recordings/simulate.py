@@ -105,7 +105,17 @@ def _prepare(out: Path, stamp: dict) -> None:
 
 
 def record_one(out: Path, name: str, seed: int, k: int) -> None:
-    """Write the images of a frame, then its truth: a frame counts as finished when that is there."""
+    """Write the images of a frame, then its truth: a frame counts as finished when that is there.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the recording.
+    name : str
+        Of the scenario.
+    seed, k : int
+        The frame's number is `k`.
+    """
     rgb, depth_m, exact_m, truth = record_frame(name, seed, k)
     write_rgb(out / rgb_name(k), rgb)
     exact = out / EXACT_DEPTH_DIR / Path(depth_name(k)).name
@@ -116,10 +126,9 @@ def record_one(out: Path, name: str, seed: int, k: int) -> None:
 
 def _capture_all(out: Path, name: str, seed: int, n: int) -> None:
     """Write motion capture of `n` frames, unless it is there."""
-    part = out / PARTS_DIR / MOCAP_PART
-    if part.exists() and read_json(part)["n_frames"] == n:
+    part, plan = out / PARTS_DIR / MOCAP_PART, scenario(name)
+    if plan.capture is None or (part.exists() and read_json(part)["n_frames"] == n):
         return
-    plan = scenario(name)
     found = plan.capture(seed, float(plan.times_s(n)[-1]), T_WORLD_ROOT @ camera_poses(plan, 1)[0])
     write_tsv(out / MOCAP_FILE, found.exported)
     if len(found.exported.times_s) < MAX_C3D_FRAMES:  # a longer one is in the TSV file alone

@@ -9,7 +9,7 @@ import numpy as np
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.simulation.appearance.materials import any_colour, hsv, linear
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 
 Rng = np.random.Generator
 
@@ -80,7 +80,7 @@ def panel_coordinates(panels: Panels, coords: np.ndarray, limbs: str) -> tuple[n
     uv = np.empty((2, len(arm)), np.float32)
     for number in range(len(panels.axes)):
         rows = np.flatnonzero(panel == number)
-        local = rest.take(rows, axis=1) - np.float32(panels.origins_m[number])[:, None]
+        local = rest.take(rows, axis=1) - column(panels.origins_m[number])
         axis, front = np.float32(panels.axes[number]), np.float32(panels.fronts[number])
         side = np.cross(axis, front).astype(np.float32)
         around = np.arctan2(side @ local, front @ local) * np.float32(panels.radii_m[number])
@@ -235,7 +235,7 @@ def cloth_material(fabric: Fabric, panels: Panels, limbs: str, trim: Trim) -> Ma
     callable
         For meshes with `clothing.put_on`'s coords.
     """
-    base = np.float32(fabric.colours[0])[:, None]
+    base = column(fabric.colours[0])
     extra = (np.float32(fabric.colours[1:3]) - np.float32(fabric.colours[:1])).T
 
     def look(hits: Hits) -> Look:

@@ -9,7 +9,7 @@ from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.body.model import PosedBody, load_body
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def _tube(local: np.ndarray, thickness: float) -> np.ndarray:
 
 def shoe_material(shoes: Shoes) -> Material:
     """Upper, sole, a seam over the toes and laces."""
-    upper, sole = np.float32(shoes.upper)[:, None], np.float32(shoes.sole)[:, None]
+    upper, sole = column(shoes.upper), column(shoes.sole)
 
     def look(hits: Hits) -> Look:
         along, across, height = hits.coords

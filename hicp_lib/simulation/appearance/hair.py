@@ -13,7 +13,7 @@ import numpy as np
 from hicp_lib.simulation.body.model import Body, PosedBody
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 
 Rng = np.random.Generator
 
@@ -374,10 +374,8 @@ def _ribbons(style: Style, head: Obstacles, points: np.ndarray, length: np.ndarr
     coords[..., 3] = t[:, None]
     strip = g.grid_triangles(k, 2)
     triangles = (np.arange(n)[:, None, None] * (2 * k) + strip).reshape(-1, 3).astype(np.int32)
-    vertices, normals, coords = (
-        x.reshape(-1, x.shape[-1]).astype(np.float32) for x in (vertices, normals, coords)
-    )
-    return g.Mesh(vertices, triangles, normals, coords)
+    flat = [x.reshape(-1, x.shape[-1]).astype(np.float32) for x in (vertices, normals, coords)]
+    return g.Mesh(flat[0], triangles, flat[1], flat[2])
 
 
 def carry(
@@ -415,7 +413,7 @@ def carry(
 
 def hair_material(colour: np.ndarray) -> Material:
     """Hair: locks of slightly different colour, single strands, darker at the roots."""
-    colour = np.float32(colour)[:, None]
+    colour = column(colour)
 
     def look(hits: Hits) -> Look:
         across, along, lock, t = hits.coords

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 from hicp_lib.simulation.rendering.textures import Texture
 
 Rng = np.random.Generator
@@ -26,7 +26,16 @@ def linear(srgb: ArrayLike) -> np.ndarray:
 
 
 def hsv(hue: float, saturation: float, value: float) -> np.ndarray:
-    """Hue, saturation and value of an sRGB colour, to linear RGB."""
+    """An sRGB colour in linear RGB, from its hue (any number), saturation and value (0 to 1).
+
+    Parameters
+    ----------
+    hue, saturation, value : float
+
+    Returns
+    -------
+    array, shape (3,)
+    """
     return linear(colorsys.hsv_to_rgb(hue % 1, np.clip(saturation, 0, 1), np.clip(value, 0, 1)))
 
 
@@ -48,14 +57,26 @@ def wood_colour(rng: Rng) -> np.ndarray:
 
 
 def plain(colour: np.ndarray, roughness: float = 0.5, gloss: float = 0.04) -> Material:
-    """One colour all over."""
-    look = Look(np.float32(colour)[:, None], gloss=gloss, roughness=roughness)
+    """One colour all over.
+
+    Parameters
+    ----------
+    colour : array, shape (3,)
+        Linear RGB.
+    roughness, gloss : float, optional
+        See `surfaces.Look`.
+
+    Returns
+    -------
+    callable
+    """
+    look = Look(column(colour), gloss=gloss, roughness=roughness)
     return lambda hits: look
 
 
 def glowing(colour: np.ndarray, glow: float) -> Material:
     """A lamp's shade."""
-    look = Look(np.float32(colour)[:, None], glow=np.float32(glow * colour)[:, None])
+    look = Look(column(colour), glow=column(glow * colour))
     return lambda hits: look
 
 
@@ -79,7 +100,7 @@ def mixed(
     -------
     callable
     """
-    base, extra = np.float32(colours[0])[:, None], (np.float32(colours[1:]) - np.float32(colours[0])).T
+    base, extra = column(colours[0]), (colours[1:].astype(np.float32) - colours[0].astype(np.float32)).T
 
     def look(hits: Hits) -> Look:
         weights = texture().sample(hits.coords[:2], hits.footprint_m)[: extra.shape[1]]
@@ -148,7 +169,7 @@ def foliage(rng: Rng) -> Material:
     colour = hsv(rng.uniform(0.22, 0.36), rng.uniform(0.4, 0.7), rng.uniform(0.3, 0.55))
 
     def look(hits: Hits) -> Look:
-        return Look(np.float32(colour)[:, None] * (0.6 + 0.8 * hits.coords[0]), roughness=0.4, softness=0.4)
+        return Look(column(colour) * (0.6 + 0.8 * hits.coords[0]), roughness=0.4, softness=0.4)
 
     return look
 
@@ -157,7 +178,7 @@ def outside(rng: Rng) -> Material:
     """The bright view from a window: sky over blurred greenery."""
     sky = hsv(rng.uniform(0.54, 0.62), rng.uniform(0.0, 0.3), 1.0) * rng.uniform(1.5, 3.5)
     green = hsv(rng.uniform(0.15, 0.4), rng.uniform(0.1, 0.4), 0.6) * rng.uniform(0.8, 1.6)
-    sky, green = np.float32(sky)[:, None], np.float32(green)[:, None]
+    sky, green = column(sky), column(green)
     horizon, rough = rng.uniform(0.2, 0.7), rng.uniform(0.1, 0.3)
 
     def look(hits: Hits) -> Look:

@@ -10,7 +10,7 @@ from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.appearance.materials import hsv, linear
 from hicp_lib.simulation.body.model import Body
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 
 # sRGB from the fairest to the darkest, evenly spaced on the scale of `Complexion.tone`.
 _TONES = linear([
@@ -165,7 +165,7 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
         blotches, pores, freckles = textures.skin().sample(uv, hits.footprint_m)
         flush = np.clip(c["flush"] * (1 + 0.25 * blotches) + 0.07 * blotches, -0.2, 1)
         flush *= 1 - 0.4 * complexion.tone
-        albedo = np.float32(tone)[:, None] + (np.float32(red)[:, None] - np.float32(tone)[:, None]) * flush
+        albedo = column(tone) + (column(red) - column(tone)) * flush
         albedo *= 1 + 0.02 * blotches + 0.025 * pores
         albedo *= 1 - 0.35 * complexion.freckles * freckles * np.clip(2 * c["flush"], 0, 1)
         albedo *= 1 - 0.10 * _step(c["eyelid"], 0.4, 0.9)
@@ -173,15 +173,15 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
         softness = np.ones(len(uv[0]), np.float32)
         albedo, roughness = _paint_lips(complexion, tone, albedo, roughness, c)
         albedo = _paint_hair(complexion, scalp, albedo, c, uv, hits.footprint_m)
-        nail, pale = 0.7 * _step(c["nail"], 0.3, 0.7), np.float32(tone * np.array([1.08, 0.92, 0.90]))
-        albedo = albedo * (1 - nail) + nail * pale[:, None]
+        nail = 0.7 * _step(c["nail"], 0.3, 0.7)
+        albedo = albedo * (1 - nail) + nail * column(tone * np.array([1.08, 0.92, 0.90]))
         roughness = roughness * (1 - 0.4 * nail)
         eye = c["eye"] > 0.5
         if eye.any():
             albedo[:, eye] = _eye(complexion, c["iris_rad"][eye])
             gloss[eye], roughness[eye], softness[eye] = 0.06, 0.16, 0.3
         inside = c["mouth"] > 0.7
-        albedo[:, inside] = np.float32([[0.12], [0.03], [0.03]])
+        albedo[:, inside] = column([0.12, 0.03, 0.03])
         return Look(albedo, 0.00009 * pores, gloss, roughness, softness)
 
     return look
@@ -202,13 +202,13 @@ def _paint_lips(complexion: Complexion, tone, albedo, roughness, c) -> tuple[np.
     weight = _step(c["lips"], 0.35, 0.75)
     natural = tone * np.array([0.86, 0.55, 0.55])
     painted = natural * (1 - complexion.lips) + complexion.lips * np.array([0.40, 0.055, 0.075])
-    albedo = albedo + (np.float32(painted)[:, None] - albedo) * weight
+    albedo = albedo + (column(painted) - albedo) * weight
     return albedo, roughness - 0.14 * weight
 
 
 def _paint_hair(complexion: Complexion, scalp: float, albedo, c, uv, footprint) -> np.ndarray:
     """Eyebrows, lashes, stubble and the hair's roots."""
-    hair = np.float32(complexion.hair)[:, None] * 0.7
+    hair = column(complexion.hair) * 0.7
     slanted = np.stack([uv[0] + uv[1], uv[1] * 2 - uv[0]])
     fibre = textures.strands().sample(slanted, footprint)[0]
     brow = complexion.brows * _step(c["brow_m"] + 0.0008 * fibre, -0.0026, 0.0008)
@@ -223,8 +223,8 @@ def _paint_hair(complexion: Complexion, scalp: float, albedo, c, uv, footprint) 
 
 def _eye(complexion: Complexion, angle: np.ndarray) -> np.ndarray:
     ring = 0.55 + 0.9 * _step(angle, 0.2, 0.5) - 0.8 * _step(angle, 0.42, 0.52)
-    iris = np.float32(complexion.iris)[:, None] * ring
-    white = np.float32([[0.60], [0.56], [0.53]]) * (1 - 0.25 * _step(angle, 0.6, 1.1))
+    iris = column(complexion.iris) * ring
+    white = column([0.60, 0.56, 0.53]) * (1 - 0.25 * _step(angle, 0.6, 1.1))
     edge = _step(angle, 0.46, 0.56)
     colour = iris * (1 - edge) + white * edge
     return colour * _step(angle, 0.16, 0.22) + 0.003

@@ -1,6 +1,8 @@
 """Where the arms go: each function takes joints with both arms hanging and places the arms.
 
-They return None where the limits of the joints do not allow what was drawn; draw again.
+All take a random generator, a `Draft`, and the joint angles of the whole body (radians, by joint), and
+return the angles with those of the arms changed. They return None where the limits of the joints do not
+allow what was drawn; draw again.
 """
 
 from dataclasses import dataclass
@@ -65,7 +67,21 @@ class Draft:
 
 
 def uniform(rng: Rng, ranges: Ranges, prefix: str = "") -> Joints:
-    """Joint angles (radians) drawn evenly from ranges in degrees; `prefix` goes before their names."""
+    """Joint angles drawn evenly from ranges.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    ranges : dict of str to tuple of 2 float
+        Degrees, by joint.
+    prefix : str, optional
+        Goes before the joints' names.
+
+    Returns
+    -------
+    dict of str to float
+        Radians.
+    """
     return radians({name: rng.uniform(*limits) for name, limits in ranges.items()}, prefix)
 
 

@@ -293,7 +293,8 @@ def rotation_matrices(body: Body, pose: Pose | np.ndarray) -> np.ndarray:
     if isinstance(pose, np.ndarray):
         return pose
     number = body.bone_numbers
-    vectors, matrices = {}, {}
+    vectors: dict[int, np.ndarray] = {}
+    matrices: dict[int, np.ndarray] = {}
     for name, rotation in pose.items():
         if name not in number:
             raise ValueError(f"no bone {name!r} in the body model")
@@ -366,7 +367,8 @@ def _unpack(stored) -> Body:
         skin_weights=skin / skin.sum(axis=1, keepdims=True),
         keypoint_weights=keypoints / keypoints.sum(axis=1, keepdims=True),
         **{name: stored[name].astype(kind) for name, kind in _STORED.items()},
-        **{name: tuple(map(str, stored[name])) for name in ("shape_names", "bone_names")},
+        shape_names=tuple(map(str, stored["shape_names"])),
+        bone_names=tuple(map(str, stored["bone_names"])),
     )
 
 

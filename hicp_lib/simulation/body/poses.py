@@ -82,7 +82,7 @@ def sample_joints(rng: np.random.Generator, body: Body, kind: str | None = None,
         if gap_m > -_PENETRATION_M:
             break
     # Hardly ever needed: the pose that comes nearest to keeping clear, or none at all.
-    return best if best is not None else _draw(rng, Draft(body, model, 0.0), "standing")
+    return best or _draw(rng, Draft(body, model, 0.0), "standing") or {}
 
 
 def _draw(rng: np.random.Generator, draft: Draft, kind: str) -> Joints | None:

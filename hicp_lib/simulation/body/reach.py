@@ -74,10 +74,10 @@ def reach(
     return result
 
 
-def _two_segments(target: np.ndarray, lengths: tuple[float, float], elbow_toward) -> dict[str, float] | None:
+def _two_segments(target: np.ndarray, lengths: tuple, elbow_toward: np.ndarray) -> dict[str, float] | None:
     """Joint angles of a left arm that bring its wrist to `target`, seen from the shoulder."""
-    upper, fore = lengths
-    distance = min(np.linalg.norm(target), _LONGEST * (upper + fore))
+    upper, fore = map(float, lengths)
+    distance = min(float(np.linalg.norm(target)), _LONGEST * (upper + fore))
     cosine = (upper**2 + fore**2 - distance**2) / (2 * upper * fore)
     flexion = float(np.pi - np.arccos(np.clip(cosine, -1, 1)))
     if flexion > np.radians(LIMITS_DEG["left_elbow_flexion"][1]):

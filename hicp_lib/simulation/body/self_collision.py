@@ -11,6 +11,8 @@ from scipy import sparse
 
 from hicp_lib.simulation.body.model import Body, Pose, Shape, pose_bones, rest_shape, shape_weights
 
+Spheres = tuple[np.ndarray, np.ndarray]  # centres (n, 3) and radii (n,)
+
 _N_SLICES = 12
 # Limbs as spheres: region, first and last bone head, fractions of the way between them. Most of the
 # upper arm may touch the trunk; a bit more than the whole way to the last knuckle is a fingertip.
@@ -104,9 +106,9 @@ def self_collision_distance_m(body: Body, model: CollisionModel, pose: Pose) -> 
     """
     rotations, heads = pose_bones(body, model.weights, pose)
     left, right = (_spheres(body, model, heads, (_UPPER_ARM, _FOREARM, _HAND), side) for side in "LR")
-    arms = [np.concatenate(both) for both in zip(left, right, strict=True)]
-    gaps = [_gap_to_trunk(model, rotations, heads, *arms).min(), _gap(*left, *right)]
-    gaps += [_gap(*arms, *_spheres(body, model, heads, (_THIGH,), side)) for side in "LR"]
+    arms = np.concatenate([left[0], right[0]]), np.concatenate([left[1], right[1]])
+    gaps = [_gap_to_trunk(model, rotations, heads, *arms).min(), _gap(left, right)]
+    gaps += [_gap(arms, _spheres(body, model, heads, (_THIGH,), side)) for side in "LR"]
     return float(min(gaps))
 
 
@@ -125,12 +127,12 @@ def _gap_to_trunk(shape: CollisionModel, rotations, heads, points, radii) -> np.
     return gap.min(axis=1)
 
 
-def _gap(points_a, radii_a, points_b, radii_b) -> float:
-    distance = np.linalg.norm(points_a[:, None] - points_b[None], axis=2)
-    return float((distance - radii_a[:, None] - radii_b).min())
+def _gap(a: Spheres, b: Spheres) -> float:
+    distance = np.linalg.norm(a[0][:, None] - b[0][None], axis=2)
+    return float((distance - a[1][:, None] - b[1]).min())
 
 
-def _spheres(body: Body, shape: CollisionModel, heads, limbs, side: str) -> tuple[np.ndarray, np.ndarray]:
+def _spheres(body: Body, shape: CollisionModel, heads, limbs, side: str) -> Spheres:
     points, radii = [], []
     for region, first, last, fractions in limbs:
         a, b = (heads[body.bone_numbers[f"{bone}.{side}"]] for bone in (first, last))

@@ -106,7 +106,7 @@ def _alike(borders: np.ndarray, trace: Trace, scene: RayScene, camera: PlacedCam
     column = np.where(upright, borders - row * (width + 1), borders - n_upright - row * width)
     shift = _SHIFT_PX * ((row + column) % 2 * 2 - 1)
     u, v = column + np.where(upright, -0.5, -shift), row + np.where(upright, shift, -0.5)
-    found = scene.trace(join_rays(camera.centre_m, sum(ray_parts(camera, u, v))))
+    found = scene.trace(join_rays(camera.centre_m, np.add(*ray_parts(camera, u, v))))
     first, second = (
         np.clip(v, 0, height - 1) * width + np.clip(u, 0, width - 1)
         for v, u in ((row - ~upright, column - upright), (row, column))

@@ -80,7 +80,7 @@ def expose(
     light = cv2.transform(radiance, gains.astype(np.float32))
     y = np.linspace(-1, 1, height, dtype=np.float32)[:, None]
     x = np.linspace(-1, 1, width, dtype=np.float32)[None, :]
-    light *= cv2.merge([1 - np.float32(sensor.vignette * 0.5) * (x * x + y * y)] * 3)
+    light = cv2.multiply(light, cv2.merge([1 - np.float32(sensor.vignette * 0.5) * (x * x + y * y)] * 3))
     light = cv2.GaussianBlur(light, (0, 0), max(sensor.blur_px, 0.2))
     variance = np.maximum(light, 0)
     variance *= np.float32(sensor.shot_noise**2)

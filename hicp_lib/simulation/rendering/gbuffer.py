@@ -133,7 +133,7 @@ def evaluate_materials(scene: RayScene, gbuffer: GBuffer, pixel_rad: float) -> S
     bounds = np.searchsorted(surface, np.arange(len(scene.surfaces) + 1), sorter=order)
     for number in np.flatnonzero(np.diff(bounds)):
         rows = order[bounds[number] : bounds[number + 1]]
-        coords = partial(_coords, scene, number, corners, weights, rows)
+        coords = partial(_coords, scene, int(number), corners, weights, rows)
         shading.put(rows, scene.surfaces[number].material(Hits(footprint_m.take(rows), coords)))
     return shading
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from hicp_lib.simulation.rendering.gbuffer import Shading
 from hicp_lib.simulation.rendering.raycast import dot
+from hicp_lib.simulation.rendering.surfaces import column
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,19 @@ def sample_offsets(cell: np.ndarray, kind: int, rng: np.random.Generator) -> np.
 
 
 def towards_light(light: Light, positions_m: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Vectors from positions (3, n) to points of the light, whose offsets (2, n) lie in the unit square."""
+    """Vectors from positions to points of a light.
+
+    Parameters
+    ----------
+    light : Light
+    positions_m : array, shape (3, n)
+    offsets : array, shape (2, n)
+        Of the points in the unit square that stands for the light.
+
+    Returns
+    -------
+    array of float32, shape (3, n)
+    """
     s, t = 2 * offsets - 1
     c, u, v = (x.astype(np.float32)[:, None] for x in (light.centre_m, light.half_u_m, light.half_v_m))
     return c + s * u + t * v - positions_m
@@ -145,7 +158,7 @@ def diffuse_and_highlight(
 
 def _creeping(n_l: np.ndarray, softness: np.ndarray) -> np.ndarray:
     """Diffuse light by the cosine `n_l` of its angle, where red creeps furthest, (3, n)."""
-    wrap = softness * np.float32([[0.40], [0.16], [0.10]])
+    wrap = softness * column([0.40, 0.16, 0.10])
     creeping = n_l + wrap
     wrap += 1
     wrap *= wrap

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 
 
@@ -116,7 +117,20 @@ def _edges(*corners: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
 
 
 def neighbours(triangles: np.ndarray, n_vertices: int, most: int = 8) -> np.ndarray:
-    """Neighbouring vertices, (n_vertices, most); a row with fewer repeats them, or the vertex itself."""
+    """Neighbouring vertices.
+
+    Parameters
+    ----------
+    triangles : array of int, shape (n, 3)
+    n_vertices : int
+    most : int, optional
+        More neighbours than this are left out.
+
+    Returns
+    -------
+    array of int, shape (n_vertices, most)
+        A row with fewer repeats them, or the vertex itself.
+    """
     pairs = _directed_edges(triangles)
     ends = np.concatenate([pairs, pairs[:, ::-1]]).T
     joined = sparse.coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(n_vertices, n_vertices)).tocsr()
@@ -153,13 +167,24 @@ QUAD = np.array([[0, 1, 2], [0, 2, 3]])
 """Triangles of four corners that go around."""
 
 
-def quad(corner_m: np.ndarray, u_m: np.ndarray, v_m: np.ndarray) -> Mesh:
-    """A parallelogram; coords are metres along `u_m` and `v_m`. It faces cross(u, v)."""
-    corner_m, u_m, v_m = (np.asarray(x, np.float32) for x in (corner_m, u_m, v_m))
-    vertices = corner_m + np.array([0 * u_m, u_m, u_m + v_m, v_m])
-    lu, lv = math.hypot(*u_m.tolist()), math.hypot(*v_m.tolist())
+def quad(corner_m: ArrayLike, u_m: ArrayLike, v_m: ArrayLike) -> Mesh:
+    """A parallelogram, which faces cross(u, v).
+
+    Parameters
+    ----------
+    corner_m, u_m, v_m : array_like, shape (3,)
+        A corner, and the two edges from there.
+
+    Returns
+    -------
+    Mesh
+        Its coords are metres along `u_m` and `v_m`.
+    """
+    corner, u, v = (np.asarray(x, np.float32) for x in (corner_m, u_m, v_m))
+    vertices = corner + np.array([0 * u, u, u + v, v])
+    lu, lv = math.hypot(*u.tolist()), math.hypot(*v.tolist())
     coords = np.array([[0, 0], [lu, 0], [lu, lv], [0, lv]], np.float32)
-    normal = np.cross(u_m.astype(float), v_m.astype(float))
+    normal = np.cross(u.astype(float), v.astype(float))
     normals = np.repeat(unit(normal)[None].astype(np.float32), 4, axis=0)
     return Mesh(vertices, QUAD.astype(np.int32), normals, coords)
 
@@ -186,8 +211,25 @@ def _unit_cube() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 _CUBE = _unit_cube()
 
 
-def box(low_m: np.ndarray, high_m: np.ndarray, yaw_rad: float = 0.0) -> Mesh:
-    """A box between two corners, turned about the vertical through its centre; coords in metres."""
+def box(low_m: ArrayLike, high_m: ArrayLike, yaw_rad: float = 0.0) -> Mesh:
+    """A box between two corners, turned about the vertical through its centre.
+
+    Parameters
+    ----------
+    low_m, high_m : array_like, shape (3,)
+    yaw_rad : float, optional
+
+    Returns
+    -------
+    Mesh
+        Its coords are metres along each face.
+
+    Examples
+    --------
+    >>> cube = box([0, 0, 0], [1, 1, 1])
+    >>> cube.vertices_m.shape, cube.triangles.shape
+    ((24, 3), (12, 3))
+    """
     low, high = np.asarray(low_m, np.float32), np.asarray(high_m, np.float32)
     return turned(boxes(low[None], high[None]), yaw_rad, (low + high) / 2)
 
@@ -207,8 +249,20 @@ def boxes(lows_m: np.ndarray, highs_m: np.ndarray) -> Mesh:
     )
 
 
-def turned(mesh: Mesh, yaw_rad: float, about_m: np.ndarray) -> Mesh:
-    """The mesh turned about a vertical axis."""
+def turned(mesh: Mesh, yaw_rad: float, about_m: ArrayLike) -> Mesh:
+    """The mesh turned about a vertical axis.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    yaw_rad : float
+    about_m : array_like, shape (3,)
+        A point of the axis.
+
+    Returns
+    -------
+    Mesh
+    """
     if yaw_rad == 0:
         return mesh
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)
@@ -217,7 +271,7 @@ def turned(mesh: Mesh, yaw_rad: float, about_m: np.ndarray) -> Mesh:
     return Mesh((mesh.vertices_m - about) @ R.T + about, mesh.triangles, mesh.normals @ R.T, mesh.coords)
 
 
-def lathe(profile_m: np.ndarray, centre_m: np.ndarray, n_sides: int = 24) -> Mesh:
+def lathe(profile_m: ArrayLike, centre_m: ArrayLike, n_sides: int = 24) -> Mesh:
     """A solid of revolution about the vertical.
 
     Parameters

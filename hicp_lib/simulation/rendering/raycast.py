@@ -1,10 +1,12 @@
 """Rays against surfaces, through Open3D's RaycastingScene."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
 import cv2
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hicp_lib.core.environment import with_variables
 from hicp_lib.simulation.rendering.camera import join_rays
@@ -194,7 +196,20 @@ def _between(values: np.ndarray, height: int, width: int) -> np.ndarray:
 
 
 def interpolate(values: np.ndarray, corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Values per vertex (k, n_vertices) at n places of triangles, corners and weights (3, n): (k, n)."""
+    """Values per vertex at places of triangles.
+
+    Parameters
+    ----------
+    values : array, shape (k, n_vertices)
+    corners : array of int, shape (3, n)
+        Numbers of the triangles' vertices.
+    weights : array, shape (3, n)
+        Barycentric.
+
+    Returns
+    -------
+    array of float32, shape (k, n)
+    """
     result = np.empty((len(values), corners.shape[1]), np.float32)
     for found, component in zip(result, values, strict=True):
         np.multiply(pick(component, corners[0]), weights[0], out=found)
@@ -211,8 +226,16 @@ def pick(values: np.ndarray, places: np.ndarray) -> np.ndarray:
     return values.take(places, axis=-1, mode="clip")
 
 
-def place(values: np.ndarray, places: np.ndarray, chosen: np.ndarray) -> None:
-    """Put chosen values (k, len(places)) at these places of every row of `values` (k, n)."""
+def place(values: np.ndarray, places: np.ndarray, chosen: Iterable[ArrayLike]) -> None:
+    """Put values at the same places of every row.
+
+    Parameters
+    ----------
+    values : array, shape (k, n)
+        Changed in place.
+    places : array of int, shape (m,)
+    chosen : array, shape (k, m)
+    """
     for row, new in zip(values, chosen, strict=True):
         row[places] = new
 

@@ -6,14 +6,14 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from hicp_lib.simulation.rendering import lights
 from hicp_lib.simulation.rendering.antialias import edge_pixels, smooth_edges
 from hicp_lib.simulation.rendering.camera import PlacedCamera, image_directions
 from hicp_lib.simulation.rendering.filters import tilt_by_height
 from hicp_lib.simulation.rendering.gbuffer import GBuffer, Shading, evaluate_materials
+from hicp_lib.simulation.rendering.lights import Ambient, Light, ambient_light, diffuse_and_highlight
 from hicp_lib.simulation.rendering.raycast import RayScene, dot, doubled, place, trace_image
 from hicp_lib.simulation.rendering.shadows import visibility
-from hicp_lib.simulation.rendering.surfaces import Surface
+from hicp_lib.simulation.rendering.surfaces import Surface, column
 
 _BLOCK = 16_384  # pixels shaded at a time: what the processor's cache holds
 
@@ -32,8 +32,8 @@ class World:
     """
 
     surfaces: list[Surface]
-    lights: list[lights.Light]
-    ambient: lights.Ambient
+    lights: list[Light]
+    ambient: Ambient
     backdrop: np.ndarray
 
     @cached_property
@@ -87,7 +87,7 @@ def render(world: World, camera: PlacedCamera, rng: np.random.Generator) -> Fram
     >>> from hicp_lib.simulation.rendering.camera import look_at
     >>> from hicp_lib.simulation.rendering.mesh import quad
     >>> wall = Surface(quad([-5, 2, -5], [10, 0, 0], [0, 0, 10]), plain(np.full(3, 0.5)))
-    >>> dim = lights.Ambient(np.full(3, 0.4), np.full(3, 0.2), np.zeros(3), np.array([1.0, 0, 0]))
+    >>> dim = Ambient(np.full(3, 0.4), np.full(3, 0.2), np.zeros(3), np.array([1.0, 0, 0]))
     >>> camera = PlacedCamera(64, 48, 60.0, 60.0, 31.5, 23.5, look_at([0, -1, 0], [0, 0, 0]))
     >>> frame = render(World([wall], [], dim, np.zeros(3)), camera, np.random.default_rng(0))
     >>> frame.radiance.shape, float(frame.depth_m[24, 32].round(3))
@@ -102,7 +102,7 @@ def render(world: World, camera: PlacedCamera, rng: np.random.Generator) -> Fram
     painted = _paint(world, scene, around, camera, False, rng)
     image = _enlarge(painted, around, trace.surface.reshape(shape), ~is_person)
     pixels = image.reshape(-1, 3).T
-    place(pixels, np.flatnonzero(trace.surface < 0), np.float32(world.backdrop)[:, None])
+    place(pixels, np.flatnonzero(trace.surface < 0), column(world.backdrop))
     rows, columns = (np.flatnonzero(is_person.any(axis=axis)) for axis in (1, 0))
     if len(rows):
         crop = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
@@ -137,7 +137,7 @@ def _paint(
 
 def _shade_block(world: World, shading: Shading, positions_m, direction, seen: np.ndarray) -> np.ndarray:
     view = direction / -np.sqrt(dot(direction, direction))
-    diffuse = lights.ambient_light(world.ambient, shading.normals)
+    diffuse = ambient_light(world.ambient, shading.normals)
     facing = 1 - np.clip(dot(shading.normals, view), 0, 1)
     facing *= facing
     fresnel = shading.gloss * (1 + 4 * facing * facing) * (1 - np.float32(0.7) * shading.roughness)
@@ -145,7 +145,7 @@ def _shade_block(world: World, shading: Shading, positions_m, direction, seen: n
     diffuse *= seen[-1] * np.float32(0.85) + np.float32(0.15)
     highlight = fresnel * diffuse
     for source, visible in zip(world.lights, seen[:-1], strict=True):
-        more, shine = lights.diffuse_and_highlight(source, positions_m, view, shading)
+        more, shine = diffuse_and_highlight(source, positions_m, view, shading)
         more *= visible
         shine *= visible
         diffuse += more

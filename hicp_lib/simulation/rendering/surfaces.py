@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hicp_lib.simulation.rendering.mesh import Mesh
 
@@ -62,6 +63,11 @@ class Look:
 
 
 Material = Callable[[Hits], Look]
+
+
+def column(colour: ArrayLike) -> np.ndarray:
+    """A colour (3,) as a column (3, 1), float32, which goes with the components of n places."""
+    return np.asarray(colour, np.float32)[:, None]
 
 
 @dataclass(frozen=True)

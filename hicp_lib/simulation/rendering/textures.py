@@ -73,7 +73,7 @@ class Texture:
         scaled = uv_m * np.float32(1 / self.width_m)
         xy[:, :n] = (scaled - np.floor(scaled)) * np.float32(size)
         maps = xy.reshape(2, rows, columns)
-        found = cv2.remap(tile, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        found = cv2.remap(tile, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.ascontiguousarray(found.reshape(rows * columns, channels)[:n].T)
 
 

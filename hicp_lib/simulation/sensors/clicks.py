@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.camera import project, transform
+from hicp_lib.core.errors import InputError
 from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import Recording, read_exact_depth_m
@@ -51,7 +52,10 @@ def simulate_clicks(
         T_cam_mocap = np.linalg.inv(recording.T_base_cam[frame]) @ T_base_mocap
         points_m = transform(T_cam_mocap, markers_m)
         pixels_px = project(recording.intrinsics, points_m)
-        seen = _is_seen(pixels_px, points_m[:, 2], read_exact_depth_m(recording, int(frame)))
+        exact_depth_m = read_exact_depth_m(recording, int(frame))
+        if exact_depth_m is None:
+            raise InputError(f"{recording.folder}: has no exact depth; give a simulated recording")
+        seen = _is_seen(pixels_px, points_m[:, 2], exact_depth_m)
         u_px, v_px = (pixels_px + rng.normal(0, noise_px, pixels_px.shape)).T
         columns = {"frame": int(frame), "marker": list(mocap.names), "u_px": u_px, "v_px": v_px}
         tables.append(pd.DataFrame(columns)[seen])
@@ -61,6 +65,6 @@ def simulate_clicks(
 def _is_seen(pixels_px: np.ndarray, depths_m: np.ndarray, exact_depth_m: np.ndarray) -> np.ndarray:
     """Which points are in the image with nothing in front of them."""
     height, width = exact_depth_m.shape
-    inside = ((pixels_px >= 0) & (pixels_px <= [width - 1, height - 1])).all(axis=1)
+    inside = np.logical_and(pixels_px >= 0, pixels_px <= [width - 1, height - 1]).all(axis=1)
     columns, rows = np.where(inside[:, None], pixels_px, 0).round().astype(int).T
     return inside & (exact_depth_m[rows, columns] > depths_m - _IN_FRONT_M)

@@ -109,13 +109,30 @@ def simulate_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCamera,
 
     Parameters
     ----------
-    scene : what is there, such as `Frame.rays` of a rendered frame
-    colour : the colour camera; what lies outside the left imager's view has no depth
+    scene : RayScene
+        What is there, such as `Frame.rays` of a rendered frame.
+    colour : PlacedCamera
+        The colour camera; what lies outside the left imager's view has no depth.
+    settings : DepthCamera
+    rng : numpy.random.Generator
+        Of the noise.
 
     Returns
     -------
-    array, shape (height, width) of the colour image, float32: metres along the camera's z axis,
-    NaN where there is none
+    array of float32, shape (colour.height_px, colour.width_px)
+        Metres along the camera's z axis, NaN where there is none.
+
+    Examples
+    --------
+    >>> from hicp_lib.simulation.appearance.materials import plain
+    >>> from hicp_lib.simulation.rendering.camera import look_at
+    >>> from hicp_lib.simulation.rendering.mesh import quad
+    >>> from hicp_lib.simulation.rendering.surfaces import Surface
+    >>> wall = Surface(quad([-5, 1, -5], [10, 0, 0], [0, 0, 10]), plain(np.ones(3)))
+    >>> camera = PlacedCamera(640, 480, 600.0, 600.0, 319.5, 239.5, look_at([0, 0, 0], [0, 1, 0]))
+    >>> depth_m = simulate_depth(RayScene([wall]), camera, D435, np.random.default_rng(0))
+    >>> float(np.nanmedian(depth_m).round(2))
+    1.0
     """
     left = left_imager(colour, settings)
     first_column, view = _crop(left, colour, settings)
@@ -123,7 +140,20 @@ def simulate_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCamera,
 
 
 def simulate_raw_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCamera, rng: Rng) -> np.ndarray:
-    """Depth as the left imager sees it, (settings.height_px, settings.width_px), else as `simulate_depth`."""
+    """Depth as the left imager sees it, before alignment.
+
+    Parameters
+    ----------
+    scene : RayScene
+    colour : PlacedCamera
+    settings : DepthCamera
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    array of float32, shape (settings.height_px, settings.width_px)
+        Else as of `simulate_depth`.
+    """
     return _measure(scene, left_imager(colour, settings), 0, settings, rng)
 
 

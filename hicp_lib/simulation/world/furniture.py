@@ -50,7 +50,22 @@ def _boxes_at(place: np.ndarray, yaw: float, spans: list[tuple]) -> g.Mesh:
 
 
 def legs(xs: Iterable[float], ys: Iterable[float], half: float, low: float, high: float) -> list[tuple]:
-    """Square legs or posts about places (x, y), as pairs of corners: half their width, from low to high."""
+    """Square legs or posts.
+
+    Parameters
+    ----------
+    xs, ys : iterable of float
+        At all pairs of these they stand.
+    half : float
+        Half their width.
+    low, high : float
+        Heights between which they reach.
+
+    Returns
+    -------
+    list of tuple
+        Pairs of corners, (x, y, z) each.
+    """
     return [((x - half, y - half, low), (x + half, y + half, high)) for x, y in product(xs, ys)]
 
 

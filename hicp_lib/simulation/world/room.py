@@ -167,6 +167,7 @@ def _curtains(rng: Rng, wall: _Wall, span: Span, high: float) -> Surface:
 def _door(rng: Rng, wall: _Wall, span: Span) -> list[Surface]:
     top = 2.05
     leaf = wall.panel(span, (0, top), 0.012)
+    parts: list[tuple[Span, Span, Span]]
     parts = [((b - 0.04, b + 0.04), (0, top + 0.04), (0, 0.04)) for b in span]
     parts.append(((span[0] - 0.04, span[1] + 0.04), (top, top + 0.08), (0, 0.04)))
     inset = (span[0] + 0.13, span[1] - 0.13)

@@ -129,10 +129,8 @@ def _lighting(rng: Rng, room: Room, eye: np.ndarray) -> tuple[list[lights.Light]
         half_u, half_v, _ = rng.uniform(0.08, 0.5) * np.eye(3)
         found.append(lights.Light(np.array([*spot, height]), half_u, half_v, lamp * rng.uniform(2.5, 6)))
     if len(found) < 2 and rng.random() < 0.6:  # light from where the photographer stands
-        side = rng.uniform(-1.5, 1.5)
-        centre = np.clip(
-            [eye[0] + side, eye[1], rng.uniform(1.6, 2.2)], [*(-room.half_m), 0], [*room.half_m, 3]
-        )
+        spot = np.array([eye[0] + rng.uniform(-1.5, 1.5), eye[1], rng.uniform(1.6, 2.2)])
+        centre = np.clip(spot, [*(-room.half_m), 0], [*room.half_m, 3])
         half_u, _, half_v = 0.35 * np.eye(3)
         found.append(lights.Light(centre, half_u, half_v, daylight * rng.uniform(1.5, 5)))
     base = daylight * rng.uniform(0.25, 0.6)
