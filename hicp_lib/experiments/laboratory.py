@@ -5,7 +5,6 @@ backward, y to its right, z up) lies above the world's origin, as high as when a
 on its stand: 0.6 m above the floor is assumed. The robot itself is not drawn.
 """
 
-from dataclasses import astuple
 from itertools import product
 
 import numpy as np
@@ -47,7 +46,7 @@ def robot_camera(T_root_camera: np.ndarray) -> PlacedCamera:
     >>> robot_camera(np.eye(4)).centre_m  # in the world
     array([0. , 0. , 0.6])
     """
-    return PlacedCamera(*astuple(COLOUR), T_WORLD_ROOT @ T_root_camera)
+    return PlacedCamera(**vars(COLOUR), T_world_camera=T_WORLD_ROOT @ T_root_camera)
 
 
 def colour_and_depth(frame: Frame, camera: PlacedCamera, rng: Rng) -> tuple[np.ndarray, np.ndarray]:
@@ -91,7 +90,7 @@ def posed(shape: np.ndarray, posture: Posture) -> PosedBody:
     for side in ("left", "right"):
         joints[f"{side}_hip_flexion"] = joints.get(f"{side}_hip_flexion", 0.0) + lean
     x, y = posture.place_m
-    pose = pose_from_joints(joints) | {"root": np.array([0.0, lean, 0.0])}
+    pose = {**pose_from_joints(joints), "root": np.array([0.0, lean, 0.0])}
     return pose_body(load_body(), shape, pose, facing_robot(y, x))
 
 
