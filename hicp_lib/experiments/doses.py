@@ -33,7 +33,6 @@ from hicp_lib.experiments.random_streams import stream
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.simulation.appearance import materials as m
 from hicp_lib.simulation.appearance.people import dress
-from hicp_lib.simulation.batch import run_jobs
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
 from hicp_lib.simulation.rendering import mesh as g
@@ -41,6 +40,7 @@ from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at
 from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
 from hicp_lib.simulation.rendering.render import Frame, World, render
 from hicp_lib.simulation.rendering.surfaces import Surface
+from hicp_lib.simulation.world.batch import run_jobs
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
 Draws = tuple[int, int]
@@ -68,7 +68,7 @@ class Picture:
 
     Attributes
     ----------
-    image : array of uint8, shape (height, width, 3)
+    image : array, shape (height, width, 3), dtype uint8
         RGB.
     mask : array of bool, shape (height, width)
         The person's pixels.

@@ -62,8 +62,8 @@ def colour_and_depth(frame: Frame, camera: PlacedCamera, rng: Rng) -> tuple[np.n
 
     Returns
     -------
-    rgb : array of uint8, shape (480, 640, 3)
-    depth_m : array of float32, shape (480, 640)
+    rgb : array, shape (480, 640, 3), dtype uint8
+    depth_m : array, shape (480, 640), dtype float32
         Aligned to the colour image; NaN for none.
     """
     rgb = expose(frame.radiance, PHOTOGRAPHIC, rng, frame.person >= 0)
@@ -110,7 +110,7 @@ def furnished(rng: Rng, surfaces: list[Surface], clear_m: list[tuple[float, floa
     ----------
     rng : numpy.random.Generator
     surfaces : list of Surface
-    clear_m : list of tuple of 3 float
+    clear_m : list of tuple of float
         Discs (x, y, radius) without furniture.
 
     Returns
@@ -127,7 +127,7 @@ def table(rng: Rng, low_m: tuple[float, float], high_m: tuple[float, float], hei
     Parameters
     ----------
     rng : numpy.random.Generator
-    low_m, high_m : tuple of 2 float
+    low_m, high_m : tuple of float
         Two corners of its top (x, y).
     height_m : float
         Of the top's surface.
@@ -148,7 +148,7 @@ def chair(rng: Rng, middle_m: tuple[float, float], seat_m: float) -> list[Surfac
     Parameters
     ----------
     rng : numpy.random.Generator
-    middle_m : tuple of 2 float
+    middle_m : tuple of float
         Of its seat (x, y); the back is behind it.
     seat_m : float
         Height of its seat.

@@ -95,7 +95,7 @@ def simulate(
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         A row per control period: `t_s`, `distance_m` between robot and person, `activations` of all taxels (a
         list) and `activation`, the highest, `status`, `hand_error_m` (from the post), a column per joint in
         radians, and `seen_s`, when the newest image that the loop knows was taken (NaN: none yet).

@@ -36,7 +36,7 @@ class Observation:
 
     Attributes
     ----------
-    rgb : array of uint8, shape (480, 640, 3)
+    rgb : array, shape (480, 640, 3), dtype uint8
     detections : Detections
     perception : Perception
         The robot's own body left out.
@@ -62,7 +62,7 @@ class HeadCamera:
         From image to keypoints in the loop.
     seed : int
         Of the noise of both cameras.
-    images : mutable mapping
+    images : mapping
         Images taken from the robot's post; until it first gives way, all detectors see the same.
     observations : list of Observation
         All so far.
@@ -110,8 +110,8 @@ def photograph(script: Script, time_s: float, posture: Posture, seed: int) -> Rg
 
     Returns
     -------
-    rgb : array of uint8, shape (480, 640, 3)
-    depth_m : array of float32, shape (480, 640)
+    rgb : array, shape (480, 640, 3), dtype uint8
+    depth_m : array, shape (480, 640), dtype float32
     """
     icub, rng = load_icub(), stream(seed, round(1000 * time_s))
     camera = robot_camera(icub.T_root_camera(posture.angles("head"), MOUNT))

@@ -71,7 +71,7 @@ class Staging:
     ----------
     sits, by_head : bool
         Whether the person sits, and whether they come with the head instead of the hand.
-    place_m : tuple of 2 float
+    place_m : tuple of float
         Where on the floor they are (x, y), world frame.
     """
 

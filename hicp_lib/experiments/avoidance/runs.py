@@ -28,8 +28,8 @@ from hicp_lib.experiments.avoidance.head_camera import HeadCamera, ImageCache, O
 from hicp_lib.experiments.avoidance.reaching import script
 from hicp_lib.experiments.laboratory import COLOUR, in_root
 from hicp_lib.robot.controller import PUBLISHED
-from hicp_lib.simulation.batch import run_jobs
 from hicp_lib.simulation.body.model import PosedBody
+from hicp_lib.simulation.world.batch import run_jobs
 
 NO_AVOIDANCE, TRUE_KEYPOINTS = "no avoidance", "ground truth"
 PUBLISHED_GAINS = "ground truth, published gains"
@@ -78,9 +78,9 @@ class Run:
     ----------
     job : Job
         What was run.
-    cycles : DataFrame
+    cycles : pd.DataFrame
         A row per control period, see `closed_loop.simulate`.
-    frames : DataFrame
+    frames : pd.DataFrame
         A row per image: `t_s`, `time_ms` (what detector and lifting took, measured), `jpeg` (bytes),
         and as flat lists `keypoints_px`, `scores` and `keypoints_m` (root frame) of all people, and
         `truth_m` of the one there is.

@@ -50,7 +50,7 @@ def skin_distance_m(spheres: tuple[np.ndarray, np.ndarray], vertices_m: np.ndarr
 
     Parameters
     ----------
-    spheres : tuple of 2 array
+    spheres : tuple of array
         See `robot_spheres`.
     vertices_m : array, shape (v, 3)
         Of the person, root frame.

@@ -65,7 +65,7 @@ def capture(
         See `sensors.markers.marker_vertices`.
     T_world_camera : array, shape (4, 4)
         The camera that carries a marker too; it stays where it is.
-    obstacles : tuple of Mesh
+    obstacles : tuple of g.Mesh
         What hides markers besides the person.
     duration_s : float
         From the first frame to the last.

@@ -24,8 +24,8 @@ def record_frame(name: str, seed: int, k: int) -> tuple[np.ndarray, np.ndarray, 
 
     Returns
     -------
-    rgb : array of uint8, shape (480, 640, 3)
-    depth_m, exact_m : array of float32, shape (480, 640)
+    rgb : array, shape (480, 640, 3), dtype uint8
+    depth_m, exact_m : array, shape (480, 640), dtype float32
         As the depth camera measures it, and as it is.
     truth : dict of str to list
         `keypoints_m` (136, 3) in the base frame and `visible` (136,).

@@ -29,7 +29,7 @@ from hicp_lib.recordings.c3d import MAX_FRAMES as MAX_C3D_FRAMES
 from hicp_lib.recordings.qualisys import write_c3d, write_tsv
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, MOCAP_FILE, RGB_LIST, Recording, open_recording
 from hicp_lib.recordings.writer import depth_name, rgb_name, write_depth, write_rgb
-from hicp_lib.simulation.batch import check_output, run_jobs
+from hicp_lib.simulation.world.batch import check_output, run_jobs
 
 
 def simulate_recording(

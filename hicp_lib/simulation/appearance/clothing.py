@@ -58,8 +58,8 @@ class Pattern:
 
     Attributes
     ----------
-    cut : Cut
-    smoothing : sparse array, shape (n, n)
+    cut : g.Cut
+    smoothing : array, shape (n, n)
         Moves each vertex most of the way to the middle of its neighbours.
     distance : array, shape (n,)
         How far inside the garment's edge each vertex is, in its field's units.
@@ -139,7 +139,7 @@ def put_on(
 
     Returns
     -------
-    mesh : Mesh
+    mesh : g.Mesh
         Its coords are rest position (3), arm, leg and torso field, distance from the edge.
     source : array of int, shape (n_triangles,)
         Body triangle that each of the mesh's triangles came from.
@@ -216,7 +216,7 @@ def collar(garment: Garment, mesh: g.Mesh, posed: PosedBody, rise_m: float, open
     Parameters
     ----------
     garment : Garment
-    mesh : Mesh
+    mesh : g.Mesh
         The garment as `put_on` returns it.
     posed : PosedBody
         Who wears it.
@@ -227,7 +227,7 @@ def collar(garment: Garment, mesh: g.Mesh, posed: PosedBody, rise_m: float, open
 
     Returns
     -------
-    Mesh
+    g.Mesh
         With the garment's coords.
     """
     pattern = cut_pattern(garment)
@@ -274,7 +274,7 @@ def skirt(posed: PosedBody, hip_rotation: np.ndarray, length_m: float, flare: fl
 
     Returns
     -------
-    Mesh
+    g.Mesh
         Its coords are those of `put_on`.
     """
     body = load_body()
@@ -317,7 +317,7 @@ def random_folds(rng: np.random.Generator, height_m: float, n_waves: int = 8) ->
 
     Returns
     -------
-    array of float32, shape (n_waves, 5)
+    array, shape (n_waves, 5), dtype float32
         Wave vector (rad/m), phase, height (m).
 
     Examples

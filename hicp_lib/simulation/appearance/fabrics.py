@@ -66,7 +66,7 @@ def panel_coordinates(panels: Panels, coords: np.ndarray, limbs: str) -> tuple[n
 
     Returns
     -------
-    uv_m : array of float32, shape (2, n)
+    uv_m : array, shape (2, n), dtype float32
         Around and along the panel.
     panel : array of int, shape (n,)
     """

@@ -52,7 +52,7 @@ def put_on_shoe(shoes: Shoes, posed: PosedBody, side: str) -> g.Mesh:
 
     Returns
     -------
-    Mesh
+    g.Mesh
         Its coords: along from heel 0 to toe 1, metres across, height above the sole's bottom.
     """
     points = posed.vertices_m[_foot(side)].astype(float)

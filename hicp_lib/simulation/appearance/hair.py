@@ -28,7 +28,7 @@ class Style:
         Length on the crown and above the ears.
     lift : float
         How steeply it leaves the scalp, 0 flat to 1 upright.
-    comb : tuple of 3 float
+    comb : tuple of float
         Direction it is combed to, in the head's frame (x forward, y left, z up), and how firmly.
     gravity : float
         Pull downwards per step.
@@ -122,7 +122,7 @@ class Obstacles:
     ----------
     centre_m : array, shape (3,)
         Middle of the head.
-    radius_m : array, shape `_GRID`
+    radius_m : array, shape (36, 72)
         Of head and neck by direction from there: rows of rising, columns of turning direction.
     corner_m : array, shape (2,)
         Where the trunk's grid over y and z begins; its cells are `_CELL_M` wide.
@@ -232,7 +232,7 @@ def grow(style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, 
 
     Returns
     -------
-    Mesh
+    g.Mesh
         Its coords: across a lock (-1 to 1), metres along it, a random number per lock, root 0 to tip 1.
     """
     head = _measure(body, rest_m, landmarks_m)
@@ -385,7 +385,7 @@ def carry(
 
     Parameters
     ----------
-    hair : Mesh
+    hair : g.Mesh
         As `grow` returns it.
     body : Body
     posed : PosedBody
@@ -396,7 +396,7 @@ def carry(
 
     Returns
     -------
-    Mesh
+    g.Mesh
         In the world frame.
     """
     chin = landmarks_m[34, 2]

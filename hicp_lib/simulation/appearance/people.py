@@ -31,9 +31,9 @@ class Worn:
 
     Attributes
     ----------
-    garment : Garment
-    fabric : Fabric
-    trim : Trim
+    garment : clothing.Garment
+    fabric : fabrics.Fabric
+    trim : fabrics.Trim
     folds : array, shape (n_waves, 5)
         See `clothing.put_on`.
     collar : bool
@@ -65,12 +65,12 @@ class Appearance:
     ----------
     shape : array, shape (n_shapes,)
         Weights over the body's shapes.
-    complexion : Complexion
-    style : Style or None
+    complexion : skin.Complexion
+    style : hair.Style or None
         Of the hair; None is bald.
     worn : list of Worn
     skirt : Skirt or None
-    shoes : Shoes or None
+    shoes : footwear.Shoes or None
         None is barefoot.
     seed : int
         Of the locks of hair.

@@ -113,7 +113,7 @@ def paint_coords(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.
 
     Returns
     -------
-    array of float32, shape (n_v, len(COORDS))
+    array, shape (n_v, len(COORDS)), dtype float32
         Columns `COORDS`.
     """
     painted, head, _ = _painted(body)

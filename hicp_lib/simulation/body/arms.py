@@ -72,7 +72,7 @@ def uniform(rng: Rng, ranges: Ranges, prefix: str = "") -> Joints:
     Parameters
     ----------
     rng : numpy.random.Generator
-    ranges : dict of str to tuple of 2 float
+    ranges : dict of str to tuple of float
         Degrees, by joint.
     prefix : str, optional
         Goes before the joints' names.

@@ -64,7 +64,7 @@ class Body:
     ----------
     shape_names : tuple of str
         Names of the shapes, such as "woman_25_slim".
-    vertices_m : array of float32, shape (n_shapes, n_v, 3)
+    vertices_m : array, shape (n_shapes, n_v, 3), dtype float32
         At rest.
     heads_m : array, shape (n_shapes, n_bones, 3)
         Where the bones begin at rest.
@@ -73,14 +73,14 @@ class Body:
     bone_names : tuple of str
     bone_parents : array of int, shape (n_bones,)
         -1 for the root, which comes first.
-    skin_weights : array of float32, shape (n_v, n_bones)
+    skin_weights : array, shape (n_v, n_bones), dtype float32
         Rows sum to 1.
-    triangles : array of int32, shape (n_t, 3)
-    keypoint_weights : array of float32, shape (136, n_v + n_bones)
+    triangles : array, shape (n_t, 3), dtype int32
+    keypoint_weights : array, shape (136, n_v + n_bones), dtype float32
         Over vertices, then bone heads; rows sum to 1.
     regions : array of int, shape (n_v,)
         Indices into `REGIONS`.
-    fields : array of float32, shape (n_v, len(FIELDS))
+    fields : array, shape (n_v, len(FIELDS)), dtype float32
         See `FIELDS`.
     """
 
@@ -128,10 +128,10 @@ class PosedBody:
 
     Attributes
     ----------
-    vertices_m : array of float32, shape (n_v, 3)
-    normals : array of float32, shape (n_v, 3)
+    vertices_m : array, shape (n_v, 3), dtype float32
+    normals : array, shape (n_v, 3), dtype float32
         Unit vectors.
-    keypoints_m : array of float32, shape (136, 3)
+    keypoints_m : array, shape (136, 3), dtype float32
         In Halpe's order.
     heads_m : array, shape (n_bones, 3)
         Where the bones begin.
@@ -192,7 +192,7 @@ def pose_body(
     body : Body
     shape : int or str or array, shape (n_shapes,)
         Index or name of a shape, or convex weights to blend shapes.
-    pose : mapping of str to array, or array, shape (n_bones, 3, 3)
+    pose : mapping of str to array or array, shape (n_bones, 3, 3)
         Rotation vectors or matrices by bone name, or all rotation matrices, in body axes.
     T_world_body : array, shape (4, 4), optional
         Where the person stands and faces; the identity when left out.
@@ -241,7 +241,7 @@ def pose_bones(body: Body, shape: Shape, pose: Pose | np.ndarray) -> tuple[np.nd
     body : Body
     shape : int or str or array, shape (n_shapes,)
         As in `pose_body`.
-    pose : mapping of str to array, or array, shape (n_bones, 3, 3)
+    pose : mapping of str to array or array, shape (n_bones, 3, 3)
         As in `pose_body`.
 
     Returns

@@ -44,12 +44,12 @@ def reach(
         "left" or "right".
     wrist_m : array, shape (3,)
         Relative to the pelvis, body axes.
-    elbow_toward : sequence of 3 float, optional
+    elbow_toward : sequence of float, optional
         In the axes of the trunk, y away from the middle of the body.
 
     Returns
     -------
-    dict of str to float, or None
+    dict of str to float or None
         `angles` with those of shoulder and elbow replaced; None where the limits allow no position.
 
     Examples

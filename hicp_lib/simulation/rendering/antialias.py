@@ -50,7 +50,7 @@ def smooth_edges(
 
     Parameters
     ----------
-    image : array of float32, shape (height, width, 3)
+    image : array, shape (height, width, 3), dtype float32
         Linear RGB; changed in place.
     edges : array of int, shape (n,)
         Numbers of pixels, see `edge_pixels`.
@@ -61,7 +61,7 @@ def smooth_edges(
 
     Returns
     -------
-    array of float32, shape (height, width, 3)
+    array, shape (height, width, 3), dtype float32
         The image.
     """
     if len(edges) == 0:

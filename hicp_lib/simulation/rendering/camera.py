@@ -32,9 +32,9 @@ def look_at(
 
     Parameters
     ----------
-    eye_m, target_m : array_like, shape (3,)
+    eye_m, target_m : array, shape (3,)
         Where it is, and what it looks at; world frame.
-    up : tuple of 3 float, optional
+    up : tuple of float, optional
         What is up in the image.
     roll_rad : float, optional
         About the line of sight.
@@ -74,7 +74,7 @@ def pixel_rays(camera: PlacedCamera, pixels_px: np.ndarray | None = None) -> np.
 
     Returns
     -------
-    array of float32, shape (n, 6)
+    array, shape (n, 6), dtype float32
         Origin and direction. Directions are not unit vectors: their camera-frame z component
         is 1, so a hit at t lies at depth t.
     """
@@ -102,7 +102,7 @@ def ray_parts(camera: PlacedCamera, u: np.ndarray, v: np.ndarray) -> tuple[np.nd
 
     Returns
     -------
-    across, down : array of float32, shape (3, n) and (3, m)
+    across, down : array, shape (3, n) and (3, m), dtype float32
     """
     x = (u.astype(np.float32) - np.float32(camera.cx_px)) / np.float32(camera.fx_px)
     y = (v.astype(np.float32) - np.float32(camera.cy_px)) / np.float32(camera.fy_px)

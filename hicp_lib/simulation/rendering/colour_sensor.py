@@ -50,7 +50,7 @@ def expose(
 
     Parameters
     ----------
-    radiance : array of float32, shape (height, width, 3)
+    radiance : array, shape (height, width, 3), dtype float32
         Linear RGB.
     sensor : Sensor
     rng : numpy.random.Generator
@@ -60,7 +60,7 @@ def expose(
 
     Returns
     -------
-    array of uint8, shape (height, width, 3)
+    array, shape (height, width, 3), dtype uint8
         RGB.
 
     Raises

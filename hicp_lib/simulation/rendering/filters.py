@@ -55,7 +55,7 @@ def sum_within(
 
     Parameters
     ----------
-    counts : array of int16, shape (k, rows, columns)
+    counts : array, shape (k, rows, columns), dtype int16
         0 or 1.
     surface : array of int, shape (rows, columns)
     positions_m, normals : array, shape (3, rows, columns)
@@ -64,7 +64,7 @@ def sum_within(
 
     Returns
     -------
-    array of int16, shape (k, rows, columns)
+    array, shape (k, rows, columns), dtype int16
     """
     pairs = product((0, 1), (1, 2))
     alike = {pair: _alike(surface, positions_m, normals, *pair) for pair in pairs}

@@ -17,7 +17,7 @@ class GBuffer:
     ----------
     pixels : array of int, shape (n,)
         Numbers of the n pixels in the grid, row by row.
-    surface : array of int16, shape (rows, columns)
+    surface : array, shape (rows, columns), dtype int16
         What is seen, -1 at pixels that are not to be shaded.
     depth_m : array, shape (rows, columns)
     positions_m : array, shape (3, rows, columns)
@@ -49,7 +49,7 @@ class GBuffer:
         centre_m : array, shape (3,)
             Where the rays begin.
         directions : array, shape (3, height, width)
-        part : tuple of 2 slice
+        part : tuple of slice
             Rows and columns.
         wanted : array of bool, shape (height, width)
             Where nothing was hit, nothing is wanted.

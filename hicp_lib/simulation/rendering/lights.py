@@ -26,7 +26,7 @@ class Light:
         The corners are centre +- half_u +- half_v.
     power : array, shape (3,)
         Linear RGB: irradiance at one metre, seen face on.
-    direction : array, shape (3,), or None
+    direction : array or None, shape (3,)
         Unit vector, where a one-sided light (a window) shines; None for one that shines all around.
     """
 
@@ -76,7 +76,7 @@ def sample_offsets(cell: np.ndarray, kind: int, rng: np.random.Generator) -> np.
 
     Returns
     -------
-    array of float32, shape (2, n)
+    array, shape (2, n), dtype float32
     """
     moved = np.roll(_PLACES.reshape(2, 4, 4), (-kind, -3 * kind), axis=(1, 2)).reshape(2, 16)
     offsets = rng.random((2, len(cell)), np.float32)
@@ -97,7 +97,7 @@ def towards_light(light: Light, positions_m: np.ndarray, offsets: np.ndarray) ->
 
     Returns
     -------
-    array of float32, shape (3, n)
+    array, shape (3, n), dtype float32
     """
     s, t = 2 * offsets - 1
     c, u, v = (x.astype(np.float32)[:, None] for x in (light.centre_m, light.half_u_m, light.half_v_m))

@@ -16,7 +16,7 @@ class Mesh:
     ----------
     vertices_m : array, shape (n_vertices, 3)
         World frame.
-    triangles : array of int32, shape (n_triangles, 3)
+    triangles : array, shape (n_triangles, 3), dtype int32
     normals : array, shape (n_vertices, 3)
         Unit vectors.
     coords : array, shape (n_vertices, n_coords)
@@ -58,8 +58,8 @@ class Cut:
     Attributes
     ----------
     i, j : array of int, shape (n,)
-    t : array of float32, shape (n,)
-    triangles : array of int32, shape (n_triangles, 3)
+    t : array, shape (n,), dtype float32
+    triangles : array, shape (n_triangles, 3), dtype int32
     source : array of int, shape (n_triangles,)
         The triangle that each new one came from.
     """
@@ -172,7 +172,7 @@ def quad(corner_m: ArrayLike, u_m: ArrayLike, v_m: ArrayLike) -> Mesh:
 
     Parameters
     ----------
-    corner_m, u_m, v_m : array_like, shape (3,)
+    corner_m, u_m, v_m : array, shape (3,)
         A corner, and the two edges from there.
 
     Returns
@@ -216,7 +216,7 @@ def box(low_m: ArrayLike, high_m: ArrayLike, yaw_rad: float = 0.0) -> Mesh:
 
     Parameters
     ----------
-    low_m, high_m : array_like, shape (3,)
+    low_m, high_m : array, shape (3,)
     yaw_rad : float, optional
 
     Returns
@@ -256,7 +256,7 @@ def turned(mesh: Mesh, yaw_rad: float, about_m: ArrayLike) -> Mesh:
     ----------
     mesh : Mesh
     yaw_rad : float
-    about_m : array_like, shape (3,)
+    about_m : array, shape (3,)
         A point of the axis.
 
     Returns
@@ -276,9 +276,9 @@ def lathe(profile_m: ArrayLike, centre_m: ArrayLike, n_sides: int = 24) -> Mesh:
 
     Parameters
     ----------
-    profile_m : array_like, shape (n, 2)
+    profile_m : array, shape (n, 2)
         Radius and height, from the bottom up.
-    centre_m : array_like, shape (3,)
+    centre_m : array, shape (3,)
         Where its axis meets height 0.
     n_sides : int, optional
 
@@ -308,7 +308,7 @@ def closed_grid(vertices_m: np.ndarray, coords: np.ndarray, axis: int) -> Mesh:
 
     Parameters
     ----------
-    vertices_m : array of float32, shape (n_rows, n_columns, 3)
+    vertices_m : array, shape (n_rows, n_columns, 3), dtype float32
     coords : array, shape (n_rows, n_columns, n_coords)
     axis : int
         The first and last row (0) or column (1) coincide.

@@ -26,13 +26,13 @@ class Trace:
 
     Attributes
     ----------
-    depth_m : array of float32, shape (n,)
+    depth_m : array, shape (n,), dtype float32
         The ray parameter; infinite: nothing was hit.
-    triangle : array of int32, shape (n,)
+    triangle : array, shape (n,), dtype int32
         Number of the triangle in the whole scene; -1: nothing.
-    surface : array of int16, shape (n,)
+    surface : array, shape (n,), dtype int16
         Number of the surface; -1: nothing.
-    barycentric : array of float32, shape (n, 2)
+    barycentric : array, shape (n, 2), dtype float32
         Weights of the triangle's second and third corner.
     """
 
@@ -208,7 +208,7 @@ def interpolate(values: np.ndarray, corners: np.ndarray, weights: np.ndarray) ->
 
     Returns
     -------
-    array of float32, shape (k, n)
+    array, shape (k, n), dtype float32
     """
     result = np.empty((len(values), corners.shape[1]), np.float32)
     for found, component in zip(result, values, strict=True):

@@ -48,11 +48,11 @@ class Frame:
 
     Attributes
     ----------
-    radiance : array of float32, shape (height, width, 3)
+    radiance : array, shape (height, width, 3), dtype float32
         Linear RGB; a sensor makes an image of it.
-    depth_m : array of float32, shape (height, width)
+    depth_m : array, shape (height, width), dtype float32
         Along the camera's z axis; infinite where nothing is.
-    person : array of int16, shape (height, width)
+    person : array, shape (height, width), dtype int16
         Index of the person seen at each pixel, -1 for none.
     rays : RayScene
         The scene, to ask further questions of.

@@ -26,7 +26,7 @@ def visibility(
 
     Parameters
     ----------
-    sources : list of Light
+    sources : list of lights.Light
     scene : RayScene
     gbuffer : GBuffer
     normals : array, shape (3, rows, columns)
@@ -37,7 +37,7 @@ def visibility(
 
     Returns
     -------
-    array of float32, shape (n_lights + 1, n)
+    array, shape (n_lights + 1, n), dtype float32
         In [0, 1], the surroundings last.
     """
     row, column = np.arange(gbuffer.surface.shape[0])[:, None], np.arange(gbuffer.surface.shape[1])

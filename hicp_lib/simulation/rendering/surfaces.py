@@ -42,15 +42,15 @@ class Look:
     ----------
     albedo : array, shape (3, n) or (3, 1)
         Linear RGB; one column where it is the same all over.
-    height_m : array, shape (n,), or float
+    height_m : float or array, shape (n,)
         Bump height that tilts the normal.
-    gloss : array, shape (n,), or float
+    gloss : float or array, shape (n,)
         Strength of the highlight; 0.04 is a dielectric's.
-    roughness : array, shape (n,), or float
+    roughness : float or array, shape (n,)
         Of the highlight, in (0, 1].
-    softness : array, shape (n,), or float
+    softness : float or array, shape (n,)
         How far light creeps past the terminator, as in skin.
-    glow : array, shape (3, n) or (3, 1), or float
+    glow : float or array, shape (3, n) or (3, 1)
         Light given off, linear RGB.
     """
 
@@ -81,7 +81,7 @@ class Surface:
         Tells what it looks like where it is hit.
     person : int
         Whose it is; -1: nobody's.
-    parts : array of int16, shape (n_triangles,), or None
+    parts : array or None, shape (n_triangles,), dtype int16
         Body part per triangle.
     """
 

@@ -21,7 +21,7 @@ class Texture:
 
     Attributes
     ----------
-    levels : list of array of float32, shape (size + 1, size + 1, channels)
+    levels : list of array, shape (size + 1, size + 1, channels), dtype float32
         Each half as large as the one before; the last row and column repeat the first.
     width_m : float
         How wide the tile is on a surface.
@@ -36,12 +36,12 @@ class Texture:
         Parameters
         ----------
         uv_m : array, shape (2, n)
-        footprint_m : array, shape (n,), or float
+        footprint_m : float or array, shape (n,)
             How many metres of surface one pixel sees.
 
         Returns
         -------
-        array of float32, shape (channels, n)
+        array, shape (channels, n), dtype float32
 
         Examples
         --------
@@ -102,12 +102,12 @@ def noise(
         The amplitude spectrum falls as frequency ** -slope.
     low : float
         Below so many cycles per tile it is flat.
-    stretch : tuple of 2 float, optional
+    stretch : tuple of float, optional
         How much longer features are along rows and columns.
 
     Returns
     -------
-    array of float32, shape (size, size)
+    array, shape (size, size), dtype float32
         Mean 0, standard deviation 1.
 
     Examples

@@ -41,7 +41,7 @@ def simulate_clicks(
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         Columns as `hicp_lib.mocap.clicking.read_clicks`.
     """
     rng = np.random.default_rng(seed)

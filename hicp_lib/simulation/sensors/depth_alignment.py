@@ -20,7 +20,7 @@ def align_to_colour(depth_m: np.ndarray, left: PlacedCamera, colour: PlacedCamer
 
     Returns
     -------
-    array of float32, shape (colour.height_px, colour.width_px)
+    array, shape (colour.height_px, colour.width_px), dtype float32
         NaN for none.
     """
     shift_m = float(colour.T_world_camera[:3, 0] @ (left.centre_m - colour.centre_m))

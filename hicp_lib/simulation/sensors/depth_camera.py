@@ -119,7 +119,7 @@ def simulate_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCamera,
 
     Returns
     -------
-    array of float32, shape (colour.height_px, colour.width_px)
+    array, shape (colour.height_px, colour.width_px), dtype float32
         Metres along the camera's z axis, NaN where there is none.
 
     Examples
@@ -151,7 +151,7 @@ def simulate_raw_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCam
 
     Returns
     -------
-    array of float32, shape (settings.height_px, settings.width_px)
+    array, shape (settings.height_px, settings.width_px), dtype float32
         Else as of `simulate_depth`.
     """
     return _measure(scene, left_imager(colour, settings), 0, settings, rng)

@@ -16,13 +16,13 @@ def correlated_noise(shape: tuple[int, int], window_px: int, rng: Rng) -> np.nda
 
     Parameters
     ----------
-    shape : tuple of 2 int
+    shape : tuple of int
     window_px : int
     rng : numpy.random.Generator
 
     Returns
     -------
-    array of float32
+    array, dtype float32
         Mean 0, variance 1.
     """
     tile = _noise_tile(window_px)
@@ -49,7 +49,7 @@ def patches(shape: tuple[int, int], share: float, window_px: int, rng: Rng) -> n
 
     Parameters
     ----------
-    shape : tuple of 2 int
+    shape : tuple of int
     share : float
         0 to 1.
     window_px : int

@@ -28,7 +28,7 @@ class Room:
         Half its sizes along x and y.
     height_m : float
     surfaces : list of Surface
-    windows : list of tuple of 4 array, shape (3,)
+    windows : list of tuple of array, shape (3,)
         Centre, half_u, half_v and inward normal of each pane, for the light.
     """
 

@@ -17,9 +17,9 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_bytes, write_json
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
-from hicp_lib.simulation.batch import check_output, run_jobs
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import Frame, render
+from hicp_lib.simulation.world.batch import check_output, run_jobs
 from hicp_lib.simulation.world.staging import Stage, distance_m, random_stage
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
@@ -130,7 +130,7 @@ def render_scene(seed: int, index: int) -> tuple[np.ndarray, list[dict]]:
 
     Returns
     -------
-    image : array of uint8, shape (height, width, 3)
+    image : array, shape (height, width, 3), dtype uint8
         RGB.
     people : list of dict
         As `annotate` describes them.
