@@ -23,7 +23,7 @@ from hicp_lib.experiments.recordings.frames import camera_at, record_frame, stag
 from hicp_lib.experiments.recordings.scenarios import SCENARIOS, Scenario
 from hicp_lib.experiments.recordings.simulate import record_one, simulate_recording
 from hicp_lib.simulation.rendering.render import render
-from hicp_lib.simulation.world.scenes import worker_pool
+from hicp_lib.simulation.world.batch import worker_pool
 
 FLOORS_S = {"relative-upper": 40.0, "relative-lower": 40.0, "mocap": 180.0}
 

@@ -20,7 +20,8 @@ from timing import Comparison, run
 from hicp_lib.simulation.rendering.camera import pixel_rays
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import render
-from hicp_lib.simulation.world.scenes import annotate, render_scene, worker_pool
+from hicp_lib.simulation.world.batch import worker_pool
+from hicp_lib.simulation.world.scenes import annotate, render_scene
 from hicp_lib.simulation.world.staging import random_stage
 
 SEED = 20220

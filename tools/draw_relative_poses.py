@@ -15,8 +15,8 @@ import pandas as pd
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.files import write_bytes
 from hicp_lib.core.keypoints import HANDS, INDEX
-from hicp_lib.experiments.laboratory import COLOUR, robot_camera
-from hicp_lib.experiments.recordings.seated_person import VIEWS, seated
+from hicp_lib.experiments.laboratory import robot_camera
+from hicp_lib.experiments.recordings.seated_person import VIEWS, seated_person
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
 from hicp_lib.simulation.rendering.camera import project_world
 
@@ -47,7 +47,7 @@ def main() -> None:
 
 def draw(icub, view: str, rng: np.random.Generator) -> list[np.ndarray]:
     """Poses of a view, degrees, to a tenth."""
-    points_m = seated(0).person.keypoints_m
+    points_m = seated_person(0)[1].keypoints_m
     low, high = np.array([RANGES_DEG[view][joint] for joint in HEAD_JOINTS], float).T
     limits_deg = np.degrees(icub.chains["head"].limits_rad)
     assert (low >= limits_deg[:, 0] - 1e-9).all() and (high <= limits_deg[:, 1] + 1e-9).all(), limits_deg
@@ -65,7 +65,7 @@ def is_framed(
     T_root_camera: np.ndarray, points_m: np.ndarray, wanted: list[int], unwanted: list[int]
 ) -> bool:
     """Whether the wanted keypoints are well inside the image, and the unwanted ones outside."""
-    camera = robot_camera(COLOUR, T_root_camera)
+    camera = robot_camera(T_root_camera)
     pixels_px = project_world(camera, points_m)[0]
     size = np.array([camera.width_px, camera.height_px])
     well_inside = ((pixels_px > MARGIN_PX) & (pixels_px < size - MARGIN_PX)).all(axis=1)

@@ -15,11 +15,10 @@ The area in the annotations, the s² of OKS, is that of the whole unhidden perso
 that the same error in body sizes counts the same at every level.
 """
 
-from __future__ import annotations
-
-import multiprocessing
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import cv2
@@ -29,7 +28,8 @@ from hicp_lib.core.cache import key
 from hicp_lib.core.files import cache_dir
 from hicp_lib.core.images import write_png
 from hicp_lib.datasets.crops import inside, whole_pixel_boxes
-from hicp_lib.experiments.laboratory import PHOTOGRAPHIC, adult, facing_robot, furnished
+from hicp_lib.experiments.laboratory import PHOTOGRAPHIC, facing_robot, furnished, random_adult
+from hicp_lib.experiments.random_streams import stream
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.simulation.appearance import materials as m
 from hicp_lib.simulation.appearance.people import dress
@@ -40,8 +40,11 @@ from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at
 from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
 from hicp_lib.simulation.rendering.render import Frame, World, render
 from hicp_lib.simulation.rendering.surfaces import Surface
-from hicp_lib.simulation.world.scenes import worker_pool
+from hicp_lib.simulation.world.batch import run_jobs
 from hicp_lib.simulation.world.visibility import keypoint_visibility
+
+Draws = tuple[int, int]
+"""Seed and number of a person: the stream of random numbers that all their pictures are drawn from."""
 
 LEVELS: dict[str, tuple[float, ...]] = {
     "distance": (0.5, 0.75, 1.0, 1.5, 2.5, 3.5),
@@ -52,6 +55,7 @@ LEVELS: dict[str, tuple[float, ...]] = {
     "lower part": (1.0, 0.8, 0.6, 0.4, 0.2),
 }
 DISTANCE_M, EYE_M = 2.5, 1.3
+_KEY_LENGTH = 16  # of a data set's folder
 _WIDTH_PX, _HEIGHT_PX, _FOCAL_PX = 480, 640, 560.0
 _PERSON_Y_M, _BOARD_M, _BOARD_HALF_M = 1.2, 0.85, 0.6
 _SIDE_MARGIN = 0.1  # of the person's height, left and right of a cut-out part
@@ -64,11 +68,15 @@ class Picture:
 
     Attributes
     ----------
-    image : RGB uint8, shape (height, width, 3)
-    mask : the person's pixels, shape (height, width), bool
+    image : array, shape (height, width, 3), dtype uint8
+        RGB.
+    mask : array of bool, shape (height, width)
+        The person's pixels.
     keypoints_px : array, shape (136, 2)
-    visibility : array, shape (136,); 0 outside, 1 hidden, 2 visible
-    area_px2 : of the whole unhidden person at this scale
+    visibility : array of int, shape (136,)
+        0 outside, 1 hidden, 2 visible.
+    area_px2 : float
+        Of the whole unhidden person at this scale.
     """
 
     image: np.ndarray
@@ -83,35 +91,33 @@ def open_doses(n_people: int = 10, seed: int = 0) -> Path:
 
     People in the annotations carry `dose`, `level`, and `source_image_id`, the number of the person.
     """
-    folder = cache_dir() / "doses" / key([open_doses], n_people=n_people, seed=seed)[:16]
+    folder = cache_dir() / "doses" / key([open_doses], n_people=n_people, seed=seed)[:_KEY_LENGTH]
     if not (folder / "annotations.json").is_file():
-        jobs = [(str(folder), seed, k) for k in range(n_people)]
-        with worker_pool(min(n_people, multiprocessing.cpu_count())) as pool:
-            people = pool.starmap(_write_person, jobs, chunksize=1)
-        write_annotations(folder / "annotations.json", _joined([row for rows in people for row in rows]))
+        people = run_jobs([partial(_write_person, folder, seed, number) for number in range(n_people)])
+        write_annotations(folder / "annotations.json", _joined([*chain.from_iterable(people)]))
     return folder
 
 
 def doses(seed: int, number: int) -> Iterator[tuple[str, float, Picture]]:
     """All pictures of one person: dose, level and picture."""
-    person, world = _stage(np.random.default_rng(np.random.SeedSequence([seed, number])))
-    base_frame, base = _photograph(person, world, DISTANCE_M, (seed, number))
-    for level in LEVELS["distance"]:
-        yield "distance", level, _at_distance(person, world, level, base, (seed, number))
-    for level in LEVELS["light"]:
-        yield "light", level, replace(base, image=_developed(base_frame, _dim(level), (seed, number)))
-    for level in LEVELS["hidden"]:
-        yield "hidden", level, _hidden(person, world, level, base, (seed, number))
-    for level in LEVELS["resolution"]:
-        yield "resolution", level, _smaller(base, level / _HEIGHT_PX)
-    for level in LEVELS["upper part"]:
-        yield "upper part", level, _part(base, level, from_above=True)
-    for level in LEVELS["lower part"]:
-        yield "lower part", level, _part(base, level, from_above=False)
+    draws = (seed, number)
+    person, world = _stage(stream(*draws))
+    base_frame, base = _photograph(person, world, DISTANCE_M, draws)
+    taken: dict[str, Callable[[float], Picture]] = {
+        "distance": lambda level: _at_distance(person, world, level, base, draws),
+        "light": lambda level: replace(base, image=_developed(base_frame, _dim(level), draws)),
+        "hidden": lambda level: _hidden(person, world, level, base, draws),
+        "resolution": lambda level: _smaller(base, level / _HEIGHT_PX),
+        "upper part": lambda level: _part(base, level, from_above=True),
+        "lower part": lambda level: _part(base, level, from_above=False),
+    }
+    for dose, levels in LEVELS.items():
+        for level in levels:
+            yield dose, level, taken[dose](level)
 
 
 def _stage(rng: np.random.Generator) -> tuple[PosedBody, World]:
-    body, appearance = load_body(), adult(rng)
+    body, appearance = load_body(), random_adult(rng)
     pose = sample_pose(rng, body, str(rng.choice(_POSES)), appearance.shape)
     person = pose_body(body, appearance.shape, pose, facing_robot(_PERSON_Y_M))
     free = [(0.0, y, 0.7) for y in np.linspace(_PERSON_Y_M - LEVELS["distance"][-1], _PERSON_Y_M, 8)]
@@ -125,18 +131,16 @@ def _camera(distance_m: float) -> PlacedCamera:
     return PlacedCamera(_WIDTH_PX, _HEIGHT_PX, _FOCAL_PX, _FOCAL_PX, *centre, pose)
 
 
-def _photograph(
-    person: PosedBody, world: World, distance_m: float, seed: tuple[int, int]
-) -> tuple[Frame, Picture]:
+def _photograph(person: PosedBody, world: World, distance_m: float, seed: Draws) -> tuple[Frame, Picture]:
     camera = _camera(distance_m)
-    frame = render(world, camera, np.random.default_rng(seed))
+    frame = render(world, camera, stream(*seed))
     pixels, seen = keypoint_visibility(frame.rays, camera, person.keypoints_m, 0)
     mask = frame.person == 0
     return frame, Picture(_developed(frame, PHOTOGRAPHIC, seed), mask, pixels, seen, float(mask.sum()))
 
 
-def _developed(frame: Frame, sensor: Sensor, seed: tuple[int, int]) -> np.ndarray:
-    return expose(frame.radiance, sensor, np.random.default_rng(seed), frame.person >= 0)
+def _developed(frame: Frame, sensor: Sensor, seed: Draws) -> np.ndarray:
+    return expose(frame.radiance, sensor, stream(*seed), frame.person >= 0)
 
 
 def _dim(light: float) -> Sensor:
@@ -144,14 +148,14 @@ def _dim(light: float) -> Sensor:
     return replace(PHOTOGRAPHIC, shot_noise=shot, read_noise=read)
 
 
-def _at_distance(person, world, distance_m: float, base: Picture, seed: tuple[int, int]) -> Picture:
+def _at_distance(person, world, distance_m: float, base: Picture, seed: Draws) -> Picture:
     if distance_m == DISTANCE_M:
         return base
     _, picture = _photograph(person, world, distance_m, seed)
     return replace(picture, area_px2=base.area_px2 * (DISTANCE_M / distance_m) ** 2)
 
 
-def _hidden(person, world, share: float, base: Picture, seed: tuple[int, int]) -> Picture:
+def _hidden(person, world, share: float, base: Picture, seed: Draws) -> Picture:
     """A board whose upper edge is seen at the given share of the person's height above their feet."""
     if share == 0:
         return base
@@ -160,10 +164,8 @@ def _hidden(person, world, share: float, base: Picture, seed: tuple[int, int]) -
     depth_m = DISTANCE_M - _BOARD_M
     top_m = EYE_M - (edge_px - (_HEIGHT_PX - 1) / 2) / _FOCAL_PX * depth_m
     y = _PERSON_Y_M - _BOARD_M
-    board = Surface(
-        g.box([-_BOARD_HALF_M, y, 0], [_BOARD_HALF_M, y + 0.02, top_m]),
-        m.plain(m.any_colour(np.random.default_rng(seed))),
-    )
+    box = g.box([-_BOARD_HALF_M, y, 0], [_BOARD_HALF_M, y + 0.02, top_m])
+    board = Surface(box, m.plain(m.any_colour(stream(*seed))))
     _, picture = _photograph(person, replace(world, surfaces=[*world.surfaces, board]), DISTANCE_M, seed)
     return replace(picture, area_px2=base.area_px2)
 
@@ -188,7 +190,7 @@ def _part(base: Picture, share: float, from_above: bool) -> Picture:
     top = box[1] if from_above else box[1] + box[3] - kept
     cut = np.array([[box[0] - margin, top, box[2] + 2 * margin, kept]])
     crop = whole_pixel_boxes(cut, np.array([_WIDTH_PX]), np.array([_HEIGHT_PX]))[0]
-    left, above, right, below = (int(edge) for edge in crop)
+    left, above, right, below = map(int, crop)
     shown = inside(base.keypoints_px, (left, above, right, below))
     window = slice(above, below), slice(left, right)
     return replace(
@@ -206,30 +208,24 @@ def _bounds(mask: np.ndarray) -> np.ndarray:
     return np.array([u.min(), v.min(), np.ptp(u) + 1, np.ptp(v) + 1], float) if len(u) else np.zeros(4)
 
 
-def _write_person(folder: str, seed: int, number: int) -> list[tuple]:
+def _write_person(folder: Path, seed: int, number: int) -> list[tuple]:
     """Writes one person's pictures; a row for each: file name, person, dose, level, sizes, truth."""
     rows = []
     for dose, level, picture in doses(seed, number):
         name = f"{number:03d}_{dose.replace(' ', '_')}_{level:g}.png"
-        write_png(Path(folder) / "images" / name, np.ascontiguousarray(picture.image))
+        write_png(folder / "images" / name, np.ascontiguousarray(picture.image))
         about = {"source_image_id": number, "dose": dose, "level": float(level)}
-        shown = picture.visibility > 0
-        keypoints = np.where(shown[:, None], picture.keypoints_px, np.nan)
-        size = picture.image.shape[1::-1]
-        box = _bounds(picture.mask)
-        rows.append(
-            (name, size, about, box, picture.area_px2, keypoints, np.where(shown, picture.visibility, 0))
-        )
+        keypoints = np.where(picture.visibility[:, None] > 0, picture.keypoints_px, np.nan)
+        size, box = picture.image.shape[1::-1], _bounds(picture.mask)
+        rows.append((name, size, about, box, picture.area_px2, keypoints, picture.visibility))
     return rows
 
 
 def _joined(rows: list[tuple]) -> Annotations:
     names, sizes, about, boxes, areas, keypoints, visibility = zip(*rows, strict=True)
     ids = np.arange(1, len(rows) + 1)
-    images = {
-        int(i): ImageInfo(int(i), name, int(size[0]), int(size[1]))
-        for i, name, size in zip(ids, names, sizes, strict=True)
-    }
+    numbered = enumerate(zip(names, sizes, strict=True), start=1)
+    images = {k: ImageInfo(k, name, *size) for k, (name, size) in numbered}
     return Annotations(
         images, ids, ids, np.array(boxes), np.array(areas), np.zeros(len(rows), bool),
         np.array(keypoints), np.array(visibility, float), list(about),

@@ -5,24 +5,29 @@ backward, y to its right, z up) lies above the world's origin, as high as when a
 on its stand: 0.6 m above the floor is assumed. The robot itself is not drawn.
 """
 
-from __future__ import annotations
+from itertools import product
 
 import numpy as np
 
-from hicp_lib.core.camera import Camera
+from hicp_lib.core.camera import Camera, transform
+from hicp_lib.experiments.minimum_jerk import Posture
 from hicp_lib.simulation.appearance import materials as m
 from hicp_lib.simulation.appearance.people import Appearance, random_appearance
-from hicp_lib.simulation.body.model import load_body
+from hicp_lib.simulation.body.joints import pose_from_joints
+from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.simulation.rendering import lights
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.camera import PlacedCamera
-from hicp_lib.simulation.rendering.colour_sensor import Sensor
-from hicp_lib.simulation.rendering.render import World
+from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
+from hicp_lib.simulation.rendering.render import Frame, World
 from hicp_lib.simulation.rendering.surfaces import Surface
+from hicp_lib.simulation.sensors.depth_camera import D435, simulate_depth
+from hicp_lib.simulation.world.furniture import legs
 from hicp_lib.simulation.world.room import make_room
 
 Rng = np.random.Generator
 
+PELVIS_LEAN = "pelvis_flexion"  # a joint of postures only: the whole trunk bends at the hips
 ROOT_HEIGHT_M = 0.6
 T_WORLD_ROOT = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, ROOT_HEIGHT_M], [0, 0, 0, 1]])
 COLOUR = Camera(640, 480, 616.591, 616.765, 318.482, 241.167)
@@ -33,12 +38,41 @@ PHOTOGRAPHIC = Sensor(
 """The colour camera's rendition: that of a good webcam."""
 
 
-def robot_camera(intrinsics: Camera, T_root_camera: np.ndarray) -> PlacedCamera:
-    """The camera on the robot's head, from its pose (4, 4) in the root frame."""
-    i = intrinsics
-    return PlacedCamera(
-        i.width_px, i.height_px, i.fx_px, i.fy_px, i.cx_px, i.cy_px, T_WORLD_ROOT @ T_root_camera
-    )
+def robot_camera(T_root_camera: np.ndarray) -> PlacedCamera:
+    """The colour camera on the robot's head, from its pose (4, 4) in the root frame.
+
+    Examples
+    --------
+    >>> robot_camera(np.eye(4)).centre_m  # in the world
+    array([0. , 0. , 0.6])
+    """
+    return PlacedCamera(**vars(COLOUR), T_world_camera=T_WORLD_ROOT @ T_root_camera)
+
+
+def colour_and_depth(frame: Frame, camera: PlacedCamera, rng: Rng) -> tuple[np.ndarray, np.ndarray]:
+    """What the depth camera on the robot's head takes of a frame.
+
+    Parameters
+    ----------
+    frame : Frame
+    camera : PlacedCamera
+        That the frame was rendered for.
+    rng : numpy.random.Generator
+        Of the noise of both sensors.
+
+    Returns
+    -------
+    rgb : array, shape (480, 640, 3), dtype uint8
+    depth_m : array, shape (480, 640), dtype float32
+        Aligned to the colour image; NaN for none.
+    """
+    rgb = expose(frame.radiance, PHOTOGRAPHIC, rng, frame.person >= 0)
+    return rgb, simulate_depth(frame.rays, camera, D435, rng)
+
+
+def in_root(points_m: np.ndarray) -> np.ndarray:
+    """Points (..., 3) of the world in the robot's root frame."""
+    return transform(np.linalg.inv(T_WORLD_ROOT), points_m)
 
 
 def facing_robot(y_m: float, x_m: float = 0.0) -> np.ndarray:
@@ -49,7 +83,18 @@ def facing_robot(y_m: float, x_m: float = 0.0) -> np.ndarray:
     return T_world_body
 
 
-def adult(rng: Rng) -> Appearance:
+def posed(shape: np.ndarray, posture: Posture) -> PosedBody:
+    """A person in a posture, facing the robot; `PELVIS_LEAN` tilts the pelvis, the legs stay."""
+    joints = dict(posture.joints)
+    lean = joints.pop(PELVIS_LEAN, 0.0)
+    for side in ("left", "right"):
+        joints[f"{side}_hip_flexion"] = joints.get(f"{side}_hip_flexion", 0.0) + lean
+    x, y = posture.place_m
+    pose = {**pose_from_joints(joints), "root": np.array([0.0, lean, 0.0])}
+    return pose_body(load_body(), shape, pose, facing_robot(y, x))
+
+
+def random_adult(rng: Rng) -> Appearance:
     """A random adult in trousers: a skirt would have to drape over a seat."""
     while True:
         appearance = random_appearance(rng)
@@ -59,44 +104,72 @@ def adult(rng: Rng) -> Appearance:
 
 
 def furnished(rng: Rng, surfaces: list[Surface], clear_m: list[tuple[float, float, float]]) -> World:
-    """A lit room around surfaces; no furniture within the discs (x, y, radius) of `clear_m`."""
+    """A lit room around surfaces.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    surfaces : list of Surface
+    clear_m : list of tuple of float
+        Discs (x, y, radius) without furniture.
+
+    Returns
+    -------
+    World
+    """
     room = make_room(rng, np.array([(0.0, 0.0, 0.6), *clear_m]))
     return World([*room.surfaces, *surfaces], *_lighting(room.height_m), backdrop=np.zeros(3))
 
 
 def table(rng: Rng, low_m: tuple[float, float], high_m: tuple[float, float], height_m: float) -> Surface:
-    """A table whose top spans from `low_m` to `high_m` (x, y), its surface at `height_m`."""
-    (x0, y0), (x1, y1) = low_m, high_m
-    boxes = [((x0, y0, height_m - 0.03), (x1, y1, height_m))]
-    boxes += [
-        ((x, y, 0.0), (x + 0.05, y + 0.05, height_m - 0.03))
-        for x in (x0 + 0.03, x1 - 0.08)
-        for y in (y0 + 0.03, y1 - 0.08)
-    ]
-    return _boxes(boxes, m.wooden(rng))
+    """A table.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    low_m, high_m : tuple of float
+        Two corners of its top (x, y).
+    height_m : float
+        Of the top's surface.
+
+    Returns
+    -------
+    Surface
+    """
+    (x0, y0), (x1, y1), below_m = low_m, high_m, height_m - 0.03
+    corners = product((x0 + 0.03, x1 - 0.08), (y0 + 0.03, y1 - 0.08))
+    feet = [((x, y, 0.0), (x + 0.05, y + 0.05, below_m)) for x, y in corners]
+    return _boxes([((x0, y0, below_m), (x1, y1, height_m)), *feet], m.wooden(rng))
 
 
 def chair(rng: Rng, middle_m: tuple[float, float], seat_m: float) -> list[Surface]:
-    """A chair that faces the robot: its seat's middle (x, y) and height; the back is behind it."""
+    """A chair that faces the robot.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    middle_m : tuple of float
+        Of its seat (x, y); the back is behind it.
+    seat_m : float
+        Height of its seat.
+
+    Returns
+    -------
+    list of Surface
+    """
     x, y = middle_m
-    half, back = 0.215, y + 0.2
-    legs = [
-        ((x + dx - 0.018, y + dy - 0.018, 0.0), (x + dx + 0.018, y + dy + 0.018, seat_m - 0.045))
-        for dx in (-half + 0.03, half - 0.03)
-        for dy in (-half + 0.03, half - 0.03)
-    ]
-    posts = [
-        ((x + dx - 0.015, back, seat_m - 0.045), (x + dx + 0.015, back + 0.03, seat_m + 0.42))
+    half, back, below_m, top_m = 0.215, y + 0.2, seat_m - 0.045, seat_m + 0.42
+    inset = (-half + 0.03, half - 0.03)
+    frame = legs([x + dx for dx in inset], [y + dy for dy in inset], 0.018, 0.0, below_m)
+    frame += [
+        ((x + dx - 0.015, back, below_m), (x + dx + 0.015, back + 0.03, top_m))
         for dx in (-half + 0.04, half - 0.04)
     ]
     cushions = [
-        ((x - half, y - half, seat_m - 0.045), (x + half, y + half, seat_m)),
-        ((x - half + 0.01, back - 0.025, seat_m + 0.14), (x + half - 0.01, back, seat_m + 0.42)),
+        ((x - half, y - half, below_m), (x + half, y + half, seat_m)),
+        ((x - half + 0.01, back - 0.025, seat_m + 0.14), (x + half - 0.01, back, top_m)),
     ]
-    return [
-        _boxes(legs + posts, m.plain(np.full(3, 0.08), 0.3)),
-        _boxes(cushions, m.upholstery(rng)),
-    ]
+    return [_boxes(frame, m.plain(np.full(3, 0.08), 0.3)), _boxes(cushions, m.upholstery(rng))]
 
 
 def _boxes(spans: list, material: m.Material) -> Surface:
@@ -106,11 +179,8 @@ def _boxes(spans: list, material: m.Material) -> Surface:
 
 def _lighting(height_m: float) -> tuple[list[lights.Light], lights.Ambient]:
     """Two rows of tubes at the ceiling, and what walls and floor return of it."""
-    tubes = [
-        lights.Light(
-            np.array([x, 0.3, height_m - 0.1]), np.array([0.1, 0, 0]), np.array([0, 0.75, 0]), np.full(3, 3.2)
-        )
-        for x in (-0.9, 0.9)
-    ]
+    half_u, half_v, power = np.array([0.1, 0, 0]), np.array([0, 0.75, 0]), np.full(3, 3.2)
+    middles = (np.array([x, 0.3, height_m - 0.1]) for x in (-0.9, 0.9))
+    tubes = [lights.Light(middle, half_u, half_v, power) for middle in middles]
     grey = np.ones(3)
     return tubes, lights.Ambient(0.42 * grey, 0.3 * grey, 0.25 * grey, np.array([0, -1.0, 0]))

@@ -5,8 +5,6 @@ from rest to rest, and how people's arms move (Flash and Hogan, *The Coordinatio
 J. Neuroscience 1985). Joints stay within the ranges of the postures, so within their limits.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -33,8 +31,20 @@ class Move:
 
 
 def between(a: Posture, b: Posture, share: float) -> Posture:
-    """The posture a share (0 to 1) of the way from `a` to `b`; joints one of them lacks are at zero there."""
-    names = [*dict(a.joints) | b.joints]  # in the same order in every process, as those of a set are not
+    """The posture a share of the way from one to another.
+
+    Parameters
+    ----------
+    a, b : Posture
+        Joints that one of them lacks are at zero there.
+    share : float
+        0 to 1.
+
+    Returns
+    -------
+    Posture
+    """
+    names = [*a.joints | b.joints]  # in the same order in every process, as those of a set are not
     start, end = (np.array([p.joints.get(name, 0.0) for name in names]) for p in (a, b))
     place = np.array(a.place_m) + share * (np.array(b.place_m) - a.place_m)
     joints = dict(zip(names, (start + share * (end - start)).tolist(), strict=True))
@@ -42,7 +52,13 @@ def between(a: Posture, b: Posture, share: float) -> Posture:
 
 
 def minimum_jerk(s: float) -> float:
-    """Share of the way after a share `s` of the time, both 0 to 1."""
+    """Share of the way after a share `s` of the time, both 0 to 1.
+
+    Examples
+    --------
+    >>> minimum_jerk(0.0), minimum_jerk(0.5), minimum_jerk(1.0)
+    (0.0, 0.5, 1.0)
+    """
     return s**3 * (10 - 15 * s + 6 * s * s)
 
 
@@ -52,8 +68,18 @@ class Motion:
 
     Attributes
     ----------
-    first : the posture until time 0
-    moves : what comes then, without end
+    first : Posture
+        Until time 0.
+    moves : iterator of Move
+        What comes then, without end.
+
+    Examples
+    --------
+    >>> from itertools import repeat
+    >>> low, high = (Posture({"left_elbow_flexion": angle}, (0.0, 0.0)) for angle in (0.0, 1.0))
+    >>> bending = Motion(low, repeat(Move(2.0, high)))
+    >>> bending.at(1.0).joints, bending.still_since_s(5.0)
+    ({'left_elbow_flexion': 0.5}, 2.0)
     """
 
     first: Posture

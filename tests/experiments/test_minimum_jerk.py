@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from hicp_lib.experiments.minimum_jerk import Motion, Move, Posture, between, minimum_jerk
 from hicp_lib.experiments.recordings.gestures import TABLE_HEIGHT_M
-from hicp_lib.experiments.recordings.moving_person import moving
+from hicp_lib.experiments.recordings.moving_person import moving_person
 from hicp_lib.simulation.body.joints import pose_from_joints, within_limits
 from hicp_lib.simulation.body.model import load_body
-from hicp_lib.simulation.body.self_collision import clearance_m, outline
+from hicp_lib.simulation.body.self_collision import collision_model, self_collision_distance_m
 
 A = Posture({"left_elbow_flexion": 0.2}, (0.0, 1.0))
 B = Posture({"left_elbow_flexion": 1.2, "neck_turn": 0.1}, (0.5, 2.0))
@@ -73,23 +73,23 @@ def test_whoever_keeps_still_is_posed_once_and_whoever_moves_is_not(scene):
 
 @pytest.fixture(scope="module")
 def scene():
-    return moving(0)
+    return moving_person(0)
 
 
 def test_a_motion_is_the_same_in_whatever_order_it_is_asked_for(scene):
     late = scene.motion.at(9.3)
-    assert moving.__wrapped__(0).motion.at(9.3) == late  # not the one that is kept
-    other = moving(1).motion.at(9.3)
+    assert moving_person.__wrapped__(0).motion.at(9.3) == late  # not the one that is kept
+    other = moving_person(1).motion.at(9.3)
     assert other.joints != late.joints
 
 
 def test_the_person_stays_within_anatomy_and_does_not_jump(scene):
-    body, person = load_body(), outline(load_body(), scene.appearance.shape)
+    body, person = load_body(), collision_model(load_body(), scene.appearance.shape)
     before = None
     for time_s in np.arange(0, 12, 0.1):
         posture = scene.motion.at(time_s)
         assert within_limits(posture.joints)
-        assert clearance_m(body, person, pose_from_joints(posture.joints)) > -0.05
+        assert self_collision_distance_m(body, person, pose_from_joints(posture.joints)) > -0.05
         wrists = scene.person_at(time_s).keypoints_m[[9, 10]]
         if before is not None:
             assert np.linalg.norm(wrists - before, axis=1).max() < 0.45  # metres in a tenth of a second

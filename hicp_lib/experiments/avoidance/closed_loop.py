@@ -1,11 +1,8 @@
 """The loop closed in simulation: the robot sees the person, gives way, and sees from its new posture.
 
-Time advances in the controller's periods. Joints follow their velocities exactly. Eyes take images at
-their camera's rate, but only when they are done with the one before; what they saw reaches the loop after
-their delay.
+Time advances in the controller's periods. Joints follow their velocities exactly. Images are taken at the
+camera's rate, but only when the one before is done with; what was perceived reaches the loop after a delay.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -14,8 +11,9 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.memo import memoised
-from hicp_lib.experiments.avoidance.reaching import Script, in_root, script
-from hicp_lib.experiments.avoidance.skin_distance import robot_balls, skin_distance_m
+from hicp_lib.experiments.avoidance.reaching import Script, script
+from hicp_lib.experiments.avoidance.skin_distance import robot_spheres, skin_distance_m
+from hicp_lib.experiments.laboratory import in_root
 from hicp_lib.robot.controller import Controller, Settings
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import ARM_JOINTS, ICub, load_icub
@@ -35,10 +33,14 @@ class Trial:
 
     Attributes
     ----------
-    script : what the person does
-    duration_s : for how long
-    seed : draws person, room and noise
-    camera_hz : images per second, if the eyes are as fast
+    script : str
+        What the person does, a key of `SCRIPTS`.
+    duration_s : float
+        For how long.
+    seed : int
+        Draws person, room and noise.
+    camera_hz : float
+        Images per second, if perception is as fast.
     """
 
     script: str
@@ -47,12 +49,15 @@ class Trial:
     camera_hz: float = 10.0
 
 
-class Eyes(Protocol):
-    """What the robot sees with. `delay_s`: from the image to when the loop knows."""
+class Perceiver(Protocol):
+    """What the robot perceives people with. `delay_s`: from the image to when the loop knows."""
 
-    delay_s: float
+    @property
+    def delay_s(self) -> float:
+        """From the image to when the loop knows."""
+        ...
 
-    def see(self, script: Script, time_s: float, posture: Posture) -> Perception:
+    def perceive(self, script: Script, time_s: float, posture: Posture) -> Perception:
         """Who is there, as seen from a posture."""
         ...
 
@@ -63,7 +68,7 @@ class TrueKeypoints:
 
     delay_s: float = 0.0
 
-    def see(self, script: Script, time_s: float, posture: Posture) -> Perception:
+    def perceive(self, script: Script, time_s: float, posture: Posture) -> Perception:
         points_m = in_root(script.person_at(time_s).keypoints_m)[None]
         return Perception(time_s, points_m, np.ones(points_m.shape[:2]))
 
@@ -74,28 +79,41 @@ def start_posture() -> Posture:
     return replace(home_posture(load_icub()), neck_rad=NECK_RAD)
 
 
-def simulate(trial: Trial, eyes: Eyes, avoids: bool = True, settings: Settings | None = None) -> pd.DataFrame:
+def simulate(
+    trial: Trial, perceiver: Perceiver, avoids: bool = True, settings: Settings | None = None
+) -> pd.DataFrame:
     """One run of a trial.
+
+    Parameters
+    ----------
+    trial : Trial
+    perceiver : Perceiver
+    avoids : bool, optional
+        Whether the robot gives way at all.
+    settings : Settings, optional
+        The controller's.
 
     Returns
     -------
-    a row per control period: `t_s`, `distance_m` between robot and person, `activations` of all taxels (a
-    list) and `activation`, the highest, `status`, `hand_error_m` (from the post), a column per joint in
-    radians, and `seen_s`, when the newest image that the loop knows was taken (NaN: none yet)
+    pd.DataFrame
+        A row per control period: `t_s`, `distance_m` between robot and person, `activations` of all taxels (a
+        list) and `activation`, the highest, `status`, `hand_error_m` (from the post), a column per joint in
+        radians, and `seen_s`, when the newest image that the loop knows was taken (NaN: none yet).
     """
     scene, icub = script(trial.script, trial.seed), load_icub()
     posture = start_posture()
-    between_s = next_image_s(0.0, eyes.delay_s, trial.camera_hz)
-    loop = _loop(icub, posture, eyes.delay_s + between_s, avoids, settings or Settings())
+    delay_s = perceiver.delay_s
+    between_s = next_image_s(0.0, delay_s, trial.camera_hz)
+    loop = _loop(icub, posture, delay_s + between_s, avoids, settings or Settings())
     period_s, under_way, free_s, rows = loop.controller.settings.period_s, None, 0.0, []
     for k in range(round(trial.duration_s / period_s)):
         now_s, arrived = k * period_s, None
-        if under_way is not None and now_s >= under_way.time_s + eyes.delay_s - 1e-9:
+        if under_way is not None and now_s >= under_way.time_s + delay_s - 1e-9:
             arrived, under_way = under_way, None
         if under_way is None and now_s >= free_s - 1e-9:
-            under_way = eyes.see(scene, now_s, posture)
-            free_s = next_image_s(now_s, eyes.delay_s, trial.camera_hz)
-            if eyes.delay_s == 0:
+            under_way = perceiver.perceive(scene, now_s, posture)
+            free_s = next_image_s(now_s, delay_s, trial.camera_hz)
+            if delay_s == 0:
                 arrived, under_way = under_way, None
         command, threat = loop.cycle(now_s, posture, arrived)
         rows.append(_row(trial, now_s, loop, posture, command, threat))
@@ -104,14 +122,33 @@ def simulate(trial: Trial, eyes: Eyes, avoids: bool = True, settings: Settings |
 
 
 def next_image_s(taken_s: float, delay_s: float, camera_hz: float) -> float:
-    """When the next image is taken: the camera's first one after the last is done with."""
+    """When the next image is taken: the camera's first one after the last is done with.
+
+    Parameters
+    ----------
+    taken_s : float
+        When the last image was taken.
+    delay_s : float
+        How long it is worked on.
+    camera_hz : float
+
+    Returns
+    -------
+    float
+        Seconds.
+
+    Examples
+    --------
+    >>> next_image_s(1.0, delay_s=0.15, camera_hz=10.0)
+    1.2
+    """
     return taken_s + max(1, np.ceil(delay_s * camera_hz - 1e-9)) / camera_hz
 
 
 def _loop(icub: ICub, posture: Posture, late_s: float, avoids: bool, settings: Settings) -> AvoidanceLoop:
-    """The loop for eyes whose next sighting may come `late_s` after the last one's image."""
+    """The loop, where the next perception may come `late_s` after the last one's image."""
     controller = Controller(icub, np.array(HOME_M["left"]), posture.angles("left"), settings=settings)
-    # A sighting holds until the next one can be there, so that slow eyes do not blink.
+    # A perception holds until the next one can be there, so that slow detectors do not blink.
     hold_s = max(Trust().hold_s, late_s)
     tracker = KeypointTracker(Trust(hold_s=hold_s, memory_s=Trust().memory_s + hold_s))
     return AvoidanceLoop(controller, tracker=tracker, avoids=avoids)
@@ -122,10 +159,10 @@ def _row(
 ) -> dict:
     icub, q = loop.controller.icub, posture.angles("left")
     hand_m = icub.chains["left"].T_root_link("hand", q)[:3, 3]
-    balls = robot_balls(icub, loop.skin, posture)
+    spheres = robot_spheres(icub, loop.skin, posture)
     row = {
         "t_s": now_s,
-        "distance_m": skin_distance_m(balls, person_skin_m(trial, now_s)),
+        "distance_m": skin_distance_m(spheres, person_skin_m(trial, now_s)),
         "activation": float(threat.activations.max()),
         "activations": threat.activations.round(3).tolist(),
         "status": command.status,

@@ -6,9 +6,7 @@ far again. Unless the robot gives way, the person's skin comes within `CONTACT_M
 the hand: where they go is decided beforehand.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,16 +14,26 @@ import numpy as np
 from hicp_lib.core.camera import transform
 from hicp_lib.core.memo import memoised
 from hicp_lib.core.rotations import about
-from hicp_lib.experiments.avoidance.skin_distance import robot_balls, skin_distance_m
-from hicp_lib.experiments.laboratory import T_WORLD_ROOT, adult, chair, facing_robot, furnished
+from hicp_lib.experiments.avoidance.skin_distance import robot_spheres, skin_distance_m
+from hicp_lib.experiments.laboratory import (
+    PELVIS_LEAN,
+    T_WORLD_ROOT,
+    chair,
+    facing_robot,
+    furnished,
+    in_root,
+    posed,
+    random_adult,
+)
 from hicp_lib.experiments.minimum_jerk import Motion, Move, Posture
+from hicp_lib.experiments.random_streams import AVOIDANCE, stream
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.skin import read_skin
 from hicp_lib.simulation.appearance.people import Appearance, dress
 from hicp_lib.simulation.body.hands import sample_hand
-from hicp_lib.simulation.body.joints import pose_from_joints
-from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body, pose_bones
+from hicp_lib.simulation.body.joints import pose_from_joints, radians
+from hicp_lib.simulation.body.model import PosedBody, load_body, pose_bones
 from hicp_lib.simulation.body.reach import reach
 from hicp_lib.simulation.rendering.render import World
 from hicp_lib.simulation.rendering.surfaces import Surface
@@ -37,26 +45,35 @@ NEAR_S = PHASES_S["far"] + PHASES_S["ready"] + PHASES_S["approach"]
 LEAVES_S = NEAR_S + PHASES_S["near"], sum(PHASES_S.values())
 """When the person begins to leave, and has left."""
 CONTACT_M = 0.01
-PELVIS_LEAN = "pelvis_flexion"  # a joint of the scripts only: the whole trunk bends at the hips
 
-_SITTING_DEG = {
-    "left_hip_flexion": 86.0, "right_hip_flexion": 86.0,
-    "left_knee_flexion": 86.0, "right_knee_flexion": 86.0,
-    "left_hip_abduction": 12.0, "right_hip_abduction": 12.0,
-}  # fmt: skip
+_SITTING_DEG = {"hip_flexion": 86.0, "knee_flexion": 86.0, "hip_abduction": 12.0}
 _HANGING_DEG = {"left_shoulder_abduction": 6.0, "right_shoulder_abduction": 6.0, "left_elbow_flexion": 12.0}
 _HAND_DEG = {"forearm_supination": -15.0, "wrist_flexion": 0.0, "wrist_deviation": 0.0}
 _LEANS_DEG = range(0, 120, 5)  # how far the trunk bends in all, tried from upright on
+_LEAN_SHARES = {PELVIS_LEAN: 0.35, "spine_flexion": 0.65, "neck_flexion": -0.45}  # the eyes look ahead
 _FROM = np.array([-0.66, 0.55, 0.45])  # whence the hand comes, root frame: from the palm's side
+_WRISTS_M = np.arange(0.40, 0.04, -0.03)  # how far the wrist is from the robot's palm, tried from afar
+_N_HALVINGS = 6  # of the step in which contact comes about
 _READY_M = 0.24  # how far from the end of the approach the person gets ready
 _HEAD_FROM_DEG = 20.0  # how much more upright the trunk is when the head gets ready
 _MISS_M = 0.005  # a wrist this near its goal is there
 _REST_M = np.array([0.16, 0.19, 0.08])  # a sitting person's wrist before, beside and above the pelvis
+_SEAT_M = 0.11  # how far below the pelvis's origin a seat is
+# Where elbows go, see `reach`: with the hands in the lap, and of the arm that reaches.
+_ELBOW_AT_REST, _ELBOW_REACHING = (-0.5, 0.7, -0.5), (-0.2, 0.5, -0.9)
 
 
 @dataclass(frozen=True)
 class Staging:
-    """How a script is staged: does the person sit, do they come by head, where on the floor are they."""
+    """How a script is staged.
+
+    Attributes
+    ----------
+    sits, by_head : bool
+        Whether the person sits, and whether they come with the head instead of the hand.
+    place_m : tuple of float
+        Where on the floor they are (x, y), world frame.
+    """
 
     sits: bool
     by_head: bool
@@ -76,10 +93,14 @@ class Script:
 
     Attributes
     ----------
-    name : key of `SCRIPTS`
-    room : without the person
-    appearance : the person's
-    motion : what they do, from when they begin to get ready
+    name : str
+        Key of `SCRIPTS`.
+    room : World
+        Without the person.
+    appearance : Appearance
+        The person's.
+    motion : Motion
+        What they do, from when they begin to get ready.
     """
 
     name: str
@@ -111,16 +132,22 @@ def _worn(scene: Script, motion_s: float) -> list[Surface]:
 
 @memoised()
 def script(name: str, seed: int = 0) -> Script:
-    """A script of `SCRIPTS`; the seed draws the person and the room. The same in every process."""
-    staging = SCRIPTS[name]
-    rng = np.random.default_rng(np.random.SeedSequence([seed, 4, *name.encode()]))
-    appearance = adult(rng)
+    """A script of `SCRIPTS`; the seed draws the person and the room. The same in every process.
+
+    Examples
+    --------
+    >>> scene = script("standing, hand")
+    >>> tip = scene.person_at(NEAR_S).keypoints_m[127]  # of the right middle finger
+    >>> bool(np.linalg.norm(in_root(tip) - HOME_M["left"]) < 0.3)
+    True
+    """
+    staging, rng = SCRIPTS[name], stream(seed, AVOIDANCE, name)
+    appearance = random_adult(rng)
     rest, ready, near = (_by_head if staging.by_head else _by_hand)(rng, appearance.shape, staging)
     x, y = staging.place_m
     seat = []
     if staging.sits:
-        person = posed(appearance.shape, rest)
-        seat = chair(rng, (x, y), float(person.heads_m[0, 2]) - 0.11)
+        seat = chair(rng, (x, y), float(posed(appearance.shape, rest).heads_m[0, 2]) - _SEAT_M)
     room = furnished(rng, seat, [(x, y - 0.2, 0.8), (x, y + 0.4, 0.7)])
     return Script(name, room, appearance, Motion(rest, _moves(rest, ready, near)))
 
@@ -134,17 +161,6 @@ def _moves(rest: Posture, ready: Posture, near: Posture) -> Iterator[Move]:
         yield Move(1.0, rest)
 
 
-def posed(shape: np.ndarray, posture: Posture) -> PosedBody:
-    """The body in a posture, facing the robot; `PELVIS_LEAN` tilts the pelvis, the legs stay."""
-    joints = dict(posture.joints)
-    lean = joints.pop(PELVIS_LEAN, 0.0)
-    for side in ("left", "right"):
-        joints[f"{side}_hip_flexion"] = joints.get(f"{side}_hip_flexion", 0.0) + lean
-    x, y = posture.place_m
-    pose = pose_from_joints(joints) | {"root": np.array([0.0, lean, 0.0])}
-    return pose_body(load_body(), shape, pose, facing_robot(y, x))
-
-
 def _by_hand(rng, shape: np.ndarray, staging: Staging) -> tuple[Posture, Posture, Posture]:
     """Far, ready and near for the right hand."""
     rest = _rest(rng, shape, staging)
@@ -155,7 +171,7 @@ def _by_hand(rng, shape: np.ndarray, staging: Staging) -> tuple[Posture, Posture
         wrist_m = transform(T_WORLD_ROOT, HOME_M["left"] + distance_m * away)
         return _leaning_reach(shape, rest, pelvis_m, wrist_m)
 
-    near_m = _contact(np.arange(0.40, 0.04, -0.03), lambda d: _distance_m(shape, with_wrist(d)))
+    near_m = _contact(_WRISTS_M, lambda distance_m: _distance_m(shape, with_wrist(distance_m)))
     return rest, with_wrist(near_m + _READY_M), with_wrist(near_m)
 
 
@@ -166,14 +182,14 @@ def _by_head(rng, shape: np.ndarray, staging: Staging) -> tuple[Posture, Posture
     return rest, _leaning(rest, near_deg - _HEAD_FROM_DEG), _leaning(rest, near_deg)
 
 
-def _contact(way: Sequence[float], distance_m: Callable[[float], float]) -> float:
+def _contact(way: Iterable[float], distance_m: Callable[[float], float]) -> float:
     """Where on a way the distance first falls to `CONTACT_M`; the way's end if it does not."""
-    before = way[0]
-    for after in way:
+    before, *further = way
+    for after in [before, *further]:
         if distance_m(after) < CONTACT_M:
             break
         before = after
-    for _ in range(6):
+    for _ in range(_N_HALVINGS):
         middle = (before + after) / 2
         before, after = (before, middle) if distance_m(middle) < CONTACT_M else (middle, after)
     return float(before)
@@ -187,32 +203,28 @@ def _distance_m(shape: np.ndarray, posture: Posture) -> float:
 @memoised()
 def _robot_at_post() -> tuple[np.ndarray, np.ndarray]:
     icub = load_icub()
-    return robot_balls(icub, read_skin(), home_posture(icub))
-
-
-def in_root(points_m: np.ndarray) -> np.ndarray:
-    """Points (..., 3) of the world in the robot's root frame."""
-    return transform(np.linalg.inv(T_WORLD_ROOT), points_m)
+    return robot_spheres(icub, read_skin(), home_posture(icub))
 
 
 def _rest(rng, shape: np.ndarray, staging: Staging) -> Posture:
     """Upright; arms hang, or lie in the lap."""
-    angles_deg = _HANGING_DEG | (_SITTING_DEG if staging.sits else {})
-    joints = {name: float(np.radians(angle)) for name, angle in angles_deg.items()}
+    joints = radians(_HANGING_DEG)
+    if staging.sits:
+        joints |= radians(_SITTING_DEG, "left_") | radians(_SITTING_DEG, "right_")
     for side in ("left", "right"):
-        hand = sample_hand(rng, "open") | {k: float(np.radians(v)) for k, v in _HAND_DEG.items()}
+        hand = sample_hand(rng, "open") | radians(_HAND_DEG)
         joints |= {f"{side}_{name}": angle for name, angle in hand.items()}
         if staging.sits:
             wrist_m = _REST_M * [1, 1 if side == "left" else -1, 1]
-            joints = reach(load_body(), shape, joints, side, wrist_m, (-0.5, 0.7, -0.5)) or joints
+            joints = reach(load_body(), shape, joints, side, wrist_m, _ELBOW_AT_REST) or joints
     return Posture(joints, staging.place_m)
 
 
 def _leaning(posture: Posture, lean_deg: float) -> Posture:
-    """The trunk bent forward by an angle, shared by hips, spine and neck; the eyes look ahead."""
+    """The trunk bent forward by an angle, shared by hips, spine and neck."""
     lean = float(np.radians(lean_deg))
-    bent = {PELVIS_LEAN: 0.35 * lean, "spine_flexion": 0.65 * lean, "neck_flexion": -0.45 * lean}
-    return replace(posture, joints=dict(posture.joints) | bent)
+    bent = {joint: share * lean for joint, share in _LEAN_SHARES.items()}
+    return replace(posture, joints=posture.joints | bent)
 
 
 def _leaning_reach(shape: np.ndarray, posture: Posture, pelvis_m: np.ndarray, wrist_m: np.ndarray) -> Posture:
@@ -224,11 +236,11 @@ def _leaning_reach(shape: np.ndarray, posture: Posture, pelvis_m: np.ndarray, wr
         bent = dict(_leaning(posture, lean_deg).joints)
         lean = bent.pop(PELVIS_LEAN)
         target = about(1, lean).T @ from_pelvis
-        found = reach(body, shape, bent, "right", target, (-0.2, 0.5, -0.9))
+        found = reach(body, shape, bent, "right", target, _ELBOW_REACHING)
         if found is None:
             continue
         _, heads = pose_bones(body, shape, pose_from_joints(found))
-        miss_m = float(np.linalg.norm(heads[body.bone_names.index("wrist.R")] - target))
+        miss_m = float(np.linalg.norm(heads[body.bone_numbers["wrist.R"]] - target))
         if miss_m < best_miss_m:
             best, best_miss_m = replace(posture, joints=found | {PELVIS_LEAN: lean}), miss_m
         if miss_m < _MISS_M:

@@ -1,6 +1,6 @@
 """The robot's torso and arms as surfaces to render: its own camera sees them."""
 
-from __future__ import annotations
+from dataclasses import replace
 
 import numpy as np
 
@@ -33,13 +33,12 @@ def _capsule(segment: Segment) -> g.Mesh:
     along = segment.end_m - segment.start_m
     length = float(np.linalg.norm(along))
     upright = _upright_capsule(round(length, 6), segment.radius_m)
-    T_world_segment = np.eye(4)
-    T_world_segment[:3, :3] = between(np.array([0.0, 0.0, 1.0]), along / length)
-    T_world_segment[:3, 3] = segment.start_m
-    T_world_segment = T_WORLD_ROOT @ T_world_segment
-    normals = upright.normals @ T_world_segment[:3, :3].T
-    vertices = transform(T_world_segment, upright.vertices_m)
-    return g.Mesh(vertices.astype(np.float32), upright.triangles, normals.astype(np.float32), upright.coords)
+    T_root_segment = np.eye(4)
+    T_root_segment[:3, :3] = between(np.array([0.0, 0.0, 1.0]), along / length)
+    T_root_segment[:3, 3] = segment.start_m
+    T = T_WORLD_ROOT @ T_root_segment
+    vertices, normals = transform(T, upright.vertices_m), upright.normals @ T[:3, :3].T
+    return replace(upright, vertices_m=vertices.astype(np.float32), normals=normals.astype(np.float32))
 
 
 @memoised(32)

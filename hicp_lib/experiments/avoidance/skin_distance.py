@@ -4,8 +4,6 @@ The robot is its taxels, and its arms as thick lines; the person is the skin of 
 clothes and hair. Fingers of the robot are not modelled.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -20,40 +18,60 @@ _STEP_M = 0.01
 _SOME = 32  # of so many vertices one is looked at first
 
 
-def robot_balls(icub: ICub, skin: Skin, posture: Posture) -> tuple[np.ndarray, np.ndarray]:
-    """Places (n, 3) on the robot in the root frame, and how thick it is there, (n,) metres.
+def robot_spheres(icub: ICub, skin: Skin, posture: Posture) -> tuple[np.ndarray, np.ndarray]:
+    """The robot as spheres: taxels are points; upper arms, forearms and hands are rows a centimetre apart.
 
-    Taxels are points; upper arms, forearms and hands are rows of balls a centimetre apart.
+    Parameters
+    ----------
+    icub : ICub
+    skin : Skin
+    posture : Posture
+
+    Returns
+    -------
+    centres_m : array, shape (n, 3)
+        In the root frame.
+    radii_m : array, shape (n,)
     """
     taxels, _ = skin.in_root(icub, posture)
     places, radii = [taxels], [np.zeros(len(taxels))]
     for segment in body_segments(icub, posture):
-        if not segment.part.startswith(("left", "right")):
-            continue
-        n = 2 + int(np.linalg.norm(segment.end_m - segment.start_m) / _STEP_M)
-        places.append(np.linspace(segment.start_m, segment.end_m, n))
-        radii.append(np.full(n, segment.radius_m))
+        if segment.part.startswith(("left", "right")):
+            n = 2 + int(np.linalg.norm(segment.end_m - segment.start_m) / _STEP_M)
+            places.append(np.linspace(segment.start_m, segment.end_m, n))
+            radii.append(np.full(n, segment.radius_m))
     return np.concatenate(places), np.concatenate(radii)
 
 
-def skin_distance_m(balls: tuple[np.ndarray, np.ndarray], vertices_m: np.ndarray) -> float:
+def skin_distance_m(spheres: tuple[np.ndarray, np.ndarray], vertices_m: np.ndarray) -> float:
     """Least distance between robot and person in metres, at most `FAR_M`; 0 where they touch.
 
     To the nearest vertex of the person's mesh, which on hands is at most a few millimetres too far.
 
     Parameters
     ----------
-    balls : see `robot_balls`
-    vertices_m : (v, 3) of the person, root frame
+    spheres : tuple of array
+        See `robot_spheres`.
+    vertices_m : array, shape (v, 3)
+        Of the person, root frame.
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> hand = np.zeros((1, 3)), np.array([0.03])
+    >>> skin_distance_m(hand, np.array([[0.1, 0, 0], [0, 0.2, 0]]))
+    0.07
     """
-    places, radii = balls
+    places, radii = spheres
     # Some of the vertices say how far the others may be that count.
     some_m = _gaps_m(places, vertices_m[::_SOME], FAR_M).min()
     within_m = float(min(some_m, FAR_M) + radii.max())
     low, high = places.min(axis=0) - within_m, places.max(axis=0) + within_m
-    near = np.logical_and.reduce(
-        [(column > a) & (column < b) for column, a, b in zip(vertices_m.T, low, high, strict=True)]
-    )
+    columns = zip(vertices_m.T, low, high, strict=True)
+    near = np.logical_and.reduce([(column > a) & (column < b) for column, a, b in columns])
     gaps_m = _gaps_m(vertices_m[near], places, within_m)
     return float(np.clip(np.min(gaps_m - radii), 0, FAR_M))
 

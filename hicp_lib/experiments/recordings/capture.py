@@ -4,13 +4,13 @@ The system has a clock and a world frame of its own: it starts before the camera
 clock shows something else. What both truly are goes into `simulation.json`, for comparison only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from hicp_lib.core.keypoints import INDEX
+from hicp_lib.experiments.random_streams import MOTION_CAPTURE, stream
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.simulation.appearance import materials as m
 from hicp_lib.simulation.appearance.people import part_of_vertices
@@ -23,7 +23,7 @@ from hicp_lib.simulation.sensors.motion_capture import (
     measure,
     mocap_frame,
     room_cameras_m,
-    watch,
+    track_markers,
 )
 
 LEAD_S = 0.5  # motion capture starts this long before the first frame, and ends as long after the last
@@ -36,8 +36,10 @@ class Capture:
 
     Attributes
     ----------
-    T_mocap_world : (4, 4)
-    start_s : when its clock shows zero, in seconds from the first frame
+    exported : MotionCapture
+    T_mocap_world : array, shape (4, 4)
+    start_s : float
+        When its clock shows zero, in seconds from the first frame.
     """
 
     exported: MotionCapture
@@ -57,32 +59,50 @@ def capture(
 
     Parameters
     ----------
-    person_at : seconds from the first frame -> the person in the world
-    vertices : (12,), see `sensors.markers.marker_vertices`
-    T_world_camera : (4, 4), the camera that carries a marker too; it stays where it is
-    obstacles : what hides markers besides the person
-    duration_s : from the first frame to the last
+    person_at : callable
+        From seconds since the first frame to the person in the world.
+    vertices : array of int, shape (12,)
+        See `sensors.markers.marker_vertices`.
+    T_world_camera : array, shape (4, 4)
+        The camera that carries a marker too; it stays where it is.
+    obstacles : tuple of g.Mesh
+        What hides markers besides the person.
+    duration_s : float
+        From the first frame to the last.
+    seed : int
+
+    Returns
+    -------
+    Capture
     """
-    rng = np.random.default_rng(np.random.SeedSequence([seed, 4]))
+    rng = stream(seed, MOTION_CAPTURE)
     T_mocap_world = mocap_frame(rng)
     n = int(round((duration_s + 2 * LEAD_S) * QUALISYS.rate_hz)) + 1
     clock_s = np.arange(n) / QUALISYS.rate_hz
-    middle_m = person_at(0.0).keypoints_m[19, :2]
-    points_m, n_seeing = watch(
-        person_at,
-        vertices,
-        camera_marker_m(T_world_camera)[None],
-        clock_s - LEAD_S,
-        room_cameras_m(QUALISYS, middle_m),
-        obstacles=obstacles,
-    )
+    cameras_m = room_cameras_m(QUALISYS, person_at(0.0).keypoints_m[INDEX["mid_hip"], :2])
+    fixed_m = camera_marker_m(T_world_camera)[None]
+    times_s = clock_s - LEAD_S
+    points_m, n_seeing = track_markers(person_at, vertices, fixed_m, times_s, cameras_m, obstacles=obstacles)
     names = (*JOINT_MARKERS, CAMERA_MARKER)
     exported = measure(clock_s, names, points_m, n_seeing, T_mocap_world, QUALISYS, rng)
     return Capture(exported, T_mocap_world, -LEAD_S)
 
 
 def marker_balls(person: PosedBody, vertices: np.ndarray, number: int) -> list[Surface]:
-    """The markers on person `number` as grey balls; each counts as the part of the body it is taped to."""
+    """The markers on a person as grey balls; each counts as the part of the body it is taped to.
+
+    Parameters
+    ----------
+    person : PosedBody
+    vertices : array of int, shape (12,)
+        See `sensors.markers.marker_vertices`.
+    number : int
+        Of the person.
+
+    Returns
+    -------
+    list of Surface
+    """
     parts = part_of_vertices(load_body())[vertices]
     balls = [_ball(centre_m) for centre_m in markers_m(person, vertices)]
     owner = np.repeat(parts, [len(ball.triangles) for ball in balls])

@@ -1,40 +1,42 @@
 """One frame of a simulated recording: colour, depth as it is measured and as it is, where the person is."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from hicp_lib.core.camera import transform
 from hicp_lib.core.memo import memoised
-from hicp_lib.experiments.laboratory import COLOUR, PHOTOGRAPHIC, T_WORLD_ROOT, robot_camera
+from hicp_lib.experiments.laboratory import colour_and_depth, in_root, robot_camera
+from hicp_lib.experiments.random_streams import stream
 from hicp_lib.experiments.recordings.scenarios import Scenario, Stage, scenario
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.simulation.rendering.camera import PlacedCamera
-from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import render
-from hicp_lib.simulation.sensors.depth_camera import D435, simulate_depth
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
 
 def record_frame(name: str, seed: int, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict]:
-    """Frame `k` of a scenario.
+    """One frame of a scenario.
+
+    Parameters
+    ----------
+    name : str
+        Of the scenario.
+    seed, k : int
+        The frame's number is `k`.
 
     Returns
     -------
-    rgb : uint8 (height, width, 3)
-    depth_m, exact_m : float32 (height, width), as the depth camera measures it, and as it is
-    truth : keypoints_m (136, 3) in the base frame and visible (136), as lists
+    rgb : array, shape (480, 640, 3), dtype uint8
+    depth_m, exact_m : array, shape (480, 640), dtype float32
+        As the depth camera measures it, and as it is.
+    truth : dict of str to list
+        `keypoints_m` (136, 3) in the base frame and `visible` (136,).
     """
-    plan = scenario(name)
-    rng = np.random.default_rng(np.random.SeedSequence([seed, k, *name.encode()]))
+    plan, rng = scenario(name), stream(seed, k, name)
     world, person = stage(name, seed)(float(plan.times_s(k + 1)[k]))
     camera = camera_at(plan, k)
     frame = render(world, camera, rng)
-    rgb = expose(frame.radiance, PHOTOGRAPHIC, rng, frame.person >= 0)
-    depth_m = simulate_depth(frame.rays, camera, D435, rng)
+    rgb, depth_m = colour_and_depth(frame, camera, rng)
     _, visible = keypoint_visibility(frame.rays, camera, person.keypoints_m, 0)
-    keypoints_m = transform(np.linalg.inv(T_WORLD_ROOT), person.keypoints_m)
-    truth = {"keypoints_m": keypoints_m.round(6).tolist(), "visible": visible.tolist()}
+    truth = {"keypoints_m": in_root(person.keypoints_m).round(6).tolist(), "visible": visible.tolist()}
     return rgb, depth_m, frame.depth_m, truth
 
 
@@ -47,7 +49,7 @@ def stage(name: str, seed: int) -> Stage:
 def camera_at(plan: Scenario, k: int) -> PlacedCamera:
     """The colour camera as frame `k` is taken."""
     (T_root_camera,) = load_icub().T_root_camera(plan.head_rad(k + 1)[k:], plan.mount)
-    return robot_camera(COLOUR, T_root_camera)
+    return robot_camera(T_root_camera)
 
 
 def camera_poses(plan: Scenario, n: int) -> np.ndarray:

@@ -2,20 +2,18 @@
 the table between them, steps aside.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from hicp_lib.experiments.laboratory import facing_robot
+from hicp_lib.experiments.laboratory import posed
 from hicp_lib.experiments.minimum_jerk import Move, Posture, between
 from hicp_lib.simulation.body.arms import Joints
-from hicp_lib.simulation.body.joints import pose_from_joints, within_limits
-from hicp_lib.simulation.body.model import Body, PosedBody, pose_body
+from hicp_lib.simulation.body.joints import pose_from_joints, radians, within_limits
+from hicp_lib.simulation.body.model import load_body
 from hicp_lib.simulation.body.poses import sample_joints
 from hicp_lib.simulation.body.reach import reach
-from hicp_lib.simulation.body.self_collision import clearance_m, outline
+from hicp_lib.simulation.body.self_collision import collision_model, self_collision_distance_m
 
 Rng = np.random.Generator
 
@@ -35,18 +33,22 @@ _PENETRATION_M = 0.03  # skin and clothes give way this far on the way from one 
 _N_TRIES = 12
 
 
-class Mover:
-    """Draws what one person does next; every movement ends in a posture from which any other may follow."""
+class Gestures:
+    """Draws what one person does next; every movement ends in a posture from which any other may follow.
 
-    def __init__(self, rng: Rng, body: Body, shape: np.ndarray):
-        self.rng, self.body, self.shape = rng, body, shape
-        self.person = outline(body, shape)
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    shape : array, shape (n_shapes,)
+        The person's.
+    """
+
+    def __init__(self, rng: Rng, shape: np.ndarray):
+        self.rng, self.body, self.shape = rng, load_body(), shape
+        self.collision_model = collision_model(self.body, shape)
         self.place_m = (0.0, DISTANCE_M)
-        self.legs = {
-            name: angle
-            for name, angle in sample_joints(rng, body, "standing", shape).items()
-            if name.endswith(_LEGS)
-        }
+        drawn = sample_joints(rng, self.body, "standing", shape)
+        self.legs = {name: angle for name, angle in drawn.items() if name.endswith(_LEGS)}
         self.now = self.at_ease()
 
     def at_ease(self) -> Posture:
@@ -83,8 +85,8 @@ class Mover:
 
     def _touch_table(self) -> Iterator[Move]:
         """Lean forward, one or both hands onto the table."""
-        joints = dict(self.now.joints) | {name: float(np.radians(v)) for name, v in _LEANING_DEG.items()}
-        pelvis_m = posed(self.body, self.shape, self._standing(joints)).heads_m[0]
+        joints = self.now.joints | radians(_LEANING_DEG)
+        pelvis_m = posed(self.shape, self._standing(joints)).heads_m[0]
         for side in self.rng.permutation(["left", "right"])[: self.rng.integers(1, 3)]:
             joints = self._with_hand_on_table(joints, str(side), pelvis_m)
         posture = self._standing(joints)
@@ -97,20 +99,17 @@ class Mover:
         left_m = self.rng.uniform(0.12, 0.3) * (1 if side == "left" else -1)
         wrist_m = np.array([ahead_m, left_m, TABLE_HEIGHT_M + _WRIST_M - pelvis_m[2]])
         joints = reach(self.body, self.shape, joints, side, wrist_m, (-0.2, 0.7, -0.7)) or joints
-        return joints | {f"{side}_{name}": float(np.radians(v)) for name, v in _PALM_DOWN_DEG.items()}
+        return joints | radians(_PALM_DOWN_DEG, f"{side}_")
 
     def _wave(self) -> Iterator[Move]:
         """One hand up, forearm to and fro."""
-        joints = dict(self.at_ease().joints)
+        joints = self.at_ease().joints
         side = str(self.rng.choice(["left", "right"]))
-        joints |= {f"{side}_{name}": float(np.radians(angle)) for name, angle in _WAVING_DEG.items()}
+        joints = joints | radians(_WAVING_DEG, f"{side}_")
         yield from self._go(self._standing(joints))
         for swing_deg in (20, -20, 20, -20, 0):
-            turned = {
-                f"{side}_{name}": float(np.radians(_WAVING_DEG[name] + sign * swing_deg))
-                for name, sign in _SWINGING
-            }
-            self.now = self._standing(joints | turned)
+            turned_deg = {name: _WAVING_DEG[name] + sign * swing_deg for name, sign in _SWINGING}
+            self.now = self._standing(joints | radians(turned_deg, f"{side}_"))
             yield Move(0.35, self.now)
 
     def _step(self) -> Iterator[Move]:
@@ -118,9 +117,9 @@ class Mover:
         x, y = self.rng.uniform((-0.22, DISTANCE_M - 0.02), (0.22, DISTANCE_M + 0.2))
         side = "left" if x < self.place_m[0] else "right"  # the person faces the robot: their left is -x
         lifted = {f"{side}_hip_flexion": 0.5, f"{side}_knee_flexion": 0.7, f"{side}_hip_abduction": 0.12}
-        middle = tuple(np.add(self.place_m, (x, y)) / 2)
+        middle = ((self.place_m[0] + x) / 2, (self.place_m[1] + y) / 2)
         self.place_m = (float(x), float(y))
-        yield Move(0.45, Posture(dict(self.now.joints) | self.legs | lifted, middle))
+        yield Move(0.45, Posture(self.now.joints | self.legs | lifted, middle))
         self.now = self._standing(self.now.joints)
         yield Move(0.45, self.now)
 
@@ -132,13 +131,8 @@ class Mover:
 
     def _is_free(self, posture: Posture) -> bool:
         """Whether the person can go to a posture without running through themselves."""
-        ways = [between(self.now, posture, share).joints for share in np.linspace(0.125, 1, 8)]
-        return within_limits(posture.joints) and all(
-            clearance_m(self.body, self.person, pose_from_joints(way)) > -_PENETRATION_M for way in ways
+        ways = (between(self.now, posture, share).joints for share in np.linspace(0.125, 1, 8))
+        gaps_m = (
+            self_collision_distance_m(self.body, self.collision_model, pose_from_joints(way)) for way in ways
         )
-
-
-def posed(body: Body, shape: np.ndarray, posture: Posture) -> PosedBody:
-    """The body in a posture, facing the robot."""
-    x, y = posture.place_m
-    return pose_body(body, shape, pose_from_joints(posture.joints), facing_robot(y, x))
+        return within_limits(posture.joints) and all(gap_m > -_PENETRATION_M for gap_m in gaps_m)

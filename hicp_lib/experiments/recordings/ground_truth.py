@@ -1,7 +1,5 @@
 """What makes finished frames a simulated recording: truth and joints as tables, settings, the lists."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 
@@ -31,7 +29,18 @@ def part_path(out: Path, k: int) -> Path:
 
 
 def finish_recording(out: Path, plan: Scenario, n: int, stamp: dict) -> None:
-    """Write all but the frames of a recording of `n` frames, and drop frames beyond."""
+    """Write all but the frames of a recording, and drop frames beyond.
+
+    Parameters
+    ----------
+    out : Path
+        Its folder.
+    plan : Scenario
+    n : int
+        How many frames it has.
+    stamp : dict
+        What the frames were made with.
+    """
     times_s, T_base_cam = START_S + plan.times_s(n), camera_poses(plan, n)
     for folder in ("rgb", "depth", EXACT_DEPTH_DIR):
         for path in (out / folder).iterdir():

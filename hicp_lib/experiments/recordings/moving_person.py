@@ -1,18 +1,17 @@
 """A person who moves before the robot, watched by motion capture; the robot stands still."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hicp_lib.core.memo import memoised
-from hicp_lib.experiments.laboratory import adult, furnished, table
+from hicp_lib.experiments.laboratory import furnished, posed, random_adult, table
 from hicp_lib.experiments.minimum_jerk import Motion
+from hicp_lib.experiments.random_streams import MOVING_PERSON, stream
 from hicp_lib.experiments.recordings.capture import marker_balls
-from hicp_lib.experiments.recordings.gestures import DISTANCE_M, TABLE_HEIGHT_M, TABLE_M, Mover, posed
+from hicp_lib.experiments.recordings.gestures import DISTANCE_M, TABLE_HEIGHT_M, TABLE_M, Gestures
 from hicp_lib.simulation.appearance.people import Appearance, dress
-from hicp_lib.simulation.body.model import PosedBody, load_body
+from hicp_lib.simulation.body.model import PosedBody
 from hicp_lib.simulation.rendering.render import World
 from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.sensors.markers import marker_vertices
@@ -22,10 +21,20 @@ HEAD_RAD = np.radians([0.0, 0.0, 0.0, 9.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True, eq=False)
-class Moving:
-    """A person who moves in a room, with markers on; times in seconds from the first frame."""
+class MovingPerson:
+    """A person who moves in a room, with markers on; times in seconds from the first frame.
 
-    room: World  # without the person
+    Attributes
+    ----------
+    room : World
+        Without the person.
+    table : Surface
+        In the room.
+    appearance : Appearance
+    motion : Motion
+    """
+
+    room: World
     table: Surface
     appearance: Appearance
     motion: Motion
@@ -41,23 +50,23 @@ class Moving:
 
 # Whoever keeps still is posed and dressed once.
 @memoised(4)
-def _person(scene: Moving, motion_s: float) -> PosedBody:
-    return posed(load_body(), scene.appearance.shape, scene.motion.at(motion_s))
+def _person(scene: MovingPerson, motion_s: float) -> PosedBody:
+    return posed(scene.appearance.shape, scene.motion.at(motion_s))
 
 
 @memoised(4)
-def _staged(scene: Moving, motion_s: float) -> tuple[World, PosedBody]:
+def _staged(scene: MovingPerson, motion_s: float) -> tuple[World, PosedBody]:
     person, vertices = _person(scene, motion_s), marker_vertices(scene.appearance.shape)
     worn = [*dress(scene.appearance, person, 0), *marker_balls(person, vertices, 0)]
     return replace(scene.room, surfaces=[*scene.room.surfaces, *worn]), person
 
 
 @memoised(1)
-def moving(seed: int) -> Moving:
+def moving_person(seed: int) -> MovingPerson:
     """The scene of a seed: who moves how, in what room. The same in every process."""
-    rng = np.random.default_rng(np.random.SeedSequence([seed, 3]))
-    appearance = adult(rng)
+    rng = stream(seed, MOVING_PERSON)
+    appearance = random_adult(rng)
     top = table(rng, *TABLE_M, TABLE_HEIGHT_M)
     room = furnished(rng, [top], [(0.0, DISTANCE_M, 0.8), (0.0, 0.9, 0.8)])
-    mover = Mover(rng, load_body(), appearance.shape)
-    return Moving(room, top, appearance, Motion(mover.now, mover.moves()))
+    gestures = Gestures(rng, appearance.shape)
+    return MovingPerson(room, top, appearance, Motion(gestures.now, gestures.moves()))

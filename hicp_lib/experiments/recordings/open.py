@@ -1,7 +1,5 @@
 """The recordings the study's notebooks look at: a lab's own, or simulated once and kept in the cache."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,10 +16,18 @@ def open_experiment(
 
     Parameters
     ----------
-    scenario : "relative-upper", "relative-lower" or "mocap"; simulated when no folder is given
-    recording : folder of a lab's own recording
-    n_frames : how many frames, from the first; all of them when left out
-    seed : of the simulation
+    scenario : str
+        "relative-upper", "relative-lower" or "mocap"; simulated when no folder is given.
+    recording : str or Path, optional
+        Folder of a lab's own recording.
+    n_frames : int, optional
+        How many frames, from the first; all of them when left out.
+    seed : int, optional
+        Of the simulation.
+
+    Returns
+    -------
+    Recording
 
     Raises
     ------

@@ -1,7 +1,5 @@
 """The recordings that can be simulated: who is before the robot, and how either of them moves."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -12,8 +10,8 @@ from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.memo import memoised
 from hicp_lib.experiments.recordings.capture import Capture, capture
-from hicp_lib.experiments.recordings.moving_person import HEAD_RAD, moving
-from hicp_lib.experiments.recordings.seated_person import VIEWS, seated
+from hicp_lib.experiments.recordings.moving_person import HEAD_RAD, moving_person
+from hicp_lib.experiments.recordings.seated_person import VIEWS, seated_person
 from hicp_lib.robot.kinematics import HEAD_JOINTS
 from hicp_lib.simulation.body.model import PosedBody
 from hicp_lib.simulation.rendering.render import World
@@ -31,13 +29,20 @@ class Scenario:
 
     Attributes
     ----------
-    name : as the command line and the notebooks call it
-    n_frames, max_frames : by default, and at most
-    rate_hz : frames per second
-    mount : holder of the camera on the robot's head
-    head_rad : number of frames -> (n, 6) joint angles of the robot, `HEAD_JOINTS`
-    stage : seed -> `Stage`
-    capture : (seed, duration in seconds, T_world_camera) -> motion capture of it; None where there is none
+    name : str
+        As the command line and the notebooks call it.
+    n_frames, max_frames : int
+        By default, and at most.
+    rate_hz : float
+        Frames per second.
+    mount : str
+        Holder of the camera on the robot's head.
+    head_rad : callable
+        From the number of frames to joint angles of the robot, (n, 6), in the order of `HEAD_JOINTS`.
+    stage : callable
+        From the seed to a `Stage`.
+    capture : callable or None
+        From the seed, the duration in seconds and T_world_camera to its motion capture.
     """
 
     name: str
@@ -61,6 +66,11 @@ def scenario(name: str) -> Scenario:
     ------
     InputError
         For an unknown name.
+
+    Examples
+    --------
+    >>> scenario("mocap").rate_hz, scenario("relative-upper").n_frames
+    (12.0, 100)
     """
     if name not in SCENARIOS:
         raise InputError(f"no scenario {name!r}; choose one of {', '.join(SCENARIOS)}")
@@ -89,12 +99,12 @@ def _relative(view: str) -> Scenario:
 
 
 def _still(seed: int) -> Stage:
-    scene = seated(seed)
-    return lambda time_s: (scene.world, scene.person)
+    scene = seated_person(seed)
+    return lambda time_s: scene
 
 
 def _capture_moving(seed: int, duration_s: float, T_world_camera: np.ndarray) -> Capture:
-    scene = moving(seed)
+    scene = moving_person(seed)
     vertices = marker_vertices(scene.appearance.shape)
     return capture(scene.person_at, vertices, T_world_camera, (scene.table.mesh,), duration_s, seed)
 
@@ -107,7 +117,7 @@ SCENARIOS = {f"relative-{view}": _relative(view) for view in VIEWS} | {
         rate_hz=12.0,
         mount="level",
         head_rad=lambda n: np.tile(HEAD_RAD, (n, 1)),
-        stage=lambda seed: moving(seed).at,
+        stage=lambda seed: moving_person(seed).at,
         capture=_capture_moving,
     )
 }

@@ -3,18 +3,15 @@
 The person sits at one place in one posture for the whole recording; only the robot moves.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
-
 import numpy as np
 
-from hicp_lib.experiments.laboratory import adult, chair, facing_robot, furnished, table
+from hicp_lib.experiments.laboratory import chair, facing_robot, furnished, random_adult, table
+from hicp_lib.experiments.random_streams import SEATED_PERSON, stream
 from hicp_lib.simulation.appearance.people import dress
 from hicp_lib.simulation.body.arms import Joints
 from hicp_lib.simulation.body.hands import sample_hand
-from hicp_lib.simulation.body.joints import pose_from_joints
-from hicp_lib.simulation.body.model import REGIONS, Body, PosedBody, load_body, pose_body
+from hicp_lib.simulation.body.joints import pose_from_joints, radians
+from hicp_lib.simulation.body.model import Body, PosedBody, load_body, pose_body
 from hicp_lib.simulation.body.reach import reach
 from hicp_lib.simulation.rendering.render import World
 
@@ -37,33 +34,25 @@ _CONTACT_M = 0.003  # between the lowest point of hand or forearm and the table
 _N_ROUNDS = 6
 
 
-@dataclass(frozen=True)
-class Seated:
-    """A person at a table in a furnished room, ready to be seen."""
-
-    world: World
-    person: PosedBody
-
-
-def seated(seed: int) -> Seated:
-    """The scene of a seed: who sits there, in what room. The same in every process."""
-    rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
-    body, appearance = load_body(), adult(rng)
+def seated_person(seed: int) -> tuple[World, PosedBody]:
+    """The scene of a seed: the person at the table in a furnished room. The same in every process."""
+    rng = stream(seed, SEATED_PERSON)
+    body, appearance = load_body(), random_adult(rng)
     person = _sit_down(body, appearance.shape, rng)
     edge_m = DISTANCE_M - _TABLE_EDGE_M
     top = table(rng, (-0.65, edge_m - _TABLE_DEPTH_M), (0.65, edge_m), TABLE_HEIGHT_M)
     seat = chair(rng, (0.0, DISTANCE_M), _seat_height_m(body, person))
     surfaces = [top, *seat, *dress(appearance, person, 0)]
     clear = [(0.0, DISTANCE_M - 0.2, 0.9), (0.0, DISTANCE_M + 0.4, 0.7)]
-    return Seated(furnished(rng, surfaces, clear), person)
+    return furnished(rng, surfaces, clear), person
 
 
 def _sit_down(body: Body, shape: np.ndarray, rng: np.random.Generator) -> PosedBody:
     """The posture, with the arms brought down until the hands lie on the table."""
-    joints = {name: float(np.radians(angle)) for name, angle in _POSTURE_DEG.items()}
+    joints = radians(_POSTURE_DEG)
     for side in _WRISTS_M:
-        hand = {name: float(np.radians(angle)) for name, angle in _HAND_DEG.items()}
-        joints |= {f"{side}_{name}": angle for name, angle in (sample_hand(rng, "open") | hand).items()}
+        hand = sample_hand(rng, "open") | radians(_HAND_DEG)
+        joints |= {f"{side}_{name}": angle for name, angle in hand.items()}
     T_world_body = facing_robot(DISTANCE_M)
     wrist_heights_m = dict.fromkeys(_WRISTS_M, TABLE_HEIGHT_M + 0.05)
     for _ in range(_N_ROUNDS):
@@ -86,7 +75,7 @@ def _with_arm(body: Body, shape: np.ndarray, joints: Joints, side: str, wrist_m:
 
 def _lowest_m(body: Body, person: PosedBody, side: str) -> float:
     """Height of the lowest point of a hand and forearm above the table's top."""
-    limbs = np.isin(body.regions, [REGIONS.index(name) for name in ("hand", "forearm")])
+    limbs = body.in_regions("hand", "forearm")
     own = (body.vertices_m[0, :, 1] > 0) == (side == "left")
     over_table = person.vertices_m[:, 1] < DISTANCE_M - _TABLE_EDGE_M
     return float(person.vertices_m[limbs & own & over_table, 2].min())
@@ -94,6 +83,5 @@ def _lowest_m(body: Body, person: PosedBody, side: str) -> float:
 
 def _seat_height_m(body: Body, person: PosedBody) -> float:
     """Right under hips and thighs."""
-    seat = np.isin(body.regions, [REGIONS.index(name) for name in ("hips", "thigh")])
     near = np.abs(person.vertices_m[:, 1] - DISTANCE_M) < 0.2
-    return float(person.vertices_m[seat & near, 2].min()) - 0.008
+    return float(person.vertices_m[body.in_regions("hips", "thigh") & near, 2].min()) - 0.008

@@ -4,11 +4,7 @@ Frame k depends on scenario, seed and k only, so the number of processes changes
 longer recording begins with the shorter one.
 """
 
-from __future__ import annotations
-
-import os
 import shutil
-from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -33,7 +29,7 @@ from hicp_lib.recordings.c3d import MAX_FRAMES as MAX_C3D_FRAMES
 from hicp_lib.recordings.qualisys import write_c3d, write_tsv
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, MOCAP_FILE, RGB_LIST, Recording, open_recording
 from hicp_lib.recordings.writer import depth_name, rgb_name, write_depth, write_rgb
-from hicp_lib.simulation.world.scenes import worker_pool
+from hicp_lib.simulation.world.batch import check_output, run_jobs
 
 
 def simulate_recording(
@@ -48,10 +44,21 @@ def simulate_recording(
 
     Parameters
     ----------
-    name : "relative-upper", "relative-lower" or "mocap"
-    n_frames : the scenario's own number when left out
-    seed : non-negative; who is there, in what room, how they move, and all noise
-    workers : processes; as many as there are processors when left out
+    out : str or Path
+    name : str
+        "relative-upper", "relative-lower" or "mocap".
+    n_frames : int, optional
+        The scenario's own number when left out.
+    seed : int, optional
+        Non-negative; who is there, in what room, how they move, and all noise.
+    workers : int, optional
+        Processes; as many as there are processors when left out.
+    progress : bool, optional
+        Whether a terminal is shown a bar.
+
+    Returns
+    -------
+    Recording
 
     Raises
     ------
@@ -66,10 +73,8 @@ def simulate_recording(
     todo = [partial(record_one, out, name, int(seed), k) for k in range(n) if not part_path(out, k).exists()]
     if plan.capture is not None:
         todo.insert(0, partial(_capture_all, out, name, int(seed), int(n)))  # the longest first
-    bar = tqdm(total=len(todo), desc=name, unit="frame", disable=None if progress else True)
-    for _ in _in_processes(todo, workers or os.cpu_count() or 1):
-        bar.update()
-    bar.close()
+    for _ in tqdm(run_jobs(todo, workers), name, len(todo), unit="frame", disable=not progress or None):
+        pass
     finish_recording(out, plan, int(n), stamp)
     return open_recording(out)
 
@@ -83,10 +88,7 @@ def _check(out: Path, plan: Scenario, n: int, seed: int, workers: int | None) ->
     for what, (value, low, high) in limits.items():
         if not isinstance(value, int | np.integer) or not low <= value <= high:
             raise InputError(f"{what} is {value!r}; {plan.name} takes a whole number from {low} to {high}")
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: is a file; give a folder for the recording")
-    if out.is_dir() and any(out.iterdir()) and not (out / PARTS_DIR).is_dir():
-        raise InputError(f"{out}: holds files that were not simulated; give an empty or new folder")
+    check_output(out, PARTS_DIR, "for the recording", "simulated")
 
 
 def _prepare(out: Path, stamp: dict) -> None:
@@ -102,36 +104,32 @@ def _prepare(out: Path, stamp: dict) -> None:
     write_json(stamp_file, stamp)
 
 
-def _in_processes(todo: list[Callable[[], None]], workers: int) -> Iterator[None]:
-    if workers == 1 or len(todo) < 2:
-        yield from map(_call, todo)
-        return
-    with worker_pool(min(workers, len(todo))) as pool:
-        yield from pool.imap_unordered(_call, todo)
-
-
-def _call(job: Callable[[], None]) -> None:
-    job()
-
-
 def record_one(out: Path, name: str, seed: int, k: int) -> None:
-    """Write the images of a frame, then its truth: a frame counts as finished when that is there."""
+    """Write the images of a frame, then its truth: a frame counts as finished when that is there.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the recording.
+    name : str
+        Of the scenario.
+    seed, k : int
+        The frame's number is `k`.
+    """
     rgb, depth_m, exact_m, truth = record_frame(name, seed, k)
     write_rgb(out / rgb_name(k), rgb)
-    write_depth(out / depth_name(k), depth_m, DEPTH_UNITS_PER_M)
     exact = out / EXACT_DEPTH_DIR / Path(depth_name(k)).name
-    write_depth(exact, exact_m, DEPTH_UNITS_PER_M)
+    for path, image_m in ((out / depth_name(k), depth_m), (exact, exact_m)):
+        write_depth(path, image_m, DEPTH_UNITS_PER_M)
     write_json(part_path(out, k), truth)
 
 
 def _capture_all(out: Path, name: str, seed: int, n: int) -> None:
     """Write motion capture of `n` frames, unless it is there."""
-    part = out / PARTS_DIR / MOCAP_PART
-    if part.exists() and read_json(part)["n_frames"] == n:
+    part, plan = out / PARTS_DIR / MOCAP_PART, scenario(name)
+    if plan.capture is None or (part.exists() and read_json(part)["n_frames"] == n):
         return
-    plan = scenario(name)
-    T_root_camera = camera_poses(plan, 1)[0]
-    found = plan.capture(seed, float(plan.times_s(n)[-1]), T_WORLD_ROOT @ T_root_camera)
+    found = plan.capture(seed, float(plan.times_s(n)[-1]), T_WORLD_ROOT @ camera_poses(plan, 1)[0])
     write_tsv(out / MOCAP_FILE, found.exported)
     if len(found.exported.times_s) < MAX_C3D_FRAMES:  # a longer one is in the TSV file alone
         write_c3d((out / MOCAP_FILE).with_suffix(".c3d"), found.exported)

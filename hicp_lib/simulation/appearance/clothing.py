@@ -5,15 +5,14 @@ On a posed body, the cut's vertices are smoothed as cloth bridges hollows, kept 
 thickness away from the skin, and folded.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
 
+from hicp_lib.core.keypoints import INDEX
 from hicp_lib.core.memo import memoised, plain_fields
-from hicp_lib.simulation.body.model import REGIONS, Body, PosedBody, load_body
+from hicp_lib.simulation.body.model import Body, PosedBody, load_body
 from hicp_lib.simulation.rendering import mesh as g
 
 
@@ -23,14 +22,21 @@ class Garment:
 
     Attributes
     ----------
-    kind : "top" or "bottom"
-    start, end : where it begins and ends. Top: height of hem and collar in the body's `torso` field.
+    kind : str
+        "top" or "bottom".
+    start, end : float
+        Where it begins and ends. Top: height of hem and collar in the body's `torso` field.
         Bottom: end in the `leg` field and waist in the `torso` field.
-    sleeve : end of the sleeves in the `arm` field
-    opening : how much deeper the collar is in front, in the `torso` field
-    thickness_m : everywhere
-    ease_m : further distance from the body at hems
-    smoothing : steps of smoothing; more bridges wider hollows
+    sleeve : float
+        End of the sleeves in the `arm` field.
+    opening : float
+        How much deeper the collar is in front, in the `torso` field.
+    thickness_m : float
+        Everywhere.
+    ease_m : float
+        Further distance from the body at hems.
+    smoothing : int
+        Steps of smoothing; more bridges wider hollows.
     """
 
     kind: str
@@ -42,16 +48,25 @@ class Garment:
     ease_m: float = 0.012
     smoothing: int = 10
 
-    __post_init__ = plain_fields
+    def __post_init__(self) -> None:
+        plain_fields(self)
 
 
 @dataclass(frozen=True)
 class Pattern:
-    """A garment cut out, ready to be put on (n vertices).
+    """A garment cut out, ready to be put on; it has n vertices.
 
-    `smoothing` (n, n) moves each vertex most of the way to the middle of its neighbours;
-    `distance` is how far inside the garment's edge each vertex is, in its field's units;
-    `rim` are the boundary's directed edges; `hidden` marks body triangles well underneath.
+    Attributes
+    ----------
+    cut : g.Cut
+    smoothing : array, shape (n, n)
+        Moves each vertex most of the way to the middle of its neighbours.
+    distance : array, shape (n,)
+        How far inside the garment's edge each vertex is, in its field's units.
+    rim : array of int, shape (n_edges, 2)
+        The boundary's directed edges.
+    hidden : array of bool, shape (n_t,)
+        Body triangles well underneath.
     """
 
     cut: g.Cut
@@ -92,21 +107,18 @@ def _top_field(body: Body, garment: Garment) -> np.ndarray:
     on_arm = arm > 0
     trunk = np.where(on_arm, np.maximum(trunk, np.minimum(8 * arm, 0.5)), trunk)
     field = np.minimum(trunk, np.where(on_arm, garment.sleeve - arm, 9))
-    return np.where(_is(body, "hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh"), field, -1)
+    allowed = body.in_regions("hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh")
+    return np.where(allowed, field, -1)
 
 
 def _bottom_field(body: Body, garment: Garment) -> np.ndarray:
     arm, leg, torso = (body.field(name).astype(float) for name in ("arm", "leg", "torso"))
     field = np.minimum(garment.end - torso, garment.start - leg)
-    allowed = _is(body, "hips", "torso", "thigh", "shin", "foot") & (arm == 0)
+    allowed = body.in_regions("hips", "torso", "thigh", "shin", "foot") & (arm == 0)
     return np.where(allowed, field, -1)
 
 
 _FIELDS = {"top": _top_field, "bottom": _bottom_field}
-
-
-def _is(body: Body, *names: str) -> np.ndarray:
-    return np.isin(body.regions, [REGIONS.index(name) for name in names])
 
 
 def put_on(
@@ -116,14 +128,21 @@ def put_on(
 
     Parameters
     ----------
-    rest_m : array, shape (n_v, 3): the same person at rest; patterns and folds are tied to it
-    folds : array, shape (n_waves, 5): wave vector in rest coordinates (rad/m), phase, height (m)
-    layers_m : array, shape (n_v,): how far from the skin the clothes worn below reach; updated in place
+    garment : Garment
+    posed : PosedBody
+    rest_m : array, shape (n_v, 3)
+        The same person at rest; patterns and folds are tied to it.
+    folds : array, shape (n_waves, 5)
+        Wave vector in rest coordinates (rad/m), phase, height (m).
+    layers_m : array, shape (n_v,)
+        How far from the skin the clothes worn below reach; updated in place.
 
     Returns
     -------
-    mesh : its coords are rest position (3), arm, leg and torso field, distance from the edge
-    source : body triangle that each of the mesh's triangles came from
+    mesh : g.Mesh
+        Its coords are rest position (3), arm, leg and torso field, distance from the edge.
+    source : array of int, shape (n_triangles,)
+        Body triangle that each of the mesh's triangles came from.
     """
     pattern = cut_pattern(garment)
     cut, body = pattern.cut, load_body()
@@ -140,9 +159,8 @@ def put_on(
     for corners in (cut.i, cut.j):  # a cut edge lies between two of the body's vertices
         np.maximum.at(layers_m, corners, height)
     normals = g.vertex_normals(cloth, cut.triangles)
-    coords = np.column_stack(
-        [laid, *(cut.apply(body.field(f)) for f in ("arm", "leg", "torso")), pattern.distance]
-    )
+    fields = (cut.apply(body.field(name)) for name in ("arm", "leg", "torso"))
+    coords = np.column_stack([laid, *fields, pattern.distance])
     return _with_rim(pattern, g.Mesh(cloth, cut.triangles, normals, coords.astype(np.float32)), skin)
 
 
@@ -158,12 +176,8 @@ def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, 
     cloth = _keep_away(cloth, skin, skin_normals, away)
     heights = sum(h * np.sin(rest @ np.array([x, y, z], np.float32) + p) for x, y, z, p, h in folds)
     cloth = cloth + (heights * np.minimum(away / 0.01, 1.5))[:, None] * skin_normals
-    return _keep_away(
-        pattern.smoothing @ cloth.astype(np.float32),
-        skin,
-        skin_normals,
-        np.maximum(0.6 * away, below + 0.003 * (below > 0)),
-    )
+    away = np.maximum(0.6 * away, below + 0.003 * (below > 0))
+    return _keep_away(pattern.smoothing @ cloth.astype(np.float32), skin, skin_normals, away)
 
 
 def _smoothing(neighbours: np.ndarray) -> sparse.csr_array:
@@ -197,19 +211,33 @@ def _with_rim(pattern: Pattern, mesh: g.Mesh, skin: np.ndarray) -> tuple[g.Mesh,
 
 
 def collar(garment: Garment, mesh: g.Mesh, posed: PosedBody, rise_m: float, open_m: float) -> g.Mesh:
-    """A shirt collar on the edge around the neck: up, then folded out and down; open in front."""
+    """A shirt collar on the edge around the neck: up, then folded out and down; open in front.
+
+    Parameters
+    ----------
+    garment : Garment
+    mesh : g.Mesh
+        The garment as `put_on` returns it.
+    posed : PosedBody
+        Who wears it.
+    rise_m : float
+        How high it stands.
+    open_m : float
+        Half the width of its opening.
+
+    Returns
+    -------
+    g.Mesh
+        With the garment's coords.
+    """
     pattern = cut_pattern(garment)
     n = len(pattern.cut.i)
-    edges = pattern.rim[
-        (mesh.coords[pattern.rim, 5] > 0.8).all(axis=1) & (mesh.coords[pattern.rim, 3] < 0.2).all(axis=1)
-    ]
-    gap = (mesh.coords[edges, 0] > 0).all(axis=1) & (np.abs(mesh.coords[edges, 1]) < open_m).any(axis=1)
-    edges = edges[~gap]
+    x, y, _, arm, _, torso, _ = mesh.coords[pattern.rim].transpose(2, 0, 1)
+    gap = (x > 0).all(axis=1) & (np.abs(y) < open_m).any(axis=1)
+    edges = pattern.rim[((torso > 0.8) & (arm < 0.2)).all(axis=1) & ~gap]
     used, place = np.unique(edges, return_inverse=True)
-    place = place.reshape(edges.shape)
     ring = mesh.vertices_m[:n][used]
-    neck = posed.keypoints_m[18]
-    up = g.unit((posed.keypoints_m[17] - neck)[None])[0]
+    up = g.unit(posed.keypoints_m[INDEX["head_top"]] - posed.keypoints_m[INDEX["neck"]])
     out = ring - ring.mean(axis=0)
     out = g.unit(out - np.outer(out @ up, up))
     rows = [
@@ -221,23 +249,38 @@ def collar(garment: Garment, mesh: g.Mesh, posed: PosedBody, rise_m: float, open
     ]
     vertices = np.concatenate(rows).astype(np.float32)
     k = len(used)
-    a, b = place.T
-    strips = []
-    for row in range(len(rows) - 1):
-        lo, hi = row * k, (row + 1) * k
-        strips += [np.stack([b + lo, a + lo, a + hi], axis=1), np.stack([b + lo, a + hi, b + hi], axis=1)]
-    triangles = np.concatenate(strips).astype(np.int32)
+    a, b = place.reshape(edges.shape).T
+    strip = np.array([[b, a, a + k], [b, a + k, b + k]]).swapaxes(1, 2)
+    lows = k * np.arange(len(rows) - 1)[:, None, None, None]
+    triangles = (lows + strip).reshape(-1, 3).astype(np.int32)
     coords = np.tile(mesh.coords[:n][used], (len(rows), 1))
     coords[:, 2] += np.repeat([0, rise_m, rise_m + 0.01, rise_m + 0.02, 2 * rise_m + 0.02], k)
     return g.Mesh(vertices, triangles, g.vertex_normals(vertices, triangles), coords)
 
 
 def skirt(posed: PosedBody, hip_rotation: np.ndarray, length_m: float, flare: float, phase: float) -> g.Mesh:
-    """A skirt around hips and legs: their outline at each height below the waist, folded towards the hem."""
+    """A skirt around hips and legs: their outline at each height below the waist, folded towards the hem.
+
+    Parameters
+    ----------
+    posed : PosedBody
+    hip_rotation : array, shape (3, 3)
+        Of the pelvis, from rest to pose.
+    length_m : float
+    flare : float
+        How much wider than the legs the hem is, as a share.
+    phase : float
+        Of the folds, radians.
+
+    Returns
+    -------
+    g.Mesh
+        Its coords are those of `put_on`.
+    """
     body = load_body()
-    legs = (body.field("leg") > 0) | _is(body, "hips")
-    legs |= _is(body, "torso") & (body.field("torso") < 0.22) & (body.field("arm") == 0)
-    hips = posed.keypoints_m[19]
+    legs = (body.field("leg") > 0) | body.in_regions("hips")
+    legs |= body.in_regions("torso") & (body.field("torso") < 0.22) & (body.field("arm") == 0)
+    hips = posed.keypoints_m[INDEX["mid_hip"]]
     points = (posed.vertices_m[legs] - hips) @ hip_rotation  # x forward, y left, z up, whatever the pose
     n_angles, n_rows = 72, 16
     angle = np.linspace(0, 2 * np.pi, n_angles, endpoint=False)
@@ -249,27 +292,40 @@ def skirt(posed: PosedBody, hip_rotation: np.ndarray, length_m: float, flare: fl
         radius[row] = (near @ ray).max(axis=0) if len(near) > 8 else radius[row - 1]
     below = np.linspace(0, 1, n_rows)[:, None]
     radius = np.maximum.accumulate(radius * 0.97, axis=0) * (1 + flare * below**1.3) + 0.008
-    radius += below * 0.016 * np.sin(9 * angle + phase + 2 * below) + below * 0.008 * np.sin(
-        17 * angle + 3 * phase
-    )
+    folds = below * 0.016 * np.sin(9 * angle + phase + 2 * below)
+    radius += folds + below * 0.008 * np.sin(17 * angle + 3 * phase)
     radius = (radius + np.roll(radius, 1, 1) + np.roll(radius, -1, 1)) / 3
-    local = np.stack(
-        [radius * ray[0], radius * ray[1], np.broadcast_to(heights[:, None], radius.shape)], axis=-1
-    )
+    local = np.stack(np.broadcast_arrays(radius * ray[0], radius * ray[1], heights[:, None]), axis=-1)
     grid = np.concatenate([local, local[:, :1]], axis=1)
     vertices = (grid.reshape(-1, 3) @ hip_rotation.T + hips).astype(np.float32)
-    triangles = g.grid_triangles(n_rows, n_angles + 1)
     rest = np.stack([0.2 * np.cos(angle), 0.2 * np.sin(angle)], axis=1)
     rest = np.concatenate([rest, rest[:1]])
     coords = np.zeros((n_rows, n_angles + 1, 7), np.float32)
     coords[..., :2], coords[..., 2], coords[..., 6] = rest, heights[:, None], (1 - below)
-    normals = g.vertex_normals(vertices, triangles).reshape(n_rows, n_angles + 1, 3)
-    normals[:, 0] = normals[:, -1] = g.unit(normals[:, 0] + normals[:, -1])
-    return g.Mesh(vertices, triangles, normals.reshape(-1, 3), coords.reshape(-1, 7))
+    return g.closed_grid(vertices.reshape(grid.shape), coords, axis=1)
 
 
 def random_folds(rng: np.random.Generator, height_m: float, n_waves: int = 8) -> np.ndarray:
-    """Waves for `put_on`: mostly upright folds, some slanting."""
+    """Waves for `put_on`: mostly upright folds, some slanting.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    height_m : float
+        Of the folds, together.
+    n_waves : int, optional
+
+    Returns
+    -------
+    array, shape (n_waves, 5), dtype float32
+        Wave vector (rad/m), phase, height (m).
+
+    Examples
+    --------
+    >>> waves = random_folds(np.random.default_rng(0), 0.005)
+    >>> waves.shape, bool(waves[:, 4].max() < 0.005)
+    ((8, 5), True)
+    """
     direction = rng.normal(size=(n_waves, 3)) * [1, 1, 0.55]
     number = 2 * np.pi / rng.uniform(0.05, 0.16, n_waves)
     waves = g.unit(direction) * number[:, None]

@@ -1,26 +1,33 @@
 """Fabrics: patterns that follow the cloth, weave, folds and seams."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
+from hicp_lib.core.keypoints import INDEX
 from hicp_lib.simulation.appearance.materials import any_colour, hsv, linear
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 
 Rng = np.random.Generator
 
 
 @dataclass(frozen=True)
-class Cuts:
-    """How a person's garments are laid out flat: axes of trunk and limbs at rest.
+class Panels:
+    """How a person's garments are laid out flat: axes of trunk and limbs at rest, body frame.
 
-    `origins_m`, `axes`, `sides` have one row per panel: 0 trunk, 1 left arm, 2 right arm,
-    3 left leg, 4 right leg; coordinates run along the axis and around it, from the outside.
+    There is one row per panel: 0 trunk, 1 left arm, 2 right arm, 3 left leg, 4 right leg;
+    coordinates run along the axis and around it, from the front.
+
+    Attributes
+    ----------
+    origins_m : array, shape (5, 3)
+    axes, fronts : array, shape (5, 3)
+        Unit vectors, at right angles to each other.
+    radii_m : array, shape (5,)
+        How thick the limbs are taken to be.
     """
 
     origins_m: np.ndarray
@@ -29,24 +36,39 @@ class Cuts:
     radii_m: np.ndarray
 
 
-def make_cuts(landmarks_m: np.ndarray) -> Cuts:
+_PANEL_ENDS = (("mid_hip", "neck"), ("left_shoulder", "left_wrist"), ("right_shoulder", "right_wrist"),
+               ("left_hip", "left_ankle"), ("right_hip", "right_ankle"))  # fmt: skip
+_PANEL_RADII_M = (0.15, 0.06, 0.06, 0.085, 0.085)
+
+
+def make_panels(landmarks_m: np.ndarray) -> Panels:
     """Panels for a person with these keypoints at rest, shape (136, 3)."""
-    k = landmarks_m
-    starts = [k[19], k[5], k[6], k[11], k[12]]
-    ends = [k[18], k[9], k[10], k[15], k[16]]
+    starts, ends = ([landmarks_m[INDEX[pair[k]]] for pair in _PANEL_ENDS] for k in (0, 1))
     axes = np.array([(b - a) / np.linalg.norm(b - a) for a, b in zip(starts, ends, strict=True)])
     axes[0] = [0, 0, 1]
     forward = np.array([1.0, 0, 0])
     fronts = np.array([forward - axis * (forward @ axis) for axis in axes])
     fronts /= np.linalg.norm(fronts, axis=1, keepdims=True)
-    return Cuts(np.array(starts), axes, fronts, np.array([0.15, 0.06, 0.06, 0.085, 0.085]))
+    return Panels(np.array(starts), axes, fronts, np.array(_PANEL_RADII_M))
 
 
-def flat_coordinates(cuts: Cuts, coords: np.ndarray, limbs: str) -> tuple[np.ndarray, np.ndarray]:
-    """Metres around and along each panel, (2, n), and the panel (n,), for a garment's coords (7, n).
+def panel_coordinates(panels: Panels, coords: np.ndarray, limbs: str) -> tuple[np.ndarray, np.ndarray]:
+    """Where on which panel places of a garment lie.
 
-    `limbs` is "arms" for tops, whose sleeves begin where the `arm` field does, "legs" for
-    trousers, whose halves meet in the middle, "" for skirts.
+    Parameters
+    ----------
+    panels : Panels
+    coords : array, shape (7, n)
+        The garment's, see `clothing.put_on`.
+    limbs : str
+        "arms" for tops, whose sleeves begin where the `arm` field does, "legs" for trousers,
+        whose halves meet in the middle, "" for skirts.
+
+    Returns
+    -------
+    uv_m : array, shape (2, n), dtype float32
+        Around and along the panel.
+    panel : array of int, shape (n,)
     """
     rest, arm = coords[:3], coords[3]
     left = rest[1] > 0
@@ -56,14 +78,12 @@ def flat_coordinates(cuts: Cuts, coords: np.ndarray, limbs: str) -> tuple[np.nda
     elif limbs == "legs":
         panel = np.where(left, 3, 4)
     uv = np.empty((2, len(arm)), np.float32)
-    for number in range(len(cuts.axes)):
+    for number in range(len(panels.axes)):
         rows = np.flatnonzero(panel == number)
-        if len(rows) == 0:
-            continue
-        local = rest.take(rows, axis=1) - np.float32(cuts.origins_m[number])[:, None]
-        axis, front = np.float32(cuts.axes[number]), np.float32(cuts.fronts[number])
+        local = rest.take(rows, axis=1) - column(panels.origins_m[number])
+        axis, front = np.float32(panels.axes[number]), np.float32(panels.fronts[number])
         side = np.cross(axis, front).astype(np.float32)
-        around = np.arctan2(side @ local, front @ local) * np.float32(cuts.radii_m[number])
+        around = np.arctan2(side @ local, front @ local) * np.float32(panels.radii_m[number])
         along = axis @ local
         if number == 0 and limbs:  # two flat panels, front and back, that bend round the sides
             x, y = local[0], local[1]
@@ -77,10 +97,19 @@ Weights = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Fabric:
-    """A cloth: up to three colours (linear RGB, (3, 3)), the pattern that mixes them, its surface.
+    """A cloth: up to three colours, the pattern that mixes them, its surface.
 
-    `pattern` maps flat coordinates (2, n) and footprints (n,) to weights of the second and
-    third colour, (2, n); None for plain cloth. `weave_m` and `crease_m` are bump heights.
+    Attributes
+    ----------
+    colours : array, shape (3, 3)
+        Linear RGB.
+    pattern : callable or None
+        Maps panel coordinates (2, n) and footprints (n,) to weights of the second and third
+        colour, (2, n); None for plain cloth.
+    weave_m, crease_m : float
+        Bump heights.
+    roughness, gloss, fuzz : float
+        See `surfaces.Look`; fuzz is its softness.
     """
 
     colours: np.ndarray
@@ -92,7 +121,7 @@ class Fabric:
     fuzz: float = 0.15
 
 
-def random_fabric(rng: Rng, plain: float = 0.5) -> Fabric:
+def random_fabric(rng: Rng, plain: float) -> Fabric:
     """Cloth for shirts; `plain` is the chance of a single colour."""
     colours = np.array([any_colour(rng) for _ in range(3)])
     if rng.random() < 0.3:  # white, black and grey are what people wear
@@ -102,26 +131,28 @@ def random_fabric(rng: Rng, plain: float = 0.5) -> Fabric:
         crease_m=rng.uniform(0.002, 0.006),
         fuzz=rng.uniform(0.05, 0.3),
     )
-    if rng.random() < plain:
-        return Fabric(colours, **finish)
-    return Fabric(colours, _random_pattern(rng), **finish)
+    return Fabric(colours, None if rng.random() < plain else _random_pattern(rng), **finish)
+
+
+# How often a pattern is worn, and between what its period lies (m).
+_PATTERNS = {"stripes": (0.3, (0.02, 0.12)), "uprights": (0.12, (0.01, 0.05)), "checks": (0.28, (0.03, 0.16)),
+             "dots": (0.12, (0.015, 0.06)), "blobs": (0.18, (0.2, 0.6))}  # fmt: skip
 
 
 def _random_pattern(rng: Rng) -> Weights:
-    kind = rng.choice(["stripes", "uprights", "checks", "dots", "blobs"], p=[0.3, 0.12, 0.28, 0.12, 0.18])
-    if kind == "stripes":
-        return _tiled(partial(textures.stripes, float(rng.choice([0.2, 0.35, 0.5]))), rng.uniform(0.02, 0.12))
-    if kind == "uprights":
-        stripes = partial(textures.stripes, float(rng.choice([0.12, 0.3])))
-        return _tiled(stripes, rng.uniform(0.01, 0.05), upright=True)
-    if kind == "checks":
-        return _tiled(partial(textures.checks, int(rng.integers(3))), rng.uniform(0.03, 0.16))
-    if kind == "dots":
-        return _tiled(textures.dots, rng.uniform(0.015, 0.06))
-    return _tiled(partial(textures.blobs, int(rng.integers(6))), rng.uniform(0.2, 0.6))
+    kind = str(rng.choice(list(_PATTERNS), p=[often for often, _ in _PATTERNS.values()]))
+    texture: Callable[[], textures.Texture] = textures.dots
+    if kind in ("stripes", "uprights"):
+        duty = rng.choice([0.2, 0.35, 0.5] if kind == "stripes" else [0.12, 0.3])
+        texture = partial(textures.stripes, float(duty))
+    elif kind == "checks":
+        texture = partial(textures.checks, int(rng.integers(3)))
+    elif kind == "blobs":
+        texture = partial(textures.blobs, int(rng.integers(6)))
+    return _tiled(texture, rng.uniform(*_PATTERNS[kind][1]), kind == "uprights")
 
 
-def _tiled(texture: Callable, period_m: float, upright: bool = False) -> Weights:
+def _tiled(texture: Callable[[], textures.Texture], period_m: float, upright: bool) -> Weights:
     def weights(uv: np.ndarray, footprint: np.ndarray) -> np.ndarray:
         found = texture().sample((uv[::-1] if upright else uv) / period_m, footprint / period_m)
         return found if len(found) > 1 else np.concatenate([found, 0 * found])
@@ -129,7 +160,7 @@ def _tiled(texture: Callable, period_m: float, upright: bool = False) -> Weights
     return weights
 
 
-def printed(rng: Rng, colours: np.ndarray) -> Weights:
+def printed(rng: Rng) -> Weights:
     """A print on the chest."""
     number, size = int(rng.integers(24)), rng.uniform(0.7, 1.1)
 
@@ -165,16 +196,22 @@ def plain_fabric(rng: Rng, dark: bool = False) -> Fabric:
     colour = hsv(rng.uniform(0, 1), rng.uniform(0, 0.35), rng.uniform(0.08, 0.3 if dark else 0.7))
     if rng.random() < 0.4:
         colour = hsv(rng.uniform(0.07, 0.12), rng.uniform(0.15, 0.45), rng.uniform(0.25, 0.8))
-    return Fabric(
-        np.array([colour] * 3), None, 0.0001, rng.uniform(0.003, 0.006), 0.85, 0.02, rng.uniform(0.05, 0.2)
-    )
+    crease_m, fuzz = rng.uniform(0.003, 0.006), rng.uniform(0.05, 0.2)
+    return Fabric(np.array([colour] * 3), None, 0.0001, crease_m, 0.85, 0.02, fuzz)
 
 
 @dataclass(frozen=True)
 class Trim:
-    """Sewn details: how wide hems are (in units of the garment's edge distance), and a line in front.
+    """Sewn details.
 
-    `line` is "none", "buttons" or "zip"; `band` the colour of collar, cuffs and hem as a factor.
+    Attributes
+    ----------
+    hem : float
+        How wide hems are, in units of the garment's distance from its edge.
+    band : float
+        Factor of the colour of collar, cuffs and hem.
+    line : str
+        In front: "none", "buttons" or "zip".
     """
 
     hem: float = 0.03
@@ -182,14 +219,28 @@ class Trim:
     line: str = "none"
 
 
-def cloth_material(fabric: Fabric, cuts: Cuts, limbs: str, trim: Trim) -> Material:
-    """The look of a garment whose mesh has `clothing.put_on`'s coords; `limbs` as in `flat_coordinates`."""
-    base = np.float32(fabric.colours[0])[:, None]
+def cloth_material(fabric: Fabric, panels: Panels, limbs: str, trim: Trim) -> Material:
+    """The material of a garment.
+
+    Parameters
+    ----------
+    fabric : Fabric
+    panels : Panels
+    limbs : str
+        As in `panel_coordinates`.
+    trim : Trim
+
+    Returns
+    -------
+    callable
+        For meshes with `clothing.put_on`'s coords.
+    """
+    base = column(fabric.colours[0])
     extra = (np.float32(fabric.colours[1:3]) - np.float32(fabric.colours[:1])).T
 
     def look(hits: Hits) -> Look:
         rest, distance = hits.coords[:3], hits.coords[6]
-        uv, panel = flat_coordinates(cuts, hits.coords, limbs)
+        uv, panel = panel_coordinates(panels, hits.coords, limbs)
         albedo = np.repeat(base, uv.shape[1], axis=1)
         if fabric.pattern is not None:
             albedo += extra @ fabric.pattern(uv, hits.footprint_m)[:2]
@@ -205,6 +256,7 @@ def cloth_material(fabric: Fabric, cuts: Cuts, limbs: str, trim: Trim) -> Materi
 
 
 def _sew(trim: Trim, distance, rest, panel, height, albedo) -> tuple[np.ndarray, np.ndarray]:
+    """Heights (n,) and albedo (3, n) with hems and a line in front."""
     band = distance < trim.hem
     seam = np.abs(distance - trim.hem) < 0.006
     one = np.float32(1)  # with Python's numbers alone, np.where would compute in double precision

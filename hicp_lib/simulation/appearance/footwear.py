@@ -1,21 +1,32 @@
 """Shoes: a closed tube around each foot, which hides the toes, on a sole."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
+from hicp_lib.core.keypoints import INDEX
 from hicp_lib.core.memo import memoised
-from hicp_lib.simulation.body.model import REGIONS, PosedBody, load_body
+from hicp_lib.simulation.body.model import PosedBody, load_body
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 
 
 @dataclass(frozen=True)
 class Shoes:
-    """A pair of shoes: colours (linear RGB) of upper and sole, its height, how thick and shiny it is."""
+    """A pair of shoes.
+
+    Attributes
+    ----------
+    upper, sole : array, shape (3,)
+        Colours, linear RGB.
+    height_m : float
+        How far up the leg it reaches.
+    thickness_m : float
+    laces : bool
+    roughness : float
+        See `surfaces.Look`.
+    """
 
     upper: np.ndarray
     sole: np.ndarray
@@ -30,45 +41,51 @@ SOLE_M = 0.022
 
 
 def put_on_shoe(shoes: Shoes, posed: PosedBody, side: str) -> g.Mesh:
-    """One shoe; coords are (along from heel 0 to toe 1, across in metres, height above the sole's bottom)."""
+    """One shoe around a foot.
+
+    Parameters
+    ----------
+    shoes : Shoes
+    posed : PosedBody
+    side : str
+        "left" or "right".
+
+    Returns
+    -------
+    g.Mesh
+        Its coords: along from heel 0 to toe 1, metres across, height above the sole's bottom.
+    """
     points = posed.vertices_m[_foot(side)].astype(float)
-    frame = _frame(posed, side)
-    local = (points - posed.keypoints_m[24 if side == "left" else 25]) @ frame.T  # along, across, up
+    frame, heel = _frame(posed, side), posed.keypoints_m[INDEX[f"{side}_heel"]]
+    local = (points - heel) @ frame.T  # along, across, up
     bottom = np.percentile(local[:, 2], 1)
     local = local[local[:, 2] < bottom + shoes.height_m]
     outline = _tube(local, shoes.thickness_m)
     outline[..., 2] = np.maximum(outline[..., 2], bottom - 0.004)
-    vertices = outline.reshape(-1, 3) @ frame + posed.keypoints_m[24 if side == "left" else 25]
+    vertices = outline.reshape(-1, 3) @ frame + heel
     vertices[:, 2] = np.maximum(vertices[:, 2], posed.vertices_m[:, 2].min() + 0.001)
-    triangles = g.grid_triangles(_N_ROWS + 4, _N_ANGLES + 1)
-    vertices = vertices.astype(np.float32)
-    normals = g.vertex_normals(vertices, triangles).reshape(_N_ROWS + 4, _N_ANGLES + 1, 3)
-    normals[:, 0] = normals[:, -1] = g.unit(normals[:, 0] + normals[:, -1])
-    span = outline[..., 0].min(), outline[..., 0].max()
-    coords = np.stack(
-        [(outline[..., 0] - span[0]) / (span[1] - span[0]), outline[..., 1], outline[..., 2] - bottom],
-        axis=-1,
-    )
-    return g.Mesh(vertices, triangles, normals.reshape(-1, 3), coords.reshape(-1, 3).astype(np.float32))
+    along, across, up = np.moveaxis(outline, -1, 0)
+    coords = np.stack([(along - along.min()) / (along.max() - along.min()), across, up - bottom], axis=-1)
+    grid = vertices.astype(np.float32).reshape(outline.shape)
+    return g.closed_grid(grid, coords.astype(np.float32), axis=1)
 
 
 @memoised()
 def _foot(side: str) -> np.ndarray:
     """Numbers of the vertices that a shoe goes around."""
     body = load_body()
-    foot = np.isin(body.regions, [REGIONS.index(name) for name in ("foot", "shin", "nail")])
+    foot = body.in_regions("foot", "shin", "nail")
     left = body.vertices_m[0, :, 1] > 0
     return np.flatnonzero(foot & (body.field("leg") > 1.85) & (left == (side == "left")))
 
 
 def _frame(posed: PosedBody, side: str) -> np.ndarray:
     """Rows: from heel to toe, across (to the foot's left), up, in the world."""
-    offset = 0 if side == "left" else 1
-    heel, toe = posed.keypoints_m[24 + offset], posed.keypoints_m[20 + offset]
-    little = posed.keypoints_m[22 + offset]
-    along = g.unit((0.6 * toe + 0.4 * little - heel)[None].astype(float))[0]
+    names = (f"{side}_{part}" for part in ("heel", "big_toe", "small_toe"))
+    heel, toe, little = (posed.keypoints_m[INDEX[name]] for name in names)
+    along = g.unit((0.6 * toe + 0.4 * little - heel).astype(float))
     across = (toe - little) * (-1 if side == "left" else 1)
-    across = g.unit((across - (across @ along) * along)[None].astype(float))[0]
+    across = g.unit((across - (across @ along) * along).astype(float))
     return np.stack([along, across, np.cross(along, across)])
 
 
@@ -87,7 +104,6 @@ def _tube(local: np.ndarray, thickness: float) -> np.ndarray:
     padded = np.pad(np.column_stack([rows, middles]), ((1, 1), (0, 0)), mode="edge")
     mixed = smooth[0] * padded[:-2] + smooth[1] * padded[1:-1] + smooth[2] * padded[2:]
     rows, middles = mixed[:, :-2] + thickness, mixed[:, -2:]
-    ends = [(start + 0.003, 0, 0.75), (start, 0, 0.0)], [(stop - 0.003, -1, 0.75), (stop, -1, 0.0)]
     grid = np.concatenate(
         [places[:, None, None] + 0 * rows[..., None], middles[:, None] + rows[..., None] * ray.T], axis=-1
     )
@@ -97,12 +113,13 @@ def _tube(local: np.ndarray, thickness: float) -> np.ndarray:
         ring[:, 0], ring[:, 1:] = place, middles[row] + scale * (ring[:, 1:] - middles[row])
         return ring
 
-    return np.stack([cap(*ends[0][1]), cap(*ends[0][0]), *grid, cap(*ends[1][0]), cap(*ends[1][1])])
+    heel, toe = ((start, 0, 0.0), (start + 0.003, 0, 0.75)), ((stop - 0.003, -1, 0.75), (stop, -1, 0.0))
+    return np.stack([*(cap(*end) for end in heel), *grid, *(cap(*end) for end in toe)])
 
 
 def shoe_material(shoes: Shoes) -> Material:
     """Upper, sole, a seam over the toes and laces."""
-    upper, sole = np.float32(shoes.upper)[:, None], np.float32(shoes.sole)[:, None]
+    upper, sole = column(shoes.upper), column(shoes.sole)
 
     def look(hits: Hits) -> Look:
         along, across, height = hits.coords
@@ -129,6 +146,5 @@ def random_shoes(rng: np.random.Generator) -> Shoes:
         colour = rng.choice([dark, white, rng.random(3) * 0.5])
         return Shoes(colour, white if rng.random() < 0.7 else dark, rng.uniform(0.06, 0.09), 0.009, True, 0.7)
     upper = brown if rng.random() < 0.5 else dark
-    return Shoes(
-        upper, dark, 0.065 if kind == 1 else 0.13, 0.007, bool(rng.random() < 0.6), rng.uniform(0.25, 0.5)
-    )
+    height_m = 0.065 if kind == 1 else 0.13
+    return Shoes(upper, dark, height_m, 0.007, bool(rng.random() < 0.6), rng.uniform(0.25, 0.5))

@@ -5,17 +5,17 @@ rounded bundle of strands. They grow on the body at rest and are then carried al
 head and, further down, by the back.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from hicp_lib.simulation.body.model import REGIONS, Body, PosedBody
+from hicp_lib.simulation.body.model import Body, PosedBody
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
+
+Rng = np.random.Generator
 
 
 @dataclass(frozen=True)
@@ -24,17 +24,28 @@ class Style:
 
     Attributes
     ----------
-    top_m, side_m : length on the crown and above the ears
-    lift : how steeply it leaves the scalp, 0 flat to 1 upright
-    comb : direction it is combed to, in the head's frame (x forward, y left, z up), and how firmly
-    gravity : pull downwards per step
-    curl : random wandering, 0 straight
-    volume_m : thickness of the layer of hair
-    parting : sign of the side it is parted on, 0 none
-    tie : "", "tail" or "bun": gathered at the back of the head
-    n_locks, n_steps : how many locks of how many pieces
-    width_m : width of a lock
-    coil_m : radius of curls
+    top_m, side_m : float
+        Length on the crown and above the ears.
+    lift : float
+        How steeply it leaves the scalp, 0 flat to 1 upright.
+    comb : tuple of float
+        Direction it is combed to, in the head's frame (x forward, y left, z up), and how firmly.
+    gravity : float
+        Pull downwards per step.
+    curl : float
+        Random wandering, 0 straight.
+    volume_m : float
+        Thickness of the layer of hair.
+    parting : float
+        Sign of the side it is parted on, 0 none.
+    tie : str
+        "", "tail" or "bun": gathered at the back of the head.
+    n_locks, n_steps : int
+        How many locks of how many pieces.
+    width_m : float
+        Width of a lock.
+    coil_m : float
+        Radius of curls.
     """
 
     top_m: float
@@ -52,66 +63,71 @@ class Style:
     coil_m: float = 0.0
 
 
-def random_style(rng: np.random.Generator, woman: bool, age: float) -> Style | None:
-    """A hair style; None for a shaven or bald head."""
+# How often a style is worn, by women, by men before and from the age of 50.
+_WOMEN = {"long": 0.30, "bob": 0.2, "tail": 0.18, "bun": 0.12, "short": 0.1, "curly": 0.1}
+_YOUNG_MEN = {"side": 0.42, "quiff": 0.2, "crop": 0.16, "curly": 0.08, "bald": 0.14}
+_OLD_MEN = {"side": 0.4, "quiff": 0.05, "crop": 0.25, "curly": 0.05, "bald": 0.25}
+# Length on the crown (m; a range is drawn from) and at the sides (a range; a share of the crown's for long
+# hair), lift, comb, gravity, curl (None: drawn), volume (m), parted, tie, locks, pieces, width, coil (m).
+_STYLES: dict[str, tuple] = {
+    "long": ((0.30, 0.48), 0.95, 0.06, (-0.5, 0, -0.3), 1.0, None, 0.014, 1, "", 850, 9, 0.020, 0.0),
+    "bob": ((0.17, 0.25), 0.85, 0.06, (-0.3, 0, -0.4), 1.0, None, 0.016, 1, "", 900, 7, 0.018, 0.0),
+    "tail": (0.3, 0.3, 0.05, (-1, 0, 0.1), 0.0, 0.01, 0.006, 0, "tail", 700, 7, 0.013, 0.0),
+    "bun": (0.3, 0.3, 0.05, (-1, 0, 0.1), 0.0, 0.01, 0.006, 0, "bun", 700, 7, 0.013, 0.0),
+    "short": (0.10, 0.07, 0.08, (0.1, 0, -0.5), 0.5, None, 0.016, 1, "", 1300, 5, 0.011, 0.0),
+    "curly": (0.07, 0.05, 0.5, (0, 0, -0.3), 0.1, 0.1, 0.03, 0, "", 1150, 7, 0.010, 0.007),
+    "side": ((0.045, 0.08), (0.012, 0.025), 0.10, (0.45, 0, -0.2), 0.1, None, 0.014, 1, "",
+             1600, 4, 0.009, 0.0),
+    "quiff": ((0.04, 0.06), 0.014, 0.22, (-0.9, 0, 0.25), 0.05, None, 0.020, 0, "", 1600, 4, 0.009, 0.0),
+    "crop": ((0.010, 0.018), 0.009, 0.3, (0.3, 0, -0.1), 0.0, 0.05, 0.010, 0, "", 1900, 2, 0.007, 0.0),
+}  # fmt: skip
+_LONG = ("long", "bob")
+_MOST_CURL = 0.10  # of what is drawn
+
+
+def random_style(rng: Rng, woman: bool, age: float) -> Style | None:
+    """A hair style; None for a shaven or bald head.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    woman : bool
+    age : float
+        Years.
+
+    Examples
+    --------
+    >>> style = random_style(np.random.default_rng(0), woman=True, age=25)
+    >>> 0.1 <= style.top_m < 0.5
+    True
+    """
     parting = float(rng.choice([-1, 1]))
-    if woman:
-        kind = rng.choice(
-            ["long", "bob", "tail", "bun", "short", "curly"], p=[0.30, 0.2, 0.18, 0.12, 0.1, 0.1]
-        )
-    else:
-        odds = [0.42, 0.2, 0.16, 0.08, 0.14] if age < 50 else [0.4, 0.05, 0.25, 0.05, 0.25]
-        kind = rng.choice(["side", "quiff", "crop", "curly", "bald"], p=odds)
-    wave = rng.uniform(0.0, 0.10)
+    odds = _WOMEN if woman else _YOUNG_MEN if age < 50 else _OLD_MEN
+    kind = str(rng.choice(list(odds), p=list(odds.values())))
+    wave = rng.uniform(0.0, _MOST_CURL)
     if kind == "bald":
         return None
-    if kind == "long":
-        length = rng.uniform(0.30, 0.48)
-        return Style(
-            length, length * 0.95, 0.06, (-0.5, 0, -0.3), 1.0, wave, 0.014, parting, "", 850, 9, 0.020
-        )
-    if kind == "bob":
-        length = rng.uniform(0.17, 0.25)
-        return Style(
-            length, length * 0.85, 0.06, (-0.3, 0, -0.4), 1.0, wave, 0.016, parting, "", 900, 7, 0.018
-        )
-    if kind in ("tail", "bun"):
-        return Style(0.3, 0.3, 0.05, (-1, 0, 0.1), 0.0, 0.01, 0.006, 0, kind, 700, 7, 0.013)
-    if kind == "short":
-        return Style(0.10, 0.07, 0.08, (0.1, 0, -0.5), 0.5, wave, 0.016, parting, "", 1300, 5, 0.011)
-    if kind == "curly":
-        return Style(0.07, 0.05, 0.5, (0, 0, -0.3), 0.1, 0.1, 0.03, 0, "", 1150, 7, 0.010, 0.007)
-    if kind == "side":
-        length = rng.uniform(0.045, 0.08)
-        return Style(
-            length,
-            rng.uniform(0.012, 0.025),
-            0.10,
-            (0.45, 0, -0.2),
-            0.1,
-            wave,
-            0.014,
-            parting,
-            "",
-            1600,
-            4,
-            0.009,
-        )
-    if kind == "quiff":
-        return Style(
-            rng.uniform(0.04, 0.06), 0.014, 0.22, (-0.9, 0, 0.25), 0.05, wave, 0.020, 0, "", 1600, 4, 0.009
-        )
-    return Style(
-        rng.uniform(0.010, 0.018), 0.009, 0.3, (0.3, 0, -0.1), 0.0, 0.05, 0.010, 0, "", 1900, 2, 0.007
-    )
+    top, side, lift, comb, gravity, curl, volume_m, is_parted, *others = _STYLES[kind]
+    top_m, side_m = (rng.uniform(*drawn) if isinstance(drawn, tuple) else drawn for drawn in (top, side))
+    side_m = side_m * top_m if kind in _LONG else side_m
+    curl, parting = wave if curl is None else curl, parting if is_parted else 0.0
+    return Style(top_m, side_m, lift, comb, gravity, curl, volume_m, parting, *others)
 
 
 @dataclass(frozen=True)
 class Obstacles:
-    """What hair lies on, at rest: head and neck by direction from the head's middle, the trunk by columns.
+    """What hair lies on, at rest, body frame.
 
-    `radius_m` has rows of rising and columns of turning direction; `back_m` and `front_m` are
-    the trunk's extent along x over a grid of y and z that starts at `corner_m` in steps of `_CELL_M`.
+    Attributes
+    ----------
+    centre_m : array, shape (3,)
+        Middle of the head.
+    radius_m : array, shape (36, 72)
+        Of head and neck by direction from there: rows of rising, columns of turning direction.
+    corner_m : array, shape (2,)
+        Where the trunk's grid over y and z begins; its cells are `_CELL_M` wide.
+    back_m, front_m : array, shape (rows, columns)
+        The trunk's extent along x in each cell.
     """
 
     centre_m: np.ndarray
@@ -124,16 +140,16 @@ class Obstacles:
 _GRID = (36, 72)
 _CELL_M = 0.02
 _CLOTH_M = 0.018
+_FAR_M = 9.0  # where a column holds no trunk
 
 
-def measure(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> Obstacles:
+def _measure(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> Obstacles:
     """Head, neck and trunk of a body at rest."""
     ears, top = landmarks_m[3:5].mean(axis=0), landmarks_m[17]
     centre = np.array([ears[0] + 0.005, 0.0, 0.5 * (ears[2] + top[2]) - 0.015])
-    trunk = body.regions <= REGIONS.index("torso")
-    corner, back, front = _columns(rest_m[trunk & (rest_m[:, 2] > centre[2] - 0.75)])
-    head = rest_m[np.isin(body.regions, [REGIONS.index(n) for n in ("face", "scalp", "neck", "eyebrow")])]
-    return Obstacles(centre, _radii(head - centre), corner, back, front)
+    trunk = body.in_regions("hips", "torso") & (rest_m[:, 2] > centre[2] - 0.75)
+    head = rest_m[body.in_regions("face", "scalp", "neck", "eyebrow")]
+    return Obstacles(centre, _radii(head - centre), *_columns(rest_m[trunk]))
 
 
 def _radii(offset: np.ndarray) -> np.ndarray:
@@ -153,12 +169,11 @@ def _columns(trunk_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     corner = trunk_m[:, 1:].min(axis=0)
     cells = ((trunk_m[:, 1:] - corner) / _CELL_M).astype(int)
     shape = tuple(cells.max(axis=0) + 1)
-    back, front = np.full(shape, np.inf), np.full(shape, -np.inf)
+    back, front = np.full(shape, _FAR_M), np.full(shape, -_FAR_M)
     numbers = cells[:, 0] * shape[1] + cells[:, 1]
     np.minimum.at(back.ravel(), numbers, trunk_m[:, 0])
     np.maximum.at(front.ravel(), numbers, trunk_m[:, 0])
     kernel = np.ones((3, 3))
-    back, front = np.where(np.isfinite(back), back, 9), np.where(np.isfinite(front), front, -9)
     return corner, cv2.erode(back, kernel), cv2.dilate(front, kernel)
 
 
@@ -193,21 +208,34 @@ def _keep_off(obstacles: Obstacles, points: np.ndarray, layer: np.ndarray) -> np
     shape = obstacles.back_m.shape
     within = ((cell >= 0) & (cell < shape)).all(axis=1)
     cell = np.clip(cell, 0, np.array(shape) - 1)
-    back, front = (
-        obstacles.back_m[tuple(cell.T)] - _CLOTH_M - layer,
-        obstacles.front_m[tuple(cell.T)] + _CLOTH_M + layer,
-    )
+    row, column = cell.T
+    back = obstacles.back_m[row, column] - _CLOTH_M - layer
+    front = obstacles.front_m[row, column] + _CLOTH_M + layer
     x = points[:, 0]
     inside = within & (x > back) & (x < front)
     points[:, 0] = np.where(inside, np.where(x < 0.45 * back + 0.55 * front, back, front), x)
     return points
 
 
-def grow(
-    style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, rng: np.random.Generator
-) -> g.Mesh:
-    """Hair on the body at rest; coords: across (-1 to 1), metres along, a random number, root 0 to tip 1."""
-    head = measure(body, rest_m, landmarks_m)
+def grow(style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, rng: Rng) -> g.Mesh:
+    """Hair on the body at rest.
+
+    Parameters
+    ----------
+    style : Style
+    body : Body
+    rest_m : array, shape (n_v, 3)
+        The person at rest, body frame.
+    landmarks_m : array, shape (136, 3)
+        The person's keypoints at rest.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    g.Mesh
+        Its coords: across a lock (-1 to 1), metres along it, a random number per lock, root 0 to tip 1.
+    """
+    head = _measure(body, rest_m, landmarks_m)
     roots, normals, inside = _roots(style, body, rest_m, rng)
     points, reach = _strands(style, head, roots, normals, inside, rng)
     if style.tie:
@@ -216,7 +244,7 @@ def grow(
     return _ribbons(style, head, points, reach, rng)
 
 
-def _roots(style: Style, body: Body, rest_m: np.ndarray, rng: np.random.Generator):
+def _roots(style: Style, body: Body, rest_m: np.ndarray, rng: Rng):
     field = body.field("hairline_m")
     triangles = body.triangles[(field[body.triangles] > -0.004).all(axis=1)]
     corners = rest_m[triangles]
@@ -246,11 +274,9 @@ def _strands(style: Style, head: Obstacles, roots, normals, inside, rng) -> tupl
     step = (length / style.n_steps)[:, None]
     points = [roots - 0.001 * normals]
     for k in range(style.n_steps):
-        wander = style.curl * (
-            1.5 * np.roll(wave, k, axis=1) * (-1) ** (k // 2) + 0.6 * rng.normal(0, 1, (n, 3))
-        )
-        pull = np.array([0, 0, -style.gravity])
-        direction = g.unit(direction + 0.6 * comb + pull + wander)
+        shared = 1.5 * np.roll(wave, k, axis=1) * (-1) ** (k // 2)
+        wander = style.curl * (shared + 0.6 * rng.normal(0, 1, (n, 3)))
+        direction = g.unit(direction + 0.6 * comb + np.array([0, 0, -style.gravity]) + wander)
         here = points[-1]
         if style.tie:
             left = _tie_point(style, head) - here
@@ -262,21 +288,20 @@ def _strands(style: Style, head: Obstacles, roots, normals, inside, rng) -> tupl
     return _coil(style, np.stack(points, axis=1), rng), length
 
 
-def _coil(style: Style, points: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def _coil(style: Style, points: np.ndarray, rng: Rng) -> np.ndarray:
     """Wind locks around themselves, the more the curlier."""
     if style.coil_m == 0:
         return points
     n, k, _ = points.shape
-    turn = rng.uniform(0, 2 * np.pi, (n, 1)) + np.arange(k) * rng.uniform(1.3, 2.0, (n, 1)) * rng.choice(
-        [-1, 1], (n, 1)
-    )
+    start, step_rad = rng.uniform(0, 2 * np.pi, (n, 1)), rng.uniform(1.3, 2.0, (n, 1))
+    turn = start + np.arange(k) * step_rad * rng.choice([-1, 1], (n, 1))
     axes = rng.normal(0, 1, (2, n, 1, 3))
     axes = axes / np.linalg.norm(axes, axis=-1, keepdims=True)
     grow = np.minimum(np.arange(k) / 2, 1)[:, None] * style.coil_m
     return points + grow * (np.cos(turn)[..., None] * axes[0] + np.sin(turn)[..., None] * axes[1])
 
 
-def _smooth_random(rng: np.random.Generator, roots: np.ndarray) -> np.ndarray:
+def _smooth_random(rng: Rng, roots: np.ndarray) -> np.ndarray:
     """Random vectors (n, 3) that neighbouring locks share."""
     waves = rng.normal(0, 60, (3, 3, 3))
     phase = rng.uniform(0, 2 * np.pi, (3, 3))
@@ -301,7 +326,7 @@ def _combing(style: Style, head: Obstacles, roots, normals) -> np.ndarray:
     return g.unit(comb)
 
 
-def _tail(style: Style, head: Obstacles, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _tail(style: Style, head: Obstacles, rng: Rng) -> tuple[np.ndarray, np.ndarray]:
     """Locks of a ponytail or a bun, from the point where the hair is tied."""
     n = 260
     origin = _tie_point(style, head)
@@ -356,25 +381,39 @@ def _ribbons(style: Style, head: Obstacles, points: np.ndarray, length: np.ndarr
 def carry(
     hair: g.Mesh, body: Body, posed: PosedBody, rest_heads_m: np.ndarray, landmarks_m: np.ndarray
 ) -> g.Mesh:
-    """Hair at rest brought to the pose: by the head, and from the chin down more and more by the back."""
-    head, back = (body.bone_names.index(name) for name in ("head", "spine01"))
+    """Hair at rest brought to the pose: by the head, and from the chin down more and more by the back.
+
+    Parameters
+    ----------
+    hair : g.Mesh
+        As `grow` returns it.
+    body : Body
+    posed : PosedBody
+    rest_heads_m : array, shape (n_bones, 3)
+        Where the bones begin at rest.
+    landmarks_m : array, shape (136, 3)
+        The person's keypoints at rest.
+
+    Returns
+    -------
+    g.Mesh
+        In the world frame.
+    """
     chin = landmarks_m[34, 2]
     share = np.clip((chin - hair.vertices_m[:, 2:]) / 0.14, 0, 1).astype(np.float32)
     places, normals = [], []
-    for bone in (head, back):
+    for bone in (body.bone_numbers["head"], body.bone_numbers["spine01"]):
         R = posed.rotations[bone].astype(np.float32)
         offset = (posed.heads_m[bone] - posed.rotations[bone] @ rest_heads_m[bone]).astype(np.float32)
         places.append(hair.vertices_m @ R.T + offset)
         normals.append(hair.normals @ R.T)
-    vertices = places[0] + share * (places[1] - places[0])
-    return g.Mesh(
-        vertices, hair.triangles, g.unit(normals[0] + share * (normals[1] - normals[0])), hair.coords
-    )
+    vertices, turned = (a + share * (b - a) for a, b in (places, normals))
+    return g.Mesh(vertices, hair.triangles, g.unit(turned), hair.coords)
 
 
 def hair_material(colour: np.ndarray) -> Material:
     """Hair: locks of slightly different colour, single strands, darker at the roots."""
-    colour = np.float32(colour)[:, None]
+    colour = column(colour)
 
     def look(hits: Hits) -> Look:
         across, along, lock, t = hits.coords

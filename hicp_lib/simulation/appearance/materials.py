@@ -1,27 +1,41 @@
 """Looks of lifeless things: paint, wood, floors, cloth on furniture, the view from a window."""
 
-from __future__ import annotations
-
 import colorsys
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 from hicp_lib.simulation.rendering.textures import Texture
 
 Rng = np.random.Generator
 
 
-def linear(srgb: np.ndarray | tuple) -> np.ndarray:
-    """sRGB in [0, 1] to linear RGB."""
+def linear(srgb: ArrayLike) -> np.ndarray:
+    """sRGB in [0, 1] to linear RGB.
+
+    Examples
+    --------
+    >>> linear([0.0, 0.5, 1.0]).round(3)
+    array([0.   , 0.214, 1.   ])
+    """
     srgb = np.asarray(srgb, float)
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def hsv(hue: float, saturation: float, value: float) -> np.ndarray:
-    """Hue, saturation and value of an sRGB colour, to linear RGB."""
+    """An sRGB colour in linear RGB, from its hue (any number), saturation and value (0 to 1).
+
+    Parameters
+    ----------
+    hue, saturation, value : float
+
+    Returns
+    -------
+    array, shape (3,)
+    """
     return linear(colorsys.hsv_to_rgb(hue % 1, np.clip(saturation, 0, 1), np.clip(value, 0, 1)))
 
 
@@ -43,26 +57,50 @@ def wood_colour(rng: Rng) -> np.ndarray:
 
 
 def plain(colour: np.ndarray, roughness: float = 0.5, gloss: float = 0.04) -> Material:
-    """One colour all over."""
-    look = Look(np.float32(colour)[:, None], gloss=gloss, roughness=roughness)
+    """One colour all over.
+
+    Parameters
+    ----------
+    colour : array, shape (3,)
+        Linear RGB.
+    roughness, gloss : float, optional
+        See `surfaces.Look`.
+
+    Returns
+    -------
+    callable
+    """
+    look = Look(column(colour), gloss=gloss, roughness=roughness)
     return lambda hits: look
 
 
 def glowing(colour: np.ndarray, glow: float) -> Material:
     """A lamp's shade."""
-    look = Look(np.float32(colour)[:, None], glow=np.float32(glow * colour)[:, None])
+    look = Look(column(colour), glow=column(glow * colour))
     return lambda hits: look
 
 
 def mixed(
-    texture: Callable[[], Texture],
-    colours: np.ndarray,
-    roughness: float,
-    height_m: float = 0.0,
-    gloss: float = 0.04,
+    texture: Callable[[], Texture], colours: np.ndarray, roughness: float, height_m=0.0, gloss=0.04
 ) -> Material:
-    """Colours (n + 1, 3) mixed by a texture's n channels; the first channel also lifts the surface."""
-    base, extra = np.float32(colours[0])[:, None], (np.float32(colours[1:]) - np.float32(colours[0])).T
+    """Colours mixed by a texture.
+
+    Parameters
+    ----------
+    texture : callable
+        Makes a texture of n channels.
+    colours : array, shape (n + 1, 3)
+        Linear RGB: where all channels are 0, and where each is 1.
+    roughness : float
+    height_m : float, optional
+        Of bumps where the first channel is 1.
+    gloss : float, optional
+
+    Returns
+    -------
+    callable
+    """
+    base, extra = column(colours[0]), (colours[1:].astype(np.float32) - colours[0].astype(np.float32)).T
 
     def look(hits: Hits) -> Look:
         weights = texture().sample(hits.coords[:2], hits.footprint_m)[: extra.shape[1]]
@@ -72,55 +110,49 @@ def mixed(
     return look
 
 
-def paint(rng: Rng, colour: np.ndarray, unevenness: float = 0.08) -> Material:
+def paint(colour: np.ndarray, unevenness: float) -> Material:
     """Paint on plaster."""
-    colour = np.asarray(colour)
     return mixed(textures.plaster, np.array([colour * (1 - unevenness), colour * (1 + unevenness)]), 0.8)
 
 
 def wooden(rng: Rng) -> Material:
     """Furniture wood."""
-    colour = wood_colour(rng)
-    return mixed(textures.wood, np.array([colour * 0.6, colour * 1.25]), rng.uniform(0.3, 0.6))
+    return mixed(textures.wood, np.outer([0.6, 1.25], wood_colour(rng)), rng.uniform(0.3, 0.6))
 
 
 def upholstery(rng: Rng) -> Material:
     """Cloth on furniture."""
-    colour = any_colour(rng)
-    return mixed(textures.carpet, np.array([colour * 0.7, colour * 1.3]), 0.9, gloss=0.02)
+    return mixed(textures.carpet, np.outer([0.7, 1.3], any_colour(rng)), 0.9, gloss=0.02)
 
 
 def random_floor(rng: Rng) -> Material:
     """Boards, tiles, carpet or screed."""
     kind = rng.choice(4, p=[0.45, 0.2, 0.25, 0.1])
     if kind == 0:
-        colour = wood_colour(rng)
-        return mixed(
-            textures.planks, np.array([colour * 0.55, colour * 1.3, colour * 0.15]), rng.uniform(0.25, 0.6)
-        )
+        boards = np.outer([0.55, 1.3, 0.15], wood_colour(rng))
+        return mixed(textures.planks, boards, rng.uniform(0.25, 0.6))
     if kind == 1:
         colour = hsv(rng.random(), rng.uniform(0, 0.2), rng.uniform(0.35, 0.9))
         grout = linear(np.full(3, rng.uniform(0.3, 0.7)))
         return mixed(textures.tiles, np.array([colour * 0.85, colour * 1.15, grout]), rng.uniform(0.15, 0.4))
     colour = hsv(rng.random(), rng.uniform(0, 0.35), rng.uniform(0.25, 0.75))
     if kind == 2:
-        return mixed(textures.carpet, np.array([colour * 0.6, colour * 1.4]), 0.95, gloss=0.01)
-    return mixed(textures.plaster, np.array([colour * 0.8, colour * 1.2]), 0.5)
+        return mixed(textures.carpet, np.outer([0.6, 1.4], colour), 0.95, gloss=0.01)
+    return mixed(textures.plaster, np.outer([0.8, 1.2], colour), 0.5)
 
 
 def random_wall(rng: Rng) -> Material:
     """Paint, mostly light; sometimes strong colours, bricks or wooden boards."""
     kind = rng.choice(4, p=[0.6, 0.22, 0.1, 0.08])
     if kind == 0:
-        return paint(rng, hsv(rng.random(), rng.beta(1.2, 8), rng.uniform(0.7, 0.95)), 0.05)
+        return paint(hsv(rng.random(), rng.beta(1.2, 8), rng.uniform(0.7, 0.95)), 0.05)
     if kind == 1:
-        return paint(rng, hsv(rng.random(), rng.uniform(0.15, 0.55), rng.uniform(0.35, 0.8)), 0.06)
+        return paint(hsv(rng.random(), rng.uniform(0.15, 0.55), rng.uniform(0.35, 0.8)), 0.06)
     if kind == 2:
         colour = hsv(rng.uniform(0.02, 0.07), rng.uniform(0.2, 0.6), rng.uniform(0.4, 0.8))
         mortar = linear(np.full(3, rng.uniform(0.5, 0.75)))
         return mixed(textures.bricks, np.array([colour * 0.6, colour * 1.3, mortar]), 0.9, 0.004)
-    colour = wood_colour(rng)
-    return mixed(textures.planks, np.array([colour * 0.6, colour * 1.25, colour * 0.2]), 0.6)
+    return mixed(textures.planks, np.outer([0.6, 1.25, 0.2], wood_colour(rng)), 0.6)
 
 
 def pictured(number: int) -> Material:
@@ -137,7 +169,7 @@ def foliage(rng: Rng) -> Material:
     colour = hsv(rng.uniform(0.22, 0.36), rng.uniform(0.4, 0.7), rng.uniform(0.3, 0.55))
 
     def look(hits: Hits) -> Look:
-        return Look(np.float32(colour)[:, None] * (0.6 + 0.8 * hits.coords[0]), roughness=0.4, softness=0.4)
+        return Look(column(colour) * (0.6 + 0.8 * hits.coords[0]), roughness=0.4, softness=0.4)
 
     return look
 
@@ -146,7 +178,7 @@ def outside(rng: Rng) -> Material:
     """The bright view from a window: sky over blurred greenery."""
     sky = hsv(rng.uniform(0.54, 0.62), rng.uniform(0.0, 0.3), 1.0) * rng.uniform(1.5, 3.5)
     green = hsv(rng.uniform(0.15, 0.4), rng.uniform(0.1, 0.4), 0.6) * rng.uniform(0.8, 1.6)
-    sky, green = np.float32(sky)[:, None], np.float32(green)[:, None]
+    sky, green = column(sky), column(green)
     horizon, rough = rng.uniform(0.2, 0.7), rng.uniform(0.1, 0.3)
 
     def look(hits: Hits) -> Look:

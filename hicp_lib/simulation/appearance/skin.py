@@ -1,28 +1,26 @@
 """Skin, lips, eyes and eyebrows, painted on the body in its rest pose."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import KDTree
 
+from hicp_lib.core.keypoints import FACE, HANDS
 from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.appearance.materials import hsv, linear
-from hicp_lib.simulation.body.model import REGIONS, Body
+from hicp_lib.simulation.body.model import Body
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 
 # sRGB from the fairest to the darkest, evenly spaced on the scale of `Complexion.tone`.
-_TONES = linear(
-    np.array(
-        [
-            [0.925, 0.755, 0.665], [0.895, 0.705, 0.590], [0.845, 0.640, 0.515], [0.765, 0.565, 0.430],
-            [0.620, 0.435, 0.325], [0.455, 0.310, 0.235], [0.320, 0.215, 0.170],
-        ]
-    )
-)  # fmt: skip
-_IRISES = linear(np.array([[0.30, 0.18, 0.09], [0.20, 0.11, 0.06], [0.38, 0.50, 0.62], [0.40, 0.45, 0.30]]))
+_TONES = linear([
+    [0.925, 0.755, 0.665], [0.895, 0.705, 0.590], [0.845, 0.640, 0.515], [0.765, 0.565, 0.430],
+    [0.620, 0.435, 0.325], [0.455, 0.310, 0.235], [0.320, 0.215, 0.170],
+])  # fmt: skip
+_IRISES = linear([[0.30, 0.18, 0.09], [0.20, 0.11, 0.06], [0.38, 0.50, 0.62], [0.40, 0.45, 0.30]])
+# Of hair that is neither dark nor grey: how often, hue, saturation, between what the value lies.
+_HAIR = ((0.4, 0.07, 0.55, (0.26, 0.38)), (0.25, 0.075, 0.55, (0.40, 0.55)),
+         (0.25, 0.105, 0.45, (0.62, 0.85)), (0.1, 0.045, 0.7, (0.45, 0.62)))  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -31,13 +29,18 @@ class Complexion:
 
     Attributes
     ----------
-    tone : 0 fairest to 1 darkest
-    warmth : shifts the skin's hue, about -1 to 1
-    hair : linear RGB of hair and eyebrows
-    iris : linear RGB
-    lips : how much redder than skin the lips are, 0 to 1 (lipstick)
-    brows, stubble, freckles : strengths, 0 to 1
-    beard : how far a full beard's shadow goes, 0 none
+    tone : float
+        0 fairest to 1 darkest.
+    warmth : float
+        Shifts the skin's hue, about -1 to 1.
+    hair : array, shape (3,)
+        Linear RGB of hair and eyebrows.
+    iris : array, shape (3,)
+        Linear RGB.
+    lips : float
+        How much redder than skin the lips are, 0 to 1 (lipstick).
+    brows, stubble, freckles : float
+        Strengths, 0 to 1.
     """
 
     tone: float
@@ -51,7 +54,21 @@ class Complexion:
 
 
 def random_complexion(rng: np.random.Generator, tone: float, woman: bool, age: float) -> Complexion:
-    """Colours that go together: dark skin with dark hair and eyes, grey hair with age (years)."""
+    """Colours that go together: dark skin with dark hair and eyes, grey hair with age.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    tone : float
+        0 fairest to 1 darkest.
+    woman : bool
+    age : float
+        Years.
+
+    Returns
+    -------
+    Complexion
+    """
     dark = tone > 0.42
     iris = _IRISES[rng.choice(2 if dark else 4, p=None if dark else [0.35, 0.15, 0.3, 0.2])]
     return Complexion(
@@ -72,14 +89,9 @@ def _hair_colour(rng: np.random.Generator, dark: bool, age: float) -> np.ndarray
         return linear(np.array([grey, grey * 0.985, grey * 0.96]))
     if dark or rng.random() < 0.25:
         return hsv(rng.uniform(0.04, 0.09), rng.uniform(0.2, 0.5), rng.uniform(0.09, 0.2))
-    kind = rng.choice(4, p=[0.4, 0.25, 0.25, 0.1])
-    value = (
-        rng.uniform(0.26, 0.38),
-        rng.uniform(0.40, 0.55),
-        rng.uniform(0.62, 0.85),
-        rng.uniform(0.45, 0.62),
-    )[kind]
-    hue, saturation = ((0.07, 0.55), (0.075, 0.55), (0.105, 0.45), (0.045, 0.7))[kind]
+    kind = rng.choice(len(_HAIR), p=[often for often, *_ in _HAIR])
+    value = [rng.uniform(*limits) for *_, limits in _HAIR][kind]
+    _, hue, saturation, _ = _HAIR[kind]
     return hsv(hue + rng.normal(0, 0.008), saturation * rng.uniform(0.8, 1.15), value)
 
 
@@ -89,17 +101,25 @@ COORDS = ("x", "y", "z", *_PAINTED, "eye", "mouth", "flush")
 
 
 def paint_coords(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.ndarray:
-    """What skin is painted by, per vertex: columns `COORDS`, shape (n_v, len(COORDS)), float32.
+    """What skin is painted by, per vertex.
 
     Parameters
     ----------
-    rest_m : array, shape (n_v, 3), the person at rest
-    landmarks_m : array, shape (136, 3), the person's keypoints at rest
+    body : Body
+    rest_m : array, shape (n_v, 3)
+        The person at rest.
+    landmarks_m : array, shape (136, 3)
+        The person's keypoints at rest.
+
+    Returns
+    -------
+    array, shape (n_v, len(COORDS)), dtype float32
+        Columns `COORDS`.
     """
     painted, head, _ = _painted(body)
     flush = np.zeros(len(rest_m), np.float32)
     p = rest_m[head].astype(np.float32)
-    face = landmarks_m[26:94].astype(np.float32)
+    face = landmarks_m[FACE].astype(np.float32)
     flush[head] = _cheeks(p, face) + 0.9 * _bump(p, face[30], 0.014) + 0.6 * body.field("ear")[head]
     flush += _knuckles(body, rest_m, landmarks_m)
     return np.column_stack([rest_m, painted, flush]).astype(np.float32)
@@ -109,10 +129,9 @@ def paint_coords(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.
 def _painted(body: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What is the same for all shapes: columns of coords (n_v, k); numbers of vertices of head and hands."""
     columns = [body.field(name) for name in _PAINTED]
-    columns += [body.regions == REGIONS.index(name) for name in ("eye", "mouth")]
-    zones = (("face", "scalp", "eyebrow", "lips", "mouth", "neck"), ("hand", "nail"))
-    numbers = [np.flatnonzero(np.isin(body.regions, [REGIONS.index(n) for n in zone])) for zone in zones]
-    return np.column_stack(columns).astype(np.float32), *numbers
+    columns += [body.in_regions(name) for name in ("eye", "mouth")]
+    head = np.flatnonzero(body.in_regions("face", "scalp", "eyebrow", "lips", "mouth", "neck"))
+    return np.column_stack(columns).astype(np.float32), head, np.flatnonzero(body.in_regions("hand", "nail"))
 
 
 def _bump(points: np.ndarray, centre: np.ndarray, width_m: float) -> np.ndarray:
@@ -128,13 +147,11 @@ def _cheeks(points: np.ndarray, face: np.ndarray) -> np.ndarray:
 def _knuckles(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.ndarray:
     red = np.zeros(len(rest_m), np.float32)
     _, _, hands = _painted(body)
-    joints = landmarks_m[[94 + k for k in range(136 - 94) if k % 21 not in (0, 1, 2)]]
+    joints = landmarks_m[HANDS[np.arange(len(HANDS)) % 21 > 2]]  # without the hand's root and the thumb's
     distance_m, _ = KDTree(joints).query(rest_m[hands], distance_upper_bound=0.06)  # infinite beyond
     red[hands] = 0.25 + 0.5 * np.exp(-((distance_m / 0.010) ** 2))
-    red += 0.4 * np.exp(-(((body.field("arm") - 1) / 0.08) ** 2)) + 0.3 * np.exp(
-        -(((body.field("leg") - 1) / 0.1) ** 2)
-    )
-    return red
+    elbows, knees = (((body.field(name) - 1) / width) ** 2 for name, width in (("arm", 0.08), ("leg", 0.1)))
+    return red + (0.4 * np.exp(-elbows) + 0.3 * np.exp(-knees))
 
 
 def skin_material(complexion: Complexion, scalp: float) -> Material:
@@ -146,10 +163,9 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
         c = dict(zip(COORDS, hits.coords, strict=True))
         uv = np.stack([c["y"] + 0.5 * c["x"], c["z"] + 0.3 * c["x"]])
         blotches, pores, freckles = textures.skin().sample(uv, hits.footprint_m)
-        flush = np.clip(c["flush"] * (1 + 0.25 * blotches) + 0.07 * blotches, -0.2, 1) * (
-            1 - 0.4 * complexion.tone
-        )
-        albedo = _mix(tone, red, flush)
+        flush = np.clip(c["flush"] * (1 + 0.25 * blotches) + 0.07 * blotches, -0.2, 1)
+        flush *= 1 - 0.4 * complexion.tone
+        albedo = column(tone) + (column(red) - column(tone)) * flush
         albedo *= 1 + 0.02 * blotches + 0.025 * pores
         albedo *= 1 - 0.35 * complexion.freckles * freckles * np.clip(2 * c["flush"], 0, 1)
         albedo *= 1 - 0.10 * _step(c["eyelid"], 0.4, 0.9)
@@ -158,16 +174,14 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
         albedo, roughness = _paint_lips(complexion, tone, albedo, roughness, c)
         albedo = _paint_hair(complexion, scalp, albedo, c, uv, hits.footprint_m)
         nail = 0.7 * _step(c["nail"], 0.3, 0.7)
-        albedo = albedo * (1 - nail) + nail * (tone * np.array([1.08, 0.92, 0.90]))[:, None].astype(
-            np.float32
-        )
+        albedo = albedo * (1 - nail) + nail * column(tone * np.array([1.08, 0.92, 0.90]))
         roughness = roughness * (1 - 0.4 * nail)
         eye = c["eye"] > 0.5
         if eye.any():
             albedo[:, eye] = _eye(complexion, c["iris_rad"][eye])
             gloss[eye], roughness[eye], softness[eye] = 0.06, 0.16, 0.3
         inside = c["mouth"] > 0.7
-        albedo[:, inside] = np.float32([[0.12], [0.03], [0.03]])
+        albedo[:, inside] = column([0.12, 0.03, 0.03])
         return Look(albedo, 0.00009 * pores, gloss, roughness, softness)
 
     return look
@@ -179,11 +193,6 @@ def _tone(complexion: Complexion) -> np.ndarray:
     return tone * (1 + 0.05 * complexion.warmth * np.array([0.4, -0.2, -1.0]))
 
 
-def _mix(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    a, b = np.float32(a)[:, None], np.float32(b)[:, None]
-    return a + (b - a) * weight
-
-
 def _step(value: np.ndarray, low: float, high: float) -> np.ndarray:
     t = np.clip((value - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)
@@ -193,33 +202,29 @@ def _paint_lips(complexion: Complexion, tone, albedo, roughness, c) -> tuple[np.
     weight = _step(c["lips"], 0.35, 0.75)
     natural = tone * np.array([0.86, 0.55, 0.55])
     painted = natural * (1 - complexion.lips) + complexion.lips * np.array([0.40, 0.055, 0.075])
-    albedo = albedo + (np.float32(painted)[:, None] - albedo) * weight
+    albedo = albedo + (column(painted) - albedo) * weight
     return albedo, roughness - 0.14 * weight
 
 
 def _paint_hair(complexion: Complexion, scalp: float, albedo, c, uv, footprint) -> np.ndarray:
     """Eyebrows, lashes, stubble and the hair's roots."""
-    hair = np.float32(complexion.hair)[:, None] * 0.7
+    hair = column(complexion.hair) * 0.7
     slanted = np.stack([uv[0] + uv[1], uv[1] * 2 - uv[0]])
     fibre = textures.strands().sample(slanted, footprint)[0]
     brow = complexion.brows * _step(c["brow_m"] + 0.0008 * fibre, -0.0026, 0.0008)
     lash = 0.85 * _step(c["lash_m"], -0.0008, 0.0006)
     roots = scalp * _step(c["hairline_m"] + 0.002 * fibre, -0.001, 0.006)
-    stubble = (
-        complexion.stubble
-        * _step(c["beard_m"] + 0.001 * fibre, -0.002, 0.012)
-        * (1 - _step(c["lips"], 0.2, 0.5))
-    )
+    stubble = complexion.stubble * _step(c["beard_m"] + 0.001 * fibre, -0.002, 0.012)
+    stubble *= 1 - _step(c["lips"], 0.2, 0.5)
     cover = 1 - (1 - brow) * (1 - roots) * (1 - stubble * (0.75 + 0.2 * fibre))
     albedo = albedo + (hair * (1 + 0.3 * fibre) - albedo) * np.clip(cover, 0, 1)
     return np.clip(albedo * (1 - lash) + 0.012 * lash, 0.001, 1)
 
 
 def _eye(complexion: Complexion, angle: np.ndarray) -> np.ndarray:
-    iris = np.float32(complexion.iris)[:, None] * (
-        0.55 + 0.9 * _step(angle, 0.2, 0.5) - 0.8 * _step(angle, 0.42, 0.52)
-    )
-    white = np.float32([[0.60], [0.56], [0.53]]) * (1 - 0.25 * _step(angle, 0.6, 1.1))
+    ring = 0.55 + 0.9 * _step(angle, 0.2, 0.5) - 0.8 * _step(angle, 0.42, 0.52)
+    iris = column(complexion.iris) * ring
+    white = column([0.60, 0.56, 0.53]) * (1 - 0.25 * _step(angle, 0.6, 1.1))
     edge = _step(angle, 0.46, 0.56)
     colour = iris * (1 - edge) + white * edge
     return colour * _step(angle, 0.16, 0.22) + 0.003

@@ -1,7 +1,5 @@
 """Hands: open, relaxed, gripping, as a fist, pointing, spread."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hicp_lib.simulation.body.joints import FINGERS, LIMITS_DEG
@@ -22,7 +20,14 @@ _FINGER_JITTER_DEG = 4.0
 
 
 def sample_hand(rng: np.random.Generator, kind: str) -> dict[str, float]:
-    """Joint angles (radians) of one hand of a kind in `HANDS_DEG`, without the side's prefix."""
+    """Joint angles (radians) of one hand of a kind in `HANDS_DEG`, without the side's prefix.
+
+    Examples
+    --------
+    >>> hand = sample_hand(np.random.default_rng(0), "fist")
+    >>> round(float(np.degrees(hand["index_middle"])), -1)
+    90.0
+    """
     fingers, thumb = HANDS_DEG[kind][:4], HANDS_DEG[kind][4:]
     joints = {}
     for joint, (low, high) in zip(_FINGER_JOINTS, fingers, strict=True):

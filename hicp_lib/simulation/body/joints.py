@@ -7,8 +7,6 @@ middle), inward rotation (the toes or the bent forearm turn to the middle), supi
 palm turns forward), deviation towards the thumb, a turn or bend to the person's left.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
@@ -56,13 +54,23 @@ _THUMB_HINGE = np.array([0.61, 0.77, -0.18])
 _MIRROR = np.array([[1.0, -1, 1], [-1, 1, -1], [1, -1, 1]])
 
 
+def radians(angles_deg: Mapping[str, float], prefix: str = "") -> dict[str, float]:
+    """Joint angles in radians from degrees; `prefix` goes before their names."""
+    return {prefix + name: float(np.radians(angle)) for name, angle in angles_deg.items()}
+
+
 def within_limits(angles: JointAngles, margin_rad: float = 1e-9) -> bool:
-    """Whether every joint lies in its range.
+    """Whether every joint lies in its range, see `LIMITS_DEG`.
 
     Raises
     ------
     KeyError
         For a joint that does not exist.
+
+    Examples
+    --------
+    >>> within_limits({"left_elbow_flexion": 1.5}), within_limits({"left_elbow_flexion": -0.5})
+    (True, False)
     """
     limits = {name: np.radians(LIMITS_DEG[name]) for name in angles}
     return all(low - margin_rad <= angles[name] <= high + margin_rad for name, (low, high) in limits.items())
@@ -71,10 +79,25 @@ def within_limits(angles: JointAngles, margin_rad: float = 1e-9) -> bool:
 def pose_from_joints(angles: JointAngles) -> Pose:
     """Rotations of the bones; joints left out stay at zero.
 
+    Parameters
+    ----------
+    angles : mapping of str to float
+        Joint angles in radians, by the names in `LIMITS_DEG`.
+
+    Returns
+    -------
+    dict of str to array
+        By bone, as `pose_body` takes them.
+
     Raises
     ------
     KeyError
         For a joint that does not exist.
+
+    Examples
+    --------
+    >>> pose_from_joints({"spine_turn": 1.0})["spine03"]
+    array([-0.  ,  0.  ,  0.25])
     """
     unknown = sorted(set(angles) - set(LIMITS_DEG))
     if unknown:
@@ -97,9 +120,16 @@ def _limb(name: str, side: str, angles: tuple[float, ...]) -> dict[str, np.ndarr
 
 
 def shoulder_rotation(flexion: float, abduction: float, inward: float) -> np.ndarray:
-    """Rotation (3, 3) of the left upper arm from hanging, relative to the trunk, from its angles.
+    """Rotation of the left upper arm from hanging, relative to the trunk, from its angles.
 
-    The arm first turns inward about itself, then is abducted, then flexed.
+    Parameters
+    ----------
+    flexion, abduction, inward : float
+        Radians; the arm first turns inward about itself, then is abducted, then flexed.
+
+    Returns
+    -------
+    array, shape (3, 3)
     """
     tilt = ARM_TILT_RAD
     return about(1, -flexion) @ about(0, abduction + tilt) @ about(2, -inward) @ about(0, -tilt)
@@ -108,7 +138,7 @@ def shoulder_rotation(flexion: float, abduction: float, inward: float) -> np.nda
 def shoulder_angles(swing: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Flexion, abduction and inward rotation (radians) of rotations (..., 3, 3) of the left upper arm.
 
-    The inverse of `shoulder_rotation` for abduction between -99 and 81 degrees; beyond,
+    Each has shape (...). The inverse of `shoulder_rotation` for abduction between -99 and 81 degrees; beyond,
     the other of the two descriptions of the same rotation is returned.
     """
     m = swing @ about(0, ARM_TILT_RAD)

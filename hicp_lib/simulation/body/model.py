@@ -11,8 +11,6 @@ shape. The mesh is skinned linearly. `tools/bake_body.py` makes the data from An
 names sources and licences.
 """
 
-from __future__ import annotations
-
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -64,35 +62,47 @@ class Body:
 
     Attributes
     ----------
-    shape_names : names of the shapes, such as "woman_25_slim"
-    vertices_m : (n_shapes, n_v, 3) float32, at rest
-    heads_m, tips_m : (n_shapes, n_bones, 3), beginning and end of the bones at rest
-    to_reference : (n_shapes, n_bones, 3, 3), rotation of each bone from rest to the reference stance
-    bone_names, bone_parents : names, and indices of the parents (-1: the root, which comes first)
-    skin_weights : (n_v, n_bones) float32, rows sum to 1
-    triangles : (n_t, 3) int32; triangle_uv : (n_t, 3, 2) texture coordinates in [0, 1], v up
-    keypoint_weights : (136, n_v + n_bones) float32, over vertices, then bone heads; rows sum to 1
-    regions : (n_v,) index into `REGIONS`
-    fields : (n_v, len(FIELDS)) float32, see `FIELDS`
+    shape_names : tuple of str
+        Names of the shapes, such as "woman_25_slim".
+    vertices_m : array, shape (n_shapes, n_v, 3), dtype float32
+        At rest.
+    heads_m : array, shape (n_shapes, n_bones, 3)
+        Where the bones begin at rest.
+    to_reference : array, shape (n_shapes, n_bones, 3, 3)
+        Rotation of each bone from rest to the reference stance.
+    bone_names : tuple of str
+    bone_parents : array of int, shape (n_bones,)
+        -1 for the root, which comes first.
+    skin_weights : array, shape (n_v, n_bones), dtype float32
+        Rows sum to 1.
+    triangles : array, shape (n_t, 3), dtype int32
+    keypoint_weights : array, shape (136, n_v + n_bones), dtype float32
+        Over vertices, then bone heads; rows sum to 1.
+    regions : array of int, shape (n_v,)
+        Indices into `REGIONS`.
+    fields : array, shape (n_v, len(FIELDS)), dtype float32
+        See `FIELDS`.
     """
 
     shape_names: tuple[str, ...]
     vertices_m: np.ndarray
     heads_m: np.ndarray
-    tips_m: np.ndarray
     to_reference: np.ndarray
     bone_names: tuple[str, ...]
     bone_parents: np.ndarray
     skin_weights: np.ndarray
     triangles: np.ndarray
-    triangle_uv: np.ndarray
     keypoint_weights: np.ndarray
     regions: np.ndarray
     fields: np.ndarray
 
     def field(self, name: str) -> np.ndarray:
-        """One column of `fields` by its name in `FIELDS`, (n_v,)."""
+        """One column of `fields` by its name in `FIELDS`, shape (n_v,)."""
         return self.fields[:, FIELDS.index(name)]
+
+    def in_regions(self, *names: str) -> np.ndarray:
+        """Whether each vertex lies in one of some `REGIONS`, bool, shape (n_v,)."""
+        return np.isin(self.regions, [REGIONS.index(name) for name in names])
 
     @cached_property
     def bone_numbers(self) -> dict[str, int]:
@@ -103,32 +113,55 @@ class Body:
 
     @cached_property
     def sparse_skin_weights(self) -> sparse.csr_array:
+        """`skin_weights`, sparse."""
         return sparse.csr_array(self.skin_weights)
 
     @cached_property
     def sparse_keypoint_weights(self) -> sparse.csr_array:
+        """`keypoint_weights`, sparse."""
         return sparse.csr_array(self.keypoint_weights)
 
 
 @dataclass(frozen=True, eq=False)
 class PosedBody:
-    """A posed person in the world: metres; normals are unit vectors."""
+    """A posed person in the world frame.
 
-    vertices_m: np.ndarray  # (n_v, 3) float32
-    normals: np.ndarray  # (n_v, 3) float32
-    keypoints_m: np.ndarray  # (136, 3) float32, Halpe order
-    heads_m: np.ndarray  # (n_bones, 3)
-    rotations: np.ndarray  # (n_bones, 3, 3), each bone from rest to pose
+    Attributes
+    ----------
+    vertices_m : array, shape (n_v, 3), dtype float32
+    normals : array, shape (n_v, 3), dtype float32
+        Unit vectors.
+    keypoints_m : array, shape (136, 3), dtype float32
+        In Halpe's order.
+    heads_m : array, shape (n_bones, 3)
+        Where the bones begin.
+    rotations : array, shape (n_bones, 3, 3)
+        Each bone from rest to pose.
+    """
+
+    vertices_m: np.ndarray
+    normals: np.ndarray
+    keypoints_m: np.ndarray
+    heads_m: np.ndarray
+    rotations: np.ndarray
 
 
 Pose = Mapping[str, np.ndarray]
 """Bone name -> rotation, as a vector (3,) in radians or a matrix (3, 3); bones left out stay as in
 the reference stance."""
 
+Shape = int | str | np.ndarray
+"""Index or name of a shape of the body model, or convex weights (n_shapes,) to blend shapes."""
+
 
 @memoised(4)
 def load_body(path: Path = BODY_FILE) -> Body:
     """The body model of the project.
+
+    Parameters
+    ----------
+    path : Path, optional
+        An .npz file as `tools/bake_body.py` writes it.
 
     Raises
     ------
@@ -148,7 +181,7 @@ def load_body(path: Path = BODY_FILE) -> Body:
 
 def pose_body(
     body: Body,
-    shape: int | str | np.ndarray,
+    shape: Shape,
     pose: Pose | np.ndarray,
     T_world_body: np.ndarray | None = None,
 ) -> PosedBody:
@@ -156,9 +189,30 @@ def pose_body(
 
     Parameters
     ----------
-    shape : index or name of a shape, or convex weights (n_shapes,) to blend shapes
-    pose : rotation vectors by bone name, or rotation matrices (n_bones, 3, 3), in body axes
-    T_world_body : (4, 4), where the person stands and faces; the identity when left out
+    body : Body
+    shape : int or str or array, shape (n_shapes,)
+        Index or name of a shape, or convex weights to blend shapes.
+    pose : mapping of str to array or array, shape (n_bones, 3, 3)
+        Rotation vectors or matrices by bone name, or all rotation matrices, in body axes.
+    T_world_body : array, shape (4, 4), optional
+        Where the person stands and faces; the identity when left out.
+
+    Returns
+    -------
+    PosedBody
+        In the world frame.
+
+    Raises
+    ------
+    ValueError
+        For an unknown shape or bone, or weights that are no blend.
+
+    Examples
+    --------
+    >>> body = load_body()
+    >>> person = pose_body(body, "man_35_average", {"lowerarm01.L": np.array([0, -1.57, 0])})
+    >>> person.keypoints_m.shape, float(person.vertices_m[:, 2].min().round(3))
+    ((136, 3), 0.0)
     """
     weights = shape_weights(body, shape)
     vertices, heads = rest_shape(body, weights)
@@ -179,15 +233,23 @@ def pose_body(
     )
 
 
-def pose_bones(
-    body: Body, shape: int | str | np.ndarray, pose: Pose | np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The bones of a posed person, without its skin; arguments as in `pose_body`.
+def pose_bones(body: Body, shape: Shape, pose: Pose | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The bones of a posed person, without its skin.
+
+    Parameters
+    ----------
+    body : Body
+    shape : int or str or array, shape (n_shapes,)
+        As in `pose_body`.
+    pose : mapping of str to array or array, shape (n_bones, 3, 3)
+        As in `pose_body`.
 
     Returns
     -------
-    rotations : (n_bones, 3, 3), each bone from rest to pose, body axes
-    heads_m : (n_bones, 3), where the bones begin, relative to the pelvis, body axes
+    rotations : array, shape (n_bones, 3, 3)
+        Each bone from rest to pose, body axes.
+    heads_m : array, shape (n_bones, 3)
+        Where the bones begin, relative to the pelvis, body axes.
     """
     heads, to_reference = _skeleton(body, shape_weights(body, shape).tobytes())
     # Turns of the reference stance add up along the chain; the turn from rest to it comes before all.
@@ -200,8 +262,8 @@ def pose_bones(
     return rotations, _chains(tuple(parents)) @ steps
 
 
-def shape_weights(body: Body, shape: int | str | np.ndarray) -> np.ndarray:
-    """Convex weights (n_shapes,) of a shape given by index, name or weights.
+def shape_weights(body: Body, shape: Shape) -> np.ndarray:
+    """Convex weights, shape (n_shapes,), of a shape given by index, name or weights.
 
     Raises
     ------
@@ -231,7 +293,8 @@ def rotation_matrices(body: Body, pose: Pose | np.ndarray) -> np.ndarray:
     if isinstance(pose, np.ndarray):
         return pose
     number = body.bone_numbers
-    vectors, matrices = {}, {}
+    vectors: dict[int, np.ndarray] = {}
+    matrices: dict[int, np.ndarray] = {}
     for name, rotation in pose.items():
         if name not in number:
             raise ValueError(f"no bone {name!r} in the body model")
@@ -263,8 +326,7 @@ def rest_shape(body: Body, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 def _rest_vertices(body: Body, weights: bytes) -> np.ndarray:
     blend = np.frombuffer(weights, np.float32)
     mixed = np.flatnonzero(blend)  # mostly one or two shapes
-    vertices = np.tensordot(blend[mixed], body.vertices_m[mixed], 1)
-    return vertices
+    return np.tensordot(blend[mixed], body.vertices_m[mixed], 1)
 
 
 @memoised(4)
@@ -300,32 +362,27 @@ def _unpack(stored) -> Body:
     np.put_along_axis(skin, bones, weights, axis=1)
     keypoints = np.zeros((N_KEYPOINTS, n_v + n_bones), np.float32)
     keypoints[stored["keypoint_rows"], stored["keypoint_columns"]] = stored["keypoint_values"]
-    arrays = dict(
+    return Body(
         vertices_m=vertices,
-        heads_m=stored["heads_m"].astype(float),
-        tips_m=stored["tips_m"].astype(float),
-        to_reference=stored["to_reference"].astype(float),
-        bone_parents=stored["bone_parents"].astype(int),
         skin_weights=skin / skin.sum(axis=1, keepdims=True),
-        triangles=stored["triangles"].astype(np.int32),
-        triangle_uv=stored["triangle_uv"].astype(np.float32) / 65535,
         keypoint_weights=keypoints / keypoints.sum(axis=1, keepdims=True),
-        regions=stored["regions"].astype(int),
-        fields=stored["fields"].astype(np.float32),
+        **{name: stored[name].astype(kind) for name, kind in _STORED.items()},
+        shape_names=tuple(map(str, stored["shape_names"])),
+        bone_names=tuple(map(str, stored["bone_names"])),
     )
-    names = {key: tuple(str(n) for n in stored[key]) for key in ("shape_names", "bone_names")}
-    return Body(**arrays, **names)
+
+
+_STORED = {"heads_m": float, "to_reference": float, "bone_parents": int, "triangles": np.int32,
+           "regions": int, "fields": np.float32}  # fmt: skip
 
 
 def _check(body: Body, path: Path) -> None:
     n_v, n_bones = body.skin_weights.shape
+    numbers = (body.vertices_m, body.heads_m, body.skin_weights, body.keypoint_weights, body.fields)
     problems = {
         "triangles name missing vertices": body.triangles.min() < 0 or body.triangles.max() >= n_v,
         "bones do not follow their parents": (body.bone_parents >= np.arange(n_bones)).any(),
-        "numbers are not finite": not all(
-            np.isfinite(a).all()
-            for a in (body.vertices_m, body.heads_m, body.skin_weights, body.keypoint_weights, body.fields)
-        ),
+        "numbers are not finite": not all(np.isfinite(array).all() for array in numbers),
         "regions are unknown": body.regions.min() < 0 or body.regions.max() >= len(REGIONS),
         "fields do not match": body.fields.shape != (n_v, len(FIELDS)),
     }

@@ -5,8 +5,6 @@ degrees, arms that go to a place are solved by `reach`, and a pose in which the 
 itself is drawn again with more room for the arms.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -15,8 +13,8 @@ from hicp_lib.simulation.body import arms
 from hicp_lib.simulation.body.arms import Draft, Joints, Ranges, uniform
 from hicp_lib.simulation.body.hands import sample_hand
 from hicp_lib.simulation.body.joints import LIMITS_DEG, pose_from_joints, within_limits
-from hicp_lib.simulation.body.model import Body, Pose
-from hicp_lib.simulation.body.self_collision import clearance_m, outline
+from hicp_lib.simulation.body.model import Body, Pose, Shape
+from hicp_lib.simulation.body.self_collision import collision_model, self_collision_distance_m
 
 _N_TRIES = 30
 _ROOM_STEP_M = 0.006  # arms keep this much further from the body with every try
@@ -35,44 +33,56 @@ _SITTING_DEG: Ranges = {
 }  # fmt: skip
 
 
-def sample_pose(
-    rng: np.random.Generator, body: Body, kind: str | None = None, shape: int | str | np.ndarray = 0
-) -> Pose:
-    """A random pose.
+def sample_pose(rng: np.random.Generator, body: Body, kind: str | None = None, shape: Shape = 0) -> Pose:
+    """A random pose; parameters and errors are those of `sample_joints`."""
+    return pose_from_joints(sample_joints(rng, body, kind, shape))
+
+
+def sample_joints(rng: np.random.Generator, body: Body, kind: str | None = None, shape: Shape = 0) -> Joints:
+    """Joint angles of a random pose, within `joints.LIMITS_DEG`.
 
     Parameters
     ----------
-    kind : one of `KINDS`; drawn as well when left out
-    shape : whose pose it will be, as in `pose_body`; arms keep clear of that shape's body
+    rng : numpy.random.Generator
+    body : Body
+    kind : str, optional
+        One of `KINDS`; drawn as well when left out.
+    shape : int or str or array, shape (n_shapes,), optional
+        Whose pose it will be, as in `pose_body`; arms keep clear of that shape's body.
+
+    Returns
+    -------
+    dict of str to float
+        Radians, by joint.
 
     Raises
     ------
     ValueError
         For an unknown kind.
+
+    Examples
+    --------
+    >>> from hicp_lib.simulation.body.model import load_body
+    >>> joints = sample_joints(np.random.default_rng(0), load_body(), "sitting")
+    >>> bool(joints["left_knee_flexion"] > 1.2)
+    True
     """
-    return pose_from_joints(sample_joints(rng, body, kind, shape))
-
-
-def sample_joints(
-    rng: np.random.Generator, body: Body, kind: str | None = None, shape: int | str | np.ndarray = 0
-) -> Joints:
-    """Joint angles (radians) of a random pose, within `joints.LIMITS_DEG`; see `sample_pose`."""
     kind = str(rng.choice(list(KINDS))) if kind is None else kind
     if kind not in KINDS:
         raise ValueError(f"no kind of pose {kind!r}; there are {', '.join(KINDS)}")
-    person = outline(body, shape)
+    model = collision_model(body, shape)
     best, best_gap_m = None, -np.inf
     for attempt in range(_N_TRIES):
-        joints = _draw(rng, Draft(body, person, attempt * _ROOM_STEP_M), kind)
+        joints = _draw(rng, Draft(body, model, attempt * _ROOM_STEP_M), kind)
         if joints is None or not within_limits(joints):
             continue
-        gap_m = clearance_m(body, person, pose_from_joints(joints))
+        gap_m = self_collision_distance_m(body, model, pose_from_joints(joints))
         if gap_m > best_gap_m:
             best, best_gap_m = joints, gap_m
         if gap_m > -_PENETRATION_M:
             break
     # Hardly ever needed: the pose that comes nearest to keeping clear, or none at all.
-    return best if best is not None else _draw(rng, Draft(body, person, 0.0), "standing")
+    return best or _draw(rng, Draft(body, model, 0.0), "standing") or {}
 
 
 def _draw(rng: np.random.Generator, draft: Draft, kind: str) -> Joints | None:
@@ -83,9 +93,6 @@ def _draw(rng: np.random.Generator, draft: Draft, kind: str) -> Joints | None:
         hand = sample_hand(rng, str(rng.choice(hands)))
         joints |= {f"{side}_{name}": angle for name, angle in (arms.hanging_arm(rng, draft) | hand).items()}
     return place_arms(rng, draft, joints)
-
-
-# Legs and trunk
 
 
 def _stand(rng: np.random.Generator) -> Joints:

@@ -1,6 +1,6 @@
 """Bringing a wrist to a point: inverse kinematics of an arm of two segments."""
 
-from __future__ import annotations
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from hicp_lib.simulation.body.joints import (
     pose_from_joints,
     shoulder_angles,
 )
-from hicp_lib.simulation.body.model import Body, pose_bones
+from hicp_lib.simulation.body.model import Body, Shape, pose_bones
 
 _SHOULDER = ("shoulder_flexion", "shoulder_abduction", "shoulder_rotation")
 _N_SWIVELS = 36
@@ -22,11 +22,11 @@ _LONGEST = 0.998  # of the stretched arm
 
 def reach(
     body: Body,
-    shape: int | str | np.ndarray,
+    shape: Shape,
     angles: JointAngles,
     side: str,
     wrist_m: np.ndarray,
-    elbow_toward: np.ndarray = (0.0, 0.3, -1.0),
+    elbow_toward: Sequence[float] = (0.0, 0.3, -1.0),
 ) -> dict[str, float] | None:
     """Bend shoulder and elbow so that the wrist comes to a point, or as near as the arm is long.
 
@@ -35,21 +35,34 @@ def reach(
 
     Parameters
     ----------
-    shape : as in `pose_body`
-    angles : joint angles of the rest of the body
-    side : "left" or "right"
-    wrist_m : (3,), relative to the pelvis, body axes
-    elbow_toward : (3,), in the axes of the trunk, y away from the middle of the body
+    body : Body
+    shape : int or str or array, shape (n_shapes,)
+        As in `pose_body`.
+    angles : mapping of str to float
+        Joint angles of the rest of the body, radians.
+    side : str
+        "left" or "right".
+    wrist_m : array, shape (3,)
+        Relative to the pelvis, body axes.
+    elbow_toward : sequence of float, optional
+        In the axes of the trunk, y away from the middle of the body.
 
     Returns
     -------
-    `angles` with those of shoulder and elbow replaced; None where the limits allow no position
+    dict of str to float or None
+        `angles` with those of shoulder and elbow replaced; None where the limits allow no position.
+
+    Examples
+    --------
+    >>> from hicp_lib.simulation.body.model import load_body
+    >>> joints = reach(load_body(), "woman_25_slim", {}, "left", np.array([0.4, 0.2, 0.3]))
+    >>> sorted(joints)[0], 0 < joints["left_elbow_flexion"] < np.pi
+    ('left_elbow_flexion', True)
     """
     result = dict(angles)
     to_left = np.array([1.0, 1.0 if side == "left" else -1.0, 1.0])
-    bone = body.bone_numbers
-    suffix = side[0].upper()
-    shoulder, elbow, wrist = (bone[f"{name}.{suffix}"] for name in ("upperarm01", "lowerarm01", "wrist"))
+    bone, end = body.bone_numbers, side[0].upper()
+    shoulder, elbow, wrist = (bone[f"{name}.{end}"] for name in ("upperarm01", "lowerarm01", "wrist"))
     for _ in range(_N_ROUNDS):
         rotations, heads = pose_bones(body, shape, pose_from_joints(result))
         lengths = np.linalg.norm(heads[elbow] - heads[shoulder]), np.linalg.norm(heads[wrist] - heads[elbow])
@@ -61,10 +74,10 @@ def reach(
     return result
 
 
-def _two_segments(target: np.ndarray, lengths: tuple[float, float], elbow_toward) -> dict[str, float] | None:
+def _two_segments(target: np.ndarray, lengths: tuple, elbow_toward: np.ndarray) -> dict[str, float] | None:
     """Joint angles of a left arm that bring its wrist to `target`, seen from the shoulder."""
-    upper, fore = lengths
-    distance = min(np.linalg.norm(target), _LONGEST * (upper + fore))
+    upper, fore = map(float, lengths)
+    distance = min(float(np.linalg.norm(target)), _LONGEST * (upper + fore))
     cosine = (upper**2 + fore**2 - distance**2) / (2 * upper * fore)
     flexion = float(np.pi - np.arccos(np.clip(cosine, -1, 1)))
     if flexion > np.radians(LIMITS_DEG["left_elbow_flexion"][1]):

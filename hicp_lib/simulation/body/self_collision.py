@@ -1,21 +1,20 @@
-"""How far a posed person's arms keep from trunk, head, thighs and from each other.
+"""Self-collision: how far a posed person's arms keep from trunk, head, thighs and from each other.
 
 A cheap test on the bones alone, for rejecting poses in which the body runs through itself: the
-trunk is a stack of elliptic slices, the head an ellipsoid, limbs are rows of balls.
+trunk is a stack of elliptic slices, the head an ellipsoid, limbs are rows of spheres.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
 
-from hicp_lib.core.memo import memoised
-from hicp_lib.simulation.body.model import REGIONS, Body, Pose, pose_bones, rest_shape, shape_weights
+from hicp_lib.simulation.body.model import Body, Pose, Shape, pose_bones, rest_shape, shape_weights
+
+Spheres = tuple[np.ndarray, np.ndarray]  # centres (n, 3) and radii (n,)
 
 _N_SLICES = 12
-# Limbs as balls: region, first and last bone head, fractions of the way between them. Most of the
+# Limbs as spheres: region, first and last bone head, fractions of the way between them. Most of the
 # upper arm may touch the trunk; a bit more than the whole way to the last knuckle is a fingertip.
 _UPPER_ARM = ("upper_arm", "upperarm01", "lowerarm01", (0.85,))
 _FOREARM = ("forearm", "lowerarm01", "wrist", (0.0, 0.2, 0.4, 0.6, 0.8, 1.0))
@@ -25,15 +24,31 @@ _HAND_FLATNESS = 0.5  # half the thickness of a hand over its vertices' distance
 
 
 @dataclass(frozen=True)
-class Outline:
-    """Sizes of one shape: its trunk's slices from below, then its head; metres, from the pelvis."""
+class CollisionModel:
+    """Sizes of one shape: its trunk's slices from below, then its head; from the pelvis, body axes.
 
-    weights: np.ndarray  # (n_shapes,) of the shape
-    bones: np.ndarray  # (n_parts,) which bone each part moves with
-    bone_heads_m: np.ndarray  # (n_parts, 3) where that bone begins at rest
-    centres_m: np.ndarray  # (n_parts, 3) at rest
-    half_axes_m: np.ndarray  # (n_parts, 3); a slice's last one is half its height
-    radii_m: dict[str, float]  # of limbs, by region
+    Attributes
+    ----------
+    weights : array, shape (n_shapes,)
+        The shape's, see `shape_weights`.
+    bones : array of int, shape (n_parts,)
+        Which bone each part moves with.
+    bone_heads_m : array, shape (n_parts, 3)
+        Where that bone begins at rest.
+    centres_m : array, shape (n_parts, 3)
+        At rest.
+    half_axes_m : array, shape (n_parts, 3)
+        A slice's last one is half its height.
+    radii_m : dict of str to float
+        Of limbs, by region.
+    """
+
+    weights: np.ndarray
+    bones: np.ndarray
+    bone_heads_m: np.ndarray
+    centres_m: np.ndarray
+    half_axes_m: np.ndarray
+    radii_m: dict[str, float]
 
     def trunk_at(self, height: float) -> tuple[np.ndarray, np.ndarray]:
         """Centre and half axes (3,) of the trunk's slice at a height from 0 (crotch) to 1 (neck), at rest."""
@@ -41,12 +56,14 @@ class Outline:
         return self.centres_m[part], self.half_axes_m[part]
 
 
-def outline(body: Body, shape: int | str | np.ndarray) -> Outline:
-    """Measure a shape; `shape` as in `pose_body`."""
+def collision_model(body: Body, shape: Shape) -> CollisionModel:
+    """Measure a shape, which is given as in `pose_body`."""
     weights = shape_weights(body, shape)
     vertices, heads = rest_shape(body, weights)
     vertices, heads = vertices - heads[0], heads - heads[0]
-    trunk, head = _vertices_of(body, "torso", "hips"), _vertices_of(body, "face", "scalp")
+    trunk, head = (
+        np.flatnonzero(body.in_regions(*names)) for names in (("torso", "hips"), ("face", "scalp"))
+    )
     z = vertices[trunk, 2]
     edges = np.linspace(z.min(), _extent(z[:, None])[1, 0], _N_SLICES + 1)
     parts = [trunk[(z >= low) & (z <= high)] for low, high in zip(edges[:-1], edges[1:], strict=True)]
@@ -57,24 +74,45 @@ def outline(body: Body, shape: int | str | np.ndarray) -> Outline:
     half_axes[:-1, 2] = (edges[1] - edges[0]) / 2
     radii = {limb[0]: _radius(body, vertices, heads, limb) for limb in (_UPPER_ARM, _FOREARM, _HAND, _THIGH)}
     radii["hand"] *= _HAND_FLATNESS
-    return Outline(weights, bones, heads[bones], (low + high) / 2, half_axes, radii)
+    return CollisionModel(weights, bones, heads[bones], (low + high) / 2, half_axes, radii)
 
 
-def clearance_m(body: Body, shape: Outline, pose: Pose) -> float:
+def self_collision_distance_m(body: Body, model: CollisionModel, pose: Pose) -> float:
     """Smallest gap between an arm and trunk, head, thighs or the other arm; negative inside.
 
     Gaps to trunk and head are approximate; only their sign near zero is to be relied on.
+
+    Parameters
+    ----------
+    body : Body
+    model : CollisionModel
+        Of the shape that is posed.
+    pose : mapping of str to array
+        See `pose_body`.
+
+    Returns
+    -------
+    float
+        Metres.
+
+    Examples
+    --------
+    >>> from hicp_lib.simulation.body.joints import pose_from_joints
+    >>> from hicp_lib.simulation.body.model import load_body
+    >>> body = load_body()
+    >>> into_the_trunk = pose_from_joints({"left_shoulder_abduction": -0.4})
+    >>> self_collision_distance_m(body, collision_model(body, 0), into_the_trunk) < 0
+    True
     """
-    rotations, heads = pose_bones(body, shape.weights, pose)
-    balls = {side: _balls(body, shape, heads, (_UPPER_ARM, _FOREARM, _HAND), side) for side in "LR"}
-    arms = [np.concatenate(both) for both in zip(balls["L"], balls["R"], strict=True)]
-    gaps = [_gap_to_trunk(shape, rotations, heads, *arms).min(), _gap(*balls["L"], *balls["R"])]
-    for side in "LR":
-        gaps.append(_gap(*arms, *_balls(body, shape, heads, (_THIGH,), side)))
+    rotations, heads = pose_bones(body, model.weights, pose)
+    left, right = (_spheres(body, model, heads, (_UPPER_ARM, _FOREARM, _HAND), side) for side in "LR")
+    arms = np.concatenate([left[0], right[0]]), np.concatenate([left[1], right[1]])
+    gaps = [_gap_to_trunk(model, rotations, heads, *arms).min(), _gap(left, right)]
+    gaps += [_gap(arms, _spheres(body, model, heads, (_THIGH,), side)) for side in "LR"]
     return float(min(gaps))
 
 
-def _gap_to_trunk(shape: Outline, rotations, heads, points, radii) -> np.ndarray:
+def _gap_to_trunk(shape: CollisionModel, rotations, heads, points, radii) -> np.ndarray:
     """Gap (n_points,) to the nearest slice of the trunk, and to the head."""
     R = rotations[shape.bones]
     centres = heads[shape.bones] + np.einsum("pij,pj->pi", R, shape.centres_m - shape.bone_heads_m)
@@ -89,12 +127,12 @@ def _gap_to_trunk(shape: Outline, rotations, heads, points, radii) -> np.ndarray
     return gap.min(axis=1)
 
 
-def _gap(points_a, radii_a, points_b, radii_b) -> float:
-    distance = np.linalg.norm(points_a[:, None] - points_b[None], axis=2)
-    return float((distance - radii_a[:, None] - radii_b).min())
+def _gap(a: Spheres, b: Spheres) -> float:
+    distance = np.linalg.norm(a[0][:, None] - b[0][None], axis=2)
+    return float((distance - a[1][:, None] - b[1]).min())
 
 
-def _balls(body: Body, shape: Outline, heads, limbs, side: str) -> tuple[np.ndarray, np.ndarray]:
+def _spheres(body: Body, shape: CollisionModel, heads, limbs, side: str) -> Spheres:
     points, radii = [], []
     for region, first, last, fractions in limbs:
         a, b = (heads[body.bone_numbers[f"{bone}.{side}"]] for bone in (first, last))
@@ -106,7 +144,7 @@ def _balls(body: Body, shape: Outline, heads, limbs, side: str) -> tuple[np.ndar
 def _radius(body: Body, vertices, heads, limb) -> float:
     region, first, last, _ = limb
     a, b = (heads[body.bone_numbers[f"{bone}.L"]] for bone in (first, last))
-    limb_m = vertices[_vertices_of(body, region)]
+    limb_m = vertices[body.in_regions(region)]
     own = limb_m[limb_m[:, 1] > 0] - a
     along = (b - a) / np.linalg.norm(b - a)
     return float(np.median(np.linalg.norm(own - np.outer(own @ along, along), axis=1)))
@@ -127,9 +165,3 @@ def _moved_by(body: Body, parts: list[np.ndarray]) -> np.ndarray:
     shape = (len(parts), len(body.skin_weights))
     members = sparse.csr_array((np.ones(len(numbers), np.float32), numbers, ends), shape=shape)
     return (members @ body.sparse_skin_weights).toarray().argmax(axis=1)
-
-
-@memoised(32)
-def _vertices_of(body: Body, *regions: str) -> np.ndarray:
-    """Numbers of the vertices of some regions."""
-    return np.flatnonzero(np.isin(body.regions, [REGIONS.index(region) for region in regions]))

@@ -7,27 +7,36 @@ points of a rotated square, mirrored from pixel to pixel so that neighbours shar
 counts as a fifth sample.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hicp_lib.simulation.rendering.camera import PlacedCamera, join_rays, ray_parts
-from hicp_lib.simulation.rendering.raycast import RayScene, Trace
+from hicp_lib.simulation.rendering.raycast import DEPTH_STEP, RayScene, Trace
 
 _SHIFT_PX = 0.17  # along the border, from its middle
 
 
 def edge_pixels(trace: Trace, sharp: np.ndarray) -> np.ndarray:
-    """Numbers of the pixels at an outline or a step in depth where one side is `sharp`.
+    """Numbers of the pixels at an outline or a step in depth.
 
-    `sharp` is a mask of the image's shape, (height, width).
+    Parameters
+    ----------
+    trace : Trace
+        Of the image's pixels.
+    sharp : array of bool, shape (height, width)
+        One side of the edge must be.
+
+    Returns
+    -------
+    array of int, shape (n,)
     """
     shape = sharp.shape
     surface, depth = trace.surface.reshape(shape), trace.depth_m.reshape(shape)
     edge = np.zeros(shape, bool)
     with np.errstate(invalid="ignore"):
         for low, high in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
-            step = (surface[low] != surface[high]) | (np.abs(depth[low] - depth[high]) > 0.03 * depth[low])
+            step = (surface[low] != surface[high]) | (
+                np.abs(depth[low] - depth[high]) > DEPTH_STEP * depth[low]
+            )
             step &= sharp[low] | sharp[high]
             edge[low] |= step
             edge[high] |= step
@@ -37,7 +46,24 @@ def edge_pixels(trace: Trace, sharp: np.ndarray) -> np.ndarray:
 def smooth_edges(
     image: np.ndarray, edges: np.ndarray, trace: Trace, scene: RayScene, camera: PlacedCamera
 ) -> np.ndarray:
-    """The image (height, width, 3) with its edge pixels replaced by the mean of five samples."""
+    """Replace edge pixels by the mean of five samples.
+
+    Parameters
+    ----------
+    image : array, shape (height, width, 3), dtype float32
+        Linear RGB; changed in place.
+    edges : array of int, shape (n,)
+        Numbers of pixels, see `edge_pixels`.
+    trace : Trace
+        Of the image's pixels.
+    scene : RayScene
+    camera : PlacedCamera
+
+    Returns
+    -------
+    array, shape (height, width, 3), dtype float32
+        The image.
+    """
     if len(edges) == 0:
         return image
     around = _borders(edges, *image.shape[:2])
@@ -80,7 +106,7 @@ def _alike(borders: np.ndarray, trace: Trace, scene: RayScene, camera: PlacedCam
     column = np.where(upright, borders - row * (width + 1), borders - n_upright - row * width)
     shift = _SHIFT_PX * ((row + column) % 2 * 2 - 1)
     u, v = column + np.where(upright, -0.5, -shift), row + np.where(upright, shift, -0.5)
-    found = scene.trace(join_rays(camera.centre_m, sum(ray_parts(camera, u, v))))
+    found = scene.trace(join_rays(camera.centre_m, np.add(*ray_parts(camera, u, v))))
     first, second = (
         np.clip(v, 0, height - 1) * width + np.clip(u, 0, width - 1)
         for v, u in ((row - ~upright, column - upright), (row, column))

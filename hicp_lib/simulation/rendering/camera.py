@@ -1,7 +1,5 @@
 """A pinhole camera: rays through pixels, and points onto pixels."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +28,29 @@ class PlacedCamera(Camera):
 def look_at(
     eye_m: np.ndarray, target_m: np.ndarray, up: tuple[float, float, float] = (0, 0, 1), roll_rad: float = 0.0
 ) -> np.ndarray:
-    """Pose of a camera at `eye_m` that sees `target_m` in its centre: T_world_camera, shape (4, 4)."""
+    """Pose of a camera that sees a point in its centre.
+
+    Parameters
+    ----------
+    eye_m, target_m : array, shape (3,)
+        Where it is, and what it looks at; world frame.
+    up : tuple of float, optional
+        What is up in the image.
+    roll_rad : float, optional
+        About the line of sight.
+
+    Returns
+    -------
+    array, shape (4, 4)
+        T_world_camera.
+
+    Examples
+    --------
+    >>> camera = PlacedCamera(64, 48, 60.0, 60.0, 31.5, 23.5, look_at([0, -3, 1], [0, 0, 1]))
+    >>> pixel_px, depth_m = project_world(camera, np.array([0, 0, 1]))
+    >>> pixel_px.round(6), float(depth_m)
+    (array([31.5, 23.5]), 3.0)
+    """
     forward = _unit(np.asarray(target_m, float) - np.asarray(eye_m, float))
     right = _unit(np.cross(forward, np.asarray(up, float)))
     down = np.cross(forward, right)
@@ -48,13 +68,15 @@ def pixel_rays(camera: PlacedCamera, pixels_px: np.ndarray | None = None) -> np.
 
     Parameters
     ----------
+    camera : PlacedCamera
     pixels_px : array, shape (n, 2), optional
         (u, v); all pixel centres, row by row, when left out.
 
     Returns
     -------
-    array, shape (n, 6), float32: origin and direction. Directions are not unit vectors:
-    their camera-frame z component is 1, so a hit at t lies at depth t.
+    array, shape (n, 6), dtype float32
+        Origin and direction. Directions are not unit vectors: their camera-frame z component
+        is 1, so a hit at t lies at depth t.
     """
     if pixels_px is None:
         directions = image_directions(camera).reshape(3, -1)
@@ -71,7 +93,17 @@ def image_directions(camera: PlacedCamera) -> np.ndarray:
 
 
 def ray_parts(camera: PlacedCamera, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What columns u (n,) and rows v (m,) add to a ray's direction: (3, n) and (3, m), float32."""
+    """What columns and rows add to a ray's direction.
+
+    Parameters
+    ----------
+    camera : PlacedCamera
+    u, v : array, shape (n,) and (m,)
+
+    Returns
+    -------
+    across, down : array, shape (3, n) and (3, m), dtype float32
+    """
     x = (u.astype(np.float32) - np.float32(camera.cx_px)) / np.float32(camera.fx_px)
     y = (v.astype(np.float32) - np.float32(camera.cy_px)) / np.float32(camera.fy_px)
     right, down, forward = camera.T_world_camera[:3, :3].astype(np.float32).T[..., None]
@@ -93,10 +125,17 @@ def to_camera(camera: PlacedCamera, points_m: np.ndarray) -> np.ndarray:
 def project_world(camera: PlacedCamera, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Project world points.
 
+    Parameters
+    ----------
+    camera : PlacedCamera
+    points_m : array, shape (..., 3)
+
     Returns
     -------
-    pixels_px : array, shape (..., 2); NaN for points not in front of the camera
-    depths_m : array, shape (...), along the camera's z axis
+    pixels_px : array, shape (..., 2)
+        NaN for points not in front of the camera.
+    depths_m : array, shape (...)
+        Along the camera's z axis.
     """
     in_camera_m = to_camera(camera, np.asarray(points_m, float))
     return project(camera, in_camera_m), in_camera_m[..., 2]

@@ -1,7 +1,5 @@
 """From light to an 8-bit image: lens, exposure, noise and tone, as a consumer camera does it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2
@@ -9,6 +7,7 @@ import numpy as np
 
 from hicp_lib.core.memo import memoised
 
+_TILE_PX = 1536
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # of linear sRGB
 
 
@@ -18,13 +17,20 @@ class Sensor:
 
     Attributes
     ----------
-    white_balance : gains of the linear RGB channels, shape (3,)
-    exposure : multiplies the automatic exposure
-    blur_px : standard deviation of lens and demosaicking blur
-    vignette : loss of light in the corners, 0 to 1
-    shot_noise, read_noise : standard deviations for full-scale light and for black, of full scale
-    contrast : steepness of the tone curve, 1 neutral
-    saturation : 1 neutral
+    white_balance : array, shape (3,)
+        Gains of the linear RGB channels.
+    exposure : float
+        Multiplies the automatic exposure.
+    blur_px : float
+        Standard deviation of lens and demosaicking blur.
+    vignette : float
+        Loss of light in the corners, 0 to 1.
+    shot_noise, read_noise : float
+        Standard deviations for full-scale light and for black, of full scale.
+    contrast : float
+        Steepness of the tone curve, 1 neutral.
+    saturation : float
+        1 neutral.
     """
 
     white_balance: np.ndarray
@@ -40,16 +46,41 @@ class Sensor:
 def expose(
     radiance: np.ndarray, sensor: Sensor, rng: np.random.Generator, meter: np.ndarray | None = None
 ) -> np.ndarray:
-    """Develop linear light, shape (height, width, 3), into RGB uint8 of the same shape.
+    """Develop linear light into an image.
 
-    `meter` marks the pixels that count most for the exposure (people: cameras look for faces).
+    Parameters
+    ----------
+    radiance : array, shape (height, width, 3), dtype float32
+        Linear RGB.
+    sensor : Sensor
+    rng : numpy.random.Generator
+        Of the noise.
+    meter : array of bool, shape (height, width), optional
+        Pixels that count most for the exposure (people: cameras look for faces).
+
+    Returns
+    -------
+    array, shape (height, width, 3), dtype uint8
+        RGB.
+
+    Raises
+    ------
+    ValueError
+        For an image larger than 1536 pixels.
+
+    Examples
+    --------
+    >>> grey = np.full((48, 64, 3), 0.7, np.float32)  # whatever the light, the exposure makes it middle grey
+    >>> image = expose(grey, Sensor(np.ones(3), vignette=0.0), np.random.default_rng(0))
+    >>> 110 < image.mean() < 130
+    np.True_
     """
     height, width = radiance.shape[:2]
     gains = np.diag(sensor.white_balance * _auto_exposure(radiance, meter) * sensor.exposure)
     light = cv2.transform(radiance, gains.astype(np.float32))
     y = np.linspace(-1, 1, height, dtype=np.float32)[:, None]
     x = np.linspace(-1, 1, width, dtype=np.float32)[None, :]
-    light *= cv2.merge([1 - np.float32(sensor.vignette * 0.5) * (x * x + y * y)] * 3)
+    light = cv2.multiply(light, cv2.merge([1 - np.float32(sensor.vignette * 0.5) * (x * x + y * y)] * 3))
     light = cv2.GaussianBlur(light, (0, 0), max(sensor.blur_px, 0.2))
     variance = np.maximum(light, 0)
     variance *= np.float32(sensor.shot_noise**2)
@@ -61,18 +92,18 @@ def expose(
 
 @memoised()
 def _noise_tile() -> np.ndarray:
-    """Noise of brightness and, blurred by demosaicking, of colour; (1536, 1536, 3)."""
-    rng = np.random.default_rng(1536)
-    colour = cv2.GaussianBlur(rng.standard_normal((1536, 1536, 3), np.float32), (0, 0), 0.8)
-    return 0.8 * rng.standard_normal((1536, 1536, 1), np.float32) + 1.2 * colour
+    """Noise of brightness and, blurred by demosaicking, of colour; (`_TILE_PX`, `_TILE_PX`, 3)."""
+    rng = np.random.default_rng(_TILE_PX)
+    colour = cv2.GaussianBlur(rng.standard_normal((_TILE_PX, _TILE_PX, 3), np.float32), (0, 0), 0.8)
+    return 0.8 * rng.standard_normal((_TILE_PX, _TILE_PX, 1), np.float32) + 1.2 * colour
 
 
 def _noise(height: int, width: int, rng: np.random.Generator) -> np.ndarray:
     """A random piece of the noise, (height, width, 3); drawing it anew would cost more than shading."""
     tile = _noise_tile()
-    if height > tile.shape[0] or width > tile.shape[1]:
+    if max(height, width) > _TILE_PX:
         raise ValueError(f"an image of {width} x {height} pixels is larger than the noise kept for it")
-    row, column = rng.integers(0, tile.shape[0] - height + 1), rng.integers(0, tile.shape[1] - width + 1)
+    row, column = (rng.integers(0, _TILE_PX - size + 1) for size in (height, width))
     piece = tile[row : row + height, column : column + width]
     return piece[:: rng.choice([-1, 1]), :: rng.choice([-1, 1])]
 
@@ -89,9 +120,8 @@ def _auto_exposure(radiance: np.ndarray, meter: np.ndarray | None) -> float:
 def _tone(light: np.ndarray, contrast: float) -> np.ndarray:
     """Linear light to sRGB with a shoulder that rolls highlights off, through a table."""
     x = np.linspace(0, 4, 4096)
-    shoulder = np.clip(
-        1.156 * x * (1 + x / 36) / (1 + 0.9 * x), 0, 1
-    )  # keeps middle grey, rolls off to white at 4
+    # Keeps middle grey, rolls off to white at 4.
+    shoulder = np.clip(1.156 * x * (1 + x / 36) / (1 + 0.9 * x), 0, 1)
     srgb = np.where(shoulder <= 0.0031308, 12.92 * shoulder, 1.055 * shoulder ** (1 / 2.4) - 0.055)
     curved = 0.5 + 0.5 * np.tanh(contrast * 2 * (srgb - 0.46)) / np.tanh(contrast)
     table = np.clip(255 * (0.35 * curved + 0.65 * srgb) + 0.5, 0, 255).astype(np.uint8)

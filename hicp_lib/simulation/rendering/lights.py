@@ -7,13 +7,13 @@ sampling: Keller and Heidrich, 2001). Highlights are Cook-Torrance with the GGX 
 Vectors have their components first, (3, n).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
+from hicp_lib.simulation.rendering.gbuffer import Shading
 from hicp_lib.simulation.rendering.raycast import dot
+from hicp_lib.simulation.rendering.surfaces import column
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,12 @@ class Light:
 
     Attributes
     ----------
-    centre_m, half_u_m, half_v_m : arrays, shape (3,); the corners are centre +- half_u +- half_v
-    power : linear RGB, shape (3,): irradiance at one metre, seen face on
-    direction : unit, where a one-sided light (a window) shines; None for one that shines all around
+    centre_m, half_u_m, half_v_m : array, shape (3,)
+        The corners are centre +- half_u +- half_v.
+    power : array, shape (3,)
+        Linear RGB: irradiance at one metre, seen face on.
+    direction : array or None, shape (3,)
+        Unit vector, where a one-sided light (a window) shines; None for one that shines all around.
     """
 
     centre_m: np.ndarray
@@ -36,7 +39,15 @@ class Light:
 
 @dataclass(frozen=True)
 class Ambient:
-    """Light from everywhere: linear RGB from above, from below, and more from one side."""
+    """Light from everywhere.
+
+    Attributes
+    ----------
+    up, down, side : array, shape (3,)
+        Linear RGB from above, from below, and more from one side.
+    side_direction : array, shape (3,)
+        Unit vector, where that side is.
+    """
 
     up: np.ndarray
     down: np.ndarray
@@ -51,10 +62,21 @@ _PLACES = np.stack([_STRATA % 8 * 2 + _STRATA // 8, 5 * _STRATA % 16]).astype(np
 
 
 def sample_offsets(cell: np.ndarray, kind: int, rng: np.random.Generator) -> np.ndarray:
-    """Points of the unit square, (2, n): 16 points of a lattice that repeat every 4 x 4 pixels, jittered.
+    """Points of the unit square: 16 points of a lattice that repeat every 4 x 4 pixels, jittered.
 
-    `cell` is each pixel's number in the 4 x 4 pattern, row by row; every `kind` of light has
-    the pattern moved. The pixels of either colour of a chessboard cover the square as well.
+    The pixels of either colour of a chessboard cover the square as well.
+
+    Parameters
+    ----------
+    cell : array of int, shape (n,)
+        Each pixel's number in the 4 x 4 pattern, row by row.
+    kind : int
+        Number of the light; each has the pattern moved.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    array, shape (2, n), dtype float32
     """
     moved = np.roll(_PLACES.reshape(2, 4, 4), (-kind, -3 * kind), axis=(1, 2)).reshape(2, 16)
     offsets = rng.random((2, len(cell)), np.float32)
@@ -64,7 +86,19 @@ def sample_offsets(cell: np.ndarray, kind: int, rng: np.random.Generator) -> np.
 
 
 def towards_light(light: Light, positions_m: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Vectors from positions to points of the light, (3, n), float32."""
+    """Vectors from positions to points of a light.
+
+    Parameters
+    ----------
+    light : Light
+    positions_m : array, shape (3, n)
+    offsets : array, shape (2, n)
+        Of the points in the unit square that stands for the light.
+
+    Returns
+    -------
+    array, shape (3, n), dtype float32
+    """
     s, t = 2 * offsets - 1
     c, u, v = (x.astype(np.float32)[:, None] for x in (light.centre_m, light.half_u_m, light.half_v_m))
     return c + s * u + t * v - positions_m
@@ -80,42 +114,51 @@ def hemisphere(normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
 def diffuse_and_highlight(
     light: Light,
     positions_m: np.ndarray,
-    normals: np.ndarray,
     view: np.ndarray,
-    gloss: np.ndarray,
-    roughness: np.ndarray,
-    softness: np.ndarray,
+    shading: Shading,
 ) -> tuple[np.ndarray, np.ndarray]:
     """What unshadowed light does at each of n points.
 
-    `view` are unit vectors to the camera. Softness lets red light creep past the terminator
-    further than green and blue, which is what makes skin look like skin.
+    Softness lets red light creep past the terminator further than green and blue, which is what
+    makes skin look like skin.
+
+    Parameters
+    ----------
+    light : Light
+    positions_m : array, shape (3, n)
+    view : array, shape (3, n)
+        Unit vectors to the camera.
+    shading : Shading
+        Of the points.
 
     Returns
     -------
-    diffuse : light that the albedo is to be multiplied with, (3, n)
-    highlight : reflected light, (3, n)
+    diffuse : array, shape (3, n)
+        Light that the albedo is to be multiplied with.
+    highlight : array, shape (3, n)
+        Reflected light.
     """
     to_light = light.centre_m.astype(np.float32)[:, None] - positions_m
     strength = 1 / dot(to_light, to_light)
     to_light *= np.sqrt(strength)
     if light.direction is not None:
         strength *= np.clip(-dot(to_light, light.direction.astype(np.float32)), 0, 1)
-    n_l = dot(normals, to_light)
+    n_l = dot(shading.normals, to_light)
     power = light.power.astype(np.float32)[:, None]
     lit = np.clip(n_l, 0, 1) * strength
-    diffuse = _creeping(n_l, softness) * (strength * power) if softness.any() else lit * power
+    soft = shading.softness.any()
+    diffuse = _creeping(n_l, shading.softness) * (strength * power) if soft else lit * power
     half = to_light
     half += view
     half /= np.maximum(np.sqrt(dot(half, half)), np.float32(1e-6))
-    lit *= gloss
-    lit *= _mirrored(np.clip(dot(normals, half), 0, 1), dot(view, half), roughness)
+    lit *= shading.gloss
+    lit *= _mirrored(np.clip(dot(shading.normals, half), 0, 1), dot(view, half), shading.roughness)
     return diffuse, lit * power
 
 
 def _creeping(n_l: np.ndarray, softness: np.ndarray) -> np.ndarray:
     """Diffuse light by the cosine `n_l` of its angle, where red creeps furthest, (3, n)."""
-    wrap = softness * np.float32([[0.40], [0.16], [0.10]])
+    wrap = softness * column([0.40, 0.16, 0.10])
     creeping = n_l + wrap
     wrap += 1
     wrap *= wrap

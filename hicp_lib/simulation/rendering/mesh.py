@@ -1,11 +1,10 @@
 """Triangle meshes: normals, cuts, hems and the simple solids furniture is made of."""
 
-from __future__ import annotations
-
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 
 
@@ -15,9 +14,11 @@ class Mesh:
 
     Attributes
     ----------
-    vertices_m : array, shape (n_vertices, 3), world frame
-    triangles : array, shape (n_triangles, 3), int32
-    normals : array, shape (n_vertices, 3), unit
+    vertices_m : array, shape (n_vertices, 3)
+        World frame.
+    triangles : array, shape (n_triangles, 3), dtype int32
+    normals : array, shape (n_vertices, 3)
+        Unit vectors.
     coords : array, shape (n_vertices, n_coords)
         What patterns are looked up with; interpolated over each triangle. The meaning is
         the material's: texture coordinates, rest-pose positions, ...
@@ -52,7 +53,15 @@ class Cut:
     """Part of a mesh as a linear function of the whole mesh's vertices.
 
     New vertex k is ``(1 - t[k]) * vertices[i[k]] + t[k] * vertices[j[k]]``, so a cut made once
-    in the rest pose follows every pose. `source` names the triangle each new one came from.
+    in the rest pose follows every pose.
+
+    Attributes
+    ----------
+    i, j : array of int, shape (n,)
+    t : array, shape (n,), dtype float32
+    triangles : array, shape (n_triangles, 3), dtype int32
+    source : array of int, shape (n_triangles,)
+        The triangle that each new one came from.
     """
 
     i: np.ndarray
@@ -72,9 +81,8 @@ def cut(triangles: np.ndarray, field: np.ndarray) -> Cut:
     inside = field > 0
     count = inside[triangles].sum(axis=1)
     source = [np.flatnonzero(count == 3)]
-    corners = [
-        np.stack([triangles[source[0]]] * 2, axis=-1)
-    ]  # each corner an edge (i, j); i == j is a vertex
+    # Each corner is an edge (i, j); i == j is a vertex.
+    corners = [np.stack([triangles[source[0]]] * 2, axis=-1)]
     for n_inside in (1, 2):
         rows = np.flatnonzero(count == n_inside)
         # Rotate each triangle so that its odd vertex out comes first.
@@ -87,7 +95,7 @@ def cut(triangles: np.ndarray, field: np.ndarray) -> Cut:
             corners += [_edges((a, b), (b, b), (c, c)), _edges((a, b), (c, c), (a, c))]
             source += [rows, rows]
     edges = np.concatenate(corners)
-    edges = np.where((edges[..., :1] > edges[..., 1:]), edges[..., ::-1], edges)
+    edges = np.sort(edges, axis=-1)
     n = len(field)
     keys = edges[..., 0].astype(np.int64) * n + edges[..., 1]
     whole = edges[..., 0] == edges[..., 1]
@@ -109,8 +117,21 @@ def _edges(*corners: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
 
 
 def neighbours(triangles: np.ndarray, n_vertices: int, most: int = 8) -> np.ndarray:
-    """Neighbouring vertices, (n_vertices, most); a row with fewer repeats them, or the vertex itself."""
-    pairs = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    """Neighbouring vertices.
+
+    Parameters
+    ----------
+    triangles : array of int, shape (n, 3)
+    n_vertices : int
+    most : int, optional
+        More neighbours than this are left out.
+
+    Returns
+    -------
+    array of int, shape (n_vertices, most)
+        A row with fewer repeats them, or the vertex itself.
+    """
+    pairs = _directed_edges(triangles)
     ends = np.concatenate([pairs, pairs[:, ::-1]]).T
     joined = sparse.coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(n_vertices, n_vertices)).tocsr()
     first, count, other = joined.indptr[:-1], np.diff(joined.indptr), joined.indices
@@ -121,12 +142,14 @@ def neighbours(triangles: np.ndarray, n_vertices: int, most: int = 8) -> np.ndar
 
 def boundary_edges(triangles: np.ndarray) -> np.ndarray:
     """Directed edges (n, 2) that belong to one triangle only."""
-    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]).astype(
-        np.int64
-    )
-    key = np.minimum(edges[:, 0], edges[:, 1]) * (edges.max() + 1) + np.maximum(edges[:, 0], edges[:, 1])
-    _, inverse, count = np.unique(key, return_inverse=True, return_counts=True)
+    edges = _directed_edges(triangles)
+    low, high = np.sort(edges.astype(np.int64), axis=1).T
+    _, inverse, count = np.unique(low * (high.max() + 1) + high, return_inverse=True, return_counts=True)
     return edges[count[inverse] == 1].astype(np.int32)
+
+
+def _directed_edges(triangles: np.ndarray) -> np.ndarray:
+    return np.concatenate([triangles[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
 
 
 def concatenate(meshes: list[Mesh]) -> Mesh:
@@ -140,16 +163,30 @@ def concatenate(meshes: list[Mesh]) -> Mesh:
     )
 
 
-def quad(corner_m: np.ndarray, u_m: np.ndarray, v_m: np.ndarray) -> Mesh:
-    """A parallelogram; coords are metres along `u_m` and `v_m`. It faces cross(u, v)."""
-    corner_m, u_m, v_m = (np.asarray(x, np.float32) for x in (corner_m, u_m, v_m))
-    vertices = corner_m + np.array([0 * u_m, u_m, u_m + v_m, v_m])
-    (ux, uy, uz), (vx, vy, vz) = u_m.tolist(), v_m.tolist()
-    lu, lv = math.hypot(ux, uy, uz), math.hypot(vx, vy, vz)
+QUAD = np.array([[0, 1, 2], [0, 2, 3]])
+"""Triangles of four corners that go around."""
+
+
+def quad(corner_m: ArrayLike, u_m: ArrayLike, v_m: ArrayLike) -> Mesh:
+    """A parallelogram, which faces cross(u, v).
+
+    Parameters
+    ----------
+    corner_m, u_m, v_m : array, shape (3,)
+        A corner, and the two edges from there.
+
+    Returns
+    -------
+    Mesh
+        Its coords are metres along `u_m` and `v_m`.
+    """
+    corner, u, v = (np.asarray(x, np.float32) for x in (corner_m, u_m, v_m))
+    vertices = corner + np.array([0 * u, u, u + v, v])
+    lu, lv = math.hypot(*u.tolist()), math.hypot(*v.tolist())
     coords = np.array([[0, 0], [lu, 0], [lu, lv], [0, lv]], np.float32)
-    normal = np.array([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx])
+    normal = np.cross(u.astype(float), v.astype(float))
     normals = np.repeat(unit(normal)[None].astype(np.float32), 4, axis=0)
-    return Mesh(vertices, np.array([[0, 1, 2], [0, 2, 3]], np.int32), normals, coords)
+    return Mesh(vertices, QUAD.astype(np.int32), normals, coords)
 
 
 def _unit_cube() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -165,7 +202,7 @@ def _unit_cube() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
             corners.append(face)
             normals.append(np.tile(np.eye(3)[normal] * (2 * side - 1), (4, 1)))
             axes.append(np.tile([u, v], (4, 1)))
-    triangles = (4 * np.arange(6)[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
+    triangles = (4 * np.arange(6)[:, None, None] + QUAD).reshape(-1, 3)
     stacked = [np.concatenate(x) for x in (corners, normals)]
     places = 3 * np.arange(24)[:, None] + np.concatenate(axes)
     return *(x.astype(np.float32) for x in stacked), triangles.astype(np.int32), places
@@ -174,8 +211,25 @@ def _unit_cube() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
 _CUBE = _unit_cube()
 
 
-def box(low_m: np.ndarray, high_m: np.ndarray, yaw_rad: float = 0.0) -> Mesh:
-    """A box between two corners, turned about the vertical through its centre; coords in metres."""
+def box(low_m: ArrayLike, high_m: ArrayLike, yaw_rad: float = 0.0) -> Mesh:
+    """A box between two corners, turned about the vertical through its centre.
+
+    Parameters
+    ----------
+    low_m, high_m : array, shape (3,)
+    yaw_rad : float, optional
+
+    Returns
+    -------
+    Mesh
+        Its coords are metres along each face.
+
+    Examples
+    --------
+    >>> cube = box([0, 0, 0], [1, 1, 1])
+    >>> cube.vertices_m.shape, cube.triangles.shape
+    ((24, 3), (12, 3))
+    """
     low, high = np.asarray(low_m, np.float32), np.asarray(high_m, np.float32)
     return turned(boxes(low[None], high[None]), yaw_rad, (low + high) / 2)
 
@@ -195,8 +249,20 @@ def boxes(lows_m: np.ndarray, highs_m: np.ndarray) -> Mesh:
     )
 
 
-def turned(mesh: Mesh, yaw_rad: float, about_m: np.ndarray) -> Mesh:
-    """The mesh turned about a vertical axis."""
+def turned(mesh: Mesh, yaw_rad: float, about_m: ArrayLike) -> Mesh:
+    """The mesh turned about a vertical axis.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    yaw_rad : float
+    about_m : array, shape (3,)
+        A point of the axis.
+
+    Returns
+    -------
+    Mesh
+    """
     if yaw_rad == 0:
         return mesh
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)
@@ -205,20 +271,57 @@ def turned(mesh: Mesh, yaw_rad: float, about_m: np.ndarray) -> Mesh:
     return Mesh((mesh.vertices_m - about) @ R.T + about, mesh.triangles, mesh.normals @ R.T, mesh.coords)
 
 
-def lathe(profile_m: np.ndarray, centre_m: np.ndarray, n_sides: int = 24) -> Mesh:
-    """A solid of revolution about the vertical: `profile_m` rows are (radius, height)."""
+def lathe(profile_m: ArrayLike, centre_m: ArrayLike, n_sides: int = 24) -> Mesh:
+    """A solid of revolution about the vertical.
+
+    Parameters
+    ----------
+    profile_m : array, shape (n, 2)
+        Radius and height, from the bottom up.
+    centre_m : array, shape (3,)
+        Where its axis meets height 0.
+    n_sides : int, optional
+
+    Returns
+    -------
+    Mesh
+        Its coords are metres around and the height.
+
+    Examples
+    --------
+    >>> pot = lathe([[0.1, 0.0], [0.2, 0.3]], [0, 0, 1])
+    >>> pot.vertices_m.shape, pot.vertices_m[:, 2].min().round(3)
+    ((50, 3), np.float32(1.0))
+    """
     profile = np.asarray(profile_m, np.float32)
     angle = np.linspace(0, 2 * np.pi, n_sides + 1, dtype=np.float32)
     radius, height = profile.T
     x, y = np.cos(angle)[:, None] * radius, np.sin(angle)[:, None] * radius
     vertices = np.stack([x, y, np.broadcast_to(height, x.shape)], axis=-1)
     coords = np.stack([np.broadcast_to(angle[:, None] * radius.max(), x.shape), vertices[..., 2]], axis=-1)
-    triangles = grid_triangles(n_sides + 1, len(profile))
-    flat = vertices.reshape(-1, 3)
+    mesh = closed_grid(vertices, coords, axis=0)
+    return replace(mesh, vertices_m=mesh.vertices_m + np.asarray(centre_m, np.float32))
+
+
+def closed_grid(vertices_m: np.ndarray, coords: np.ndarray, axis: int) -> Mesh:
+    """A grid of vertices as a tube without a seam.
+
+    Parameters
+    ----------
+    vertices_m : array, shape (n_rows, n_columns, 3), dtype float32
+    coords : array, shape (n_rows, n_columns, n_coords)
+    axis : int
+        The first and last row (0) or column (1) coincide.
+
+    Returns
+    -------
+    Mesh
+    """
+    triangles, flat = grid_triangles(*vertices_m.shape[:2]), vertices_m.reshape(-1, 3)
     normals = vertex_normals(flat, triangles)
-    seam = slice(0, len(profile))  # the first and last column coincide
-    normals[seam] = normals[-len(profile) :] = unit(normals[seam] + normals[-len(profile) :])
-    return Mesh(flat + np.asarray(centre_m, np.float32), triangles, normals, coords.reshape(-1, 2))
+    across = np.moveaxis(normals.reshape(vertices_m.shape), axis, 0)
+    across[0] = across[-1] = unit(across[0] + across[-1])
+    return Mesh(flat, triangles, normals, coords.reshape(len(flat), -1))
 
 
 def grid_triangles(n_rows: int, n_columns: int) -> np.ndarray:

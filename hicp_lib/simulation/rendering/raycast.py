@@ -1,12 +1,12 @@
 """Rays against surfaces, through Open3D's RaycastingScene."""
 
-from __future__ import annotations
-
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
 import cv2
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hicp_lib.core.environment import with_variables
 from hicp_lib.simulation.rendering.camera import join_rays
@@ -16,16 +16,24 @@ from hicp_lib.simulation.rendering.surfaces import Surface
 with with_variables(OPEN3D_DISABLE_WEB_VISUALIZER="true"):
     import open3d as o3d
 
+DEPTH_STEP = 0.03  # neighbours whose depths differ by a larger share lie on different surfaces
 N_THREADS = 1  # frames are rendered in parallel by processes; one scene takes calls from one thread only
 
 
 @dataclass(frozen=True)
 class Trace:
-    """The first thing each ray met; every array has n rows.
+    """The first thing each of n rays met.
 
-    `depth_m` is the ray parameter (infinite: nothing hit), `triangle` the triangle's number in
-    the whole scene (-1: nothing), `surface` the surface's number (-1: nothing), `barycentric`
-    the weights of the triangle's second and third corner.
+    Attributes
+    ----------
+    depth_m : array, shape (n,), dtype float32
+        The ray parameter; infinite: nothing was hit.
+    triangle : array, shape (n,), dtype int32
+        Number of the triangle in the whole scene; -1: nothing.
+    surface : array, shape (n,), dtype int16
+        Number of the surface; -1: nothing.
+    barycentric : array, shape (n, 2), dtype float32
+        Weights of the triangle's second and third corner.
     """
 
     depth_m: np.ndarray
@@ -35,7 +43,21 @@ class Trace:
 
 
 class RayScene:
-    """Surfaces that rays can be cast at."""
+    """Surfaces that rays can be cast at.
+
+    Parameters
+    ----------
+    surfaces : list of Surface
+
+    Examples
+    --------
+    >>> from hicp_lib.simulation.appearance.materials import plain
+    >>> from hicp_lib.simulation.rendering.mesh import box
+    >>> scene = RayScene([Surface(box([-1, 2, -1], [1, 3, 1]), plain(np.zeros(3)))])
+    >>> rays = np.array([[0, 0, 0, 0, 1, 0], [0, 0, 0, 0, -1, 0]], np.float32)
+    >>> scene.trace(rays).depth_m, scene.trace(rays).surface
+    (array([ 2., inf], dtype=float32), array([ 0, -1], dtype=int16))
+    """
 
     def __init__(self, surfaces: list[Surface]):
         self.surfaces = surfaces
@@ -101,11 +123,24 @@ def trace_image(scene: RayScene, centre_m: np.ndarray, directions: np.ndarray, f
 
     Every second row and column is traced. Between four of those that meet one and the same
     triangle the rest is known: 1 / depth is linear over a plane's image. Everything else is
-    traced as well, and so is all that lies near surfaces with a true `fine` (one per surface).
-    Rows of the answer are the image's pixels; `barycentric` is left undefined between traced ones.
+    traced as well.
+
+    Parameters
+    ----------
+    scene : RayScene
+    centre_m : array, shape (3,)
+        Where the rays begin.
+    directions : array, shape (3, height, width)
+    fine : array of bool, shape (n_surfaces,)
+        Near which surfaces all is traced.
+
+    Returns
+    -------
+    Trace
+        Its rows are the image's pixels; `barycentric` is left undefined between traced ones.
     """
     height, width = directions.shape[1:]
-    every_second = (slice(None, None, 2), slice(None, None, 2))
+    every_second = np.s_[::2, ::2]
     coarse = scene.trace(join_rays(centre_m, directions[:, ::2, ::2].reshape(3, -1)))
     coarse_shape = (-(-height // 2), -(-width // 2))
     triangle = coarse.triangle.reshape(coarse_shape)
@@ -161,7 +196,20 @@ def _between(values: np.ndarray, height: int, width: int) -> np.ndarray:
 
 
 def interpolate(values: np.ndarray, corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Values per vertex (k, n_vertices) at n places of triangles, corners and weights (3, n): (k, n)."""
+    """Values per vertex at places of triangles.
+
+    Parameters
+    ----------
+    values : array, shape (k, n_vertices)
+    corners : array of int, shape (3, n)
+        Numbers of the triangles' vertices.
+    weights : array, shape (3, n)
+        Barycentric.
+
+    Returns
+    -------
+    array, shape (k, n), dtype float32
+    """
     result = np.empty((len(values), corners.shape[1]), np.float32)
     for found, component in zip(result, values, strict=True):
         np.multiply(pick(component, corners[0]), weights[0], out=found)
@@ -178,8 +226,16 @@ def pick(values: np.ndarray, places: np.ndarray) -> np.ndarray:
     return values.take(places, axis=-1, mode="clip")
 
 
-def place(values: np.ndarray, places: np.ndarray, chosen: np.ndarray) -> None:
-    """Put chosen values (k, len(places)) at these places of every row of `values` (k, n)."""
+def place(values: np.ndarray, places: np.ndarray, chosen: Iterable[ArrayLike]) -> None:
+    """Put values at the same places of every row.
+
+    Parameters
+    ----------
+    values : array, shape (k, n)
+        Changed in place.
+    places : array of int, shape (m,)
+    chosen : array, shape (k, m)
+    """
     for row, new in zip(values, chosen, strict=True):
         row[places] = new
 

@@ -1,32 +1,39 @@
 """From surfaces, lights and a camera to what the camera sees: colour, depth, people and parts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
 import cv2
 import numpy as np
 
-from hicp_lib.simulation.rendering import lights
 from hicp_lib.simulation.rendering.antialias import edge_pixels, smooth_edges
 from hicp_lib.simulation.rendering.camera import PlacedCamera, image_directions
-from hicp_lib.simulation.rendering.filters import View, tilt_by_height
-from hicp_lib.simulation.rendering.gbuffer import Looks, gather_looks
+from hicp_lib.simulation.rendering.filters import tilt_by_height
+from hicp_lib.simulation.rendering.gbuffer import GBuffer, Shading, evaluate_materials
+from hicp_lib.simulation.rendering.lights import Ambient, Light, ambient_light, diffuse_and_highlight
 from hicp_lib.simulation.rendering.raycast import RayScene, dot, doubled, place, trace_image
 from hicp_lib.simulation.rendering.shadows import visibility
-from hicp_lib.simulation.rendering.surfaces import Surface
+from hicp_lib.simulation.rendering.surfaces import Surface, column
 
 _BLOCK = 16_384  # pixels shaded at a time: what the processor's cache holds
 
 
 @dataclass(frozen=True)
 class World:
-    """All there is to see: surfaces, area lights, ambient light, and the colour where nothing is."""
+    """All there is to see.
+
+    Attributes
+    ----------
+    surfaces : list of Surface
+    lights : list of Light
+    ambient : Ambient
+    backdrop : array, shape (3,)
+        Linear RGB where nothing is.
+    """
 
     surfaces: list[Surface]
-    lights: list[lights.Light]
-    ambient: lights.Ambient
+    lights: list[Light]
+    ambient: Ambient
     backdrop: np.ndarray
 
     @cached_property
@@ -41,87 +48,115 @@ class Frame:
 
     Attributes
     ----------
-    radiance : linear RGB, shape (height, width, 3), float32; a sensor makes an image of it
-    depth_m : along the camera's z axis, shape (height, width), float32; infinite where nothing is
-    person : index of the person seen at each pixel, -1 for none, shape (height, width), int16
-    part : body part seen there (numbering of the surfaces' `parts`), -1 for none, same shape, int16
-    rays : the scene, to ask further questions of
+    radiance : array, shape (height, width, 3), dtype float32
+        Linear RGB; a sensor makes an image of it.
+    depth_m : array, shape (height, width), dtype float32
+        Along the camera's z axis; infinite where nothing is.
+    person : array, shape (height, width), dtype int16
+        Index of the person seen at each pixel, -1 for none.
+    rays : RayScene
+        The scene, to ask further questions of.
     """
 
     radiance: np.ndarray
     depth_m: np.ndarray
     person: np.ndarray
-    part: np.ndarray
     rays: RayScene
 
 
 def render(world: World, camera: PlacedCamera, rng: np.random.Generator) -> Frame:
-    """Render one frame; the random generator scatters the shadow rays.
+    """Render one frame.
 
     Depth and people are exact at every pixel, but only people are shaded there: they are in focus.
     What is around them is shaded at every second row and column, and a little out of focus.
+
+    Parameters
+    ----------
+    world : World
+    camera : PlacedCamera
+    rng : numpy.random.Generator
+        Scatters the shadow rays.
+
+    Returns
+    -------
+    Frame
+
+    Examples
+    --------
+    >>> from hicp_lib.simulation.appearance.materials import plain
+    >>> from hicp_lib.simulation.rendering.camera import look_at
+    >>> from hicp_lib.simulation.rendering.mesh import quad
+    >>> wall = Surface(quad([-5, 2, -5], [10, 0, 0], [0, 0, 10]), plain(np.full(3, 0.5)))
+    >>> dim = Ambient(np.full(3, 0.4), np.full(3, 0.2), np.zeros(3), np.array([1.0, 0, 0]))
+    >>> camera = PlacedCamera(64, 48, 60.0, 60.0, 31.5, 23.5, look_at([0, -1, 0], [0, 0, 0]))
+    >>> frame = render(World([wall], [], dim, np.zeros(3)), camera, np.random.default_rng(0))
+    >>> frame.radiance.shape, float(frame.depth_m[24, 32].round(3))
+    ((48, 64, 3), 3.0)
     """
     scene, centre_m, directions = world.rays, camera.centre_m, image_directions(camera)
     shape = (camera.height_px, camera.width_px)
     trace = trace_image(scene, centre_m, directions, scene.owners[:-1] >= 0)
     person = scene.owners.take(trace.surface, mode="wrap").reshape(shape)
-    part = scene.parts.take(trace.triangle, mode="wrap").reshape(shape)
     is_person = person >= 0
-    around = View.of(trace, centre_m, directions, np.s_[::2, ::2], ~is_person)
+    around = GBuffer.of(trace, centre_m, directions, np.s_[::2, ::2], ~is_person)
     painted = _paint(world, scene, around, camera, False, rng)
     image = _enlarge(painted, around, trace.surface.reshape(shape), ~is_person)
     pixels = image.reshape(-1, 3).T
-    place(pixels, np.flatnonzero(trace.surface < 0), np.float32(world.backdrop)[:, None])
+    place(pixels, np.flatnonzero(trace.surface < 0), column(world.backdrop))
     rows, columns = (np.flatnonzero(is_person.any(axis=axis)) for axis in (1, 0))
     if len(rows):
         crop = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        people = View.of(trace, centre_m, directions, crop, is_person)
+        people = GBuffer.of(trace, centre_m, directions, crop, is_person)
         place(pixels, np.flatnonzero(is_person), _paint(world, scene, people, camera, True, rng))
         image = smooth_edges(image, edge_pixels(trace, is_person), trace, scene, camera)
-    return Frame(image, trace.depth_m.reshape(shape), person, part, scene)
+    return Frame(image, trace.depth_m.reshape(shape), person, scene)
 
 
-def _paint(world: World, scene: RayScene, view: View, camera: PlacedCamera, sharp: bool, rng) -> np.ndarray:
-    """Linear RGB of a view's pixels, (3, n)."""
-    looks = gather_looks(scene, view, 1 / camera.fx_px)
-    normals = view.on_grid(looks.normals)
-    if looks.height_m.any():
-        tilt_by_height(normals, view.on_grid(looks.height_m[None])[0], view)
-        looks.normals = view.from_grid(normals)
-    seen = visibility(world.lights, scene, view, normals, sharp, rng)
-    positions_m, painted = view.from_grid(view.positions_m), np.empty_like(looks.normals)
-    for start in range(0, len(view.pixels), _BLOCK):
+def _paint(
+    world: World,
+    scene: RayScene,
+    gbuffer: GBuffer,
+    camera: PlacedCamera,
+    sharp: bool,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """Linear RGB of a G-buffer's pixels, (3, n)."""
+    shading = evaluate_materials(scene, gbuffer, 1 / camera.fx_px)
+    normals = gbuffer.on_grid(shading.normals)
+    if shading.height_m.any():
+        tilt_by_height(normals, gbuffer.on_grid(shading.height_m[None])[0], gbuffer)
+        shading.normals = gbuffer.from_grid(normals)
+    seen = visibility(world.lights, scene, gbuffer, normals, sharp, rng)
+    positions_m, painted = gbuffer.from_grid(gbuffer.positions_m), np.empty_like(shading.normals)
+    for start in range(0, len(gbuffer.pixels), _BLOCK):
         block = slice(start, start + _BLOCK)
-        painted[:, block] = _shade_block(
-            world, looks.part(block), positions_m[:, block], view.directions[:, block], seen[:, block]
-        )
+        geometry = (values[:, block] for values in (positions_m, gbuffer.directions, seen))
+        painted[:, block] = _shade_block(world, shading.part(block), *geometry)
     return painted
 
 
-def _shade_block(world: World, looks: Looks, positions_m, direction, seen: np.ndarray) -> np.ndarray:
+def _shade_block(world: World, shading: Shading, positions_m, direction, seen: np.ndarray) -> np.ndarray:
     view = direction / -np.sqrt(dot(direction, direction))
-    diffuse = lights.ambient_light(world.ambient, looks.normals)
-    facing = 1 - np.clip(dot(looks.normals, view), 0, 1)
+    diffuse = ambient_light(world.ambient, shading.normals)
+    facing = 1 - np.clip(dot(shading.normals, view), 0, 1)
     facing *= facing
-    fresnel = looks.gloss * (1 + 4 * facing * facing) * (1 - np.float32(0.7) * looks.roughness)
+    fresnel = shading.gloss * (1 + 4 * facing * facing) * (1 - np.float32(0.7) * shading.roughness)
     # Part of what is hidden returns by bouncing about: crevices are not black.
     diffuse *= seen[-1] * np.float32(0.85) + np.float32(0.15)
     highlight = fresnel * diffuse
     for source, visible in zip(world.lights, seen[:-1], strict=True):
-        more, shine = lights.diffuse_and_highlight(
-            source, positions_m, looks.normals, view, looks.gloss, looks.roughness, looks.softness
-        )
+        more, shine = diffuse_and_highlight(source, positions_m, view, shading)
         more *= visible
         shine *= visible
         diffuse += more
         highlight += shine
-    diffuse *= looks.albedo
+    diffuse *= shading.albedo
     diffuse += highlight
-    diffuse += looks.glow
+    diffuse += shading.glow
     return diffuse
 
 
-def _enlarge(painted: np.ndarray, view: View, surface: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def _enlarge(painted: np.ndarray, view: GBuffer, surface: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """From every second pixel to all, (height, width, 3), out of focus; colours run on under people.
 
     Each `wanted` pixel takes the colour (3, n) of the nearest painted one that shows the same
@@ -132,7 +167,9 @@ def _enlarge(painted: np.ndarray, view: View, surface: np.ndarray, wanted: np.nd
     channels = coarse.reshape(-1, 4).T
     place(channels, view.pixels, [*painted, np.float32(1)])
     coarse += 1e-4 * cv2.blur(coarse, (9, 9)) + np.float32(1e-9)
-    full = _doubled_colours(coarse, surface.shape)
+    # As `doubled`; OpenCV is faster with several channels.
+    full = cv2.resize(coarse, (2 * shape[1], 2 * shape[0]), interpolation=cv2.INTER_NEAREST)
+    full = np.ascontiguousarray(full[: surface.shape[0], : surface.shape[1]])
     wrong, best = _nearest_alike(view.surface, surface, wanted)
     place(full.reshape(-1, 4).T, wrong, channels.take(best, axis=1))
     full = cv2.GaussianBlur(full, (7, 7), 1.1)
@@ -152,10 +189,3 @@ def _nearest_alike(coarse: np.ndarray, surface: np.ndarray, wanted: np.ndarray):
         np.copyto(best, near, where=padded.ravel().take(near) == own)
     row, column = np.divmod(best, padded.shape[1])
     return wrong, (row - 1) * coarse.shape[1] + column - 1
-
-
-def _doubled_colours(image: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """As `doubled`; OpenCV is faster with several channels."""
-    height, width = image.shape[:2]
-    doubled = cv2.resize(image, (2 * width, 2 * height), interpolation=cv2.INTER_NEAREST)
-    return np.ascontiguousarray(doubled[: shape[0], : shape[1]])

@@ -1,12 +1,11 @@
 """How much of each light every pixel sees: one ray towards a point of each light, then a filter."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hicp_lib.simulation.rendering import lights
 from hicp_lib.simulation.rendering.camera import join_rays
-from hicp_lib.simulation.rendering.filters import View, sum_within
+from hicp_lib.simulation.rendering.filters import sum_within
+from hicp_lib.simulation.rendering.gbuffer import GBuffer
 from hicp_lib.simulation.rendering.raycast import RayScene, dot, pick
 
 AMBIENT_REACH_M = 0.7
@@ -16,32 +15,46 @@ _OFF_SURFACE_M = 0.003  # where rays begin
 def visibility(
     sources: list[lights.Light],
     scene: RayScene,
-    view: View,
+    gbuffer: GBuffer,
     normals: np.ndarray,
     sharp: bool,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Visible share of each light and (last) of the surroundings, (n_lights + 1, n) in [0, 1].
+    """Visible share of each light and of the surroundings.
 
-    `normals` are those of all of the view's pixels, (3, rows, columns).
-    Every second pixel is asked, as on a chessboard, and the filter fills in the others; in a
-    `sharp` view it reaches less far.
+    Every second pixel is asked, as on a chessboard, and the filter fills in the others.
+
+    Parameters
+    ----------
+    sources : list of lights.Light
+    scene : RayScene
+    gbuffer : GBuffer
+    normals : array, shape (3, rows, columns)
+        Of all pixels of the G-buffer's grid.
+    sharp : bool
+        Whether the filter reaches less far.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    array, shape (n_lights + 1, n), dtype float32
+        In [0, 1], the surroundings last.
     """
-    row, column = np.arange(view.surface.shape[0])[:, None], np.arange(view.surface.shape[1])
+    row, column = np.arange(gbuffer.surface.shape[0])[:, None], np.arange(gbuffer.surface.shape[1])
     turn = (row + column) % 2 == 0
-    asked = np.flatnonzero(turn.ravel().take(view.pixels))
-    pixels = view.pixels.take(asked)
+    asked = np.flatnonzero(turn.ravel().take(gbuffer.pixels))
+    pixels = gbuffer.pixels.take(asked)
     cell = (row % 4 * 4 + column % 4).ravel().take(pixels)
     facing_out = pick(normals.reshape(3, -1), pixels)
-    origins = pick(view.positions_m.reshape(3, -1), pixels) + np.float32(_OFF_SURFACE_M) * facing_out
-    counts = np.zeros((len(sources) + 2, view.surface.size), np.int16)
+    origins = pick(gbuffer.positions_m.reshape(3, -1), pixels) + np.float32(_OFF_SURFACE_M) * facing_out
+    counts = np.zeros((len(sources) + 2, gbuffer.surface.size), np.int16)
     for kind, source in enumerate([*sources, None]):
         offsets = lights.sample_offsets(cell, kind, rng)
         counts[kind][pixels] = _sees(scene, source, origins, facing_out, offsets)
     counts[-1] = turn.ravel()
-    counts = counts.reshape(-1, *view.surface.shape)
-    sums = sum_within(counts, view.surface, view.positions_m, normals, 2 if sharp else 3)
-    *seen, weight = view.from_grid(sums).astype(np.float32)
+    counts = counts.reshape(-1, *gbuffer.surface.shape)
+    sums = sum_within(counts, gbuffer.surface, gbuffer.positions_m, normals, 2 if sharp else 3)
+    *seen, weight = gbuffer.from_grid(sums).astype(np.float32)
     return np.where(weight > 0, np.stack(seen) / np.maximum(weight, 1), np.float32(1))
 
 

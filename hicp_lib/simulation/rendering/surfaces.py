@@ -1,12 +1,11 @@
 """What a renderer needs to know of things: surfaces, the hits of rays on them, their looks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hicp_lib.simulation.rendering.mesh import Mesh
 
@@ -20,8 +19,10 @@ class Hits:
 
     Attributes
     ----------
-    footprint_m : how wide one pixel is at the hit, (n,)
-    interpolate : gives the mesh's coords at the hits
+    footprint_m : array, shape (n,)
+        How wide one pixel is at the hit.
+    interpolate : callable
+        Gives the mesh's coords at the hits, (n_coords, n).
     """
 
     footprint_m: np.ndarray
@@ -39,12 +40,18 @@ class Look:
 
     Attributes
     ----------
-    albedo : linear RGB, (3, n), or (3, 1) where it is the same all over
-    height_m : bump height that tilts the normal, (n,) or 0
-    gloss : strength of the highlight, (n,) or a number; 0.04 is a dielectric's
-    roughness : of the highlight, (n,) or a number in (0, 1]
-    softness : how far light creeps past the terminator, as in skin, (n,) or a number
-    glow : light given off, linear RGB, (3, n), (3, 1) or 0
+    albedo : array, shape (3, n) or (3, 1)
+        Linear RGB; one column where it is the same all over.
+    height_m : float or array, shape (n,)
+        Bump height that tilts the normal.
+    gloss : float or array, shape (n,)
+        Strength of the highlight; 0.04 is a dielectric's.
+    roughness : float or array, shape (n,)
+        Of the highlight, in (0, 1].
+    softness : float or array, shape (n,)
+        How far light creeps past the terminator, as in skin.
+    glow : float or array, shape (3, n) or (3, 1)
+        Light given off, linear RGB.
     """
 
     albedo: np.ndarray
@@ -58,9 +65,25 @@ class Look:
 Material = Callable[[Hits], Look]
 
 
+def column(colour: ArrayLike) -> np.ndarray:
+    """A colour (3,) as a column (3, 1), float32, which goes with the components of n places."""
+    return np.asarray(colour, np.float32)[:, None]
+
+
 @dataclass(frozen=True)
 class Surface:
-    """A mesh with a material. `person` is whose it is (-1: nobody's), `parts` the body part per triangle."""
+    """A mesh with a material.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    material : callable
+        Tells what it looks like where it is hit.
+    person : int
+        Whose it is; -1: nobody's.
+    parts : array or None, shape (n_triangles,), dtype int16
+        Body part per triangle.
+    """
 
     mesh: Mesh
     material: Material

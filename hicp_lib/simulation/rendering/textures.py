@@ -4,8 +4,6 @@ A tile holds mixing weights or a height, not colours: a scene chooses the colour
 tile serves every paint, wood and cloth. Tiles are made once per process from fixed seeds.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2
@@ -19,7 +17,15 @@ _REMAP_COLUMNS = 8192  # OpenCV's remap takes no array longer than 32767
 
 @dataclass(frozen=True)
 class Texture:
-    """A periodic tile, (size, size, channels) float32, `width_m` metres wide, with its mip levels."""
+    """A periodic tile with its mip levels.
+
+    Attributes
+    ----------
+    levels : list of array, shape (size + 1, size + 1, channels), dtype float32
+        Each half as large as the one before; the last row and column repeat the first.
+    width_m : float
+        How wide the tile is on a surface.
+    """
 
     levels: list[np.ndarray]
     width_m: float
@@ -29,12 +35,19 @@ class Texture:
 
         Parameters
         ----------
-        uv_m : array, shape (2, n), metres
-        footprint_m : how many metres of surface one pixel sees, shape (n,) or one number
+        uv_m : array, shape (2, n)
+        footprint_m : float or array, shape (n,)
+            How many metres of surface one pixel sees.
 
         Returns
         -------
-        array, shape (channels, n), float32
+        array, shape (channels, n), dtype float32
+
+        Examples
+        --------
+        >>> where = np.array([[0.1, 0.6], [0.0, 0.0]], np.float32)
+        >>> stripes(0.5).sample(where, 0.001)
+        array([[1., 0.]], dtype=float32)
         """
         texel_m = self.width_m / (self.levels[0].shape[0] - 1)
         level = np.log2(np.maximum(np.asarray(footprint_m, np.float32) / texel_m, 1e-6))
@@ -60,7 +73,7 @@ class Texture:
         scaled = uv_m * np.float32(1 / self.width_m)
         xy[:, :n] = (scaled - np.floor(scaled)) * np.float32(size)
         maps = xy.reshape(2, rows, columns)
-        found = cv2.remap(tile, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        found = cv2.remap(tile, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.ascontiguousarray(found.reshape(rows * columns, channels)[:n].T)
 
 
@@ -76,16 +89,32 @@ def make_texture(tile: np.ndarray, width_m: float) -> Texture:
 
 
 def noise(
-    size: int,
-    rng: np.random.Generator,
-    slope: float = 1.5,
-    low: float = 1,
-    stretch: tuple[float, float] = (1, 1),
+    size: int, rng: np.random.Generator, slope: float, low: float, stretch: tuple[float, float] = (1, 1)
 ) -> np.ndarray:
-    """Periodic Gaussian noise, shape (size, size), mean 0, standard deviation 1.
+    """Periodic Gaussian noise.
 
-    Its amplitude spectrum falls as frequency ** -slope and is flat below `low` cycles per
-    tile; `stretch` lengthens the features along (rows, columns).
+    Parameters
+    ----------
+    size : int
+        Of the tile, in texels.
+    rng : numpy.random.Generator
+    slope : float
+        The amplitude spectrum falls as frequency ** -slope.
+    low : float
+        Below so many cycles per tile it is flat.
+    stretch : tuple of float, optional
+        How much longer features are along rows and columns.
+
+    Returns
+    -------
+    array, shape (size, size), dtype float32
+        Mean 0, standard deviation 1.
+
+    Examples
+    --------
+    >>> field = noise(64, np.random.default_rng(0), slope=1.5, low=2)
+    >>> abs(float(field.mean())) < 1e-6, round(float(field.std()), 3)
+    (True, 1.0)
     """
     rows, columns = fft.fftfreq(size, 1 / size), fft.rfftfreq(size, 1 / size)
     radius = np.hypot(rows[:, None] * stretch[0], columns * stretch[1]).astype(np.float32)
@@ -96,101 +125,105 @@ def noise(
     return field / field.std()
 
 
+_SEED, _SIZE = 20220, 512
+
+
 def _rng(number: int) -> np.random.Generator:
-    return np.random.default_rng([20220, number])
+    return np.random.default_rng([_SEED, number])
+
+
+def _noise(number: int, slope: float, low: float, stretch: tuple[float, float] = (1, 1)) -> np.ndarray:
+    return noise(_SIZE, _rng(number), slope, low, stretch)
+
+
+def _grid(size: int = _SIZE) -> np.ndarray:
+    """Coordinates v and u of texels, from 0 to 1, (2, size, size)."""
+    return np.mgrid[:size, :size] / size
+
+
+def _from_whole(x: np.ndarray) -> np.ndarray:
+    """Distance from the nearest whole number."""
+    return np.abs(np.mod(x + 0.5, 1) - 0.5)
+
+
+def _symmetric(profile: np.ndarray, combine: np.ufunc) -> np.ndarray:
+    """A pattern (n, n) that is the same along both axes."""
+    return combine(profile[:, None], profile[None, :])
 
 
 @memoised()
 def cloud() -> Texture:
     """Smooth noise of all sizes, two independent channels; 1 m."""
-    return make_texture(np.dstack([noise(512, _rng(k), 1.6, 2) for k in (1, 2)]), 1.0)
+    return make_texture(np.dstack([_noise(k, 1.6, 2) for k in (1, 2)]), 1.0)
 
 
 @memoised()
 def planks() -> Texture:
     """Wooden boards: (light to dark, gap between boards); 1.2 m, boards along v."""
-    size, boards = 512, 8
-    v, u = np.mgrid[:size, :size] / size
-    board = np.floor(u * boards)
-    shift = _rng(4).random(boards)[board.astype(int)]
-    end = np.mod(v + shift, 1)
-    tone = _rng(5).random((boards, 2))[board.astype(int), (end > 0.5).astype(int)]
-    fibre = noise(size, _rng(6), 1.1, 4, (14, 1))
+    boards, (v, u) = 8, _grid()
+    board = np.floor(u * boards).astype(int)
+    end = np.mod(v + _rng(4).random(boards)[board], 1)
+    tone = _rng(5).random((boards, 2))[board, (end > 0.5).astype(int)]
     gap = np.minimum(
-        np.abs(np.mod(u * boards + 0.5, 1) - 0.5) / boards,
-        np.minimum(np.abs(end - 0.5), np.minimum(end, 1 - end)),
+        _from_whole(u * boards) / boards, np.minimum(np.abs(end - 0.5), np.minimum(end, 1 - end))
     )
+    fibre = _noise(6, 1.1, 4, (14, 1))
     return make_texture(np.dstack([np.clip(0.5 * tone + 0.25 + 0.12 * fibre, 0, 1), gap < 0.0025]), 1.2)
 
 
 @memoised()
 def wood() -> Texture:
     """Sawn wood, light to dark, grain along v; 0.8 m."""
-    rings = noise(512, _rng(7), 1.7, 1, (10, 1))
-    fibre = noise(512, _rng(8), 0.8, 8, (20, 1))
+    rings, fibre = _noise(7, 1.7, 1, (10, 1)), _noise(8, 0.8, 8, (20, 1))
     return make_texture(np.clip(0.5 + 0.28 * np.sin(4 * rings) + 0.12 * fibre, 0, 1), 0.8)
 
 
 @memoised()
 def tiles() -> Texture:
     """Square tiles: (tone, grout); four tiles across, 1.2 m."""
-    size, count = 512, 4
-    v, u = np.mgrid[:size, :size] / size * count
-    tone = _rng(9).random((count, count))[v.astype(int), u.astype(int)]
-    edge = np.minimum(np.abs(np.mod(u + 0.5, 1) - 0.5), np.abs(np.mod(v + 0.5, 1) - 0.5))
-    return make_texture(
-        np.dstack([0.35 + 0.3 * tone + 0.08 * noise(size, _rng(10), 1.2, 3), edge < 0.012]), 1.2
-    )
+    v, u = _grid() * 4
+    tone = _rng(9).random((4, 4))[v.astype(int), u.astype(int)]
+    edge = np.minimum(_from_whole(u), _from_whole(v))
+    return make_texture(np.dstack([0.35 + 0.3 * tone + 0.08 * _noise(10, 1.2, 3), edge < 0.012]), 1.2)
 
 
 @memoised()
 def carpet() -> Texture:
     """Short pile, light to dark; 0.6 m."""
-    return make_texture(0.5 + 0.13 * noise(512, _rng(11), 0.4, 40) + 0.05 * noise(512, _rng(12), 1.2, 2), 0.6)
+    return make_texture(0.5 + 0.13 * _noise(11, 0.4, 40) + 0.05 * _noise(12, 1.2, 2), 0.6)
 
 
 @memoised()
 def plaster() -> Texture:
     """Painted wall: slight unevenness, light to dark; 1.6 m."""
-    return make_texture(0.5 + 0.12 * noise(512, _rng(13), 1.4, 2) + 0.12 * noise(512, _rng(14), 0.7, 40), 1.6)
+    return make_texture(0.5 + 0.12 * _noise(13, 1.4, 2) + 0.12 * _noise(14, 0.7, 40), 1.6)
 
 
 @memoised()
 def bricks() -> Texture:
     """Brick wall: (tone, mortar); 1 m, 4 bricks by 12 courses."""
-    size, across, courses = 512, 4, 12
-    v, u = np.mgrid[:size, :size] / size
+    across, courses, (v, u) = 4, 12, _grid()
     course = np.floor(v * courses)
     x = np.mod(u * across + 0.5 * np.mod(course, 2), across)
     tone = _rng(15).random((courses, across))[course.astype(int), x.astype(int) % across]
-    edge_u = np.abs(np.mod(x + 0.5, 1) - 0.5) / across
-    edge_v = np.abs(np.mod(v * courses + 0.5, 1) - 0.5) / courses
-    rough = noise(size, _rng(16), 1.0, 8)
-    return make_texture(
-        np.dstack(
-            [
-                np.clip(tone * 0.7 + 0.15 + 0.1 * rough, 0, 1),
-                np.minimum(edge_u, edge_v) < 0.006 + 0.001 * rough,
-            ]
-        ),
-        1.0,
-    )
+    edge, rough = np.minimum(_from_whole(x) / across, _from_whole(v * courses) / courses), _noise(16, 1.0, 8)
+    mortar = edge < 0.006 + 0.001 * rough
+    return make_texture(np.dstack([np.clip(tone * 0.7 + 0.15 + 0.1 * rough, 0, 1), mortar]), 1.0)
 
 
 @memoised()
 def weave() -> Texture:
     """Woven or knitted cloth seen close, around 0; 0.06 m at a tenth of a millimetre."""
-    size, threads = 512, 60
-    v, u = np.mgrid[:size, :size] / size * 2 * np.pi * threads
+    v, u = _grid() * 2 * np.pi * 60  # threads
     cross = np.sin(u) * np.sin(v) + 0.5 * np.sin(u + v)
-    return make_texture(0.6 * cross + 0.5 * noise(size, _rng(17), 0.8, 10), 0.06)
+    return make_texture(0.6 * cross + 0.5 * _noise(17, 0.8, 10), 0.06)
 
 
 @memoised()
 def wrinkles() -> Texture:
     """Height of small folds in cloth, around 0, two channels (soft, creased); 0.5 m, folds run along v."""
-    soft = noise(512, _rng(18), 2.6, 3, (2.0, 1))
-    ridges = [1 - 2 * np.abs(noise(512, _rng(k), 2.2, 2, (1.5, 1))) for k in (19, 20)]
+    soft = _noise(18, 2.6, 3, (2.0, 1))
+    ridges = [1 - 2 * np.abs(_noise(k, 2.2, 2, (1.5, 1))) for k in (19, 20)]
     creased = cv2.GaussianBlur(np.tile(np.minimum(*ridges), (3, 3)), (0, 0), 3)[512:1024, 512:1024]
     return make_texture(np.dstack([soft, creased]), 0.5)
 
@@ -198,18 +231,14 @@ def wrinkles() -> Texture:
 @memoised()
 def strands() -> Texture:
     """Hair: brightness of single strands and locks, around 0; 0.1 m, strands along v."""
-    fine = noise(512, _rng(21), 0.2, 30, (60, 1))
-    locks = noise(512, _rng(22), 1.0, 5, (25, 1))
-    return make_texture(0.6 * fine + 0.6 * locks, 0.1)
+    return make_texture(0.6 * _noise(21, 0.2, 30, (60, 1)) + 0.6 * _noise(22, 1.0, 5, (25, 1)), 0.1)
 
 
 @memoised()
 def skin() -> Texture:
     """Skin: (blotches of redness, pores and lines, freckles 0..1), the first two around 0; 0.12 m."""
-    blotches = noise(512, _rng(23), 1.8, 4)
-    pores = noise(512, _rng(24), 0.5, 60)
-    freckles = np.clip(noise(512, _rng(25), 0.8, 40) - 1.7, 0, 1)
-    return make_texture(np.dstack([blotches, pores, freckles]), 0.12)
+    freckles = np.clip(_noise(25, 0.8, 40) - 1.7, 0, 1)
+    return make_texture(np.dstack([_noise(23, 1.8, 4), _noise(24, 0.5, 60), freckles]), 0.12)
 
 
 @memoised()
@@ -223,15 +252,16 @@ def stripes(duty: float = 0.5) -> Texture:
 def checks(kind: int) -> Texture:
     """Gingham, tartan or window pane: weights of (second, third) colour; one period per metre."""
     t = (np.arange(256) + 0.5) / 256
+    second = np.zeros((256, 256))
     if kind == 0:
-        a = (t < 0.5) * 0.5
-        return make_texture(np.dstack([a[:, None] + a[None, :], np.zeros((256, 256))]), 1.0)
-    if kind == 1:
-        a = 0.5 * ((np.abs(t - 0.3) < 0.17) | (np.abs(t - 0.8) < 0.04))
-        b = 0.55 * (np.abs(t - 0.3) < 0.025) + 0.4 * (np.abs(t - 0.65) < 0.02)
-        return make_texture(np.dstack([a[:, None] + a[None, :], np.maximum(b[:, None], b[None, :])]), 1.0)
-    line = 0.9 * (np.abs(t - 0.5) < 0.03)
-    return make_texture(np.dstack([np.maximum(line[:, None], line[None, :]), np.zeros((256, 256))]), 1.0)
+        first = _symmetric((t < 0.5) * 0.5, np.add)
+    elif kind == 1:
+        first = _symmetric(0.5 * ((np.abs(t - 0.3) < 0.17) | (np.abs(t - 0.8) < 0.04)), np.add)
+        lines = 0.55 * (np.abs(t - 0.3) < 0.025) + 0.4 * (np.abs(t - 0.65) < 0.02)
+        second = _symmetric(lines, np.maximum)
+    else:
+        first = _symmetric(0.9 * (np.abs(t - 0.5) < 0.03), np.maximum)
+    return make_texture(np.dstack([first, second]), 1.0)
 
 
 @memoised()
@@ -245,10 +275,8 @@ def dots() -> Texture:
 @memoised()
 def blobs(number: int) -> Texture:
     """Flower-, leaf- or camouflage-like blobs: weights of (second, third) colour; one period per metre."""
-    a, b = (
-        noise(256, _rng(30 + 2 * number + k), (2.5, 1.2, 3.5)[number % 3], (4, 9, 2)[number % 3])
-        for k in (0, 1)
-    )
+    slope, low = ((2.5, 4), (1.2, 9), (3.5, 2))[number % 3]
+    a, b = (noise(256, _rng(30 + 2 * number + k), slope, low) for k in (0, 1))
     return make_texture(np.dstack([a > 0.6, (b > 0.8) & (a <= 0.6)]), 1.0)
 
 
@@ -287,8 +315,7 @@ def picture(number: int) -> Texture:
     for _ in range(rng.integers(3, 12)):
         colour = tuple(int(c) for c in rng.integers(0, 256, 3))
         centre, axes = rng.integers(0, 256, 2), rng.integers(8, 90, 2)
-        cv2.ellipse(
-            tile, centre.tolist(), axes.tolist(), float(rng.integers(180)), 0, 360, colour, -1, cv2.LINE_AA
-        )
+        turn_deg = float(rng.integers(180))
+        cv2.ellipse(tile, centre.tolist(), axes.tolist(), turn_deg, 0, 360, colour, -1, cv2.LINE_AA)
     blurred = 0.6 * tile + 0.4 * cv2.GaussianBlur(tile, (0, 0), 6)
     return make_texture(np.clip(blurred / 255, 0.02, 0.95), 1.0)

@@ -1,11 +1,10 @@
 """Markers as someone would click them: where they are in the image, with the error of a hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 
 from hicp_lib.core.camera import project, transform
+from hicp_lib.core.errors import InputError
 from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import Recording, read_exact_depth_m
@@ -28,13 +27,22 @@ def simulate_clicks(
 
     Parameters
     ----------
-    T_base_mocap : array, shape (4, 4); the true one
-    noise_px : standard deviation of a click in u and in v
-    offset_s : to add to the motion capture's stamps to have them on the camera's clock; the true one
+    recording : Recording
+        A simulated one.
+    mocap : MotionCapture
+    T_base_mocap : array, shape (4, 4)
+        The true one.
+    n_images : int
+    noise_px : float
+        Standard deviation of a click in u and in v.
+    offset_s : float, optional
+        To add to the motion capture's stamps to have them on the camera's clock; the true one.
+    seed : int, optional
 
     Returns
     -------
-    DataFrame, columns as `hicp_lib.mocap.clicking.read_clicks`
+    pd.DataFrame
+        Columns as `hicp_lib.mocap.clicking.read_clicks`.
     """
     rng = np.random.default_rng(seed)
     tables = []
@@ -44,18 +52,19 @@ def simulate_clicks(
         T_cam_mocap = np.linalg.inv(recording.T_base_cam[frame]) @ T_base_mocap
         points_m = transform(T_cam_mocap, markers_m)
         pixels_px = project(recording.intrinsics, points_m)
-        seen = _is_seen(pixels_px, points_m[:, 2], read_exact_depth_m(recording, int(frame)))
-        clicked_px = pixels_px + rng.normal(0, noise_px, pixels_px.shape)
-        table = pd.DataFrame(clicked_px, columns=["u_px", "v_px"])
-        table.insert(0, "marker", list(mocap.names))
-        table.insert(0, "frame", int(frame))
-        tables.append(table[seen])
+        exact_depth_m = read_exact_depth_m(recording, int(frame))
+        if exact_depth_m is None:
+            raise InputError(f"{recording.folder}: has no exact depth; give a simulated recording")
+        seen = _is_seen(pixels_px, points_m[:, 2], exact_depth_m)
+        u_px, v_px = (pixels_px + rng.normal(0, noise_px, pixels_px.shape)).T
+        columns = {"frame": int(frame), "marker": list(mocap.names), "u_px": u_px, "v_px": v_px}
+        tables.append(pd.DataFrame(columns)[seen])
     return pd.concat(tables, ignore_index=True)
 
 
 def _is_seen(pixels_px: np.ndarray, depths_m: np.ndarray, exact_depth_m: np.ndarray) -> np.ndarray:
     """Which points are in the image with nothing in front of them."""
     height, width = exact_depth_m.shape
-    inside = ((pixels_px >= 0) & (pixels_px <= [width - 1, height - 1])).all(axis=1)
+    inside = np.logical_and(pixels_px >= 0, pixels_px <= [width - 1, height - 1]).all(axis=1)
     columns, rows = np.where(inside[:, None], pixels_px, 0).round().astype(int).T
     return inside & (exact_depth_m[rows, columns] > depths_m - _IN_FRONT_M)

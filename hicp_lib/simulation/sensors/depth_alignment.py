@@ -1,7 +1,5 @@
 """Depth moved from the imager that measured it to the colour camera beside it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hicp_lib.simulation.rendering.camera import PlacedCamera
@@ -15,8 +13,15 @@ def align_to_colour(depth_m: np.ndarray, left: PlacedCamera, colour: PlacedCamer
 
     Parameters
     ----------
-    depth_m : (left.height_px, left.width_px), NaN for none
-    left, colour : cameras beside each other: the same orientation, a shift along x
+    depth_m : array, shape (left.height_px, left.width_px)
+        NaN for none.
+    left, colour : PlacedCamera
+        Beside each other: the same orientation, a shift along x.
+
+    Returns
+    -------
+    array, shape (colour.height_px, colour.width_px), dtype float32
+        NaN for none.
     """
     shift_m = float(colour.T_world_camera[:3, 0] @ (left.centre_m - colour.centre_m))
     z = np.where(np.isfinite(depth_m), depth_m, np.float32(np.inf))

@@ -7,8 +7,6 @@ Sweetser, Woodfill) for the noise, the D435's data sheet for geometry and invali
 for units, range and alignment; the book's page on simulated sensors has the formulas.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import cv2
@@ -36,20 +34,36 @@ class DepthCamera:
 
     Attributes
     ----------
-    width_px, height_px, focal_px : of the left imager; its principal point is the middle
-    baseline_m : from the left to the right imager
-    colour_offset_m : from the colour camera to the left imager
-    subpixel_rms_px : standard deviation of disparity; z**2 * subpixel_rms_px / (f B) in depth
-    window_px : side of the matching window, odd; noise is correlated over about this much
-    edge_px : width of the slope of flying pixels between two depths; 0 makes depth steps sharp
-    edge_holes : share of that slope that gets no depth
-    disparity_step_px : what disparity is a multiple of
-    depth_units_per_m : what depth is a multiple of
-    searched_px : largest disparity that is searched; nearer than f B / searched_px there is no depth
-    max_range_m : no depth beyond
-    left_band : no depth where the right imager's image ends, at the left edge
-    shadow : no depth where something hides the surface from the right imager
-    hair_holes : share of hair that gives no depth
+    width_px, height_px : int
+        Of the left imager; its principal point is the middle.
+    focal_px : float
+        Of the left imager.
+    baseline_m : float
+        From the left to the right imager.
+    colour_offset_m : float
+        From the colour camera to the left imager.
+    subpixel_rms_px : float
+        Standard deviation of disparity; z**2 * subpixel_rms_px / (f B) in depth.
+    window_px : int
+        Side of the matching window, odd; noise is correlated over about this much.
+    edge_px : float
+        Width of the slope of flying pixels between two depths; 0 makes depth steps sharp.
+    edge_holes : float
+        Share of that slope that gets no depth.
+    disparity_step_px : float
+        What disparity is a multiple of.
+    depth_units_per_m : float
+        What depth is a multiple of.
+    searched_px : float
+        Largest disparity that is searched; nearer than f B / searched_px there is no depth.
+    max_range_m : float
+        No depth beyond.
+    left_band : bool
+        No depth where the right imager's image ends, at the left edge.
+    shadow : bool
+        No depth where something hides the surface from the right imager.
+    hair_holes : float
+        Share of hair that gives no depth.
     """
 
     width_px: int = 848
@@ -95,13 +109,30 @@ def simulate_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCamera,
 
     Parameters
     ----------
-    scene : what is there, such as `Frame.rays` of a rendered frame
-    colour : the colour camera; what lies outside the left imager's view has no depth
+    scene : RayScene
+        What is there, such as `Frame.rays` of a rendered frame.
+    colour : PlacedCamera
+        The colour camera; what lies outside the left imager's view has no depth.
+    settings : DepthCamera
+    rng : numpy.random.Generator
+        Of the noise.
 
     Returns
     -------
-    array, shape (height, width) of the colour image, float32: metres along the camera's z axis,
-    NaN where there is none
+    array, shape (colour.height_px, colour.width_px), dtype float32
+        Metres along the camera's z axis, NaN where there is none.
+
+    Examples
+    --------
+    >>> from hicp_lib.simulation.appearance.materials import plain
+    >>> from hicp_lib.simulation.rendering.camera import look_at
+    >>> from hicp_lib.simulation.rendering.mesh import quad
+    >>> from hicp_lib.simulation.rendering.surfaces import Surface
+    >>> wall = Surface(quad([-5, 1, -5], [10, 0, 0], [0, 0, 10]), plain(np.ones(3)))
+    >>> camera = PlacedCamera(640, 480, 600.0, 600.0, 319.5, 239.5, look_at([0, 0, 0], [0, 1, 0]))
+    >>> depth_m = simulate_depth(RayScene([wall]), camera, D435, np.random.default_rng(0))
+    >>> float(np.nanmedian(depth_m).round(2))
+    1.0
     """
     left = left_imager(colour, settings)
     first_column, view = _crop(left, colour, settings)
@@ -109,7 +140,20 @@ def simulate_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCamera,
 
 
 def simulate_raw_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCamera, rng: Rng) -> np.ndarray:
-    """Depth as the left imager sees it, (settings.height_px, settings.width_px), else as `simulate_depth`."""
+    """Depth as the left imager sees it, before alignment.
+
+    Parameters
+    ----------
+    scene : RayScene
+    colour : PlacedCamera
+    settings : DepthCamera
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    array, shape (settings.height_px, settings.width_px), dtype float32
+        Else as of `simulate_depth`.
+    """
     return _measure(scene, left_imager(colour, settings), 0, settings, rng)
 
 

@@ -1,7 +1,5 @@
 """What errors of stereo matching have in common: they are smooth over the matching window."""
 
-from __future__ import annotations
-
 from statistics import NormalDist
 
 import cv2
@@ -14,7 +12,19 @@ _TILE_PX = 1536
 
 
 def correlated_noise(shape: tuple[int, int], window_px: int, rng: Rng) -> np.ndarray:
-    """Normal noise of variance 1, smooth over a matching window, float32: a random piece of the kept one."""
+    """Normal noise, smooth over a matching window: a random piece of the cached tile.
+
+    Parameters
+    ----------
+    shape : tuple of int
+    window_px : int
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    array, dtype float32
+        Mean 0, variance 1.
+    """
     tile = _noise_tile(window_px)
     start = rng.integers(tile.shape)
     rows, columns = (np.arange(n) + first for n, first in zip(shape, start, strict=True))
@@ -35,7 +45,26 @@ def _noise_tile(window_px: int) -> np.ndarray:
 
 
 def patches(shape: tuple[int, int], share: float, window_px: int, rng: Rng) -> np.ndarray:
-    """Patches as large as a matching window that cover a share of the image."""
+    """Patches as large as a matching window that cover a share of the image.
+
+    Parameters
+    ----------
+    shape : tuple of int
+    share : float
+        0 to 1.
+    window_px : int
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    array of bool
+
+    Examples
+    --------
+    >>> holes = patches((480, 640), 0.3, 7, np.random.default_rng(0))
+    >>> abs(float(holes.mean()) - 0.3) < 0.02
+    True
+    """
     if not 0 < share < 1:
         return np.full(shape, share >= 1)
     return correlated_noise(shape, window_px, rng) > NormalDist().inv_cdf(1 - share)

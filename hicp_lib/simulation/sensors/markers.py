@@ -4,13 +4,11 @@ Two on each shoulder, elbow and wrist, on opposite sides, so that their mean is 
 (the paper's section IV-C takes that mean for the joint); one on the depth camera.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.core.memo import memoised
-from hicp_lib.simulation.body.model import Body, PosedBody, load_body, pose_body
+from hicp_lib.simulation.body.model import Body, PosedBody, Shape, load_body, pose_body
 from hicp_lib.simulation.rendering.mesh import Mesh
 from hicp_lib.simulation.rendering.raycast import RayScene
 from hicp_lib.simulation.rendering.surfaces import Hits, Look, Surface
@@ -43,9 +41,18 @@ STANDOFF_M = 0.012
 
 
 def markers_m(person: PosedBody, vertices: np.ndarray) -> np.ndarray:
-    """Centres of the markers on a posed person, (12, 3), in the frame the person is posed in.
+    """Centres of the markers on a posed person.
 
-    `vertices` (12,) are those of `marker_vertices` for the person's shape.
+    Parameters
+    ----------
+    person : PosedBody
+    vertices : array of int, shape (12,)
+        Those of `marker_vertices` for the person's shape.
+
+    Returns
+    -------
+    array, shape (12, 3)
+        In the frame the person is posed in.
     """
     return (person.vertices_m[vertices] + STANDOFF_M * person.normals[vertices]).astype(float)
 
@@ -56,11 +63,27 @@ def camera_marker_m(T_world_camera: np.ndarray) -> np.ndarray:
     return T[..., :3, :3] @ np.array(CAMERA_MARKER_M) + T[..., :3, 3]
 
 
-def marker_vertices(shape: int | str | np.ndarray) -> np.ndarray:
-    """Vertices of the body model that the markers are taped to, (12,), in the order of `JOINT_MARKERS`.
+def marker_vertices(shape: Shape) -> np.ndarray:
+    """Vertices of the body model that the markers are taped to.
 
     In the reference stance, the skin that a line from the joint's centre comes out through.
-    `shape` as in `pose_body`.
+
+    Parameters
+    ----------
+    shape : int or str or array, shape (n_shapes,)
+        As in `pose_body`.
+
+    Returns
+    -------
+    array of int, shape (12,)
+        In the order of `JOINT_MARKERS`.
+
+    Examples
+    --------
+    >>> person = pose_body(load_body(), "man_35_average", {})
+    >>> front, back = markers_m(person, marker_vertices("man_35_average"))[:2]  # of the left shoulder
+    >>> bool(front[0] > back[0] + 0.05)
+    True
     """
     body = load_body()
     key = shape if isinstance(shape, str | int) else np.asarray(shape, np.float32).tobytes()
@@ -94,6 +117,11 @@ def body_scene(person: PosedBody, obstacles: tuple[Mesh, ...] = ()) -> RayScene:
     """What may hide markers: the person's skin, and other meshes. Markers lie on clothes, not under them.
 
     The skin is that between every few vertices: as good as all of it, and ready in a third of the time.
+
+    Parameters
+    ----------
+    person : PosedBody
+    obstacles : tuple of Mesh, optional
     """
     skin = _bare(person, _coarse_triangles())
     return RayScene([skin, *(Surface(mesh, _unseen) for mesh in obstacles)])

@@ -5,8 +5,6 @@ of a millimetre. Trajectories too short to be recognised again are lost. The sys
 frame is its own: z up, its origin and heading wherever the calibration frame lay on the floor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -31,11 +29,18 @@ class MocapSystem:
 
     Attributes
     ----------
-    rate_hz : measurements per second
-    noise_m : standard deviation of each coordinate; 0 for none
-    min_cameras : that must see a marker
-    shortest_s : trajectories between dropouts that are shorter are lost; 0 keeps them
-    n_cameras, ring_m, height_m : cameras stand on a ring of this radius, at this height
+    rate_hz : float
+        Measurements per second.
+    noise_m : float
+        Standard deviation of each coordinate; 0 for none.
+    min_cameras : int
+        That must see a marker.
+    shortest_s : float
+        Trajectories between dropouts that are shorter are lost; 0 keeps them.
+    n_cameras : int
+        How many stand on a ring around the scene.
+    ring_m, height_m : float
+        Its radius, and how high it is.
     """
 
     rate_hz: float = 100.0
@@ -52,21 +57,39 @@ QUALISYS = MocapSystem()
 
 
 def room_cameras_m(system: MocapSystem, middle_m: np.ndarray) -> np.ndarray:
-    """Positions of the system's cameras, (n_cameras, 3), around a place on the floor (x, y)."""
+    """Positions of the system's cameras, (n_cameras, 3), around a place on the floor (x, y).
+
+    Examples
+    --------
+    >>> room_cameras_m(QUALISYS, np.zeros(2)).shape
+    (8, 3)
+    """
     angle = 2 * np.pi * (np.arange(system.n_cameras) + 0.5) / system.n_cameras
     ring = np.c_[np.cos(angle), np.sin(angle)] * system.ring_m + np.asarray(middle_m, float)[:2]
     return np.c_[ring, np.full(system.n_cameras, system.height_m)]
 
 
 def count_seeing(scene: RayScene, points_m: np.ndarray, cameras_m: np.ndarray) -> np.ndarray:
-    """How many cameras see each marker (m, 3) past what is in the scene, (m,)."""
+    """How many cameras see each marker past what is in the scene.
+
+    Parameters
+    ----------
+    scene : RayScene
+    points_m : array, shape (m, 3)
+        The markers.
+    cameras_m : array, shape (n_cameras, 3)
+
+    Returns
+    -------
+    array of int, shape (m,)
+    """
     m, c = len(points_m), len(cameras_m)
     start = np.repeat(points_m, c, axis=0)
     hidden = scene.occluded(join_rays(start.T, (np.tile(cameras_m, (m, 1)) - start).T))
     return (~hidden).reshape(m, c).sum(axis=1)
 
 
-def watch(
+def track_markers(
     person_at: Callable[[float], PosedBody],
     vertices: np.ndarray,
     fixed_m: np.ndarray,
@@ -79,17 +102,26 @@ def watch(
 
     Parameters
     ----------
-    person_at : seconds -> the person, posed in the world; while they keep still, the same object saves time
-    vertices : (12,), where the markers are on the person's skin
-    fixed_m : (k, 3), markers that do not move
-    times_s : (n,), increasing
-    every : the person is posed at every so many times; splines lead from one to the next
-    obstacles : what hides markers besides the person
+    person_at : callable
+        From seconds to the person, posed in the world; while they keep still, the same object saves time.
+    vertices : array of int, shape (12,)
+        Where the markers are on the person's skin.
+    fixed_m : array, shape (k, 3)
+        Markers that do not move.
+    times_s : array, shape (n,)
+        Increasing.
+    cameras_m : array, shape (n_cameras, 3)
+    every : int, optional
+        The person is posed at every so many times; splines lead from one to the next.
+    obstacles : tuple of Mesh, optional
+        What hides markers besides the person.
 
     Returns
     -------
-    markers_m : (n, 12 + k, 3), true centres in the world
-    n_seeing : (n, 12 + k), how many cameras see each
+    markers_m : array, shape (n, 12 + k, 3)
+        True centres in the world.
+    n_seeing : array of int, shape (n, 12 + k)
+        How many cameras see each.
     """
     at = np.unique(np.append(np.arange(0, len(times_s), every), len(times_s) - 1))
     found, seeing, before = [], [], None
@@ -128,11 +160,23 @@ def measure(
 
     Parameters
     ----------
-    times_s : (n,), on the system's clock, 1 / system.rate_hz apart
-    names : of the m markers
-    points_m : (n, m, 3), their true centres in the world
-    n_seeing : (n, m), how many cameras see each
-    T_mocap_world : (4, 4), into the system's frame
+    times_s : array, shape (n,)
+        On the system's clock, 1 / system.rate_hz apart.
+    names : tuple of str
+        Of the m markers.
+    points_m : array, shape (n, m, 3)
+        Their true centres in the world.
+    n_seeing : array of int, shape (n, m)
+        How many cameras see each.
+    T_mocap_world : array, shape (4, 4)
+        Into the system's frame.
+    system : MocapSystem
+    rng : numpy.random.Generator
+        Of the noise.
+
+    Returns
+    -------
+    MotionCapture
     """
     measured = np.asarray(n_seeing) >= system.min_cameras
     measured = _without_short_runs(measured, int(round(system.shortest_s * system.rate_hz)))

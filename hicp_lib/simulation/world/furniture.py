@@ -1,11 +1,13 @@
 """Furniture and clutter, built of boxes and turned shapes; floor at z = 0, metres."""
 
-from __future__ import annotations
+from collections.abc import Callable, Iterable
+from itertools import product
 
 import numpy as np
 
+from hicp_lib.core.keypoints import INDEX
 from hicp_lib.simulation.appearance import materials as m
-from hicp_lib.simulation.body.model import REGIONS, PosedBody, load_body
+from hicp_lib.simulation.body.model import PosedBody, load_body
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.surfaces import Surface
 
@@ -13,83 +15,104 @@ Rng = np.random.Generator
 
 
 def furnish(rng: Rng, half_m: np.ndarray, keep_clear_m: np.ndarray) -> list[Surface]:
-    """Furniture and clutter for a room of half sizes `half_m` (2,), clear of the discs (x, y, radius)."""
+    """Furniture and clutter for a room around the origin.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    half_m : array, shape (2,)
+        Half the room's sizes.
+    keep_clear_m : array, shape (n, 3)
+        Discs (x, y, radius) where nothing is put.
+
+    Returns
+    -------
+    list of Surface
+    """
     surfaces: list[Surface] = []
     taken = [tuple(disc) for disc in keep_clear_m]
-    makers = [_table, _chair, _chair, _sofa, _plant, _boxes, _lamp, _cupboard, _plant, _chair]
-    for index in rng.permutation(len(makers))[: rng.integers(4, 9)]:
-        for _ in range(12):
-            radius = (0.85, 0.35, 0.35, 1.0, 0.3, 0.4, 0.25, 0.6, 0.3, 0.35)[index]
+    for number in rng.permutation(len(_PIECES))[: rng.integers(4, 9)]:
+        make, radius, turns = _PIECES[number]
+        for _ in range(_N_TRIES):
             x, y = rng.uniform(-half_m + radius * 0.8, half_m - radius * 0.8)
             if all(np.hypot(x - a, y - b) > radius + r for a, b, r in taken):
                 taken.append((x, y, radius))
-                yaw = rng.uniform(-np.pi, np.pi) if index in (1, 2, 9, 5) else rng.choice([0, np.pi / 2])
-                surfaces += makers[index](rng, np.array([x, y, 0], np.float32), float(yaw))
+                yaw = rng.uniform(-np.pi, np.pi) if turns else rng.choice([0, np.pi / 2])
+                surfaces += make(rng, np.array([x, y, 0], np.float32), float(yaw))
                 break
     return surfaces
 
 
-def _turned(parts: list[g.Mesh], yaw: float, place: np.ndarray) -> g.Mesh:
-    return g.turned(g.concatenate(parts), yaw, place)
+def _boxes_at(place: np.ndarray, yaw: float, spans: list[tuple]) -> g.Mesh:
+    """Boxes between pairs of corners about a place, turned about it."""
+    lows, highs = (place + np.array(spans)).swapaxes(0, 1)
+    return g.turned(g.boxes(lows, highs), yaw, place)
 
 
-def _at(place: np.ndarray, low: tuple, high: tuple) -> g.Mesh:
-    return g.box(place + np.array(low), place + np.array(high))
+def legs(xs: Iterable[float], ys: Iterable[float], half: float, low: float, high: float) -> list[tuple]:
+    """Square legs or posts.
+
+    Parameters
+    ----------
+    xs, ys : iterable of float
+        At all pairs of these they stand.
+    half : float
+        Half their width.
+    low, high : float
+        Heights between which they reach.
+
+    Returns
+    -------
+    list of tuple
+        Pairs of corners, (x, y, z) each.
+    """
+    return [((x - half, y - half, low), (x + half, y + half, high)) for x, y in product(xs, ys)]
 
 
 def _table(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
     a, b, h = rng.uniform([0.4, 0.3, 0.55], [0.8, 0.45, 0.78])
-    parts = [_at(place, (-a, -b, h - 0.035), (a, b, h))]
-    for x in (-a + 0.05, a - 0.05):
-        parts += [
-            _at(place, (x - 0.025, y - 0.025, 0), (x + 0.025, y + 0.025, h - 0.03))
-            for y in (-b + 0.05, b - 0.05)
-        ]
-    surfaces = [Surface(_turned(parts, yaw, place), m.wooden(rng))]
+    top = ((-a, -b, h - 0.035), (a, b, h))
+    spans = [top, *legs((-a + 0.05, a - 0.05), (-b + 0.05, b - 0.05), 0.025, 0, h - 0.03)]
+    surfaces = [Surface(_boxes_at(place, yaw, spans), m.wooden(rng))]
     for _ in range(rng.integers(0, 5)):
         x, y = rng.uniform([-a + 0.15, -b + 0.12], [a - 0.15, b - 0.12])
-        spot = place + np.array([x, y, h], np.float32)
-        if rng.random() < 0.5:
-            r, tall = rng.uniform(0.03, 0.05), rng.uniform(0.08, 0.25)
-            thing = g.lathe(
-                [[0, 0], [r, 0], [r, tall * 0.6], [r * rng.uniform(0.4, 1.2), tall], [0, tall]], spot, 16
-            )
-        else:
-            w, d, t = rng.uniform([0.05, 0.05, 0.01], [0.15, 0.12, 0.2])
-            thing = g.box(spot - [w, d, 0], spot + [w, d, t], rng.uniform(0, 3))
+        thing = _small_thing(rng, place + np.array([x, y, h], np.float32))
         surfaces.append(Surface(g.turned(thing, yaw, place), m.plain(m.any_colour(rng), 0.4)))
     return surfaces
 
 
+def _small_thing(rng: Rng, spot: np.ndarray) -> g.Mesh:
+    """A vase or a box."""
+    if rng.random() < 0.5:
+        r, tall = rng.uniform(0.03, 0.05), rng.uniform(0.08, 0.25)
+        mouth = r * rng.uniform(0.4, 1.2)
+        return g.lathe([[0, 0], [r, 0], [r, tall * 0.6], [mouth, tall], [0, tall]], spot, 16)
+    w, d, t = rng.uniform([0.05, 0.05, 0.01], [0.15, 0.12, 0.2])
+    return g.box(spot - [w, d, 0], spot + [w, d, t], rng.uniform(0, 3))
+
+
 def _chair(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
     h, r = 0.45, 0.21
-    legs = [_at(place, (x - 0.02, y - 0.02, 0), (x + 0.02, y + 0.02, h)) for x in (-r, r) for y in (-r, r)]
-    back = [_at(place, (x - 0.02, r - 0.02, h), (x + 0.02, r + 0.02, 0.95)) for x in (-r, r)]
-    cushion = [_at(place, (-r - 0.02, -r - 0.02, h), (r + 0.02, r + 0.02, h + 0.05))]
-    cushion.append(_at(place, (-r, r - 0.025, 0.62), (r, r + 0.025, 0.95)))
+    frame = legs((-r, r), (-r, r), 0.02, 0, h) + legs((-r, r), (r,), 0.02, h, 0.95)
+    cushions = [((-r - 0.02, -r - 0.02, h), (r + 0.02, r + 0.02, h + 0.05))]
+    cushions.append(((-r, r - 0.025, 0.62), (r, r + 0.025, 0.95)))
     seat = m.upholstery(rng) if rng.random() < 0.5 else m.plain(m.any_colour(rng), 0.4)
-    return [
-        Surface(
-            _turned(legs + back, yaw, place),
-            m.wooden(rng) if rng.random() < 0.5 else m.plain(np.full(3, 0.08), 0.3),
-        ),
-        Surface(_turned(cushion, yaw, place), seat),
-    ]
+    stand = m.wooden(rng) if rng.random() < 0.5 else m.plain(np.full(3, 0.08), 0.3)
+    return [Surface(_boxes_at(place, yaw, frame), stand), Surface(_boxes_at(place, yaw, cushions), seat)]
 
 
 def _sofa(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
     w = rng.uniform(0.7, 1.0)
-    parts = [
-        _at(place, (-w, -0.4, 0.05), (w, 0.4, 0.25)),
-        _at(place, (-w, 0.25, 0.25), (w, 0.45, 0.85)),
-        _at(place, (-w - 0.12, -0.42, 0.05), (-w, 0.45, 0.6)),
-        _at(place, (w, -0.42, 0.05), (w + 0.12, 0.45, 0.6)),
+    spans = [
+        ((-w, -0.4, 0.05), (w, 0.4, 0.25)),
+        ((-w, 0.25, 0.25), (w, 0.45, 0.85)),
+        ((-w - 0.12, -0.42, 0.05), (-w, 0.45, 0.6)),
+        ((w, -0.42, 0.05), (w + 0.12, 0.45, 0.6)),
+        *(((x, -0.42, 0.25), (x + w - 0.01, 0.26, 0.43)) for x in (-w + 0.005, 0.005)),
     ]
-    cushions = [_at(place, (x, -0.42, 0.25), (x + w - 0.01, 0.26, 0.43)) for x in (-w + 0.005, 0.005)]
-    cloth = m.upholstery(rng)
-    surfaces = [Surface(_turned(parts + cushions, yaw, place), cloth)]
-    pillow = g.box(place + [0.1 - w, 0.05, 0.43], place + [0.5 - w, 0.2, 0.75])
-    return [*surfaces, Surface(_turned([pillow], yaw, place), m.upholstery(rng))]
+    sofa = Surface(_boxes_at(place, yaw, spans), m.upholstery(rng))
+    pillow = _boxes_at(place, yaw, [((0.1 - w, 0.05, 0.43), (0.5 - w, 0.2, 0.75))])
+    return [sofa, Surface(pillow, m.upholstery(rng))]
 
 
 def _plant(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
@@ -103,9 +126,7 @@ def _plant(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
     side = np.stack([-np.sin(azimuth), np.cos(azimuth), 0 * rise], axis=1) * rng.uniform(0.02, 0.06)
     drop = np.array([0, 0, -0.1])
     leaf = np.stack([start, start + 0.5 * out + side, start + out + drop, start + 0.5 * out - side], axis=1)
-    triangles = (
-        (np.arange(n)[:, None, None] * 4 + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3).astype(np.int32)
-    )
+    triangles = (4 * np.arange(n)[:, None, None] + g.QUAD).reshape(-1, 3).astype(np.int32)
     vertices = leaf.reshape(-1, 3).astype(np.float32)
     coords = np.repeat(rng.random((n, 2)), 4, axis=0).astype(np.float32)
     leaves = g.Mesh(vertices, triangles, g.vertex_normals(vertices, triangles), coords)
@@ -118,7 +139,7 @@ def _boxes(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
         a, b, h = rng.uniform([0.15, 0.12, 0.12], [0.3, 0.25, 0.4])
         mesh = g.box(place + [-a, -b, z], place + [a, b, z + h], yaw + rng.normal(0, 0.15))
         colour = np.array([0.42, 0.28, 0.15]) if rng.random() < 0.6 else m.any_colour(rng)
-        surfaces.append(Surface(mesh, m.paint(rng, colour, 0.1)))
+        surfaces.append(Surface(mesh, m.paint(colour, 0.1)))
         z += h
     return surfaces
 
@@ -135,35 +156,34 @@ def _lamp(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
 
 def _cupboard(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
     a, b, h = rng.uniform([0.4, 0.2, 0.7], [0.6, 0.28, 1.9])
-    body = _at(place, (-a, -b, 0.05), (a, b, h))
     doors = [
-        _at(place, (x, s * b - 0.01, 0.08), (x + a - 0.02, s * b + 0.012, h - 0.03))
+        ((x, side * b - 0.01, 0.08), (x + a - 0.02, side * b + 0.012, h - 0.03))
         for x in (-a + 0.01, 0.01)
-        for s in (-1, 1)
+        for side in (-1, 1)
     ]
     material = m.wooden(rng) if rng.random() < 0.6 else m.plain(m.off_white(rng), 0.35)
-    return [Surface(_turned([body, *doors], yaw, place), material)]
+    return [Surface(_boxes_at(place, yaw, [((-a, -b, 0.05), (a, b, h)), *doors]), material)]
+
+
+# What makes a piece, how much room it takes (radius, m), and whether it stands at any angle.
+_PIECES: list[tuple[Callable[[Rng, np.ndarray, float], list[Surface]], float, bool]] = [
+    (_table, 0.85, False), (_chair, 0.35, True), (_chair, 0.35, True), (_sofa, 1.0, False),
+    (_plant, 0.3, False), (_boxes, 0.4, True), (_lamp, 0.25, False), (_cupboard, 0.6, False),
+    (_plant, 0.3, False), (_chair, 0.35, True),
+]  # fmt: skip
+_N_TRIES = 12
 
 
 def stool(rng: Rng, posed: PosedBody) -> Surface:
     """Something to sit on, right under a sitting person."""
-    body = load_body()
-    seat = posed.vertices_m[
-        np.isin(body.regions, [REGIONS.index("hips"), REGIONS.index("torso"), REGIONS.index("thigh")])
-    ]
-    x, y = posed.keypoints_m[19, :2]
+    seat = posed.vertices_m[load_body().in_regions("hips", "torso", "thigh")]
+    x, y = posed.keypoints_m[INDEX["mid_hip"], :2]
     near = np.hypot(seat[:, 0] - x, seat[:, 1] - y) < 0.2
     top = float(seat[near, 2].min()) - 0.004
     r = rng.uniform(0.17, 0.21)
     if rng.random() < 0.5:
         mesh = g.box([x - r, y - r, 0], [x + r, y + r, top], rng.uniform(0, 3))
     else:
-        mesh = g.lathe(
-            [[r * 0.8, 0], [0.05, 0.05], [0.05, top - 0.06], [r, top - 0.05], [r, top], [0, top]], [x, y, 0]
-        )
-    return Surface(mesh, _wood_or_paint(rng))
-
-
-def _wood_or_paint(rng: Rng) -> m.Material:
-    """Furniture is wood, or painted."""
-    return m.wooden(rng) if rng.random() < 0.5 else m.plain(m.any_colour(rng), 0.4)
+        profile = [[r * 0.8, 0], [0.05, 0.05], [0.05, top - 0.06], [r, top - 0.05], [r, top], [0, top]]
+        mesh = g.lathe(profile, [x, y, 0])
+    return Surface(mesh, m.wooden(rng) if rng.random() < 0.5 else m.plain(m.any_colour(rng), 0.4))

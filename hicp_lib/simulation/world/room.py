@@ -3,8 +3,7 @@
 World frame: z up, floor at z = 0, metres. The room is a box around the origin.
 """
 
-from __future__ import annotations
-
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,19 +14,28 @@ from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.world.furniture import furnish
 
 Rng = np.random.Generator
+Span = tuple[float, float]
+Window = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
 class Room:
-    """A furnished room: `half_m` are half its sizes along x and y, `height_m` its height.
+    """A furnished room.
 
-    `windows` are (centre, half_u, half_v, inward normal) of the panes, for the light.
+    Attributes
+    ----------
+    half_m : array, shape (2,)
+        Half its sizes along x and y.
+    height_m : float
+    surfaces : list of Surface
+    windows : list of tuple of array, shape (3,)
+        Centre, half_u, half_v and inward normal of each pane, for the light.
     """
 
     half_m: np.ndarray
     height_m: float
     surfaces: list[Surface]
-    windows: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]
+    windows: list[Window]
 
 
 def make_room(rng: Rng, keep_clear_m: np.ndarray) -> Room:
@@ -35,21 +43,32 @@ def make_room(rng: Rng, keep_clear_m: np.ndarray) -> Room:
 
     Parameters
     ----------
+    rng : numpy.random.Generator
     keep_clear_m : array, shape (n, 3)
         Discs (x, y, radius) on the floor where nothing is put: people, and the view of them.
+
+    Returns
+    -------
+    Room
+
+    Examples
+    --------
+    >>> room = make_room(np.random.default_rng(0), np.array([[0.0, 0.0, 1.0]]))
+    >>> 2.4 <= room.height_m <= 3.1, len(room.surfaces) > 10
+    (True, True)
     """
     half = rng.uniform([2.6, 3.2], [4.2, 4.6])
     height = rng.uniform(2.4, 3.1)
-    surfaces = _shell(rng, half, height)
-    windows: list = []
-    for wall in range(4):
-        surfaces += _on_wall(rng, _Wall(wall, half, height), windows)
+    walls = [_Wall(number, half, height) for number in range(4)]
+    surfaces = _shell(rng, half, height, walls)
+    for wall in walls:
+        surfaces += _on_wall(rng, wall)
     surfaces += furnish(rng, half, keep_clear_m)
-    return Room(half, height, surfaces, windows)
+    return Room(half, height, surfaces, [window for wall in walls for window in wall.windows])
 
 
 class _Wall:
-    """One wall's own frame: u along it, v up, w into the room; `point(u, v, w)` in the world."""
+    """One wall's own frame: u along it, v up, w into the room; and the windows in it, see `Room`."""
 
     def __init__(self, number: int, half: np.ndarray, height: float):
         axis, sign = number // 2, 1 - 2 * (number % 2)
@@ -59,22 +78,16 @@ class _Wall:
         self.half_width, self.height = float(half[1 - axis]), height
         self.centre = np.zeros(3, np.float32)
         self.centre[axis] = sign * half[axis]
+        self.windows: list[Window] = []
 
     def point(self, u: float | np.ndarray, v: float, w: float | np.ndarray = 0.0) -> np.ndarray:
         """A place, or several for u and w of shape (n, 1)."""
         return self.centre + u * self.u + np.array([0, 0, v], np.float32) + w * self.inward
 
-    def box(self, u: tuple[float, float], v: tuple[float, float], w: tuple[float, float]) -> g.Mesh:
-        corners = np.array([self.point(u[i], v[i], w[i]) for i in (0, 1)])
-        return g.box(corners.min(axis=0), corners.max(axis=0))
-
-    def boxes(self, spans: list[tuple]) -> g.Mesh:
-        """Several boxes at once, each ((u, u), (v, v), (w, w))."""
-        corners = np.moveaxis(np.array(spans, np.float32), 1, 2)  # (n, low or high, uvw)
-        up = np.array([0, 0, 1], np.float32)
-        points = (
-            self.centre + corners[..., :1] * self.u + corners[..., 1:2] * up + corners[..., 2:] * self.inward
-        )
+    def boxes(self, *spans: tuple[Span, Span, Span]) -> g.Mesh:
+        """Boxes, each ((u, u), (v, v), (w, w))."""
+        u, v, w = (np.array(spans, np.float32)[:, k, :, None] for k in range(3))
+        points = self.centre + u * self.u + v * np.array([0, 0, 1], np.float32) + w * self.inward
         return g.boxes(points.min(axis=1), points.max(axis=1))
 
     def panel(self, u: tuple[float, float], v: tuple[float, float], w: float) -> g.Mesh:
@@ -83,79 +96,60 @@ class _Wall:
         return mesh if mesh.normals[0] @ self.inward > 0 else g.quad(mesh.vertices_m[1], -across, up)
 
 
-def _shell(rng: Rng, half: np.ndarray, height: float) -> list[Surface]:
+def _shell(rng: Rng, half: np.ndarray, height: float, walls: list[_Wall]) -> list[Surface]:
     x, y = half
     floor = g.quad([-x, -y, 0], [2 * x, 0, 0], [0, 2 * y, 0])
     if rng.random() < 0.5:
         floor = g.quad([x, -y, 0], [0, 2 * y, 0], [-2 * x, 0, 0])
     ceiling = g.quad([-x, y, height], [2 * x, 0, 0], [0, -2 * y, 0])
-    surfaces = [Surface(floor, m.random_floor(rng)), Surface(ceiling, m.paint(rng, m.off_white(rng), 0.03))]
+    surfaces = [Surface(floor, m.random_floor(rng)), Surface(ceiling, m.paint(m.off_white(rng), 0.03))]
     paint = m.random_wall(rng)
     accent = int(rng.integers(0, 8))  # often, one wall differs
-    for number in range(4):
-        wall = _Wall(number, half, height)
+    for number, wall in enumerate(walls):
         material = m.random_wall(rng) if number == accent else paint
         surfaces.append(Surface(wall.panel((-wall.half_width, wall.half_width), (0, height), 0), material))
     skirting_colour = m.off_white(rng) if rng.random() < 0.7 else m.wood_colour(rng)
-    skirting = [
-        _Wall(k, half, height).box((-half[1 - k // 2], half[1 - k // 2]), (0, 0.09), (0, 0.015))
-        for k in range(4)
-    ]
+    skirting = [wall.boxes(((-wall.half_width, wall.half_width), (0, 0.09), (0, 0.015))) for wall in walls]
     return [*surfaces, Surface(g.concatenate(skirting), m.plain(skirting_colour, 0.4))]
 
 
-def _on_wall(rng: Rng, wall: _Wall, windows: list) -> list[Surface]:
+def _on_wall(rng: Rng, wall: _Wall) -> list[Surface]:
     """What hangs on a wall or opens in it, side by side along it."""
     surfaces: list[Surface] = []
     u = -wall.half_width + rng.uniform(0.1, 0.8)
     while u < wall.half_width - 0.5:
-        kind = rng.choice(["window", "door", "picture", "shelf", "nothing", "radiator"], p=_WALL_ODDS)
-        width = {"window": 1.4, "door": 0.9, "picture": 0.6, "shelf": 1.0, "nothing": 0.6, "radiator": 1.0}[
-            kind
-        ]
+        kind = rng.choice(list(_ON_WALL), p=[often for often, _, _ in _ON_WALL.values()])
+        _, width, make = _ON_WALL[kind]
         width *= rng.uniform(0.8, 1.25)
         if u + width > wall.half_width - 0.1:
             break
-        span = (u, u + width)
-        if kind == "window":
-            surfaces += _window(rng, wall, span, windows)
-        elif kind == "door":
-            surfaces += _door(rng, wall, span)
-        elif kind == "picture":
-            surfaces += _picture(rng, wall, span)
-        elif kind == "shelf":
-            surfaces += _shelf(rng, wall, span)
-        elif kind == "radiator":
-            ribs = [((a, a + 0.05), (0.12, 0.7), (0.03, 0.12)) for a in np.arange(u, u + width - 0.05, 0.075)]
-            surfaces.append(Surface(wall.boxes(ribs), m.plain(m.off_white(rng), 0.35)))
+        surfaces += make(rng, wall, (u, u + width))
         u += width + rng.uniform(0.15, 0.9)
     return surfaces
 
 
-_WALL_ODDS = [0.22, 0.13, 0.30, 0.17, 0.10, 0.08]
+def _radiator(rng: Rng, wall: _Wall, span: Span) -> list[Surface]:
+    ribs = [((u, u + 0.05), (0.12, 0.7), (0.03, 0.12)) for u in np.arange(span[0], span[1] - 0.05, 0.075)]
+    return [Surface(wall.boxes(*ribs), m.plain(m.off_white(rng), 0.35))]
 
 
-def _window(rng: Rng, wall: _Wall, span: tuple[float, float], windows: list) -> list[Surface]:
+def _window(rng: Rng, wall: _Wall, span: Span) -> list[Surface]:
     low, high = rng.uniform(0.6, 1.0), rng.uniform(2.0, min(2.3, wall.height - 0.1))
     pane = wall.panel(span, (low, high), 0.01)
     centre = wall.point(sum(span) / 2, (low + high) / 2, 0.03)
-    windows.append(
-        (centre, wall.u * (span[1] - span[0]) / 2, np.array([0, 0, (high - low) / 2]), wall.inward)
-    )
+    half_u, half_v = wall.u * (span[1] - span[0]) / 2, np.array([0, 0, (high - low) / 2])
+    wall.windows.append((centre, half_u, half_v, wall.inward))
     bars = [span[0], *np.linspace(*span, rng.integers(2, 4))[1:-1], span[1]]
     frame = [((b - 0.03, b + 0.03), (low - 0.03, high + 0.03), (0, 0.04)) for b in bars]
     frame += [(span, (b - 0.03, b + 0.03), (0, 0.04)) for b in (low, high)]
     frame.append(((span[0] - 0.08, span[1] + 0.08), (low - 0.06, low - 0.03), (0, 0.16)))
-    surfaces = [
-        Surface(pane, m.outside(rng)),
-        Surface(wall.boxes(frame), m.plain(m.off_white(rng), 0.35)),
-    ]
+    surfaces = [Surface(pane, m.outside(rng)), Surface(wall.boxes(*frame), m.plain(m.off_white(rng), 0.35))]
     if rng.random() < 0.5:
-        surfaces += _curtains(rng, wall, span, high)
+        surfaces.append(_curtains(rng, wall, span, high))
     return surfaces
 
 
-def _curtains(rng: Rng, wall: _Wall, span: tuple[float, float], high: float) -> list[Surface]:
+def _curtains(rng: Rng, wall: _Wall, span: Span, high: float) -> Surface:
     meshes = []
     width, bottom = rng.uniform(0.25, 0.5), rng.choice([0.05, 0.6])
     for side in (span[0] - 0.2, span[1] + 0.2 - width):
@@ -167,29 +161,30 @@ def _curtains(rng: Rng, wall: _Wall, span: tuple[float, float], high: float) -> 
         coords = np.tile(np.c_[(u - side) * 2, u * 0], (2, 1)).astype(np.float32)
         coords[len(u) :, 1] = high - bottom
         meshes.append(g.Mesh(vertices, triangles, g.vertex_normals(vertices, triangles), coords))
-    return [Surface(g.concatenate(meshes), m.upholstery(rng))]
+    return Surface(g.concatenate(meshes), m.upholstery(rng))
 
 
-def _door(rng: Rng, wall: _Wall, span: tuple[float, float]) -> list[Surface]:
+def _door(rng: Rng, wall: _Wall, span: Span) -> list[Surface]:
     top = 2.05
     leaf = wall.panel(span, (0, top), 0.012)
+    parts: list[tuple[Span, Span, Span]]
     parts = [((b - 0.04, b + 0.04), (0, top + 0.04), (0, 0.04)) for b in span]
     parts.append(((span[0] - 0.04, span[1] + 0.04), (top, top + 0.08), (0, 0.04)))
     inset = (span[0] + 0.13, span[1] - 0.13)
     parts += [(inset, v, (0.012, 0.022)) for v in ((0.2, 0.85), (1.05, 1.9))]
-    handle = wall.box((span[1] - 0.13, span[1] - 0.03), (1.02, 1.04), (0.04, 0.07))
+    handle = wall.boxes(((span[1] - 0.13, span[1] - 0.03), (1.02, 1.04), (0.04, 0.07)))
     material = m.plain(m.off_white(rng), 0.35) if rng.random() < 0.5 else m.wooden(rng)
     return [
-        Surface(g.concatenate([leaf, wall.boxes(parts)]), material),
+        Surface(g.concatenate([leaf, wall.boxes(*parts)]), material),
         Surface(handle, m.plain(np.full(3, 0.35), 0.25, 0.5)),
     ]
 
 
-def _picture(rng: Rng, wall: _Wall, span: tuple[float, float]) -> list[Surface]:
+def _picture(rng: Rng, wall: _Wall, span: Span) -> list[Surface]:
     height = (span[1] - span[0]) * rng.uniform(0.6, 1.4)
     middle = rng.uniform(1.45, 1.75)
     v = (middle - height / 2, middle + height / 2)
-    frame = wall.box((span[0] - 0.03, span[1] + 0.03), (v[0] - 0.03, v[1] + 0.03), (0, 0.02))
+    frame = wall.boxes(((span[0] - 0.03, span[1] + 0.03), (v[0] - 0.03, v[1] + 0.03), (0, 0.02)))
     mount = wall.panel(span, v, 0.022)
     border = rng.uniform(0.0, 0.12) * (span[1] - span[0])
     image = wall.panel((span[0] + border, span[1] - border), (v[0] + border, v[1] - border), 0.024)
@@ -201,7 +196,7 @@ def _picture(rng: Rng, wall: _Wall, span: tuple[float, float]) -> list[Surface]:
     ]
 
 
-def _shelf(rng: Rng, wall: _Wall, span: tuple[float, float]) -> list[Surface]:
+def _shelf(rng: Rng, wall: _Wall, span: Span) -> list[Surface]:
     """A bookcase on the floor, or boards on the wall, with books and boxes."""
     standing = rng.random() < 0.6
     depth = rng.uniform(0.22, 0.35)
@@ -211,23 +206,37 @@ def _shelf(rng: Rng, wall: _Wall, span: tuple[float, float]) -> list[Surface]:
     if standing:
         boards += [((b - 0.012, b + 0.012), (0, high), (0, depth)) for b in span]
         boards.append((span, (0, high), (0, 0.01)))
-    groups: dict[int, list] = {k: [] for k in range(5)}
+    books: list[list] = [[] for _ in range(5)]  # by colour
     for v in levels[:-1]:
-        u = span[0] + 0.03
-        while u < span[1] - 0.08:
-            if rng.random() < 0.15:
-                u += rng.uniform(0.05, 0.25)
-                continue
-            thick = rng.uniform(0.015, 0.05) if rng.random() < 0.85 else rng.uniform(0.12, 0.25)
-            if u + thick > span[1] - 0.02:
-                break
-            tall = min(rng.uniform(0.17, 0.29), levels[1] - levels[0] - 0.04)
-            book = ((u, u + thick), (v + 0.012, v + tall), (0.015, depth - rng.uniform(0.01, 0.07)))
-            groups[int(rng.integers(5))].append(book)
-            u += thick + 0.002
+        for colour, book in _row_of_books(rng, span, v, depth, levels[1] - levels[0] - 0.04):
+            books[colour].append(book)
     wood = m.wooden(rng) if rng.random() < 0.6 else m.plain(m.off_white(rng), 0.4)
-    surfaces = [Surface(wall.boxes(boards), wood)]
-    for books in groups.values():
-        if books:
-            surfaces.append(Surface(wall.boxes(books), m.plain(m.any_colour(rng), 0.55)))
-    return surfaces
+    coloured = [Surface(wall.boxes(*some), m.plain(m.any_colour(rng), 0.55)) for some in books if some]
+    return [Surface(wall.boxes(*boards), wood), *coloured]
+
+
+def _row_of_books(rng: Rng, span: Span, v: float, depth: float, room: float) -> Iterator[tuple[int, tuple]]:
+    """Books, boxes and gaps on a board at height `v`, at most `room` high: colour and span of each."""
+    u = span[0] + 0.03
+    while u < span[1] - 0.08:
+        if rng.random() < 0.15:
+            u += rng.uniform(0.05, 0.25)
+            continue
+        thick = rng.uniform(0.015, 0.05) if rng.random() < 0.85 else rng.uniform(0.12, 0.25)
+        if u + thick > span[1] - 0.02:
+            break
+        tall = min(rng.uniform(0.17, 0.29), room)
+        book = ((u, u + thick), (v + 0.012, v + tall), (0.015, depth - rng.uniform(0.01, 0.07)))
+        yield int(rng.integers(5)), book
+        u += thick + 0.002
+
+
+# What is on a wall: how often, how wide (m), what makes it.
+_ON_WALL: dict[str, tuple[float, float, Callable[[Rng, _Wall, Span], list[Surface]]]] = {
+    "window": (0.22, 1.4, _window),
+    "door": (0.13, 0.9, _door),
+    "picture": (0.30, 0.6, _picture),
+    "shelf": (0.17, 1.0, _shelf),
+    "nothing": (0.10, 0.6, lambda rng, wall, span: []),
+    "radiator": (0.08, 1.0, _radiator),
+}

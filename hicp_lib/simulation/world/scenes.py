@@ -5,13 +5,7 @@ image would be five times as large and tell no more. Image k depends on the seed
 the number of worker processes changes nothing, and a larger data set contains the smaller one.
 """
 
-from __future__ import annotations
-
-import multiprocessing
-import multiprocessing.pool
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -19,18 +13,20 @@ import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.core.cache import key
-from hicp_lib.core.environment import with_variables
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_bytes, write_json
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import Frame, render
+from hicp_lib.simulation.world.batch import check_output, run_jobs
 from hicp_lib.simulation.world.staging import Stage, distance_m, random_stage
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
 JPEG_QUALITY = 95
 MAX_SCENES = 1_000_000
+_MAX_NUMBER = 1_000_000_000  # of seeds and workers
+_PARTS_DIR = ".scenes"  # the people of finished images, and what they were made with
 
 
 def render_dataset(
@@ -46,8 +42,19 @@ def render_dataset(
 
     Parameters
     ----------
-    seed : non-negative
-    workers : processes; as many as there are processors when left out
+    out : str or Path
+    n : int
+        How many images.
+    seed : int
+        Non-negative.
+    workers : int, optional
+        Processes; as many as there are processors when left out.
+    progress : bool, optional
+        Whether a terminal is shown a bar.
+
+    Returns
+    -------
+    Annotations
 
     Raises
     ------
@@ -58,13 +65,11 @@ def render_dataset(
     _check(out, n, seed, workers)
     stamp = {"renderer": key([render_dataset]), "seed": int(seed)}
     _prepare(out, stamp)
-    todo = [(str(out), seed, index) for index in range(n) if not _is_done(out, index)]
-    bar = tqdm(
-        total=n, initial=n - len(todo), desc="rendering", unit="image", disable=None if progress else True
-    )
-    for _ in _in_processes(todo, workers or os.cpu_count() or 1):
-        bar.update()
-    bar.close()
+    # The people are written after the image.
+    missing = [k for k in range(n) if not (_people_path(out, k).exists() and _image_path(out, k).exists())]
+    done = run_jobs([partial(_render_one, out, seed, index) for index in missing], workers)
+    for _ in tqdm(done, "rendering", n, initial=n - len(missing), unit="image", disable=not progress or None):
+        pass
     annotations = _collect(out, n)
     for path in (out / "images").glob("*.jpg"):
         if int(path.stem) not in annotations.images:
@@ -79,25 +84,22 @@ def _check(out: Path, n: int, seed: int, workers: int | None) -> None:
         ("seed", seed, 0),
         ("workers", 1 if workers is None else workers, 1),
     ):
-        if not isinstance(value, int | np.integer) or not low <= value <= MAX_SCENES * 1000:
+        if not isinstance(value, int | np.integer) or not low <= value <= _MAX_NUMBER:
             raise InputError(f"{name} is {value!r}; expected a whole number of at least {low}")
     if n > MAX_SCENES:
         raise InputError(f"n is {n}; expected at most {MAX_SCENES} images")
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: is a file; give a folder to render into")
-    if out.is_dir() and any(out.iterdir()) and not (out / ".scenes").is_dir():
-        raise InputError(f"{out}: holds files that were not rendered; give an empty or new folder")
+    check_output(out, _PARTS_DIR, "to render into", "rendered")
 
 
 def _prepare(out: Path, stamp: dict) -> None:
     """Make the folders; drop what another seed or renderer left."""
-    stamp_file = out / ".scenes" / "stamp.json"
-    (out / ".scenes").mkdir(parents=True, exist_ok=True)
-    (out / "images").mkdir(exist_ok=True)
+    stamp_file = out / _PARTS_DIR / "stamp.json"
+    for folder in (_PARTS_DIR, "images"):
+        (out / folder).mkdir(parents=True, exist_ok=True)
     (out / "annotations.json").unlink(missing_ok=True)
     if stamp_file.exists() and read_json(stamp_file) == stamp:
         return
-    for path in [stamp_file, *(out / ".scenes").glob("*.json"), *(out / "images").glob("*.jpg")]:
+    for path in [stamp_file, *(out / _PARTS_DIR).glob("*.json"), *(out / "images").glob("*.jpg")]:
         path.unlink(missing_ok=True)
     write_json(stamp_file, stamp)
 
@@ -107,51 +109,33 @@ def _image_path(out: Path, index: int) -> Path:
 
 
 def _people_path(out: Path, index: int) -> Path:
-    return out / ".scenes" / f"{index:06d}.json"
+    return out / _PARTS_DIR / f"{index:06d}.json"
 
 
-def _is_done(out: Path, index: int) -> bool:
-    # The people are written after the image.
-    return _people_path(out, index).exists() and _image_path(out, index).exists()
-
-
-def _in_processes(todo: list[tuple[str, int, int]], workers: int) -> Iterator[None]:
-    if workers == 1 or len(todo) < 3:
-        yield from map(_render_one, todo)
-        return
-    with worker_pool(min(workers, len(todo))) as pool:
-        yield from pool.imap_unordered(_render_one, todo, chunksize=2)
-
-
-@contextmanager
-def worker_pool(workers: int) -> Iterator[multiprocessing.pool.Pool]:
-    """Processes that render, with one thread each: more threads than processors only wait for each other.
-
-    Each starts as a fresh interpreter, since Open3D's threads do not survive a fork; the
-    linear algebra library reads its number of threads when it is loaded.
-    """
-    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-    context = multiprocessing.get_context("spawn")
-    with with_variables(**dict.fromkeys(names, "1")):
-        pool = context.Pool(workers, initializer=cv2.setNumThreads, initargs=(1,))
-    with pool:
-        yield pool
-
-
-def _render_one(job: tuple[str, int, int]) -> None:
-    out, seed, index = Path(job[0]), job[1], job[2]
+def _render_one(out: Path, seed: int, index: int) -> None:
     image, people = render_scene(seed, index)
     bgr = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
     _, encoded = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     write_bytes(_image_path(out, index), encoded.tobytes())
-    write_json(
-        _people_path(out, index), {"width": image.shape[1], "height": image.shape[0], "people": people}
-    )
+    height, width = image.shape[:2]
+    write_json(_people_path(out, index), {"width": width, "height": height, "people": people})
 
 
 def render_scene(seed: int, index: int) -> tuple[np.ndarray, list[dict]]:
-    """Image `index` of a seed: RGB uint8, (height, width, 3), and its people as JSON-able rows."""
-    rng = np.random.default_rng(np.random.SeedSequence([seed, index]))
+    """One image of a data set.
+
+    Parameters
+    ----------
+    seed, index : int
+
+    Returns
+    -------
+    image : array, shape (height, width, 3), dtype uint8
+        RGB.
+    people : list of dict
+        As `annotate` describes them.
+    """
+    rng = np.random.default_rng([seed, index])
     while True:
         stage = random_stage(rng)
         frame = render(stage.world, stage.camera, rng)
@@ -161,7 +145,14 @@ def render_scene(seed: int, index: int) -> tuple[np.ndarray, list[dict]]:
 
 
 def annotate(stage: Stage, frame: Frame) -> list[dict]:
-    """Box, area, keypoints and distance of everyone seen in a frame."""
+    """Everyone seen in a frame, as JSON-able dictionaries.
+
+    Returns
+    -------
+    list of dict
+        Of each person `bbox` (x, y, width, height) and `area` of the visible pixels, `keypoints`
+        (136 times u, v, visibility; zeros outside the image) and `distance_m`.
+    """
     rows = []
     for number, person in enumerate(stage.people):
         v, u = np.nonzero(frame.person == number)
@@ -170,15 +161,10 @@ def annotate(stage: Stage, frame: Frame) -> list[dict]:
         pixels, seen = keypoint_visibility(frame.rays, stage.camera, person.keypoints_m, number)
         box = [int(u.min()), int(v.min()), int(np.ptp(u)) + 1, int(np.ptp(v)) + 1]
         keypoints = np.where(seen[:, None] > 0, np.column_stack([pixels, seen]), 0)
-        keypoints = np.clip(keypoints.round(2), 0, [frame.person.shape[1] - 1, frame.person.shape[0] - 1, 2])
-        rows.append(
-            {
-                "bbox": box,
-                "area": len(u),
-                "keypoints": keypoints.tolist(),
-                "distance_m": round(distance_m(stage.camera, person), 3),
-            }
-        )
+        last = [stage.camera.width_px - 1, stage.camera.height_px - 1, 2]
+        keypoints = np.clip(keypoints.round(2), 0, last).tolist()
+        away_m = round(distance_m(stage.camera, person), 3)
+        rows.append({"bbox": box, "area": len(u), "keypoints": keypoints, "distance_m": away_m})
     return rows
 
 
@@ -188,17 +174,17 @@ def _collect(out: Path, n: int) -> Annotations:
         k: ImageInfo(k, _image_path(out, k).name, scene["width"], scene["height"])
         for k, scene in enumerate(scenes)
     }
-    people = [(k, person) for k, scene in enumerate(scenes) for person in scene["people"]]
-    keypoints = np.array([p["keypoints"] for _, p in people]).reshape(-1, N_KEYPOINTS, 3)
+    people = [person for scene in scenes for person in scene["people"]]
+    keypoints = np.array([person["keypoints"] for person in people]).reshape(-1, N_KEYPOINTS, 3)
     labelled = keypoints[..., 2:] > 0
     return Annotations(
         images=images,
         ids=np.arange(1, len(people) + 1),
-        image_ids=np.array([k for k, _ in people]),
-        boxes_px=np.array([p["bbox"] for _, p in people], float),
-        areas_px2=np.array([p["area"] for _, p in people], float),
+        image_ids=np.repeat(np.arange(n), [len(scene["people"]) for scene in scenes]),
+        boxes_px=np.array([person["bbox"] for person in people], float),
+        areas_px2=np.array([person["area"] for person in people], float),
         is_crowd=np.zeros(len(people), bool),
         keypoints_px=np.where(labelled, keypoints[..., :2], np.nan),
         visibility=keypoints[..., 2],
-        extras=[{"distance_m": p["distance_m"]} for _, p in people],
+        extras=[{"distance_m": person["distance_m"]} for person in people],
     )

@@ -1,11 +1,11 @@
 """Staging: who stands where, in what room and light, and where the photograph is taken from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
+from hicp_lib.core.keypoints import INDEX
 from hicp_lib.simulation.appearance.materials import hsv
 from hicp_lib.simulation.appearance.people import dress, random_appearance
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
@@ -23,7 +23,16 @@ Rng = np.random.Generator
 
 @dataclass(frozen=True)
 class Stage:
-    """A scene ready to be photographed; `people` in the order of the surfaces' person numbers."""
+    """A scene ready to be photographed.
+
+    Attributes
+    ----------
+    world : World
+    camera : PlacedCamera
+    sensor : Sensor
+    people : list of PosedBody
+        In the order of the surfaces' person numbers.
+    """
 
     world: World
     camera: PlacedCamera
@@ -32,24 +41,26 @@ class Stage:
 
 
 def random_stage(rng: Rng) -> Stage:
-    """One to three people, one to five metres from a camera, in a furnished room."""
-    n_people = int(rng.choice([1, 2, 3], p=[0.68, 0.24, 0.08]))
-    places = _places(rng, n_people)
-    people, surfaces = [], []
-    for number, place in enumerate(places):
-        posed, dressed = _person(rng, place, number)
-        people.append(posed)
-        surfaces += dressed
+    """One to three people, one to five metres from a camera, in a furnished room.
+
+    Examples
+    --------
+    >>> stage = random_stage(np.random.default_rng(0))
+    >>> len(stage.people), (stage.camera.width_px, stage.camera.height_px)
+    (1, (640, 480))
+    """
+    places = _places(rng, int(rng.choice([1, 2, 3], p=[0.68, 0.24, 0.08])))
+    people, dressed = zip(*(_person(rng, place, number) for number, place in enumerate(places)), strict=True)
     camera = _camera(rng, people[0])
     centre = camera.centre_m
     clear = [(x, y, 0.55) for x, y in places] + [(centre[0], centre[1], 0.7)]
     if rng.random() < 0.88:  # the rest of the time something may stand before people
-        clear += [
-            (*(centre[:2] + t * (np.array(p) - centre[:2])), 0.3) for p in places for t in (0.3, 0.5, 0.7)
-        ]
+        ways = (np.array(place) - centre[:2] for place in places)
+        clear += [(*(centre[:2] + t * way), 0.3) for way in ways for t in (0.3, 0.5, 0.7)]
     room = make_room(rng, np.array(clear))
-    world = World(room.surfaces + surfaces, *_lighting(rng, room, places, centre), backdrop=np.zeros(3))
-    return Stage(world, camera, _sensor(rng), people)
+    surfaces = [*room.surfaces, *chain(*dressed)]
+    world = World(surfaces, *_lighting(rng, room, centre), backdrop=np.zeros(3))
+    return Stage(world, camera, _sensor(rng), list(people))
 
 
 def _places(rng: Rng, n_people: int) -> list[tuple[float, float]]:
@@ -66,10 +77,8 @@ def _places(rng: Rng, n_people: int) -> list[tuple[float, float]]:
 def _person(rng: Rng, place: tuple[float, float], number: int) -> tuple[PosedBody, list[Surface]]:
     appearance = random_appearance(rng)
     # Mostly towards the camera (which lies along -y), less often sideways, sometimes away.
-    turn = rng.choice(
-        [rng.normal(0, 0.45), rng.uniform(-1.8, 1.8), rng.uniform(-np.pi, np.pi)], p=[0.76, 0.17, 0.07]
-    )
-    yaw = -np.pi / 2 + turn
+    turns = [rng.normal(0, 0.45), rng.uniform(-1.8, 1.8), rng.uniform(-np.pi, np.pi)]
+    yaw = -np.pi / 2 + rng.choice(turns, p=[0.76, 0.17, 0.07])
     T_world_body = np.eye(4)
     T_world_body[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
     T_world_body[:2, 3] = place
@@ -78,8 +87,7 @@ def _person(rng: Rng, place: tuple[float, float], number: int) -> tuple[PosedBod
         kind = "standing"
     body = load_body()
     posed = pose_body(body, appearance.shape, sample_pose(rng, body, kind, appearance.shape), T_world_body)
-    surfaces = dress(appearance, posed, number)
-    return posed, [*surfaces, stool(rng, posed)] if kind == "sitting" else surfaces
+    return posed, dress(appearance, posed, number) + ([stool(rng, posed)] if kind == "sitting" else [])
 
 
 # How often each kind of pose is photographed.
@@ -91,30 +99,23 @@ _POSES = {
 
 def _camera(rng: Rng, person: PosedBody) -> PlacedCamera:
     """A hand-held camera that frames the first person: all of them, to the knees, or closer."""
-    upright = rng.random() < 0.35
-    width, height = (480, 640) if upright else (640, 480)
+    width, height = (480, 640) if rng.random() < 0.35 else (640, 480)
     focal = rng.uniform(0.82, 1.15) * 640
-    top, low = person.vertices_m[:, 2].max(), 0.0
-    hips, chest = person.keypoints_m[19, 2], person.keypoints_m[18, 2] - 0.2
-    shot = rng.choice(["full", "knees", "hips", "close"], p=[0.3, 0.28, 0.27, 0.15])
-    bottom = {"full": low - 0.05, "knees": 0.5 * hips, "hips": hips - 0.1, "close": chest - 0.05}[shot]
-    bottom += rng.normal(0, 0.05)
-    ceiling = top + rng.uniform(0.03, 0.35)
+    (x, y, hips), chest = person.keypoints_m[INDEX["mid_hip"]], person.keypoints_m[INDEX["neck"], 2] - 0.2
+    lowest = {"full": -0.05, "knees": 0.5 * hips, "hips": hips - 0.1, "close": chest - 0.05}
+    bottom = lowest[rng.choice(list(lowest), p=[0.3, 0.28, 0.27, 0.15])] + rng.normal(0, 0.05)
+    ceiling = person.vertices_m[:, 2].max() + rng.uniform(0.03, 0.35)
     distance = float(np.clip((ceiling - bottom) * focal / height * rng.uniform(1.0, 1.25), 0.95, 5.0))
-    middle = np.array([person.keypoints_m[19, 0], person.keypoints_m[19, 1], (ceiling + bottom) / 2])
-    eye_height = np.clip(rng.normal(1.45, 0.22), 0.8, 2.0)
-    azimuth = rng.normal(0, 0.25)
-    eye = np.array(
-        [middle[0] + np.sin(azimuth) * distance, middle[1] - np.cos(azimuth) * distance, eye_height]
-    )
+    middle = np.array([x, y, (ceiling + bottom) / 2])
+    eye_height, azimuth = np.clip(rng.normal(1.45, 0.22), 0.8, 2.0), rng.normal(0, 0.25)
+    eye = middle + distance * np.array([np.sin(azimuth), -np.cos(azimuth), 0])
+    eye[2] = eye_height
     target = middle + np.array([rng.normal(0, 0.10) * distance * width / focal, 0, 0])
     pose = look_at(eye, target, roll_rad=rng.normal(0, 0.02))
     return PlacedCamera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, pose)
 
 
-def _lighting(
-    rng: Rng, room: Room, places: list, eye: np.ndarray
-) -> tuple[list[lights.Light], lights.Ambient]:
+def _lighting(rng: Rng, room: Room, eye: np.ndarray) -> tuple[list[lights.Light], lights.Ambient]:
     """A key light (window, lamp or ceiling), mostly a second one, over soft light from all around."""
     daylight, lamp = _temperature(rng.uniform(0, 1)), _temperature(rng.uniform(-1.2, -0.2))
     found = []
@@ -125,34 +126,23 @@ def _lighting(
     height = room.height_m - 0.12
     if not found or rng.random() < 0.6:
         spot = rng.uniform(-1.2, 1.2, 2) + np.array([0, -0.6])
-        size = rng.uniform(0.08, 0.5)
-        found.append(_ceiling(spot, height, size, lamp * rng.uniform(2.5, 6)))
+        half_u, half_v, _ = rng.uniform(0.08, 0.5) * np.eye(3)
+        found.append(lights.Light(np.array([*spot, height]), half_u, half_v, lamp * rng.uniform(2.5, 6)))
     if len(found) < 2 and rng.random() < 0.6:  # light from where the photographer stands
-        side = rng.uniform(-1.5, 1.5)
-        centre = np.clip(
-            [eye[0] + side, eye[1], rng.uniform(1.6, 2.2)], [*(-room.half_m), 0], [*room.half_m, 3]
-        )
-        soft = lights.Light(
-            centre, np.array([0.35, 0, 0]), np.array([0, 0, 0.35]), daylight * rng.uniform(1.5, 5)
-        )
-        found.append(soft)
+        spot = np.array([eye[0] + rng.uniform(-1.5, 1.5), eye[1], rng.uniform(1.6, 2.2)])
+        centre = np.clip(spot, [*(-room.half_m), 0], [*room.half_m, 3])
+        half_u, _, half_v = 0.35 * np.eye(3)
+        found.append(lights.Light(centre, half_u, half_v, daylight * rng.uniform(1.5, 5)))
     base = daylight * rng.uniform(0.25, 0.6)
     side = np.array([rng.normal(), rng.normal() - 1, 0.2])
-    ambient = lights.Ambient(
-        base * 1.1, base * rng.uniform(0.45, 0.8), base * 0.6, side / np.linalg.norm(side)
-    )
-    return found, ambient
-
-
-def _ceiling(spot: np.ndarray, height: float, size: float, power: np.ndarray) -> lights.Light:
-    return lights.Light(np.array([*spot, height]), np.array([size, 0, 0]), np.array([0, size, 0]), power)
+    down = base * rng.uniform(0.45, 0.8)
+    return found, lights.Ambient(base * 1.1, down, base * 0.6, side / np.linalg.norm(side))
 
 
 def _temperature(warm_to_cool: float) -> np.ndarray:
     """Linear RGB of light from incandescent (-1.2) over neutral (0) to the blue sky (1)."""
-    return np.array([1 - 0.10 * warm_to_cool, 1.0, 1 + 0.16 * warm_to_cool]) ** (
-        1.5 if warm_to_cool < 0 else 1
-    )
+    colour = np.array([1 - 0.10 * warm_to_cool, 1.0, 1 + 0.16 * warm_to_cool])
+    return colour ** (1.5 if warm_to_cool < 0 else 1)
 
 
 def _sensor(rng: Rng) -> Sensor:
@@ -170,5 +160,5 @@ def _sensor(rng: Rng) -> Sensor:
 
 
 def distance_m(camera: PlacedCamera, person: PosedBody) -> float:
-    """Depth of the middle of a person's keypoints."""
+    """Depth of the middle of a person's keypoints, along the camera's z axis."""
     return float(np.median(project_world(camera, person.keypoints_m)[1]))

@@ -1,15 +1,14 @@
 """Which keypoints a camera sees."""
 
-from __future__ import annotations
-
 import numpy as np
 
-from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS
-from hicp_lib.simulation.appearance.people import N_PARTS, RIGHT
+from hicp_lib.core.keypoints import HANDS, INDEX, N_KEYPOINTS
+from hicp_lib.simulation.appearance.people import RIGHT
 from hicp_lib.simulation.body.model import REGIONS
 from hicp_lib.simulation.rendering.camera import PlacedCamera, pixel_rays, project_world
 from hicp_lib.simulation.rendering.raycast import RayScene
 
+_TOUCHING_M = 0.002  # a keypoint that lies no further behind what is seen is on the surface
 _HEAD = ("face", "eyebrow", "lips", "mouth", "eye", "neck")
 # Joint: parts it may be seen through, and how deep below them it may lie (metres).
 _BODY_RULES: dict[str, tuple[tuple[str, ...], float]] = {
@@ -29,32 +28,18 @@ _HAND_RULE = (("hand", "nail", "forearm"), 0.025)
 _SIDED = ("upper_arm", "forearm", "hand", "thigh", "shin", "foot", "nail")
 
 
-def _rule(name: str) -> tuple[tuple[str, ...], float]:
-    for ending, rule in _BODY_RULES.items():
-        if name.endswith(ending):
-            return rule
-    is_hand = name.split("_", 1)[0] in ("left", "right") and name not in (
-        "left_eye",
-        "right_eye",
-        "left_ear",
-        "right_ear",
-    )
-    return _HAND_RULE if is_hand else _FACE_RULE
-
-
 def _tables() -> tuple[np.ndarray, np.ndarray]:
-    allowed = np.zeros((N_KEYPOINTS, N_PARTS + 1), bool)  # the last column: no part
+    """Parts that keypoints may be seen through, (136, n_parts + 1), the last for no part; depths (136,)."""
+    allowed = np.zeros((N_KEYPOINTS, 2 * RIGHT + 1), bool)
     depth_m = np.zeros(N_KEYPOINTS)
     for name, index in INDEX.items():
-        parts, depth_m[index] = _rule(name)
+        otherwise = _HAND_RULE if index in HANDS else _FACE_RULE
+        rules = (rule for ending, rule in _BODY_RULES.items() if name.endswith(ending))
+        parts, depth_m[index] = next(rules, otherwise)
         for part in parts:
-            number = REGIONS.index(part)
-            left, right = (
-                (not name.startswith("right_"), not name.startswith("left_"))
-                if part in _SIDED
-                else (True, True)
-            )
-            allowed[index, number], allowed[index, number + RIGHT] = left, right
+            number, sided = REGIONS.index(part), part in _SIDED
+            allowed[index, number] = not (sided and name.startswith("right_"))
+            allowed[index, number + RIGHT] = not (sided and name.startswith("left_"))
     return allowed, depth_m
 
 
@@ -75,12 +60,18 @@ def keypoint_visibility(
 
     Parameters
     ----------
-    keypoints_m : array, shape (136, 3), world frame
+    scene : RayScene
+    camera : PlacedCamera
+    keypoints_m : array, shape (136, 3)
+        World frame.
+    person : int
+        Whose they are.
 
     Returns
     -------
     pixels_px : array, shape (136, 2)
-    visibility : array, shape (136,), int: 2 visible, 1 occluded, 0 outside the image
+    visibility : array of int, shape (136,)
+        2 visible, 1 occluded, 0 outside the image.
     """
     pixels_px, depths_m = project_world(camera, keypoints_m)
     inside = camera.contains(pixels_px)
@@ -90,5 +81,5 @@ def keypoint_visibility(
     before_m = (depths_m - trace.depth_m) * stretch
     owner, parts = scene.owners[trace.surface], scene.parts[trace.triangle]
     own = (owner == person) & _ALLOWED[np.arange(N_KEYPOINTS), parts] & (before_m <= _DEPTH_M)
-    visible = (before_m <= 0.002) | own
+    visible = (before_m <= _TOUCHING_M) | own
     return pixels_px, np.where(inside, np.where(visible, 2, 1), 0)

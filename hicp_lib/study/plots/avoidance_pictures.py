@@ -17,8 +17,9 @@ from PIL import Image
 
 from hicp_lib.core.keypoints import LIMBS
 from hicp_lib.experiments.avoidance.closed_loop import start_posture
-from hicp_lib.experiments.avoidance.reaching import in_root, script
+from hicp_lib.experiments.avoidance.reaching import script
 from hicp_lib.experiments.avoidance.runs import Run, image
+from hicp_lib.experiments.laboratory import in_root
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.segments import body_segments

@@ -9,7 +9,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.experiments.avoidance import head_camera
 from hicp_lib.experiments.avoidance.closed_loop import MOUNT, start_posture
-from hicp_lib.experiments.avoidance.head_camera import DetectorEyes
+from hicp_lib.experiments.avoidance.head_camera import HeadCamera
 from hicp_lib.experiments.laboratory import COLOUR, ROOT_HEIGHT_M, furnished
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.simulation.appearance import materials as m
@@ -54,13 +54,13 @@ def test_points_of_a_table_are_found_where_they_are_and_the_robots_hand_is_none(
     posture = start_posture()
     palm_m = load_icub().chains["left"].T_root_link("hand", posture.angles("left"))[:3, 3]
     assert len(points_m) + 1 == N_KEYPOINTS
-    eyes = DetectorEyes(Pointing(seen_at_px(np.r_[points_m, palm_m[None]])), 0.1)
-    found_m = eyes.see(Table(), 0.5, posture).keypoints_m[0]
+    camera = HeadCamera(Pointing(seen_at_px(np.r_[points_m, palm_m[None]])), 0.1)
+    found_m = camera.perceive(Table(), 0.5, posture).keypoints_m[0]
     assert np.isnan(found_m[-1]).all()
     assert np.isfinite(found_m[:-1]).mean() > 0.9
     assert np.nanmax(np.linalg.norm(found_m[:-1] - points_m, axis=1)) < 0.01
-    (sight,) = eyes.sights
-    red, green, blue = sight.rgb[tuple(seen_at_px(points_m).round().astype(int).T[::-1])].astype(int).T
+    (seen,) = camera.observations
+    red, green, blue = seen.rgb[tuple(seen_at_px(points_m).round().astype(int).T[::-1])].astype(int).T
     assert (red > green + 50).all() and (red > blue + 50).all()
 
 
@@ -78,17 +78,17 @@ def taken(monkeypatch):
 
 
 def test_detectors_share_pictures_until_the_robot_gives_way(taken):
-    album, pixels = {}, np.full((N_KEYPOINTS, 2), np.nan)  # nothing to lift
-    first, second = (DetectorEyes(Pointing(pixels), 0.1, album=album) for _ in range(2))
+    images, pixels = {}, np.full((N_KEYPOINTS, 2), np.nan)  # nothing to lift
+    first, second = (HeadCamera(Pointing(pixels), 0.1, images=images) for _ in range(2))
     post = start_posture()
     away = post.moved("left", post.angles("left") + 0.01)
-    for eyes in (first, second):
-        eyes.see(Table(), 0.1, post)
-    assert len(taken) == 1 and np.array_equal(first.sights[0].rgb, second.sights[0].rgb)
-    first.see(Table(), 0.2, post)
-    DetectorEyes(Pointing(pixels), 0.1, seed=1, album=album).see(Table(), 0.2, post)
-    second.see(Table("chair"), 0.2, post)
+    for camera in (first, second):
+        camera.perceive(Table(), 0.1, post)
+    assert len(taken) == 1 and np.array_equal(first.observations[0].rgb, second.observations[0].rgb)
+    first.perceive(Table(), 0.2, post)
+    HeadCamera(Pointing(pixels), 0.1, seed=1, images=images).perceive(Table(), 0.2, post)
+    second.perceive(Table("chair"), 0.2, post)
     assert len(taken) == 4
-    for eyes in (first, second):
-        eyes.see(Table(), 0.3, away)
-    assert len(taken) == 6 and not np.array_equal(first.sights[-1].rgb, second.sights[-1].rgb)
+    for camera in (first, second):
+        camera.perceive(Table(), 0.3, away)
+    assert len(taken) == 6 and not np.array_equal(first.observations[-1].rgb, second.observations[-1].rgb)

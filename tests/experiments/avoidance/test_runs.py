@@ -11,8 +11,9 @@ from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.experiments.avoidance import head_camera
 from hicp_lib.experiments.avoidance import runs as avoidance_runs
 from hicp_lib.experiments.avoidance.closed_loop import Trial
-from hicp_lib.experiments.avoidance.reaching import in_root, script
+from hicp_lib.experiments.avoidance.reaching import script
 from hicp_lib.experiments.avoidance.runs import Job, choose, image, keypoints_m, run_all
+from hicp_lib.experiments.laboratory import in_root
 
 TRIAL = Trial("sitting, head", 0.14)
 

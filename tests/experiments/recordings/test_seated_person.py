@@ -9,13 +9,13 @@ from hicp_lib.core.camera import project, transform
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.experiments.laboratory import COLOUR, T_WORLD_ROOT
 from hicp_lib.experiments.recordings.scenarios import SCENARIOS, relative_poses_rad
-from hicp_lib.experiments.recordings.seated_person import TABLE_HEIGHT_M, seated
+from hicp_lib.experiments.recordings.seated_person import TABLE_HEIGHT_M, seated_person
 from hicp_lib.robot.kinematics import load_icub
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_hands_lie_on_the_table(seed):
-    person = seated(seed).person
+    person = seated_person(seed)[1]
     for side in ("left", "right"):
         wrist = person.keypoints_m[INDEX[f"{side}_wrist"]]
         assert TABLE_HEIGHT_M + 0.01 < wrist[2] < TABLE_HEIGHT_M + 0.11
@@ -26,7 +26,7 @@ def test_hands_lie_on_the_table(seed):
 
 
 def test_a_seed_always_gives_the_same_person():
-    np.testing.assert_array_equal(seated(3).person.vertices_m, seated(3).person.vertices_m)
+    np.testing.assert_array_equal(seated_person(3)[1].vertices_m, seated_person(3)[1].vertices_m)
 
 
 @pytest.mark.parametrize("view", ["upper", "lower"])
@@ -37,7 +37,7 @@ def test_the_listed_poses_are_possible_and_frame_the_person(view):
     assert (poses_rad >= low).all() and (poses_rad <= high).all()
     T_root_camera = icub.T_root_camera(poses_rad, SCENARIOS[f"relative-{view}"].mount)
     T_camera_world = np.linalg.inv(T_WORLD_ROOT @ T_root_camera)
-    pixels_px = project(COLOUR, transform(T_camera_world, seated(0).person.keypoints_m))
+    pixels_px = project(COLOUR, transform(T_camera_world, seated_person(0)[1].keypoints_m))
     inside = ((pixels_px > 0) & (pixels_px < [639, 479])).all(axis=2).mean(axis=0)
     seen = dict(zip(INDEX, inside, strict=True))
     assert seen["left_wrist"] == seen["right_elbow"] == 1

@@ -6,7 +6,7 @@ from hicp_lib.simulation.body.hands import HANDS_DEG, sample_hand
 from hicp_lib.simulation.body.joints import LIMITS_DEG, pose_from_joints, within_limits
 from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.simulation.body.poses import KINDS, sample_joints, sample_pose
-from hicp_lib.simulation.body.self_collision import clearance_m, outline
+from hicp_lib.simulation.body.self_collision import collision_model, self_collision_distance_m
 
 BODY = load_body()
 PER_KIND = 12
@@ -35,7 +35,8 @@ def test_poses_keep_to_the_limits_of_the_joints(drawn):
 def test_poses_keep_clear_of_the_body(drawn):
     _, draws = drawn
     for shape, joints, _ in draws:
-        assert clearance_m(BODY, outline(BODY, shape), pose_from_joints(joints)) > -0.045
+        model = collision_model(BODY, shape)
+        assert self_collision_distance_m(BODY, model, pose_from_joints(joints)) > -0.045
 
 
 def test_poses_are_what_they_are_called(drawn):

@@ -4,13 +4,13 @@ import pytest
 from hicp_lib.simulation.body.joints import pose_from_joints
 from hicp_lib.simulation.body.model import REGIONS, load_body, pose_body
 from hicp_lib.simulation.body.reach import reach
-from hicp_lib.simulation.body.self_collision import clearance_m, outline
+from hicp_lib.simulation.body.self_collision import collision_model, self_collision_distance_m
 
 BODY = load_body()
 
 
 def gap(shape, joints) -> float:
-    return clearance_m(BODY, outline(BODY, shape), pose_from_joints(joints))
+    return self_collision_distance_m(BODY, collision_model(BODY, shape), pose_from_joints(joints))
 
 
 def both(**joints) -> dict[str, float]:
@@ -20,14 +20,14 @@ def both(**joints) -> dict[str, float]:
 @pytest.mark.parametrize("shape", BODY.shape_names)
 def test_arms_held_out_are_clear_and_arms_through_the_body_are_not(shape):
     assert gap(shape, both(shoulder_abduction=1.2)) > 0.03
-    person = outline(BODY, shape)
+    person = collision_model(BODY, shape)
     centre, half = person.trunk_at(0.5)
     through = reach(BODY, shape, {}, "left", centre + [half[0] * 0.3, 0, 0])
     assert through is None or gap(shape, through) < -0.03
 
 
 def test_hand_in_head_thigh_and_other_hand():
-    head = outline(BODY, 0).centres_m[-1]
+    head = collision_model(BODY, 0).centres_m[-1]
     assert gap(0, reach(BODY, 0, {}, "right", head + [0.03, -0.02, -0.05])) < -0.03
     assert gap(0, both(shoulder_abduction=-0.25)) < -0.02
     meet = np.array([0.35, 0.0, 0.3])
@@ -46,7 +46,7 @@ def test_the_gap_does_not_depend_on_side():
 
 def test_the_outline_is_that_of_the_body():
     for shape in BODY.shape_names:
-        person = outline(BODY, shape)
+        person = collision_model(BODY, shape)
         rest = BODY.vertices_m[BODY.shape_names.index(shape)]
         trunk = np.isin(BODY.regions, [REGIONS.index(name) for name in ("hips", "torso")])
         assert person.half_axes_m[:-1, 1].max() <= np.ptp(rest[trunk, 1]) / 2

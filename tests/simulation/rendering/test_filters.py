@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from hicp_lib.simulation.rendering.filters import View, sum_within, tilt_by_height
+from hicp_lib.simulation.rendering.filters import sum_within, tilt_by_height
+from hicp_lib.simulation.rendering.gbuffer import GBuffer
 
 ROWS, COLUMNS = 20, 24
 V, U = np.mgrid[:ROWS, :COLUMNS].astype(np.float32)
@@ -30,11 +31,11 @@ def test_sums_do_not_cross_to_another_surface_or_over_a_step(cause):
     assert (sums[:, :12] == 0).all() and (sums[:, 12:] > 0).all()
 
 
-def _view(surface: np.ndarray) -> View:
+def _view(surface: np.ndarray) -> GBuffer:
     pixels = np.flatnonzero(surface.ravel() >= 0)
     n = len(pixels)
     depth_m = np.ones((ROWS, COLUMNS), np.float32)
-    return View(pixels, surface, depth_m, FLAT, np.zeros((3, n)), np.zeros(n, int), np.zeros((n, 2)))
+    return GBuffer(pixels, surface, depth_m, FLAT, np.zeros((3, n)), np.zeros(n, int), np.zeros((n, 2)))
 
 
 def test_a_slope_of_heights_turns_the_normal_against_it():

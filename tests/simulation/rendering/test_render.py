@@ -10,8 +10,7 @@ from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.simulation.rendering import lights
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.camera import PlacedCamera, image_directions, look_at
-from hicp_lib.simulation.rendering.filters import View
-from hicp_lib.simulation.rendering.gbuffer import gather_looks
+from hicp_lib.simulation.rendering.gbuffer import GBuffer, evaluate_materials
 from hicp_lib.simulation.rendering.raycast import RayScene, trace_image
 from hicp_lib.simulation.rendering.render import World, render
 from hicp_lib.simulation.rendering.shadows import visibility
@@ -92,8 +91,8 @@ def test_a_ball_alone_is_in_nobodys_shadow():
     scene = RayScene([Surface(_sphere([0, 0, 1], 0.5), GREY, person=0)])
     directions = image_directions(CAMERA)
     trace = trace_image(scene, CAMERA.centre_m, directions, np.array([True]))
-    view = View.of(trace, CAMERA.centre_m, directions, np.s_[:, :], np.ones((60, 80), bool))
-    normals = view.on_grid(gather_looks(scene, view, 1 / 70).normals)
+    view = GBuffer.of(trace, CAMERA.centre_m, directions, np.s_[:, :], np.ones((60, 80), bool))
+    normals = view.on_grid(evaluate_materials(scene, view, 1 / 70).normals)
     seen = visibility([lamp], scene, view, normals, True, np.random.default_rng(0))
     assert seen.shape == (2, len(view.pixels)) and len(view.pixels) > 400
     assert (seen == 1).all()

@@ -26,7 +26,7 @@ from hicp_lib.simulation.sensors.motion_capture import (
     measure,
     mocap_frame,
     room_cameras_m,
-    watch,
+    track_markers,
 )
 
 BODY = load_body()
@@ -154,7 +154,7 @@ def test_following_a_swinging_arm_is_exact_to_a_tenth_of_a_millimetre():
     times_s = np.arange(50) / 100
     fixed = np.array([[0.5, 0.0, 1.5]])
     cameras = room_cameras_m(QUALISYS, np.zeros(2))
-    followed, seeing = watch(person_at, vertices, fixed, times_s, cameras)
+    followed, seeing = track_markers(person_at, vertices, fixed, times_s, cameras)
     assert followed.shape == (50, 13, 3) and seeing.shape == (50, 13)
     for k in (13, 26, 49):
         assert np.abs(followed[k, :12] - markers_m(person_at(times_s[k]), vertices)).max() < 1e-4
