@@ -44,14 +44,14 @@ def against_no_avoidance(table: pd.DataFrame, times: float = 2.0) -> pd.DataFram
 
     Parameters
     ----------
-    table : DataFrame
+    table : pd.DataFrame
         As from `metrics`.
     times : float
         What is enough.
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         Columns `script, detector, min_distance_m, value` (the ratio), `enough` (at least `times`), and
         `why` in words where it is not.
 
@@ -116,7 +116,7 @@ def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> d
     Parameters
     ----------
     runs : iterable of Run
-    errors : DataFrame
+    errors : pd.DataFrame
         As from `keypoint_errors`.
     period_s : float
         Of the controller.

@@ -34,7 +34,7 @@ def class_examples(
 
     Parameters
     ----------
-    classes : DataFrame
+    classes : pd.DataFrame
         As from `people_classes`.
     truth : mapping of str to Annotations
         By subset.
@@ -121,7 +121,7 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
 
     Parameters
     ----------
-    table : DataFrame
+    table : pd.DataFrame
         As from `kind_proportions`, of one group of keypoints.
     by : str
         Its column that names the bars.
@@ -228,7 +228,7 @@ def gallery(
 
     Parameters
     ----------
-    cases : DataFrame
+    cases : pd.DataFrame
         As from `worst_cases`.
     folders : mapping of str to Path
         The subsets' dataset folders.

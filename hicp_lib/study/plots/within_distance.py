@@ -25,7 +25,7 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
 
     Parameters
     ----------
-    table : DataFrame
+    table : pd.DataFrame
         At many thresholds.
     marked_m : sequence of float
         Distances marked in grey; the alt text gives the shares at the middle one.
