@@ -172,7 +172,7 @@ def head_change(table: pd.DataFrame, note: str) -> Figure:
 
 @in_style
 def hallucinated_heads(table: pd.DataFrame, note: str) -> Figure:
-    """Where keypoints of the head are given that was cut off; `table` is of `failures.without_head`."""
+    """Where keypoints of a head are given that was cut off; `table` from `hallucinated_heads`."""
     figure, axes, panels = _detector_panels(table, 4.0, 4.4, sharex=True)
     for axis, detector, rows in panels:
         dots = axis.scatter(rows["along"], rows["below"], c=rows["score"], s=14, vmin=0, vmax=1, alpha=0.8)
