@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -126,6 +126,23 @@ def whiskers(rows: pd.DataFrame, value: str = "value", low: str = "low", high: s
     """
     below, above = rows[value] - rows[low], rows[high] - rows[value]
     return np.maximum([below.to_numpy(float), above.to_numpy(float)], 0)
+
+
+def stacked_bars(axis, lengths: pd.DataFrame, styles: Mapping[str, dict[str, Any]]) -> None:
+    """Lying bars, one per row of a table, of its columns end to end.
+
+    Parameters
+    ----------
+    axis : matplotlib.axes.Axes
+    lengths : pd.DataFrame
+        A row per bar, a column per part.
+    styles : mapping of str to dict
+        Options of `Axes.barh` by part, in the order of the parts from 0.
+    """
+    ends = lengths[list(styles)].cumsum(axis=1).shift(axis=1, fill_value=0)
+    for part, style in styles.items():
+        axis.barh(range(len(lengths)), lengths[part], left=ends[part], label=part, **style)
+    axis.grid(axis="y", visible=False)
 
 
 def draw_boxes(axis, samples: Sequence[pd.Series], colours: Iterable[str], **options: Any) -> None:
