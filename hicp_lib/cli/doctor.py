@@ -168,25 +168,25 @@ def check_probe(name: str, command: tuple[str, ...] = PROBE, limit_s: float = PR
     streams: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": pipe, "stderr": pipe, "text": True}
     process = subprocess.Popen([*command, name], **streams, errors="replace", start_new_session=True)
     try:
-        said, murmured = process.communicate(timeout=limit_s)
+        output, errors = process.communicate(timeout=limit_s)
     except subprocess.TimeoutExpired:
         return Check(name, FAIL, f"no answer within {limit_s:g} s, ended", _remedy(""))
     finally:
         with contextlib.suppress(ProcessLookupError):  # itself, and what it started
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-    return _outcome(name, process.returncode, _last_line(said), _last_line(murmured))
+    return _outcome(name, process.returncode, _last_line(output), _last_line(errors))
 
 
-def _outcome(name: str, code: int, said: str, murmured: str) -> Check:
-    """What the end of a trial means; `said` and `murmured` are its last words on the two outputs."""
+def _outcome(name: str, code: int, output: str, errors: str) -> Check:
+    """What the end of a trial means; `output` and `errors` are its last words on the two outputs."""
     if code in (0, EXIT_ABSENT):
-        return Check(name, ABSENT if code else OK, said)
-    if code == EXIT_FAILED and said:
-        return Check(name, FAIL, said, _remedy(said))
+        return Check(name, ABSENT if code else OK, output)
+    if code == EXIT_FAILED and output:
+        return Check(name, FAIL, output, _remedy(output))
     ending = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-    words = f" ({murmured})" if murmured else ""
-    return Check(name, FAIL, f"its process died of {ending}{words}", _remedy(murmured))
+    words = f" ({errors})" if errors else ""
+    return Check(name, FAIL, f"its process died of {ending}{words}", _remedy(errors))
 
 
 def _remedy(words: str) -> str:

@@ -59,7 +59,7 @@ def make_report(
         page, is_new = build_book(folders) if only is None else (None, False)
     took = f"({time.perf_counter() - start_s:.0f} s)"
     if only is not None:
-        log(f"The results are in {folders.results / only}; no other notebook ran, no book was built {took}")
+        log(f"The results are in {folders.results / only}; no book was built {took}")
         return None
     log(f"book: {'built' if is_new else 'unchanged'}")
     log(f"The report is {page} {took}")

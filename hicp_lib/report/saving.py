@@ -28,8 +28,8 @@ def strip_study_notebook(model: dict[str, Any], path: str, contents_manager: Any
         What is to be saved, as Jupyter's contents API describes it; its `content` is changed in place.
     path : str
         Of the file, from the server's root.
-    contents_manager : ContentsManager
-        Jupyter's; its `root_dir` is the server's root.
+    contents_manager : object
+        Jupyter's ContentsManager; its `root_dir` is the server's root.
     """
     folder = Path(contents_manager.root_dir, path.strip("/")).parent
     if model["type"] != "notebook" or not (folder / PROFILES_FILE).is_file():

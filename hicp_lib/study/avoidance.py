@@ -44,14 +44,14 @@ def against_no_avoidance(table: pd.DataFrame, times: float = 2.0) -> pd.DataFram
 
     Parameters
     ----------
-    table : DataFrame
+    table : pd.DataFrame
         As from `metrics`.
     times : float
         What is enough.
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         Columns `script, detector, min_distance_m, value` (the ratio), `enough` (at least `times`), and
         `why` in words where it is not.
 
@@ -96,11 +96,11 @@ def keypoint_errors(runs: Iterable[Run]) -> pd.DataFrame:
     parts = []
     for run in runs:
         for _, frame in run.frames.iterrows():
-            points, kept, truth = sure_keypoints(frame)
+            points, is_sure, truth = sure_keypoints(frame)
             either_m = [np.linalg.norm(points - side, axis=2) for side in (truth, truth[mirror("halpe136")])]
             near = np.linalg.norm(points - HOME_M["left"], axis=2) < REACH_M
             about = {"script": run.job.trial.script, "detector": run.job.condition, "t_s": frame["t_s"]}
-            errors = {"error_m": np.min(either_m, axis=0)[kept], "near": near[kept]}
+            errors = {"error_m": np.min(either_m, axis=0)[is_sure], "near": near[is_sure]}
             parts.append(pd.DataFrame(errors).assign(**about))
     empty = {"error_m": np.zeros(0), "near": np.zeros(0, bool), "script": [], "detector": [], "t_s": []}
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(empty)
@@ -116,7 +116,7 @@ def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> d
     Parameters
     ----------
     runs : iterable of Run
-    errors : DataFrame
+    errors : pd.DataFrame
         As from `keypoint_errors`.
     period_s : float
         Of the controller.

@@ -37,11 +37,11 @@ class Registered:
 
     Attributes
     ----------
-    fits : list of Registration
+    fits : list of registration.Registration
         In the order of the module `hicp_lib.mocap.registration`, then by reprojection: the one to use.
-    exact : array, shape (4, 4), or None
+    exact : array or None, shape (4, 4)
         The true transform T_base_mocap; None where it is not known.
-    clicks : DataFrame
+    clicks : pd.DataFrame
         The clicks of the images the paper's registration rests on; empty where the transform was given.
     """
 
@@ -98,9 +98,9 @@ def lift_frames(
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         Columns as of `hicp_lib.lifting.table.lift_found`, by each of `METHODS`.
-    DataFrame
+    pd.DataFrame
         The first detector's, also by every step between the methods where true positions are known (for
         `ablation`).
     """
@@ -116,7 +116,7 @@ def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame)
     ----------
     recording : Recording
     mocap : MotionCapture
-    points : DataFrame
+    points : pd.DataFrame
         The first of `lift_frames`; those of all detectors and methods are compared at once.
 
     Returns
@@ -210,7 +210,7 @@ def medians_under(
     Parameters
     ----------
     registered : Registered
-    points : DataFrame
+    points : pd.DataFrame
         The first of `lift_frames`.
     recording : Recording
     mocap : MotionCapture
@@ -219,7 +219,7 @@ def medians_under(
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         Columns `registration, detector, method, part, median_m` (both sides together; score above 0.1); the
         exact transform, where it is known, comes last.
     """
@@ -243,7 +243,7 @@ def errors_at_joints(
 
     Parameters
     ----------
-    points : DataFrame
+    points : pd.DataFrame
         The first of `lift_frames`.
     registered : Registered
     recording : Recording
@@ -253,7 +253,7 @@ def errors_at_joints(
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
     """
     stamps_s, T_base_mocap = recording.times_s - offset_s, registered.fits[-1].T_base_mocap
     reference = marker_means(mocap, stamps_s, T_base_mocap)

@@ -58,7 +58,7 @@ class Study:
     ----------
     name : str
         The notebook's file name without `.ipynb`.
-    **parameters
+    **parameters : dict
         Every parameter of the notebook's `parameters` cell, by its name; `hicp report` refuses a run whose
         stamp differs from what it was given.
 
@@ -148,7 +148,7 @@ class Study:
         Parameters
         ----------
         name : str
-        table : DataFrame
+        table : pd.DataFrame
         caption : str
         digits : int
             Decimals of its floats, as shown.

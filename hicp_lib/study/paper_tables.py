@@ -22,14 +22,14 @@ def beside_paper(medians: pd.DataFrame, paper: pd.DataFrame, min_score: float) -
 
     Parameters
     ----------
-    medians, paper : DataFrame
+    medians, paper : pd.DataFrame
         As from `median_errors` and `paper_medians`.
     min_score : float
         Whose table: one of `MIN_SCORES`.
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         Columns `detector, lifting` and one per joint: "count / median [cm]", here with the 95 % interval.
     """
     rows = pd.concat([medians, paper.assign(detector=paper["detector"] + " (paper)", method="paper")])

@@ -88,7 +88,7 @@ def lift_views(views: Mapping[str, Recording], found: Found) -> pd.DataFrame:
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         Columns `view` and those of `hicp_lib.lifting.table.lift_found`.
 
     Raises

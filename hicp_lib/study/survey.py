@@ -23,7 +23,7 @@ def surveyed_detectors(run: Collection[str]) -> pd.DataFrame:
 
     Parameters
     ----------
-    run : collection of str
+    run : sequence of str
         Names of the detectors that were run; one that was imported as NAME-imported counts.
 
     Examples

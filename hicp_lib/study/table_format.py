@@ -21,7 +21,7 @@ def in_units(table: pd.DataFrame, titles: Mapping[str, str], text: bool = False)
 
     Parameters
     ----------
-    table : DataFrame
+    table : pd.DataFrame
         Units are the suffixes of its columns: `_m`, `_s`, `_ms`, `_rad`, `_share`.
     titles : Mapping[str, str]
         Column -> its title; ``"retreat [cm]"`` for `retreat_m`. A title without a unit leaves the column as
@@ -31,7 +31,7 @@ def in_units(table: pd.DataFrame, titles: Mapping[str, str], text: bool = False)
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         The columns of `titles`, in their order.
 
     Raises
@@ -83,7 +83,7 @@ def bounds_of(
 
     Parameters
     ----------
-    rows : DataFrame
+    rows : pd.DataFrame
     columns : sequence of str
         The value's and its interval's.
     factor : float
@@ -117,7 +117,7 @@ def wide(
 
     Parameters
     ----------
-    rows : DataFrame
+    rows : pd.DataFrame
     index : Sequence[str]
         Columns that name a row of the result.
     columns : str

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import sys
 import time
+import tomllib
+from types import SimpleNamespace
 
 import psutil
 import pytest
+from packaging.specifiers import SpecifierSet
 
 from hicp_lib.cli import doctor, system_libraries
 from hicp_lib.cli import main as cli
+from hicp_lib.core.checkout import CHECKOUT
+from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.registry import default_detector_names
 
 
@@ -163,3 +168,42 @@ def test_the_command_prints_one_line_a_check_and_its_exit_code_tells(capsys, mon
     ]
     monkeypatch.setattr(doctor, "run_checks", lambda: checks[:2])
     assert cli.run(["doctor"]) == 0
+
+
+@pytest.mark.parametrize(("free_gb", "status"), [(doctor.MIN_FREE_GB, doctor.OK), (2.99, doctor.FAIL)])
+def test_the_disk_needs_room(tmp_path, monkeypatch, free_gb, status):
+    usage = SimpleNamespace(free=free_gb * 1e9)
+    monkeypatch.setattr(doctor.shutil, "disk_usage", lambda folder: usage)
+    _, room = doctor.check_folder("results", tmp_path / "new", "-")
+    assert room.status == status and room.remedy == f"free space on the disk of {tmp_path}"
+    assert room.finding == f"{free_gb:.1f} GB free (at least 3 wanted)"
+
+
+@pytest.mark.parametrize(
+    ("version", "status"),
+    [((3, 10, 9), doctor.FAIL), ((3, 11, 0), doctor.OK), ((3, 14, 2), doctor.OK), ((3, 15, 0), doctor.FAIL)],
+)
+def test_python_is_one_of_those_the_package_allows(monkeypatch, version, status):
+    monkeypatch.setattr(doctor.sys, "version_info", version)
+    assert doctor.check_python().status == status
+    requires = tomllib.loads((CHECKOUT / "pyproject.toml").read_text())["project"]["requires-python"]
+    assert (".".join(map(str, version)) in SpecifierSet(requires)) == (status == doctor.OK)
+
+
+def test_a_registry_that_cannot_be_read_is_one_line(tmp_path, monkeypatch):
+    from hicp_lib.detectors.weights import default
+
+    def broken() -> None:
+        raise InputError("data/detectors.json: not JSON")
+
+    monkeypatch.setattr(default, "registry", broken)
+    check = doctor.check_weights()
+    assert (check.status, check.finding) == (doctor.FAIL, "data/detectors.json: not JSON")
+
+
+def test_without_a_checkout_there_is_no_lock_to_keep(monkeypatch, tmp_path):
+    monkeypatch.setattr(doctor.provenance, "CHECKOUT", None)
+    assert doctor.check_locked_versions(tmp_path / "no.lock").status == doctor.OK
+    monkeypatch.setattr(doctor.provenance, "CHECKOUT", tmp_path)
+    check = doctor.check_locked_versions(tmp_path / "no.lock")
+    assert check.status == doctor.FAIL and check.remedy == "git restore environment.lock"

@@ -22,7 +22,9 @@ def test_declared_parameters_are_read_without_running_them(study):
     assert notebook.defaults == {"seed": 0, "scale": 1.5, "detectors": ["a", "b"], "images": ""}
 
 
-@pytest.mark.parametrize("parameters", ["n = open('x')", "n, m = 1, 2", "print(1)", "n = ", "n: int"])
+@pytest.mark.parametrize(
+    "parameters", ["n = open('x')", "n = m = 1", "n, m = 1, 2", "print(1)", "n = ", "n: int"]
+)
 def test_parameters_that_are_no_plain_values_are_refused(tmp_path, parameters):
     path = write_notebook(tmp_path / "x.ipynb", parameters=parameters)
     with pytest.raises(InputError, match=r"x\.ipynb: its parameters cell is not `name = value` lines"):

@@ -6,6 +6,7 @@ import random
 import shutil
 import subprocess
 
+import psutil
 import pytest
 
 from hicp_lib.core.cache import input_sha256
@@ -62,3 +63,48 @@ def test_an_input_folder_is_known_by_names_sizes_and_times(tmp_path):
     (tmp_path / "b").write_bytes(b"")
     assert input_sha256(tmp_path) != before
     assert input_sha256(tmp_path / "a") != input_sha256(tmp_path / "b")
+
+
+def test_the_stamp_tells_code_data_machine_and_libraries():
+    stamp = provenance.provenance({"seed": 3})
+    assert stamp["parameters"] == {"seed": 3}
+    assert stamp["machine"]["cores"] == provenance.usable_cores() >= 1
+    assert stamp["versions"]["python"] and stamp["versions"]["numpy"]
+    assert not {"pip", "setuptools"} & set(stamp["versions"]), "only what can move a number"
+    assert all(len(sha256) == 64 for sha256 in stamp["weights_sha256"].values())
+
+
+def test_threads_are_told_where_they_are_limited(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    assert provenance.machine()["OMP_NUM_THREADS"] == "1"
+    assert "OPENBLAS_NUM_THREADS" not in provenance.machine()
+
+
+def test_memory_is_in_megabytes():
+    held_mb = psutil.Process().memory_info().rss / 1e6
+    assert 0.9 * held_mb <= provenance.peak_memory_mb() <= 50 * held_mb
+
+
+@pytest.mark.parametrize(("changed", "words"), [(None, "abc"), (0, "abc"), (2, "abc with 2 changed files")])
+def test_the_footer_shows_all_that_was_stamped(changed, words):
+    stamp = {
+        "parameters": {"source": "<rendered>", "names": ["ä"]},
+        "git": {"commit": "abc", "changed_files": changed},
+        "library_sha256": "1" * 64, "lock_sha256": "2" * 64, "data_sha256": "3" * 64,
+        "weights_sha256": {"pose": "4" * 64},
+        "versions": {"python": "3.11"},
+        "onnx_providers": [],
+        "machine": {"cpu": "x", "cores": 2},
+        "wall_s": 1.25,
+    }  # fmt: skip
+    footer = provenance.provenance_html(stamp)
+    for text in (
+        f"<td>{words}</td>", "source = &quot;&lt;rendered&gt;&quot;, names = [&quot;ä&quot;]",
+        f"library {'1' * 12}, lock {'2' * 12}, data {'3' * 12}<", f"pose {'4' * 12}<", "python 3.11",
+        "ONNX Runtime not used", "cpu x, cores 2", "1.2 s",
+    ):  # fmt: skip
+        assert text in footer
+    assert "CPUExecutionProvider, Other" in provenance.provenance_html(
+        stamp | {"onnx_providers": ["CPUExecutionProvider", "Other"]}
+    )

@@ -1,4 +1,4 @@
-"""The relative test's material: which recordings, what is found and lifted in them, what is known of them."""
+"""The data of the relative test: which recordings, what is found and lifted in them, and known of them."""
 
 from types import SimpleNamespace
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pandas as pd
 
 from hicp_lib.core.errors import InputError
@@ -13,14 +12,15 @@ from hicp_lib.study.claims.verdicts import (
     REPRODUCED,
     VERDICTS,
 )
+from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 
 # Okabe and Ito's palette; the hatch says the same without colour.
 _FILLS = {
-    REPRODUCED: {"color": "#009E73", "hatch": ""},
-    ON_RENDERED_DATA: {"color": "#56B4E9", "hatch": "//"},
-    NOT_REPRODUCED: {"color": "#D55E00", "hatch": "xx"},
-    NOT_TESTABLE: {"color": "#D9D9D9", "hatch": ".."},
+    REPRODUCED: {"color": "#009E73", "hatch": "", "edgecolor": "white"},
+    ON_RENDERED_DATA: {"color": "#56B4E9", "hatch": "//", "edgecolor": "white"},
+    NOT_REPRODUCED: {"color": "#D55E00", "hatch": "xx", "edgecolor": "white"},
+    NOT_TESTABLE: {"color": "#D9D9D9", "hatch": "..", "edgecolor": "white"},
 }
 
 
@@ -39,14 +39,10 @@ def verdicts(table: pd.DataFrame) -> Figure:
     counts = table.groupby(["section", "verdict"], sort=False).size().unstack(fill_value=0)
     counts = counts.reindex(index=sections, columns=VERDICTS, fill_value=0)
     figure, axis = new_figure(1, 1, 8.0, 1.4 + 0.32 * len(sections))
-    left = np.zeros(len(sections))
-    for verdict in VERDICTS:
-        pen = {"edgecolor": "white", "label": verdict} | _FILLS[verdict]
-        axis.barh(sections, counts[verdict], left=left, **pen)
-        left += counts[verdict].to_numpy()
+    marks.stacked_bars(axis, counts, _FILLS)
+    axis.set(yticks=range(len(sections)), yticklabels=sections)
     axis.invert_yaxis()
-    axis.set(xlabel="claims", ylabel="section of the paper", xticks=range(int(left.max()) + 1))
-    axis.grid(axis="y", visible=False)
+    axis.set(xlabel="claims", ylabel="section of the paper", xticks=range(int(counts.sum(axis=1).max()) + 1))
     figure.legend(loc="outside upper center", ncols=2)
     said = [f"{counts[verdict].sum()} {verdict}" for verdict in VERDICTS]
     caption = f"The paper's claims by section and verdict: {in_words(said)}."

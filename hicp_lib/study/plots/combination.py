@@ -41,7 +41,7 @@ def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, min_term: flo
 
     Parameters
     ----------
-    curves, errors : DataFrame
+    curves, errors : pd.DataFrame
         As from `calibration_study`.
     min_term : float
         What counts as a hit: the OKS term from which on.

@@ -77,7 +77,7 @@ def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
 
     Parameters
     ----------
-    table : DataFrame
+    table : pd.DataFrame
         Rows of `hicp_lib.datasets.subsets.plan`.
     images_dir : str or Path
         Of the whole images.
@@ -175,7 +175,7 @@ def crop_sizes(table: pd.DataFrame, min_pixels: int, note: str) -> Figure:
 
     Parameters
     ----------
-    table : DataFrame
+    table : pd.DataFrame
         As from `hicp_lib.datasets.subsets.plan`.
     min_pixels : int
         The limit.

@@ -24,7 +24,7 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
 
     Parameters
     ----------
-    table : DataFrame
+    table : pd.DataFrame
         One row per subset x group x detector x metric, columns `subset, group, detector, metric, value, low,
         high` (interval bounds at 95 %).
     data_note : str
@@ -139,7 +139,7 @@ def examples(folders, truth, found, n_people: int, note: str) -> Figure:
     ----------
     folders : mapping of str to Path
         Subset -> dataset folder.
-    truth : mapping of str to Annotations
+    truth : mapping of str to hicp_lib.formats.annotations.Annotations
         By subset.
     found : mapping of (str, str) to mapping of int to Detections
         By subset and detector, then by image id.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
@@ -21,9 +20,8 @@ from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, s
 
 _TRUTH_COLOUR = "#39D353"
 _ONE_CROP = ["subset", "image_id", "annotation_id"]
-_KIND_COLOURS = dict(
-    zip(KINDS, ("#1B9E4B", "#9BD3A0", "#0072B2", "#CC79A7", "#D5272D", "#BDBDBD", "#5F5F5F"), strict=True)
-)
+_KIND_COLOURS = ("#1B9E4B", "#9BD3A0", "#0072B2", "#CC79A7", "#D5272D", "#BDBDBD", "#5F5F5F")
+_KIND_STYLES = {kind: {"color": colour} for kind, colour in zip(KINDS, _KIND_COLOURS, strict=True)}
 _STATE_STYLES = dict(zip(STATES, (("-", "o"), ("--", "s"), (":", "^"), (":", "x")), strict=True))
 
 
@@ -34,7 +32,7 @@ def class_examples(
 
     Parameters
     ----------
-    classes : DataFrame
+    classes : pd.DataFrame
         As from `people_classes`.
     truth : mapping of str to Annotations
         By subset.
@@ -121,7 +119,7 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
 
     Parameters
     ----------
-    table : DataFrame
+    table : pd.DataFrame
         As from `kind_proportions`, of one group of keypoints.
     by : str
         Its column that names the bars.
@@ -132,13 +130,9 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
     figure, axes, panels = _detector_panels(table, 4.2, 1.5 + 0.36 * len(order))
     for axis, _, rows in panels:
         part = rows.pivot(index=by, columns="kind", values="share").reindex(order)
-        left = np.zeros(len(part))
-        for kind in KINDS:
-            axis.barh(range(len(part)), part[kind], left=left, color=_KIND_COLOURS[kind], label=kind)
-            left = left + part[kind].to_numpy()
+        marks.stacked_bars(axis, part, _KIND_STYLES)
         _say_too_few(axis, order, set(part.index[part.isna().all(axis=1)]))
         axis.set(xlabel="share of labelled keypoints", xlim=(0, 1))
-        axis.grid(axis="y", visible=False)
     marks.name_rows(axes[0], order)
     marks.legend_below(figure, axes)
     worst = table[(table["kind"] == "miss") & table["share"].notna()]
@@ -172,7 +166,7 @@ def head_change(table: pd.DataFrame, note: str) -> Figure:
 
 @in_style
 def hallucinated_heads(table: pd.DataFrame, note: str) -> Figure:
-    """Where keypoints of the head are given that was cut off; `table` is of `failures.without_head`."""
+    """Where keypoints of a head are given that was cut off; `table` from `hallucinated_heads`."""
     figure, axes, panels = _detector_panels(table, 4.0, 4.4, sharex=True)
     for axis, detector, rows in panels:
         dots = axis.scatter(rows["along"], rows["below"], c=rows["score"], s=14, vmin=0, vmax=1, alpha=0.8)
@@ -228,7 +222,7 @@ def gallery(
 
     Parameters
     ----------
-    cases : DataFrame
+    cases : pd.DataFrame
         As from `worst_cases`.
     folders : mapping of str to Path
         The subsets' dataset folders.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ def legend_below(figure, axes, ncols: int = 4, fontsize: float = 9) -> None:
     Parameters
     ----------
     figure : matplotlib.figure.Figure
-    axes : Axes or array of Axes
+    axes : matplotlib.axes.Axes or array of matplotlib.axes.Axes
     ncols : int
         Columns of the legend.
     fontsize : float
@@ -37,7 +37,7 @@ def legend_lines(axis, names: Iterable[str], styles: Iterable[dict[str, Any]]) -
 
     Parameters
     ----------
-    axis : Axes
+    axis : matplotlib.axes.Axes
         Takes the lines.
     names : iterable of str
     styles : iterable of dict
@@ -45,7 +45,7 @@ def legend_lines(axis, names: Iterable[str], styles: Iterable[dict[str, Any]]) -
 
     Returns
     -------
-    list of Line2D
+    list of matplotlib.lines.Line2D
     """
     pairs = zip(names, styles, strict=True)
     return [axis.plot([], [], **{"color": _NO_DETECTOR, "label": name} | style)[0] for name, style in pairs]
@@ -61,18 +61,20 @@ def facets(axes, table: pd.DataFrame, down: str, across: str) -> Iterator[tuple[
 
     Parameters
     ----------
-    axes : array of Axes, shape (n values of `down`, n values of `across`)
-    table : DataFrame
+    axes : array of matplotlib.axes.Axes, shape (n_down, n_across)
+    table : pd.DataFrame
     down, across : str
         Columns of the table; their values in the order they come in.
 
     Yields
     ------
-    Axes
-    DataFrame
+    matplotlib.axes.Axes
+    pd.DataFrame
         Its rows of the table, which may be none.
-    object, object
-        The values of `down` and `across`.
+    object
+        The value of `down`.
+    object
+        The value of `across`.
     """
     cases = itertools.product(table[down].unique(), table[across].unique())
     for axis, (row, column) in zip(np.ravel(axes), cases, strict=True):
@@ -107,7 +109,7 @@ def whiskers(rows: pd.DataFrame, value: str = "value", low: str = "low", high: s
 
     Parameters
     ----------
-    rows : DataFrame
+    rows : pd.DataFrame
     value, low, high : str
         Columns of the values and of their intervals' ends.
 
@@ -126,17 +128,34 @@ def whiskers(rows: pd.DataFrame, value: str = "value", low: str = "low", high: s
     return np.maximum([below.to_numpy(float), above.to_numpy(float)], 0)
 
 
+def stacked_bars(axis, lengths: pd.DataFrame, styles: Mapping[str, dict[str, Any]]) -> None:
+    """Lying bars, one per row of a table, of its columns end to end.
+
+    Parameters
+    ----------
+    axis : matplotlib.axes.Axes
+    lengths : pd.DataFrame
+        A row per bar, a column per part.
+    styles : mapping of str to dict
+        Options of `Axes.barh` by part, in the order of the parts from 0.
+    """
+    ends = lengths[list(styles)].cumsum(axis=1).shift(axis=1, fill_value=0)
+    for part, style in styles.items():
+        axis.barh(range(len(lengths)), lengths[part], left=ends[part], label=part, **style)
+    axis.grid(axis="y", visible=False)
+
+
 def draw_boxes(axis, samples: Sequence[pd.Series], colours: Iterable[str], **options: Any) -> None:
     """Lying boxes of quartiles with their medians, whiskers from the 5th to the 95th percentile.
 
     Parameters
     ----------
-    axis : Axes
-    samples : sequence of Series
+    axis : matplotlib.axes.Axes
+    samples : sequence of pd.Series
         The values of each box.
     colours : iterable of str
         A box's colour each.
-    **options
+    **options : dict
         Further ones of `Axes.boxplot`.
     """
     shape = {"orientation": "horizontal", "whis": (5, 95), "showfliers": False, "patch_artist": True}

@@ -28,7 +28,7 @@ def fraction_curves(errors: pd.DataFrame, min_score: float, note: str) -> Figure
 
     Parameters
     ----------
-    errors : DataFrame
+    errors : pd.DataFrame
         As from `hicp_lib.evaluation.space.mocap_error.mocap_errors`.
     min_score : float
         A keypoint counts as found above it.
@@ -67,9 +67,9 @@ def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: fl
 
     Parameters
     ----------
-    errors : DataFrame
+    errors : pd.DataFrame
         As from `hicp_lib.evaluation.space.mocap_error.mocap_errors`.
-    paper : DataFrame
+    paper : pd.DataFrame
         As from `hicp_lib.study.paper_tables.paper_medians`.
     min_score : float
         A keypoint counts as found above it.
@@ -138,7 +138,7 @@ def trajectories(
 
     Parameters
     ----------
-    errors : DataFrame
+    errors : pd.DataFrame
         As from `hicp_lib.evaluation.space.mocap_error.mocap_errors`.
     times_s : array, shape (n_frames,)
         Of the recording; shown from 0.

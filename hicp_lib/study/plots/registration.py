@@ -27,11 +27,11 @@ def registration(
     Parameters
     ----------
     recording : Recording
-    clicks : DataFrame
+    clicks : pd.DataFrame
         Those of the images shown, columns `frame, marker, u_px, v_px`.
-    pixels : DataFrame
+    pixels : pd.DataFrame
         As from `marker_pixels`; only markers that were clicked are drawn.
-    table : DataFrame
+    table : pd.DataFrame
         As from `compare_registrations`.
     note : str
         What the data are, for the caption.

@@ -77,9 +77,9 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
 
     Parameters
     ----------
-    medians : DataFrame
+    medians : pd.DataFrame
         As from `hicp_lib.evaluation.space.stability.median_positions`, one method.
-    truth : mapping of str to DataFrame, or None
+    truth : mapping of str to pd.DataFrame or None
         By view, columns `keypoint, x_m, y_m, z_m`; None where it is not known.
     note : str
         What the data are, for the caption.
@@ -124,7 +124,7 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
 
     Parameters
     ----------
-    table : DataFrame
+    table : pd.DataFrame
         As from `hicp_lib.evaluation.space.stability.spread_and_bias`, with truth.
     method : str
         The lifting that is drawn.

@@ -40,12 +40,12 @@ def scene(
     ----------
     recordings : mapping of str to Recording
         By view; all camera poses are drawn, and what the first saw in its first frame.
-    medians : DataFrame
+    medians : pd.DataFrame
         As from `hicp_lib.evaluation.space.stability.median_positions`, one method; one skeleton per view and
         detector.
     robot : sequence of Segment
         The robot's body in the base frame; empty where the joints are not known.
-    truth : mapping of str to DataFrame, optional
+    truth : mapping of str to pd.DataFrame, optional
         By view, columns `keypoint, x_m, y_m, z_m`, of which the first is drawn; None where not known.
 
     Returns

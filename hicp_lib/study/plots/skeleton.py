@@ -20,7 +20,7 @@ def limb_lines(
 
     Parameters
     ----------
-    rows : DataFrame
+    rows : pd.DataFrame
         With `keypoint` (Halpe names) and coordinates; of a table with many frames, the first counts.
     columns : sequence of str
         The d coordinates.

@@ -42,7 +42,7 @@ class Figure:
         What is drawn, on what data, with what uncertainty; one or two sentences.
     alt : str
         What a reader who cannot see it should know: the axes and the main finding.
-    table : DataFrame or None
+    table : pd.DataFrame or None
         The numbers behind it, offered for download; None for pictures.
     """
 
@@ -74,7 +74,7 @@ def new_figure(n_rows: int = 1, n_columns: int = 1, width_in: float = 8.0, heigh
         Of axes.
     width_in, height_in : float
         The figure's size in inches.
-    **kwargs
+    **kwargs : dict
         Further ones of `plt.subplots`.
     """
     figure, axes = plt.subplots(n_rows, n_columns, figsize=(width_in, height_in), **kwargs)

@@ -25,7 +25,7 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
 
     Parameters
     ----------
-    table : DataFrame
+    table : pd.DataFrame
         At many thresholds.
     marked_m : sequence of float
         Distances marked in grey; the alt text gives the shares at the middle one.
@@ -52,7 +52,7 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
         f"{_REFERENCES[table['reference'].iloc[0]]}, left and right together (solid: robust lifting, dotted: "
         f"the paper's; grey: the distances of the bars): {note}."
     )
-    return Figure(figure, caption, f"Rising curves per detector. {_said(table, marked_m)}", table)
+    return Figure(figure, caption, f"Rising curves per detector. {_shares_text(table, marked_m)}", table)
 
 
 @in_style
@@ -78,7 +78,7 @@ def within_bars(table: pd.DataFrame, note: str) -> Figure:
         f"{in_words(table['method'].unique())}); whiskers are 95 % bootstrap intervals over "
         f"images: {note}."
     )
-    return Figure(figure, caption, f"Bars per keypoint and detector. {_said(table, limits_m)}", table)
+    return Figure(figure, caption, f"Bars per keypoint and detector. {_shares_text(table, limits_m)}", table)
 
 
 def _draw_bars(axis, rows: pd.DataFrame, width: float, colour: str) -> None:
@@ -106,7 +106,7 @@ def _in_cm(distances_m: Sequence[float]) -> str:
     return f"{in_words([f'{100 * distance:g}' for distance in distances_m])} cm"
 
 
-def _said(table: pd.DataFrame, marked_m: Sequence[float]) -> str:
+def _shares_text(table: pd.DataFrame, marked_m: Sequence[float]) -> str:
     """Mean share over the parts of every case, at the middle one of the marked distances."""
     middle_m = marked_m[len(marked_m) // 2]
     nearest_m = min(table["threshold_m"], key=lambda threshold: abs(threshold - middle_m))

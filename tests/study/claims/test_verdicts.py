@@ -290,3 +290,39 @@ def test_for_reading_every_claim_appears_once(write):
     assert list(parts[v.REPRODUCED]) == ["section", "claim", "paper", "ours"]
     assert "no robot: buy one" in set(parts[v.NOT_TESTABLE]["why not, and what would test it"])
     assert v.verdict_counts(table)[v.REPRODUCED] == 1
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "within", "greater"),
+    [
+        (-0.1, 0.1, True, False),  # the tolerance itself is within
+        (-0.10001, 0.1, None, False),
+        (-0.1, 0.10001, None, None),
+        (0.10001, 0.2, False, True),
+        (0.1, 0.2, None, None),  # the margin itself is not above it
+        (-0.2, -0.1, None, False),
+        (-0.2, -0.10001, False, False),
+        (0.0, 0.1, True, False),
+    ],
+)
+def test_tolerance_counts_as_within_and_margin_not_as_above(low, high, within, greater):
+    pair = [(v.Quantity(0.0, low, high, {}, ""), v.Quantity(0.0, 0.0, 0.0, {}, ""))]
+    assert v.holds(Comparison("within", LOSS, 0.0, tolerance=0.1), pair) is within
+    assert v.holds(Comparison(">", LOSS, 0.0, margin=0.1), pair) is greater
+
+
+def test_evidence_without_an_interval_has_no_brackets(write):
+    assert verdict(claim(LOSES), write(rows(a=(-0.4, -0.4, -0.4)))).ours == "a -0.4"
+
+
+def test_a_detector_that_needs_no_model_is_simply_run(write):
+    best = Comparison(">", Selection("02", "loss", {"detector": "openpose-mobilenet"}, "change"), LOSS)
+    found = verdict(claim(best), write(rows(a=(-0.4, -0.5, -0.3))))
+    assert found.command == "hicp report -p detectors mediapipe,openpose-mobilenet"
+
+
+def test_the_least_and_the_greatest_row_are_picked_and_scaled(write):
+    results = write(rows(a=(-0.4, -0.5, -0.3), b=(0.2, 0.1, 0.3)))
+    for pick, expected in (("least", (-400, -500, -300)), ("greatest", (200, 100, 300))):
+        (found,) = v.select(Selection("02", "loss", {}, "change", {}, pick, "low", "high", 1000.0), results)
+        assert (found.value, found.low, found.high) == pytest.approx(expected)
