@@ -69,14 +69,11 @@ class Hands:
         return cls(found.keypoints_px[rows[:, None], points], found.scores[rows[:, None], points], sides)
 
     @classmethod
-    def together(cls, parts: list[Hands]) -> Hands:
+    def concatenate(cls, parts: list[Hands]) -> Hands:
         """All sightings of several looks."""
         none = cls(np.zeros((0, 21, 2)), np.zeros((0, 21)), np.zeros(0, dtype=int))
-        return cls(
-            np.concatenate([part.keypoints_px for part in [none, *parts]]),
-            np.concatenate([part.scores for part in [none, *parts]]),
-            np.concatenate([part.sides for part in [none, *parts]]),
-        )
+        rows = [(part.keypoints_px, part.scores, part.sides) for part in [none, *parts]]
+        return cls(*map(np.concatenate, zip(*rows, strict=True)))
 
     def take(self, rows: np.ndarray) -> Hands:
         """Some of the sightings."""
@@ -99,7 +96,7 @@ def merge_duplicates(hands: Hands, same_hand: float) -> Hands:
         centre = np.where(left, (near & left).sum(axis=1), 0).argmax()
         merged.append(_median(hands.take(near[centre] & left)))
         left &= ~near[centre]
-    return Hands.together(merged)
+    return Hands.concatenate(merged)
 
 
 def _median(same: Hands) -> Hands:

@@ -93,8 +93,7 @@ class Square:
     def overlaps(self, image: np.ndarray) -> bool:
         """Whether any of it lies in the image."""
         height, width = image.shape[:2]
-        end_x, end_y = self.left_px + self.side_px, self.top_px + self.side_px
-        return self.left_px < width and self.top_px < height and end_x > 0 and end_y > 0
+        return -self.side_px < self.left_px < width and -self.side_px < self.top_px < height
 
     def cut(self, image: np.ndarray, min_side_px: int) -> np.ndarray:
         """Its pixels, black outside the image, enlarged to `min_side_px` when smaller."""

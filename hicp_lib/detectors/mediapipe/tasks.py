@@ -30,7 +30,7 @@ from hicp_lib.core.keypoints import COCO_17, to_halpe
 from hicp_lib.detectors.combined.arbitration import Hands, give_hands, in_pairs, nearest_first
 from hicp_lib.detectors.mediapipe import bundles, child
 from hicp_lib.detectors.mediapipe.program import program_folder, program_version
-from hicp_lib.detectors.runtime.isolation import NativeProcess
+from hicp_lib.detectors.runtime.isolation import IsolatedProcess
 
 _WRISTS = [9, 10]
 
@@ -111,7 +111,7 @@ class MediaPipe:
 
     def __init__(self, num_people: int = 1, min_score: float = 0.5, side_by_side: bool = False) -> None:
         self._thread = ThreadPoolExecutor(1) if side_by_side else None
-        self.parts = {
+        self.parts: dict[str, MediaPipePose | MediaPipeHands] = {
             "pose": MediaPipePose(num_people, min_score), "hands": MediaPipeHands(2 * num_people, min_score)
         }  # fmt: skip
         self.settings = {name: part.settings for name, part in self.parts.items()}
@@ -145,7 +145,7 @@ def attach_hands(bodies: Detections, found: Detections) -> Detections:
 
 def _process(
     name: str, task: str, n: int, min_score: float, model: str | Path | None
-) -> tuple[NativeProcess, dict]:
+) -> tuple[IsolatedProcess, dict]:
     """MediaPipe's task in a process of its own, and what identifies its models in a detector's settings.
 
     Its start takes half a second and waits for the first image; a bundle of the user's own is tried at once.
@@ -155,7 +155,7 @@ def _process(
             f"{name}: finds {n} at scores from {min_score}; expected 1 or more, and a score from 0 to 1"
         )
     bundle = bundles.read_bundle(task, model) if model else bundles.assemble(task)
-    process = NativeProcess(
+    process = IsolatedProcess(
         [child.__file__, str(program_folder().parent)],
         {"task": task, "n": n, "min_score": min_score},
         bundle,

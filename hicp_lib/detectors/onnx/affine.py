@@ -56,7 +56,7 @@ class Regions:
             crops.append(cv2.warpAffine(image, matrix, input_size_px, flags=cv2.INTER_LINEAR))
         return crops
 
-    def to_image_px(self, positions: np.ndarray, grid_size: np.ndarray) -> np.ndarray:
+    def to_image_px(self, positions: np.ndarray, grid_size: tuple[int, int]) -> np.ndarray:
         """Positions on each region's grid as image pixels, pixel centres at integers.
 
         Parameters

@@ -15,6 +15,7 @@ import numpy as np
 
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.letterbox import Letterbox
 from hicp_lib.detectors.onnx.session import open_content
 from hicp_lib.detectors.openpose.paf import PafOptions, PartModel, assemble
@@ -36,6 +37,18 @@ COCO_18 = PartModel(
     fields=np.array(list(_COCO_18_LIMBS.values())),
     completing=frozenset({17, 18}),
 )
+
+
+def check_height(net_height_px: int) -> None:
+    """Refuse a height that these networks cannot take.
+
+    Raises
+    ------
+    InputError
+        If it is no positive multiple of 16.
+    """
+    if net_height_px <= 0 or net_height_px % 16:
+        raise InputError(f"net_height_px {net_height_px}: expected a positive multiple of 16")
 
 
 def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> Letterbox:
@@ -79,8 +92,7 @@ class OpenPoseMobileNet:
         provider: str = "cpu",
         threads: int = 1,
     ) -> None:
-        if net_height_px <= 0 or net_height_px % 16:
-            raise ValueError(f"net_height_px must be a positive multiple of 16, not {net_height_px}")
+        check_height(net_height_px)
         self._model = open_content(load(WEIGHTS.name), WEIGHTS, provider, threads)
         self._height_px = net_height_px
         self._options = options or PafOptions()

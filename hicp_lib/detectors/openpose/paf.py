@@ -96,12 +96,12 @@ def find_peaks(heat_maps: np.ndarray, stride: int, min_peak: float) -> list[np.n
     cells = np.argwhere(_is_maximum(heat_maps) & (heat_maps > min_peak))
     part, row, column = cells.T
     logs = np.pad(np.log(np.maximum(heat_maps, _LEAST)), ((0, 0), (1, 1), (1, 1)), constant_values=np.nan)
-    x = column + _vertex(
-        logs[part, row + 1, column], logs[part, row + 1, column + 1], logs[part, row + 1, column + 2]
-    )
-    y = row + _vertex(
-        logs[part, row, column + 1], logs[part, row + 1, column + 1], logs[part, row + 2, column + 1]
-    )
+
+    def beside(dy: int, dx: int) -> np.ndarray:
+        return logs[part, row + 1 + dy, column + 1 + dx]
+
+    x = column + _vertex(beside(0, -1), beside(0, 0), beside(0, 1))
+    y = row + _vertex(beside(-1, 0), beside(0, 0), beside(1, 0))
     value = heat_maps[part, row, column]
     peaks = np.stack([(x + 0.5) * stride - 0.5, (y + 0.5) * stride - 0.5, value], axis=1)
     order = np.argsort(-value, kind="stable")
@@ -113,12 +113,10 @@ def _is_maximum(maps: np.ndarray) -> np.ndarray:
     height, width = maps.shape[1:]
     padded = np.pad(maps, ((0, 0), (1, 1), (1, 1)), constant_values=-np.inf)
     result = np.ones(maps.shape, dtype=bool)
-    for dy in (-1, 0, 1):
-        for dx in (-1, 0, 1):
-            if dy == dx == 0:
-                continue
-            neighbour = padded[:, 1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width]
-            result &= (maps > neighbour) if (dy, dx) < (0, 0) else (maps >= neighbour)
+    for dy, dx in np.ndindex(3, 3):
+        neighbour = padded[:, dy : dy + height, dx : dx + width]
+        if (dy, dx) != (1, 1):
+            result &= (maps > neighbour) if (dy, dx) < (1, 1) else (maps >= neighbour)
     return result
 
 
@@ -244,19 +242,19 @@ def _join(
     """Add the limb between peak `a` and peak `b` (part, index) to the people found so far."""
     with_a = next((person for person in people if person.peaks.get(a[0]) == a[1]), None)
     with_b = next((person for person in people if person.peaks.get(b[0]) == b[1]), None)
-    if with_a is None and with_b is None:
+    person = with_a or with_b
+    if person is None:
         if completing:
             return
-        with_a = _Person()
-        people.append(with_a)
-    elif with_a is not None and with_b is not None and with_a is not with_b:
-        if with_a.peaks.keys() & with_b.peaks.keys():
+        person = _Person()
+        people.append(person)
+    elif with_b is not None and with_b is not person:
+        if person.peaks.keys() & with_b.peaks.keys():
             return
-        with_a.peaks.update(with_b.peaks)
-        with_a.limb_score += with_b.limb_score
-        with_a.n_limbs += with_b.n_limbs
-        people[:] = [person for person in people if person is not with_b]
-    person = with_a or with_b
+        person.peaks.update(with_b.peaks)
+        person.limb_score += with_b.limb_score
+        person.n_limbs += with_b.n_limbs
+        people[:] = [other for other in people if other is not with_b]
     for part, peak in (a, b):
         if person.peaks.setdefault(part, peak) != peak:
             return

@@ -21,7 +21,7 @@ from hicp_lib.core.keypoints import INDEX, LEFT_HAND, RIGHT_HAND
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import planes
 from hicp_lib.detectors.onnx.session import OnnxModel, open_model
-from hicp_lib.detectors.openpose.mobilenet import COCO_18, STRIDE, as_detections, fit
+from hicp_lib.detectors.openpose.mobilenet import COCO_18, STRIDE, as_detections, check_height, fit
 from hicp_lib.detectors.openpose.paf import PafOptions, PartModel, assemble
 from hicp_lib.detectors.openpose.released import assemble_released, enlarge
 
@@ -71,8 +71,7 @@ class OpenPose:
         provider: str = "cpu",
         threads: int = 1,
     ) -> None:
-        if net_height_px <= 0 or net_height_px % 16:
-            raise InputError(f"net_height_px {net_height_px}: expected a positive multiple of 16")
+        check_height(net_height_px)
         self._model = open_model(model, provider, threads)
         height, width = self._model.image_size_px
         self._size_px = height or net_height_px, width if height else None

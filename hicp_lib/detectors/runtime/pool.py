@@ -13,7 +13,7 @@ import numpy as np
 
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.cached_parts import Runner
-from hicp_lib.detectors.runtime.isolation import NativeError
+from hicp_lib.detectors.runtime.isolation import IsolationError
 from hicp_lib.detectors.runtime.results import Timed
 
 
@@ -54,12 +54,12 @@ class DetectorPool:
 
 
 @contextmanager
-def naming(path: str | Path) -> Iterator[None]:
+def naming_image(path: str | Path) -> Iterator[None]:
     """Name the image in what is told of a library that failed on it."""
     try:
         yield
-    except NativeError as error:
-        raise NativeError(f"{path}: {error}") from None
+    except IsolationError as error:
+        raise IsolationError(f"{path}: {error}") from None
 
 
 class _OneThread:

@@ -19,15 +19,15 @@ import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.images import read_image
-from hicp_lib.detectors.runtime.pool import DetectorPool, naming, single_threaded_opencv
+from hicp_lib.core.files import sha256_bytes
+from hicp_lib.core.images import decode_image
+from hicp_lib.detectors.runtime.pool import DetectorPool, naming_image, single_threaded_opencv
 from hicp_lib.detectors.runtime.results import (
     Timed,
     cache_folder,
-    image_sha256,
-    read_result,
+    cached,
+    image_bytes,
     result_path,
-    write_result,
 )
 from hicp_lib.formats.annotations import read_annotations
 
@@ -87,8 +87,8 @@ def detect_images(
     """
     workers = max(1, min(workers or n_cores(), len(paths) or 1))
     pool = DetectorPool(name, options, workers)
-    takes_boxes = boxes_px is not None and getattr(pool.first, "takes_boxes", False)
-    jobs = {key: (Path(path), boxes_px[key] if takes_boxes else None) for key, path in paths.items()}
+    boxes_px = boxes_px if getattr(pool.first, "takes_boxes", False) else None
+    jobs = {key: (Path(path), None if boxes_px is None else boxes_px[key]) for key, path in paths.items()}
     if dask is None:
         results = _in_threads(pool, jobs, workers)
     else:
@@ -105,19 +105,18 @@ def _in_threads(
 ) -> Iterator[tuple[Key, Timed]]:
     folder = cache_folder(pool.first)
     with single_threaded_opencv, ThreadPoolExecutor(workers) as executor:
-        calls = executor.map(lambda job: _detect_one(pool, *job, folder), jobs.values())
+        calls = executor.map(lambda job: _detect_one(pool, folder, *job), jobs.values())
         yield from zip(jobs, calls, strict=True)
 
 
-def _detect_one(pool: DetectorPool, path: Path, boxes_px: np.ndarray | None, folder: Path) -> Timed:
-    sha256 = image_sha256(path)
-    kept = result_path(folder, sha256, boxes_px)
-    result = read_result(kept)
-    if result is None:
-        with naming(path):
-            result = pool.detect(read_image(path), boxes_px, sha256)
-        write_result(kept, result)
-    return result
+def _detect_one(pool: DetectorPool, folder: Path, path: Path, boxes_px: np.ndarray | None) -> Timed:
+    content = image_bytes(path)
+    sha256 = sha256_bytes(content)
+    with naming_image(path):
+        return cached(
+            result_path(folder, sha256, boxes_px),
+            lambda: pool.detect(decode_image(content, path), boxes_px, sha256),
+        )
 
 
 def n_cores() -> int:
