@@ -18,11 +18,16 @@ class Entry:
 
     Attributes
     ----------
-    name : what users type
-    label : what figures and tables call it
-    groups : keypoint groups it can be scored on, keys of `hicp_lib.core.keypoints.GROUPS`
-    module, class_name : where it is; imported on demand, MediaPipe alone takes a second
-    needs_model : it runs only on a weight file of the user's own, option `model`
+    name : str
+        What users type.
+    label : str
+        What figures and tables call it.
+    groups : tuple of str
+        Keypoint groups it can be scored on, keys of `hicp_lib.core.keypoints.GROUPS`.
+    module, class_name : str
+        Where it is; imported on demand, MediaPipe alone takes a second.
+    needs_model : bool
+        It runs only on a weight file of the user's own, option `model`.
     """
 
     name: str
@@ -64,7 +69,13 @@ def default_detector_names() -> list[str]:
 
 
 def command_to_run(name: str) -> str:
-    """The command that runs a detector on a folder of images."""
+    """The command that runs a detector on a folder of images.
+
+    Examples
+    --------
+    >>> command_to_run("mediapipe")
+    'hicp detect --detector mediapipe --dataset DIR --out FILE.json'
+    """
     model = " --model FILE.onnx" if DETECTORS[name].needs_model else ""
     return f"hicp detect --detector {name}{model} --dataset DIR --out FILE.json"
 
@@ -75,16 +86,33 @@ def command_to_use(name: str) -> str:
 
 
 def make_detector(name: str, **options) -> Detector:
-    """A detector ready to run; `options` are the parameters of its class.
+    """A detector ready to run.
 
     One that needs a model and is given none takes those kept for it (`hicp_lib.detectors.weights.user`).
     `combined:BODY+HANDS` puts two detectors together (see `hicp_lib.detectors.combined.detector`): its own
     options, those of the hand detector with `hands_` before their names, and all others the body detector's.
 
+    Parameters
+    ----------
+    name : str
+    **options : object
+        Parameters of its class.
+
+    Returns
+    -------
+    Detector
+
     Raises
     ------
     InputError
         If the name or an option is unknown, a weight file is absent or damaged, or a package is missing.
+
+    Examples
+    --------
+    >>> make_detector("openpose-mobilenet", height=300)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    hicp_lib.core.errors.InputError: detector 'openpose-mobilenet' has no option 'height'; expected ...
     """
     if name.startswith(COMBINED):
         return _make_combined(name, options)

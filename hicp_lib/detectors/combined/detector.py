@@ -43,12 +43,16 @@ class Combined:
 
     Parameters
     ----------
-    body, hands : ready detectors; `hands` gives hand points in the Halpe layout
-    looks : where hands are looked for, joined by +: "wrists" (squares at the forearms' ends), "image" (the
-        whole of it), "along" (squares along an oblong image)
-    arbitrate : apply the rules of `arbitration`; if not, a wrist takes the surest hand of its own
-        squares, and further hands go to the nearest free wrist
-    min_side_px : smaller squares are enlarged to this
+    body, hands : Detector
+        Ready detectors; `hands` gives hand points in the Halpe layout.
+    looks : str
+        Where hands are looked for, joined by +: "wrists" (squares at the forearms' ends), "image" (the whole
+        of it), "along" (squares along an oblong image).
+    arbitrate : bool
+        Apply the rules of `arbitration`; if not, a wrist takes the surest hand of its own squares, and
+        further hands go to the nearest free wrist.
+    min_side_px : int
+        Smaller squares are enlarged to this.
     """
 
     def __init__(

@@ -29,7 +29,24 @@ _VISION = "mediapipe.tasks.python.vision"
 
 
 def send(file: IO[bytes], head: dict, body: bytes = b"") -> None:
-    """Write one message."""
+    """Write one message.
+
+    Parameters
+    ----------
+    file : file
+    head : dict
+        JSON-able.
+    body : bytes
+
+    Examples
+    --------
+    >>> from io import BytesIO
+    >>> pipe = BytesIO()
+    >>> send(pipe, {"shape": [1, 2]}, b"ab")
+    >>> _ = pipe.seek(0)
+    >>> receive(pipe)
+    ({'shape': [1, 2]}, b'ab')
+    """
     text = json.dumps(head).encode()
     file.write(_LENGTHS.pack(len(text), len(body)) + text)
     file.write(body)
@@ -81,7 +98,19 @@ def _serve(questions: IO[bytes], answers: IO[bytes], folder: str, shared: int) -
 
 
 def detection(bundle: bytes, task: str, **options: Any) -> Callable[[np.ndarray], np.ndarray]:
-    """A function from an image (height, width, 3) to what `_poses` or `_hands` say."""
+    """A function from an image to what `_poses` or `_hands` say.
+
+    Parameters
+    ----------
+    bundle : bytes
+    task : {"pose", "hand"}
+    **options : object
+        As of `landmarker`.
+
+    Returns
+    -------
+    callable
+    """
     task_is_ready = landmarker(bundle, task, **options)
     pixels = import_module(f"{_VISION}.core.image")
     rows = {"pose": _poses, "hand": _hands}[task]
@@ -89,7 +118,17 @@ def detection(bundle: bytes, task: str, **options: Any) -> Callable[[np.ndarray]
 
 
 def landmarker(bundle: bytes, task: str, n: int, min_score: float) -> Any:
-    """MediaPipe's task ("pose" or "hand") for still images, ready."""
+    """MediaPipe's task for still images, ready.
+
+    Parameters
+    ----------
+    bundle : bytes
+    task : {"pose", "hand"}
+    n : int
+        Most people, or hands.
+    min_score : float
+        Threshold of the detector and of the presence check.
+    """
     base_options = import_module("mediapipe.tasks.python.core.base_options")
     module = import_module(f"{_VISION}.{task}_landmarker")
     kind = task.capitalize()

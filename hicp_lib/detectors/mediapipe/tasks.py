@@ -40,9 +40,12 @@ class MediaPipePose:
 
     Parameters
     ----------
-    num_poses : most people to return per image; 1, as in the paper, suits crops of one person
-    min_score : threshold of MediaPipe's person detector and of its presence check
-    model : an official `.task` bundle to use in place of the fetched weights
+    num_poses : int
+        Most people to return per image; 1, as in the paper, suits crops of one person.
+    min_score : float
+        Threshold of MediaPipe's person detector and of its presence check.
+    model : str or Path, optional
+        An official `.task` bundle to use in place of the fetched weights.
     """
 
     name = "mediapipe-pose"
@@ -70,9 +73,12 @@ class MediaPipeHands:
 
     Parameters
     ----------
-    num_hands : most hands to return per image
-    min_score : threshold of MediaPipe's palm detector and of its presence check
-    model : an official `.task` bundle to use in place of the fetched weights
+    num_hands : int
+        Most hands to return per image.
+    min_score : float
+        Threshold of MediaPipe's palm detector and of its presence check.
+    model : str or Path, optional
+        An official `.task` bundle to use in place of the fetched weights.
     """
 
     name = "mediapipe-hands"
@@ -101,10 +107,13 @@ class MediaPipe:
 
     Parameters
     ----------
-    num_people : most people to return per image (and half the number of hands)
-    min_score : threshold of both detectors
-    side_by_side : look for both at the same time, in two threads: an answer comes sooner where a processor
-        is free, which is what a robot waits for
+    num_people : int
+        Most people to return per image (and half the number of hands).
+    min_score : float
+        Threshold of both detectors.
+    side_by_side : bool
+        Look for both at the same time, in two threads: an answer comes sooner where a processor is free,
+        which is what a robot waits for.
     """
 
     name = "mediapipe"
@@ -135,7 +144,8 @@ def attach_hands(bodies: Detections, found: Detections) -> Detections:
 
     Returns
     -------
-    The bodies with their hands, then instances of the hands that found no free wrist.
+    Detections
+        The bodies with their hands, then instances of the hands that found no free wrist.
     """
     hands = Hands.of(found)
     chosen = nearest_first(bodies.keypoints_px[:, _WRISTS], hands, np.full((len(bodies), 2), -1))

@@ -38,11 +38,18 @@ class AlphaPose:
 
     Parameters
     ----------
-    model : ONNX export
-    person_model, boxes : see `BoxSource`
-    decoding : "heatmap", "integral" (symmetric integral regression) or "combined" (face and hands
-        integral); if None, told by the network's answer to the mean colour
-    flip_test, provider, threads : as for `MMPose`
+    model : str or Path
+        ONNX export.
+    person_model : str or Path, optional
+    boxes : str, optional
+        See `hicp_lib.detectors.onnx.box_source.BoxSource`.
+    decoding : str, optional
+        "heatmap", "integral" (symmetric integral regression) or "combined" (face and hands integral); if
+        None, told by the network's answer to the mean colour.
+    flip_test : bool
+    provider : str
+    threads : int
+        As for `hicp_lib.detectors.onnx.mmpose.MMPose`.
     """
 
     name = "alphapose"

@@ -23,9 +23,11 @@ class BoxSource:
 
     Parameters
     ----------
-    boxes : "gt" (annotated boxes, handed to `detect`), "image" (one person, the whole image) or
-        "detected"; by default detected with a person model, and otherwise the image
-    person_model : ONNX export of YOLOX or RTMDet
+    boxes : str or None
+        "gt" (annotated boxes, handed to `detect`), "image" (one person, the whole image) or "detected"; by
+        default detected with a person model, and otherwise the image.
+    person_model : str or Path or None
+        ONNX export of YOLOX or RTMDet.
     """
 
     def __init__(

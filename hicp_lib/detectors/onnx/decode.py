@@ -17,7 +17,14 @@ Decoded = tuple[np.ndarray, np.ndarray]
 
 
 def peaks(maps: np.ndarray) -> Decoded:
-    """The highest cell of each heat map (n, k, h, w) and its value."""
+    """The highest cell of each heat map (n, k, h, w) and its value.
+
+    Examples
+    --------
+    >>> cells, scores = peaks(np.array([[[[0.0, 0.5, 0.1], [0.2, 0.3, 0.9]]]]))
+    >>> cells.tolist(), scores.tolist()
+    ([[[2.0, 1.0]]], [[0.9]])
+    """
     flat = maps.reshape(*maps.shape[:2], -1)
     best = flat.argmax(axis=-1)
     scores = np.take_along_axis(flat, best[..., None], axis=-1)[..., 0].astype(float)

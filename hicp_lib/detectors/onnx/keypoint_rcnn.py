@@ -46,10 +46,15 @@ class KeypointRcnn:
 
     Parameters
     ----------
-    model : ONNX export of Detectron2's or torchvision's Keypoint R-CNN
-    family : "detectron2" or "torchvision"; told by the number of outputs' keypoint scores if None
-    min_score : least box score of a person
-    provider, threads : see `hicp_lib.detectors.onnx.session.open_model`
+    model : str or Path
+        ONNX export of Detectron2's or torchvision's Keypoint R-CNN.
+    family : str, optional
+        "detectron2" or "torchvision"; told by the number of outputs' keypoint scores if None.
+    min_score : float
+        Least box score of a person.
+    provider : str
+    threads : int
+        See `hicp_lib.detectors.onnx.session.open_model`.
     """
 
     name = "detectron2"
@@ -157,7 +162,13 @@ class KeypointRcnn:
 
 
 def logistic_score(logits: np.ndarray) -> np.ndarray:
-    """Scores in [0, 1] for raw logits; 0.5 at 2. A logit that is not a number scores 0."""
+    """Scores in [0, 1] for raw logits; 0.5 at 2. A logit that is not a number scores 0.
+
+    Examples
+    --------
+    >>> logistic_score(np.array([-50, 2, 50, np.nan])).round(3).tolist()
+    [0.0, 0.5, 1.0, 0.0]
+    """
     return np.nan_to_num(1 / (1 + np.exp(np.clip(_LOGIT_MIDDLE - logits, -_MAX_EXPONENT, _MAX_EXPONENT))))
 
 

@@ -30,13 +30,22 @@ class MMPose:
 
     Parameters
     ----------
-    model : ONNX export, whole body (133 points), Halpe (26, 136), COCO (17) or one hand (21)
-    person_model, boxes : see `BoxSource`
-    dark : decode heat maps aware of their distribution (the "dark" configurations)
-    flip_test : also run the mirrored crops, and average
-    score_scale : network score that counts as 1; if None, 10 for RTMW's head and 1 otherwise
-    hand : "left" or "right", what a one-hand network is shown
-    provider, threads : see `hicp_lib.detectors.onnx.session.open_model`
+    model : str or Path
+        ONNX export, whole body (133 points), Halpe (26, 136), COCO (17) or one hand (21).
+    person_model : str or Path, optional
+    boxes : str, optional
+        See `hicp_lib.detectors.onnx.box_source.BoxSource`.
+    dark : bool
+        Decode heat maps aware of their distribution (the "dark" configurations).
+    flip_test : bool
+        Also run the mirrored crops, and average.
+    score_scale : float, optional
+        Network score that counts as 1; if None, 10 for RTMW's head and 1 otherwise.
+    hand : str
+        "left" or "right", what a one-hand network is shown.
+    provider : str
+    threads : int
+        See `hicp_lib.detectors.onnx.session.open_model`.
     """
 
     name = "mmpose"

@@ -41,7 +41,8 @@ class PersonBoxes:
     ----------
     model : str or Path
         ONNX export.
-    provider, threads : str, int
+    provider : str
+    threads : int
         See `hicp_lib.detectors.onnx.session.open_model`.
     """
 

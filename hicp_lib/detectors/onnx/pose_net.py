@@ -37,7 +37,7 @@ class PoseNet:
     Parameters
     ----------
     model : OnnxModel
-    mean, std : tuple of float
+    mean, std : Colour
         Of the R, G and B values 0-255, taken off and divided by.
     decode_maps : callable
         Heat maps, shape (n, k, h, w), to positions in cells, shape (n, k, 2), and scores, shape (n, k).
@@ -95,7 +95,9 @@ class PoseNet:
 
         Returns
         -------
-        Positions (n, k, 2) in image pixels, NaN where the score is not positive, and scores (n, k).
+        positions_px : array, shape (n, k, 2)
+            In the image; NaN where the score is not positive.
+        scores : array, shape (n, k)
         """
         outputs = self._respond(regions.crop(image, self.input_size_px))
         cells, scores = decode_simcc(*outputs) if self.is_simcc else self._decode_maps(outputs[0])

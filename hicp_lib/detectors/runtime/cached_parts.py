@@ -60,9 +60,9 @@ class Runner:
 
         Parameters
         ----------
-        image : array, shape (height, width, 3), uint8
+        image : array, shape (height, width, 3), dtype uint8
             RGB.
-        boxes_px : array, shape (n, 4: x, y, width, height), or None
+        boxes_px : array or None, shape (n, 4: x, y, width, height)
             For detectors that take them.
         image_sha256 : str or None
             Of the image's file; without it nothing is read from disk or kept there.

@@ -66,16 +66,18 @@ def detect_on_cluster(
     ----------
     address : str
         Of Dask's scheduler, e.g. "tcp://127.0.0.1:8786".
-    name, options : str, dict of str to object
+    name : str
+    options : dict of str to object
         Of the detector, as `make_detector` takes them.
     detector : Detector
         The same, made here; workers' ones must equal it in all that results depend on.
-    jobs : dict of object to tuple of Path and array
+    jobs : dict of object to (Path, array or None)
         Image file, and boxes (n, 4: x, y, width, height) if the detector takes them, by any key.
 
     Yields
     ------
-    tuple of object and Timed
+    (object, Timed)
+        Key and result.
 
     Raises
     ------

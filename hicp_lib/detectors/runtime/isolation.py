@@ -43,10 +43,15 @@ class IsolatedProcess:
 
     Parameters
     ----------
-    program : script that speaks as `hicp_lib.detectors.mediapipe.child` says, and its first arguments
-    head, body : the first message to it
-    name : what messages to the user begin with
-    remedy : what they end with if the program cannot start
+    program : list of str
+        Script that speaks as `hicp_lib.detectors.mediapipe.child` says, and its first arguments.
+    head : dict
+    body : bytes
+        The first message to it.
+    name : str
+        What messages to the user begin with.
+    remedy : str
+        What they end with if the program cannot start.
     """
 
     def __init__(self, program: list[str], head: dict, body: bytes, name: str, remedy: str) -> None:

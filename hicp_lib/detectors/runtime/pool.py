@@ -22,12 +22,16 @@ class DetectorPool:
 
     Parameters
     ----------
-    name, options : as `make_detector` takes them
-    workers : how many threads use them at a time
+    name : str
+    options : dict of str to object
+        As `make_detector` takes them.
+    workers : int
+        How many threads use them at a time.
 
     Attributes
     ----------
-    first : one of them, made at once; it tells the settings of all
+    first : hicp_lib.core.detections.Detector
+        One of them, made at once; it tells the settings of all.
     """
 
     def __init__(self, name: str, options: dict, workers: int) -> None:
@@ -40,7 +44,14 @@ class DetectorPool:
     def detect(
         self, image: np.ndarray, boxes_px: np.ndarray | None, image_sha256: str | None = None
     ) -> Timed:
-        """As `Runner.detect`, by one that is idle."""
+        """As `Runner.detect`, by one that is idle.
+
+        Parameters
+        ----------
+        image : array, shape (height, width, 3), dtype uint8
+        boxes_px : array or None, shape (n, 4: x, y, width, height)
+        image_sha256 : str, optional
+        """
         try:
             runner = self._idle.get_nowait()
         except queue.Empty:

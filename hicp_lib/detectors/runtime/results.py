@@ -32,9 +32,12 @@ class Timed:
 
     Attributes
     ----------
-    detections : the people found
-    time_ms : time of the detector's call when it was made (what was kept, its parts' too, keeps its time)
-    workers : how many such calls ran side by side then; more of them make each slower
+    detections : Detections
+        The people found.
+    time_ms : float
+        Time of the detector's call when it was made (what was kept, its parts' too, keeps its time).
+    workers : int
+        How many such calls ran side by side then; more of them make each slower.
     """
 
     detections: Detections
@@ -85,7 +88,20 @@ def pixels_sha256(image: np.ndarray) -> str:
 
 
 def result_path(folder: Path, image_sha256: str, boxes_px: np.ndarray | None) -> Path:
-    """Where the result of an image is kept; boxes (n, 4) count if they were given."""
+    """Where the result of an image is kept.
+
+    Parameters
+    ----------
+    folder : Path
+    image_sha256 : str
+    boxes_px : array or None, shape (n, 4)
+        They count if they were given.
+
+    Examples
+    --------
+    >>> result_path(Path("kept"), "ab12", None).as_posix()
+    'kept/ab12.bin'
+    """
     boxes_key = "" if boxes_px is None else "-" + sha256_bytes(np.asarray(boxes_px, float).tobytes())[:16]
     return folder / f"{image_sha256}{boxes_key}.bin"
 
@@ -93,7 +109,21 @@ def result_path(folder: Path, image_sha256: str, boxes_px: np.ndarray | None) ->
 def cached(path: Path | None, make: Callable[[], Timed]) -> Timed:
     """The result kept at `path`, or where there is none what `make` finds, kept there from then on.
 
-    Without a path nothing is read or kept.
+    Parameters
+    ----------
+    path : Path or None
+        Without one nothing is read or kept.
+    make : callable
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "a.bin"
+    ...     first = cached(path, lambda: Timed(Detections.none(), 12.5, 1))
+    ...     again = cached(path, lambda: None)
+    >>> again.time_ms, again.workers, len(again.detections)
+    (12.5, 1, 0)
     """
     result = read_result(path) if path else None
     if result is None:

@@ -35,7 +35,19 @@ Key = TypeVar("Key", bound=Hashable)
 
 
 def detect_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Detections]:
-    """As `time_dataset`, without the times."""
+    """As `time_dataset`, without the times.
+
+    Parameters
+    ----------
+    name : str
+    dataset_dir : path
+    **options : object
+        As of `time_dataset`.
+
+    Returns
+    -------
+    dict of int to Detections
+    """
     results = time_dataset(name, dataset_dir, **options)
     return {image_id: result.detections for image_id, result in results.items()}
 
@@ -43,7 +55,18 @@ def detect_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, D
 def time_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Timed]:
     """People in every image of a dataset folder (`images/`, `annotations.json`), by image id.
 
-    `name` and `options` are those of `detect_images`; the annotated boxes go to detectors that take them.
+    The annotated boxes go to detectors that take them.
+
+    Parameters
+    ----------
+    name : str
+    dataset_dir : path
+    **options : object
+        As of `detect_images`.
+
+    Returns
+    -------
+    dict of int to Timed
     """
     annotations = read_annotations(Path(dataset_dir) / "annotations.json")
     paths = {
@@ -68,17 +91,25 @@ def detect_images(
 
     Parameters
     ----------
-    name : detector, see `hicp_lib.detectors.registry`
-    paths : image files by any key
-    workers : threads (the cores this process may use, if None)
-    progress : show a bar; only ever on a terminal
-    boxes_px : annotated boxes (n, 4: x, y, width, height) of each image, for detectors that take them
-    dask : address of a Dask scheduler, whose workers do what threads do otherwise
-    options : options of the detector
+    name : str
+        Detector, see `hicp_lib.detectors.registry`.
+    paths : dict of object to path
+        Image files by any key.
+    workers : int, optional
+        Threads (the cores this process may use, if None).
+    progress : bool, default True
+        Show a bar; only ever on a terminal.
+    boxes_px : dict of object to array, optional
+        Annotated boxes (n, 4: x, y, width, height) of each image, for detectors that take them.
+    dask : str, optional
+        Address of a Dask scheduler, whose workers do what threads do otherwise.
+    **options : object
+        Of the detector.
 
     Returns
     -------
-    The result of each image, in the order of `paths`.
+    dict of object to Timed
+        By the keys of `paths`, in their order.
 
     Raises
     ------

@@ -146,11 +146,13 @@ def fetch(names: Iterable[str] | None = None) -> list[str]:
 
     Parameters
     ----------
-    names : weight files or detectors (all weight files if None)
+    names : iterable of str, optional
+        Weight files or detectors (all weight files if None).
 
     Returns
     -------
-    The names of the files that were written.
+    list of str
+        Names of the files that were written.
 
     Raises
     ------
