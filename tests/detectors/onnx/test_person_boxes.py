@@ -104,3 +104,21 @@ def test_yolox_sees_raw_bgr_and_rtmdet_normalised_bgr(tmp_path):
 
 def test_what_lies_beside_the_image_is_grey_114(tmp_path):
     assert PersonBoxes(echo_model(tmp_path / "p.onnx", 12, pixel=63)).find(IMAGE)[1] == [114]
+
+
+def test_a_box_at_the_least_score_counts_and_one_below_does_not(tmp_path):
+    least = np.float32(0.3)
+    rows = [
+        [0, 0, 9, 9, np.nextafter(least, np.float32(1))],
+        [20, 0, 29, 9, np.nextafter(least, np.float32(0))],
+    ]
+    assert len(PersonBoxes(with_suppression(tmp_path / "p.onnx", rows)).find(IMAGE)[0]) == 1
+
+
+@pytest.mark.parametrize(("shift_px", "n"), [(11, 1), (13, 2)])
+def test_of_raw_boxes_that_overlap_by_more_than_45_percent_one_remains(tmp_path, shift_px, n):
+    """Boxes 32 wide, shifted by d, have (32 - d) / (32 + d) of their union in common: 0.49 and 0.42."""
+    boxes = np.array([[4, 4, 32, 30], [4 + shift_px, 4, 32, 30]])
+    rows = raw_rows(boxes, [0.9, 0.8])[None].astype(np.float32)
+    path = constant_model(tmp_path / "p.onnx", (1, 3, 64, 64), {"output": rows})
+    assert len(PersonBoxes(path).find(IMAGE)[0]) == n

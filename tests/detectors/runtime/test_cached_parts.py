@@ -10,7 +10,7 @@ from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.detectors.combined.detector import Combined
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime import cached_parts, pool, run
-from hicp_lib.detectors.runtime.results import cache_folder
+from hicp_lib.detectors.runtime.results import _modules, cache_folder
 
 PART_S, OWN_S, START_S = 0.03, 0.005, 1.0
 
@@ -186,3 +186,21 @@ def test_mediapipe_shares_with_its_parts(own_cache, photograph, tmp_path):
     assert found.time_ms > sum(result.time_ms for result in alone.values())
     live = make_detector("mediapipe").detect(photograph)
     np.testing.assert_array_equal(found.detections.keypoints_px, live.keypoints_px)
+
+
+def test_the_detector_that_a_runner_is_given_stays_as_it_is(detectors):
+    given = detectors.make("combined:both+hands")
+    body, hands = given.parts["body"], given.parts["hands"]
+    inner = dict(body.parts)
+    runner = cached_parts.Runner(given, workers=1)
+    assert runner.detector is given
+    assert given.parts == {"body": body, "hands": hands} and body.parts == inner
+
+
+def test_the_key_of_a_combination_names_the_code_of_its_parts(weights):
+    first = pool.DetectorPool("combined:openpose-mobilenet+mediapipe-hands", {}, workers=1).first
+    assert set(_modules(first)) == {
+        "hicp_lib.detectors.combined.detector",
+        "hicp_lib.detectors.mediapipe.tasks",
+        "hicp_lib.detectors.openpose.mobilenet",
+    }
