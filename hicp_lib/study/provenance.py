@@ -23,7 +23,7 @@ from hicp_lib.core.cache import LIBRARY_DIR, digest, files_sha256
 from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.files import read_json, sha256_file
-from hicp_lib.detectors.weights.user import own_sha256
+from hicp_lib.detectors.weights.user import user_weights_sha256
 
 LOCK_PATH = (CHECKOUT or LIBRARY_DIR) / "environment.lock"
 
@@ -89,7 +89,7 @@ def weights_sha256() -> dict[str, str]:
     Further ones are of what the user named for detectors, by these.
     """
     weights = read_json(DATA_DIR / "detectors.json")["weights"]
-    return {name: row["sha256"] for name, row in weights.items()} | own_sha256()
+    return {name: row["sha256"] for name, row in weights.items()} | user_weights_sha256()
 
 
 def usable_cores() -> int:

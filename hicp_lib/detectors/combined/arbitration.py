@@ -35,9 +35,11 @@ class ArbitrationRule:
 
     Attributes
     ----------
-    same_hand : roots closer than this share of the smaller hand's size are one hand's (size: from the
-        root to the farthest point)
-    wrist_reach, elbow_reach, shoulder_reach : farthest root from the arm's last given joint, in forearms
+    same_hand : float
+        Roots closer than this share of the smaller hand's size are one hand's (size: from the root to the
+        farthest point).
+    wrist_reach, elbow_reach, shoulder_reach : float
+        Farthest root from the arm's last given joint, in forearms.
     """
 
     same_hand: float = 0.5
@@ -52,9 +54,11 @@ class Hands:
 
     Attributes
     ----------
-    keypoints_px : array, shape (n, 21, 2); the root is given, others may be NaN
+    keypoints_px : array, shape (n, 21, 2)
+        The root is given, others may be NaN.
     scores : array, shape (n, 21)
-    sides : array, shape (n,), what the hand model calls them: 0 left, 1 right
+    sides : array, shape (n,)
+        What the hand model calls them: 0 left, 1 right.
     """
 
     keypoints_px: np.ndarray
@@ -69,14 +73,11 @@ class Hands:
         return cls(found.keypoints_px[rows[:, None], points], found.scores[rows[:, None], points], sides)
 
     @classmethod
-    def together(cls, parts: list[Hands]) -> Hands:
+    def concatenate(cls, parts: list[Hands]) -> Hands:
         """All sightings of several looks."""
         none = cls(np.zeros((0, 21, 2)), np.zeros((0, 21)), np.zeros(0, dtype=int))
-        return cls(
-            np.concatenate([part.keypoints_px for part in [none, *parts]]),
-            np.concatenate([part.scores for part in [none, *parts]]),
-            np.concatenate([part.sides for part in [none, *parts]]),
-        )
+        rows = [(part.keypoints_px, part.scores, part.sides) for part in [none, *parts]]
+        return cls(*map(np.concatenate, zip(*rows, strict=True)))
 
     def take(self, rows: np.ndarray) -> Hands:
         """Some of the sightings."""
@@ -99,7 +100,7 @@ def merge_duplicates(hands: Hands, same_hand: float) -> Hands:
         centre = np.where(left, (near & left).sum(axis=1), 0).argmax()
         merged.append(_median(hands.take(near[centre] & left)))
         left &= ~near[centre]
-    return Hands.together(merged)
+    return Hands.concatenate(merged)
 
 
 def _median(same: Hands) -> Hands:
@@ -112,9 +113,16 @@ def _median(same: Hands) -> Hands:
 def distances(arms: Arms, hands: Hands, rule: ArbitrationRule) -> np.ndarray:
     """How far hands are from where arms end, in forearms.
 
+    Parameters
+    ----------
+    arms : Arms
+    hands : Hands
+    rule : ArbitrationRule
+
     Returns
     -------
-    array, shape (n_bodies, 2, n_hands), inf where the arm refuses the hand
+    array, shape (n_bodies, 2, n_hands)
+        inf where the arm refuses the hand.
     """
     result = np.full((*arms.scales_px.shape, len(hands)), np.inf)
     joints = (
@@ -130,7 +138,13 @@ def distances(arms: Arms, hands: Hands, rule: ArbitrationRule) -> np.ndarray:
 
 
 def assign(away: np.ndarray) -> np.ndarray:
-    """Which hand each arm gets, from distances (n_bodies, 2, n_hands): (n_bodies, 2), -1 for none."""
+    """Which hand each arm gets, from distances (n_bodies, 2, n_hands): (n_bodies, 2), -1 for none.
+
+    Examples
+    --------
+    >>> assign(np.array([[[0.2, 0.5], [0.1, np.inf]]])).tolist()
+    [[1, 0]]
+    """
     chosen = np.full(away.shape[:2], -1)
     costs = np.where(np.isfinite(away), away, _REFUSED).reshape(chosen.size, away.shape[2])
     rows, columns = linear_sum_assignment(costs)
@@ -142,8 +156,17 @@ def assign(away: np.ndarray) -> np.ndarray:
 def nearest_first(wrists_px: np.ndarray, hands: Hands, chosen: np.ndarray) -> np.ndarray:
     """Assignment without arbitration: each hand, surest first, to the nearest wrist that is still free.
 
-    Of wrists (n_bodies, 2, 2), NaN where not given, those are free whose arm has no hand yet, -1 in `chosen`
-    (n_bodies, 2); the hands are indexed as in `assign`.
+    Parameters
+    ----------
+    wrists_px : array, shape (n_bodies, 2, 2)
+        NaN where not given.
+    hands : Hands
+    chosen : array of int, shape (n_bodies, 2)
+        The hands that arms have already; -1 where an arm is free.
+
+    Returns
+    -------
+    array of int, shape (n_bodies, 2)
     """
     chosen = chosen.copy()
     away = np.linalg.norm(wrists_px[:, :, None] - hands.keypoints_px[:, 0], axis=-1)
@@ -156,7 +179,16 @@ def nearest_first(wrists_px: np.ndarray, hands: Hands, chosen: np.ndarray) -> np
 
 
 def give_hands(bodies: Detections, hands: Hands, chosen: np.ndarray) -> Detections:
-    """Bodies (n) with their chosen hands (n, 2), -1 for none: such an arm keeps what its body came with."""
+    """Bodies with their chosen hands; an arm with none keeps what its body came with.
+
+    Parameters
+    ----------
+    bodies : Detections
+        n people.
+    hands : Hands
+    chosen : array of int, shape (n, 2)
+        -1 for none.
+    """
     keypoints_px, scores = bodies.keypoints_px.copy(), bodies.scores.copy()
     for body, side in np.argwhere(chosen >= 0):
         hand = chosen[body, side]

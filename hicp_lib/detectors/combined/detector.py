@@ -17,6 +17,7 @@ hand that the body detector itself gave, if it did.
 from __future__ import annotations
 
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
@@ -42,13 +43,16 @@ class Combined:
 
     Parameters
     ----------
-    body, hands : ready detectors; `hands` gives hand points in the Halpe layout
-    looks : where hands are looked for, joined by +: "wrists" (squares at the forearms' ends), "image" (the
-        whole of it), "along" (squares along an oblong image)
-    arbitrate : apply the rules of `arbitration`; if not, a wrist takes the surest hand of its own
-        squares, and further hands go to the nearest free wrist
-    min_side_px : smaller squares are enlarged to this
-    squares, rule : thresholds
+    body, hands : Detector
+        Ready detectors; `hands` gives hand points in the Halpe layout.
+    looks : str
+        Where hands are looked for, joined by +: "wrists" (squares at the forearms' ends), "image" (the whole
+        of it), "along" (squares along an oblong image).
+    arbitrate : bool
+        Apply the rules of `arbitration`; if not, a wrist takes the surest hand of its own squares, and
+        further hands go to the nearest free wrist.
+    min_side_px : int
+        Smaller squares are enlarged to this.
     """
 
     def __init__(
@@ -58,17 +62,14 @@ class Combined:
         looks: str = "wrists+image+along",
         arbitrate: bool = True,
         min_side_px: int = 320,
-        squares: SquareRule | None = None,
-        rule: ArbitrationRule | None = None,
     ) -> None:
         self._looks = looks.split("+")
         if not set(self._looks) <= set(LOOKS):
             raise InputError(f"looks {looks!r}: expected some of {', '.join(LOOKS)}, joined by +")
         self.name = f"combined:{body.name}+{hands.name}"
-        self.parts = {"body": body, "hands": hands}
-        self._arbitrate = arbitrate
-        self._min_side_px = min_side_px
-        self._squares, self._rule = squares or SquareRule(), rule or ArbitrationRule()
+        self.parts: dict[str, Any] = {"body": body, "hands": hands}
+        self._arbitrate, self._min_side_px = arbitrate, min_side_px
+        self._squares, self._rule = SquareRule(), ArbitrationRule()
         self.takes_boxes = getattr(body, "takes_boxes", False)
         self.settings = {
             "body": {"name": body.name, **body.settings},
@@ -89,7 +90,7 @@ class Combined:
 
     def _arbitrated(self, image: np.ndarray, bodies: Detections, arms: Arms) -> Detections:
         seen = [hands for _, _, hands in self._at_wrists(image, arms)] + self._elsewhere(image)
-        hands = merge_duplicates(Hands.together(seen), self._rule.same_hand)
+        hands = merge_duplicates(Hands.concatenate(seen), self._rule.same_hand)
         chosen = assign(distances(arms, hands, self._rule))
         strangers = hands.take(~self._within_reach(arms, hands))
         return give_hands(bodies, hands, chosen).concatenate(without_body(strangers))
@@ -108,8 +109,8 @@ class Combined:
         for person, side, hands in self._at_wrists(image, arms):
             if len(hands) and chosen[person, side] < 0:
                 chosen[person, side] = len(seen)
-                seen.append(hands.take([hands.scores.mean(axis=1).argmax()]))
-        hands = Hands.together(seen + self._elsewhere(image))
+                seen.append(hands.take(hands.scores.mean(axis=1).argmax(keepdims=True)))
+        hands = Hands.concatenate(seen + self._elsewhere(image))
         chosen = nearest_first(arms.wrists_px, hands, chosen)
         rest = np.setdiff1d(np.arange(len(hands)), chosen)
         return give_hands(bodies, hands, chosen).concatenate(without_body(hands.take(rest)))

@@ -30,11 +30,15 @@ class SquareRule:
 
     Attributes
     ----------
-    beyond_wrist : where the centre is, in forearms from the wrist, away from the elbow
-    side : side in units of the arm's scale; one square per value
-    forearms_per_upper_arm, forearms_per_shoulders : what the forearm's length is taken to be at least,
-        as a share of the upper arm's and the shoulders' in the image
-    min_score : wrists of a lower score have no square
+    beyond_wrist : float
+        Where the centre is, in forearms from the wrist, away from the elbow.
+    sides : tuple of float
+        Side in units of the arm's scale; one square per value.
+    forearms_per_upper_arm, forearms_per_shoulders : float
+        What the forearm's length is taken to be at least, as a share of the upper arm's and the shoulders' in
+        the image.
+    min_score : float
+        Wrists of a lower score have no square.
     """
 
     beyond_wrist: float = 0.33
@@ -50,8 +54,10 @@ class Arms:
 
     Attributes
     ----------
-    wrists_px, elbows_px, shoulders_px : arrays, shape (n, 2, 2), NaN where not given
-    scales_px : array, shape (n, 2): length of the forearm, see `SquareRule`; NaN where nothing tells
+    wrists_px, elbows_px, shoulders_px : array, shape (n, 2, 2)
+        NaN where not given.
+    scales_px : array, shape (n, 2)
+        Length of the forearm, see `SquareRule`; NaN where nothing tells.
     """
 
     wrists_px: np.ndarray
@@ -85,7 +91,13 @@ class Square:
 
     @classmethod
     def around(cls, centre_px: np.ndarray, side_px: float) -> Square:
-        """The square of about this side whose middle lies nearest to a centre, pixel centres at integers."""
+        """The square of about this side whose middle lies nearest to a centre, pixel centres at integers.
+
+        Examples
+        --------
+        >>> Square.around((10.0, 20.0), 5.2)
+        Square(left_px=8, top_px=18, side_px=5)
+        """
         side = max(2, round(side_px))
         left, top = np.round(np.asarray(centre_px) - (side - 1) / 2).astype(int).tolist()
         return cls(left, top, side)
@@ -93,8 +105,7 @@ class Square:
     def overlaps(self, image: np.ndarray) -> bool:
         """Whether any of it lies in the image."""
         height, width = image.shape[:2]
-        end_x, end_y = self.left_px + self.side_px, self.top_px + self.side_px
-        return self.left_px < width and self.top_px < height and end_x > 0 and end_y > 0
+        return -self.side_px < self.left_px < width and -self.side_px < self.top_px < height
 
     def cut(self, image: np.ndarray, min_side_px: int) -> np.ndarray:
         """Its pixels, black outside the image, enlarged to `min_side_px` when smaller."""
@@ -119,9 +130,16 @@ class Square:
 def hand_squares(arms: Arms, rule: SquareRule, image: np.ndarray) -> list[tuple[int, int, Square]]:
     """The squares of all hands that may lie in the image.
 
+    Parameters
+    ----------
+    arms : Arms
+    rule : SquareRule
+    image : array, shape (height, width, 3)
+
     Returns
     -------
-    (person, side (0 left, 1 right), square), largest square of a hand last
+    list of tuple of (int, int, Square)
+        Person, side (0 left, 1 right), square; largest square of a hand last.
     """
     forearm = np.nan_to_num(arms.wrists_px - arms.elbows_px)  # without an elbow: around the wrist
     centres = arms.wrists_px + rule.beyond_wrist * forearm
@@ -137,7 +155,15 @@ def hand_squares(arms: Arms, rule: SquareRule, image: np.ndarray) -> list[tuple[
 
 
 def squares_along(image: np.ndarray) -> list[Square]:
-    """Squares along an oblong image, as wide as its short side, each half over the next or more."""
+    """Squares along an oblong image, as wide as its short side, each half over the next or more.
+
+    Examples
+    --------
+    >>> [(square.left_px, square.side_px) for square in squares_along(np.zeros((100, 200, 3)))]
+    [(0, 100), (50, 100), (100, 100)]
+    >>> squares_along(np.zeros((100, 110, 3)))
+    []
+    """
     height, width = image.shape[:2]
     side, length = min(height, width), max(height, width)
     if length < MIN_OBLONG * side:

@@ -82,33 +82,25 @@ def _with_scaling(model: bytes, mean: float, std: float) -> bytes:
     """Append TFLite metadata that declares (pixel - mean) / std for an RGB input."""
     tflite = _of_mediapipe("tasks/metadata/schema_py_generated.py")
     tree = tflite.ModelT.InitFromPackedBuf(model, 0)
-    block = tflite.BufferT()
-    block.data = np.frombuffer(_scaling_metadata(mean, std), dtype=np.uint8)
-    tree.buffers.append(block)
-    entry = tflite.MetadataT()
-    entry.name, entry.buffer = "TFLITE_METADATA", len(tree.buffers) - 1
+    tree.buffers.append(tflite.BufferT(data=np.frombuffer(_scaling_metadata(mean, std), dtype=np.uint8)))
+    entry = tflite.MetadataT(name="TFLITE_METADATA", buffer=len(tree.buffers) - 1)
     tree.metadata = [*(tree.metadata or []), entry]
     return _pack(tree, b"TFL3")
 
 
 def _scaling_metadata(mean: float, std: float) -> bytes:
-    metadata = _of_mediapipe("tasks/metadata/metadata_schema_py_generated.py")
-    scaling = metadata.NormalizationOptionsT()
-    scaling.mean, scaling.std = [mean] * 3, [std] * 3
-    unit = metadata.ProcessUnitT()
-    unit.optionsType, unit.options = metadata.ProcessUnitOptions.NormalizationOptions, scaling
-    colours = metadata.ImagePropertiesT()
-    colours.colorSpace = metadata.ColorSpaceType.RGB
-    content = metadata.ContentT()
-    content.contentPropertiesType = metadata.ContentProperties.ImageProperties
-    content.contentProperties = colours
-    tensor = metadata.TensorMetadataT()
-    tensor.name, tensor.content, tensor.processUnits = "image", content, [unit]
-    graph = metadata.SubGraphMetadataT()
-    graph.inputTensorMetadata = [tensor]
-    root = metadata.ModelMetadataT()
-    root.subgraphMetadata = [graph]
-    return _pack(root, b"M001")
+    schema = _of_mediapipe("tasks/metadata/metadata_schema_py_generated.py")
+    scaling = schema.ProcessUnitT(
+        optionsType=schema.ProcessUnitOptions.NormalizationOptions,
+        options=schema.NormalizationOptionsT(mean=[mean] * 3, std=[std] * 3),
+    )
+    content = schema.ContentT(
+        contentPropertiesType=schema.ContentProperties.ImageProperties,
+        contentProperties=schema.ImagePropertiesT(colorSpace=schema.ColorSpaceType.RGB),
+    )
+    image = schema.TensorMetadataT(name="image", content=content, processUnits=[scaling])
+    graph = schema.SubGraphMetadataT(inputTensorMetadata=[image])
+    return _pack(schema.ModelMetadataT(subgraphMetadata=[graph]), b"M001")
 
 
 def _pack(tree: Any, identifier: bytes) -> bytes:
@@ -125,6 +117,7 @@ def _of_mediapipe(file: str) -> ModuleType:
     """One file of the package, as a module that nobody else sees."""
     path = program_folder() / file
     spec = spec_from_file_location(f"{__name__}.{path.stem}", path)
+    assert spec and spec.loader
     module = module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -17,9 +17,8 @@ import struct
 import sys
 from collections.abc import Callable
 from importlib import import_module
-from importlib.util import find_spec
 from types import ModuleType
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 import numpy as np
 
@@ -29,15 +28,32 @@ _SIDES = {"Left": 0.0, "Right": 1.0}
 _VISION = "mediapipe.tasks.python.vision"
 
 
-def send(file: BinaryIO, head: dict, body: bytes = b"") -> None:
-    """Write one message."""
+def send(file: IO[bytes], head: dict, body: bytes = b"") -> None:
+    """Write one message.
+
+    Parameters
+    ----------
+    file : file
+    head : dict
+        JSON-able.
+    body : bytes
+
+    Examples
+    --------
+    >>> from io import BytesIO
+    >>> pipe = BytesIO()
+    >>> send(pipe, {"shape": [1, 2]}, b"ab")
+    >>> _ = pipe.seek(0)
+    >>> receive(pipe)
+    ({'shape': [1, 2]}, b'ab')
+    """
     text = json.dumps(head).encode()
     file.write(_LENGTHS.pack(len(text), len(body)) + text)
     file.write(body)
     file.flush()
 
 
-def receive(file: BinaryIO) -> tuple[dict, bytearray]:
+def receive(file: IO[bytes]) -> tuple[dict, bytes]:
     """Read one message.
 
     Raises
@@ -49,24 +65,24 @@ def receive(file: BinaryIO) -> tuple[dict, bytearray]:
     if len(lengths) < _LENGTHS.size:
         raise EOFError
     n_head, n_body = _LENGTHS.unpack(lengths)
-    head, body = file.read(n_head), bytearray(n_body)
-    if len(head) < n_head or file.readinto(body) < n_body:
+    head, body = file.read(n_head), file.read(n_body)
+    if len(head) < n_head or len(body) < n_body:
         raise EOFError
     return json.loads(head), body
 
 
-def _serve(questions: BinaryIO, answers: BinaryIO, shared: int) -> None:
+def _serve(questions: IO[bytes], answers: IO[bytes], folder: str, shared: int) -> None:
     head, bundle = receive(questions)
     # Whatever hangs in the library is ended by the system, also when nobody waits for it any more.
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGALRM])
     limit_s = head.pop("limit_s")
     signal.setitimer(signal.ITIMER_REAL, limit_s)
-    _leave_out("mediapipe", "mediapipe.tasks.python", _VISION)
-    detect = detection(bytes(bundle), **head)
+    _leave_out(folder, "mediapipe", "mediapipe.tasks.python", _VISION)
+    detect = detection(bundle, **head)
     signal.setitimer(signal.ITIMER_REAL, 0)
     send(answers, {})
-    pixels = b""
+    pixels: bytes | mmap.mmap = b""
     while True:
         shape = receive(questions)[0]["shape"]
         signal.setitimer(signal.ITIMER_REAL, limit_s)
@@ -82,7 +98,19 @@ def _serve(questions: BinaryIO, answers: BinaryIO, shared: int) -> None:
 
 
 def detection(bundle: bytes, task: str, **options: Any) -> Callable[[np.ndarray], np.ndarray]:
-    """A function from an image (height, width, 3) to what `_poses` or `_hands` say."""
+    """A function from an image to what `_poses` or `_hands` say.
+
+    Parameters
+    ----------
+    bundle : bytes
+    task : {"pose", "hand"}
+    **options : object
+        As of `landmarker`.
+
+    Returns
+    -------
+    callable
+    """
     task_is_ready = landmarker(bundle, task, **options)
     pixels = import_module(f"{_VISION}.core.image")
     rows = {"pose": _poses, "hand": _hands}[task]
@@ -90,7 +118,17 @@ def detection(bundle: bytes, task: str, **options: Any) -> Callable[[np.ndarray]
 
 
 def landmarker(bundle: bytes, task: str, n: int, min_score: float) -> Any:
-    """MediaPipe's task ("pose" or "hand") for still images, ready."""
+    """MediaPipe's task for still images, ready.
+
+    Parameters
+    ----------
+    bundle : bytes
+    task : {"pose", "hand"}
+    n : int
+        Most people, or hands.
+    min_score : float
+        Threshold of the detector and of the presence check.
+    """
     base_options = import_module("mediapipe.tasks.python.core.base_options")
     module = import_module(f"{_VISION}.{task}_landmarker")
     kind = task.capitalize()
@@ -102,12 +140,11 @@ def landmarker(bundle: bytes, task: str, n: int, min_score: float) -> Any:
     return getattr(module, f"{kind}Landmarker").create_from_options(options)
 
 
-def _leave_out(*packages: str) -> None:
+def _leave_out(folder: str, *packages: str) -> None:
     """Put empty packages in the place of MediaPipe's own, which load Matplotlib, audio and what not."""
-    (root,) = find_spec("mediapipe").submodule_search_locations
     for name in packages:
         package = ModuleType(name)
-        package.__path__ = [os.path.join(root, *name.split(".")[1:])]
+        package.__path__ = [os.path.join(folder, *name.split("."))]
         sys.modules[name] = package
 
 
@@ -135,7 +172,7 @@ def _main() -> None:
     os.dup2(2, 1)  # what the library prints is no answer
     sys.path.append(sys.argv[1])  # where MediaPipe is
     try:
-        _serve(sys.stdin.buffer, answers, int(sys.argv[2]))
+        _serve(sys.stdin.buffer, answers, sys.argv[1], int(sys.argv[2]))
     except EOFError:
         pass
     except Exception as error:  # a broken library may raise anything

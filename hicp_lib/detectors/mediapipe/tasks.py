@@ -30,7 +30,7 @@ from hicp_lib.core.keypoints import COCO_17, to_halpe
 from hicp_lib.detectors.combined.arbitration import Hands, give_hands, in_pairs, nearest_first
 from hicp_lib.detectors.mediapipe import bundles, child
 from hicp_lib.detectors.mediapipe.program import program_folder, program_version
-from hicp_lib.detectors.runtime.isolation import NativeProcess
+from hicp_lib.detectors.runtime.isolation import IsolatedProcess
 
 _WRISTS = [9, 10]
 
@@ -40,9 +40,12 @@ class MediaPipePose:
 
     Parameters
     ----------
-    num_poses : most people to return per image; 1, as in the paper, suits crops of one person
-    min_score : threshold of MediaPipe's person detector and of its presence check
-    model : an official `.task` bundle to use in place of the fetched weights
+    num_poses : int
+        Most people to return per image; 1, as in the paper, suits crops of one person.
+    min_score : float
+        Threshold of MediaPipe's person detector and of its presence check.
+    model : str or Path, optional
+        An official `.task` bundle to use in place of the fetched weights.
     """
 
     name = "mediapipe-pose"
@@ -70,9 +73,12 @@ class MediaPipeHands:
 
     Parameters
     ----------
-    num_hands : most hands to return per image
-    min_score : threshold of MediaPipe's palm detector and of its presence check
-    model : an official `.task` bundle to use in place of the fetched weights
+    num_hands : int
+        Most hands to return per image.
+    min_score : float
+        Threshold of MediaPipe's palm detector and of its presence check.
+    model : str or Path, optional
+        An official `.task` bundle to use in place of the fetched weights.
     """
 
     name = "mediapipe-hands"
@@ -101,17 +107,20 @@ class MediaPipe:
 
     Parameters
     ----------
-    num_people : most people to return per image (and half the number of hands)
-    min_score : threshold of both detectors
-    side_by_side : look for both at the same time, in two threads: an answer comes sooner where a processor
-        is free, which is what a robot waits for
+    num_people : int
+        Most people to return per image (and half the number of hands).
+    min_score : float
+        Threshold of both detectors.
+    side_by_side : bool
+        Look for both at the same time, in two threads: an answer comes sooner where a processor is free,
+        which is what a robot waits for.
     """
 
     name = "mediapipe"
 
     def __init__(self, num_people: int = 1, min_score: float = 0.5, side_by_side: bool = False) -> None:
         self._thread = ThreadPoolExecutor(1) if side_by_side else None
-        self.parts = {
+        self.parts: dict[str, MediaPipePose | MediaPipeHands] = {
             "pose": MediaPipePose(num_people, min_score), "hands": MediaPipeHands(2 * num_people, min_score)
         }  # fmt: skip
         self.settings = {name: part.settings for name, part in self.parts.items()}
@@ -135,7 +144,8 @@ def attach_hands(bodies: Detections, found: Detections) -> Detections:
 
     Returns
     -------
-    The bodies with their hands, then instances of the hands that found no free wrist.
+    Detections
+        The bodies with their hands, then instances of the hands that found no free wrist.
     """
     hands = Hands.of(found)
     chosen = nearest_first(bodies.keypoints_px[:, _WRISTS], hands, np.full((len(bodies), 2), -1))
@@ -145,7 +155,7 @@ def attach_hands(bodies: Detections, found: Detections) -> Detections:
 
 def _process(
     name: str, task: str, n: int, min_score: float, model: str | Path | None
-) -> tuple[NativeProcess, dict]:
+) -> tuple[IsolatedProcess, dict]:
     """MediaPipe's task in a process of its own, and what identifies its models in a detector's settings.
 
     Its start takes half a second and waits for the first image; a bundle of the user's own is tried at once.
@@ -155,7 +165,7 @@ def _process(
             f"{name}: finds {n} at scores from {min_score}; expected 1 or more, and a score from 0 to 1"
         )
     bundle = bundles.read_bundle(task, model) if model else bundles.assemble(task)
-    process = NativeProcess(
+    process = IsolatedProcess(
         [child.__file__, str(program_folder().parent)],
         {"task": task, "n": n, "min_score": min_score},
         bundle,

@@ -24,7 +24,8 @@ class Regions:
     Attributes
     ----------
     centres_px : array, shape (n, 2)
-    sizes_px : array, shape (n, 2), width and height
+    sizes_px : array, shape (n, 2)
+        Width and height.
     """
 
     centres_px: np.ndarray
@@ -34,7 +35,22 @@ class Regions:
     def around(
         cls, boxes_px: np.ndarray, input_size_px: tuple[int, int], padding: float = PADDING
     ) -> Regions:
-        """The regions of boxes (n, 4: x, y, width, height) for a network's input (width, height)."""
+        """The regions of boxes for a network's input.
+
+        Parameters
+        ----------
+        boxes_px : array, shape (n, 4: x, y, width, height)
+        input_size_px : tuple of int
+            Width and height.
+        padding : float
+            What the boxes are grown by.
+
+        Examples
+        --------
+        >>> regions = Regions.around([[10, 20, 30, 80]], (192, 256), padding=1.0)
+        >>> regions.centres_px.tolist(), regions.sizes_px.tolist()
+        ([[25.0, 60.0]], [[60.0, 80.0]])
+        """
         boxes_px = np.asarray(boxes_px, dtype=float).reshape(-1, 4)
         sizes = np.maximum(boxes_px[:, 2:], 1.0)
         aspect = input_size_px[0] / input_size_px[1]
@@ -56,13 +72,14 @@ class Regions:
             crops.append(cv2.warpAffine(image, matrix, input_size_px, flags=cv2.INTER_LINEAR))
         return crops
 
-    def to_image_px(self, positions: np.ndarray, grid_size: np.ndarray) -> np.ndarray:
+    def to_image_px(self, positions: np.ndarray, grid_size: tuple[int, int]) -> np.ndarray:
         """Positions on each region's grid as image pixels, pixel centres at integers.
 
         Parameters
         ----------
         positions : array, shape (n, k, 2)
-        grid_size : (width, height) of the grid, in the unit of `positions`
+        grid_size : tuple of int
+            (width, height) of the grid, in the unit of `positions`.
         """
         corners = self.centres_px - self.sizes_px / 2
         return corners[:, None] + positions / np.asarray(grid_size, float) * self.sizes_px[:, None]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -13,22 +12,25 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx import pose_nms
 from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.box_source import BoxSource
-from hicp_lib.detectors.onnx.decode import Decoded, decode_combined, decode_integral, decode_quarter
+from hicp_lib.detectors.onnx.decode import decode_combined, decode_integral, decode_quarter
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.pose_net import PoseNet, Recipe
+from hicp_lib.detectors.onnx.pose_net import Decoder, PoseNet
 from hicp_lib.detectors.onnx.session import open_model
 
 _N_FACE_AND_HANDS = 110
-_DECODERS: dict[str, Callable[[np.ndarray], Decoded]] = {
-    "heatmap": partial(decode_quarter, needs_both_axes=True),
-    "integral": decode_integral,
-    "combined": partial(decode_combined, n_integral=_N_FACE_AND_HANDS),
+# By the name of the decoding: how heat maps are read, and what a keypoint's score is.
+_DECODINGS: dict[str, tuple[Decoder, str]] = {
+    "heatmap": (partial(decode_quarter, needs_both_axes=True), "maximum of the map"),
+    "integral": (decode_integral, "maximum of the map's sigmoid"),
+    "combined": (
+        partial(decode_combined, n_integral=_N_FACE_AND_HANDS),
+        "maximum of the map; of its sigmoid for face and hands",
+    ),
 }
-_SCORES = {
-    "heatmap": "maximum of the map",
-    "integral": "maximum of the map's sigmoid",
-    "combined": "maximum of the map; of its sigmoid for face and hands",
-}
+# Taken off the R, G and B values, which are then divided.
+_MEAN, _STD = (0.406 * 255, 0.457 * 255, 0.480 * 255), (255.0,) * 3
+# Weight of the greatest keypoint score in a person's score.
+_GREATEST_WEIGHT = 1.25
 
 
 class AlphaPose:
@@ -36,11 +38,18 @@ class AlphaPose:
 
     Parameters
     ----------
-    model : ONNX export
-    person_model, boxes : see `BoxSource`
-    decoding : "heatmap", "integral" (symmetric integral regression) or "combined" (face and hands
-        integral); if None, told by the network's answer to the mean colour
-    flip_test, provider, threads : as for `MMPose`
+    model : str or Path
+        ONNX export.
+    person_model : str or Path, optional
+    boxes : str, optional
+        See `hicp_lib.detectors.onnx.box_source.BoxSource`.
+    decoding : str, optional
+        "heatmap", "integral" (symmetric integral regression) or "combined" (face and hands integral); if
+        None, told by the network's answer to the mean colour.
+    flip_test : bool
+    provider : str
+    threads : int
+        As for `hicp_lib.detectors.onnx.mmpose.MMPose`.
     """
 
     name = "alphapose"
@@ -58,15 +67,9 @@ class AlphaPose:
         opened = open_model(model, provider, threads)
         self._is_told = decoding is None
         self.decoding = decoding or _told_decoding(opened.response_to_zeros)
-        if self.decoding not in _DECODERS:
-            raise InputError(f"decoding {decoding!r}: not known; expected one of: {', '.join(_DECODERS)}")
-        recipe = Recipe(
-            mean=(0.406 * 255, 0.457 * 255, 0.480 * 255),
-            std=(255.0, 255.0, 255.0),
-            decode_maps=_DECODERS[self.decoding],
-            flip_test=flip_test,
-        )
-        self._net = PoseNet(opened, recipe)
+        if self.decoding not in _DECODINGS:
+            raise InputError(f"decoding {decoding!r}: not known; expected one of: {', '.join(_DECODINGS)}")
+        self._net = PoseNet(opened, _MEAN, _STD, _DECODINGS[self.decoding][0], flip_test)
         if self._net.is_simcc:
             raise InputError(f"{model}: gives SimCC vectors; expected heat maps, or use detector mmpose")
         self._rules = _rules(self._net, self.decoding)
@@ -87,7 +90,8 @@ class AlphaPose:
         regions = Regions.around(boxes, self._net.input_size_px)
         positions_px, scores = self._net.find(image, regions)
         rows, positions_px, scores = pose_nms.merge_poses(positions_px, scores, boxes, self._rules)
-        person_scores = scores.mean(axis=1) + box_scores[rows] + 1.25 * scores.max(axis=1, initial=0)
+        greatest = scores.max(axis=1, initial=0)
+        person_scores = scores.mean(axis=1) + box_scores[rows] + _GREATEST_WEIGHT * greatest
         return Detections.of_parts(positions_px, np.clip(scores, 0, 1), person_scores, self._net.convention)
 
     def describe(self) -> list[Fact]:
@@ -97,12 +101,11 @@ class AlphaPose:
             *self._net.describe(),
             Fact("pixels", "RGB / 255 - (0.406, 0.457, 0.480)", "as AlphaPose trains"),
             Fact("decoding", self.decoding, f"{told}; option decoding"),
-            Fact("keypoint score", _SCORES[self.decoding] + ", cut off at 1", "as AlphaPose"),
-            Fact(
-                "person score", "mean + 1.25 x greatest keypoint score + box score", "as AlphaPose; pose-NMS"
-            ),
+            Fact("keypoint score", _DECODINGS[self.decoding][1] + ", cut off at 1", "as AlphaPose"),
+            Fact("person score", f"mean + {_GREATEST_WEIGHT} x greatest keypoint score + box score",
+                 "as AlphaPose; pose-NMS"),
             *self._boxes.describe(),
-        ]
+        ]  # fmt: skip
 
 
 def _told_decoding(outputs: list[np.ndarray]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,11 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.person_boxes import PersonBoxes
 
-BOX_SOURCES = ("gt", "image", "detected")
+_MEANINGS = {
+    "gt": "the annotated boxes",
+    "image": "one person per image, the whole of it",
+    "detected": "by the person model",
+}
 
 
 class BoxSource:
@@ -18,30 +23,29 @@ class BoxSource:
 
     Parameters
     ----------
-    boxes : "gt" (annotated boxes, handed to `detect`), "image" (one person, the whole image) or
-        "detected"; by default detected with a person model, and otherwise the image
-    person_model : ONNX export of YOLOX or RTMDet
+    boxes : str or None
+        "gt" (annotated boxes, handed to `detect`), "image" (one person, the whole image) or "detected"; by
+        default detected with a person model, and otherwise the image.
+    person_model : str or Path or None
+        ONNX export of YOLOX or RTMDet.
     """
 
     def __init__(
         self, boxes: str | None, person_model: str | Path | None, provider: str, threads: int
     ) -> None:
         self.kind = boxes or ("detected" if person_model else "image")
-        if self.kind not in BOX_SOURCES:
-            raise InputError(f"boxes {boxes!r}: not known; expected one of: {', '.join(BOX_SOURCES)}")
+        if self.kind not in _MEANINGS:
+            raise InputError(f"boxes {boxes!r}: not known; expected one of: {', '.join(_MEANINGS)}")
         if (self.kind == "detected") != (person_model is not None):
             raise InputError(
                 f"boxes {self.kind!r}: {'need' if self.kind == 'detected' else 'do not use'} a person model; "
                 "give boxes 'detected' together with person_model (--person-model FILE.onnx), or neither"
             )
-        self._finder = (
-            PersonBoxes(person_model, provider=provider, threads=threads)
-            if person_model is not None
-            else None
-        )
-        self.settings = {"boxes": self.kind} | (
-            {"person_model": self._finder.settings} if self._finder else {}
-        )
+        self._finder: PersonBoxes | None = None
+        self.settings: dict[str, Any] = {"boxes": self.kind}
+        if person_model is not None:
+            self._finder = PersonBoxes(person_model, provider, threads)
+            self.settings["person_model"] = self._finder.settings
 
     def find(self, image: np.ndarray, boxes_px: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
         """Boxes (n, 4) and scores (n,) of an RGB image's people; `boxes_px` are the annotated ones."""
@@ -59,10 +63,5 @@ class BoxSource:
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the boxes."""
-        meaning = {
-            "gt": "the annotated boxes",
-            "image": "one person per image, the whole of it",
-            "detected": "by the person model",
-        }
-        row = Fact("boxes", self.kind, meaning[self.kind])
+        row = Fact("boxes", self.kind, _MEANINGS[self.kind])
         return [row, *(self._finder.describe() if self._finder else [])]

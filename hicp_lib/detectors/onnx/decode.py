@@ -7,6 +7,8 @@ score is not a positive number is not given: NaN with score 0.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 
@@ -15,7 +17,14 @@ Decoded = tuple[np.ndarray, np.ndarray]
 
 
 def peaks(maps: np.ndarray) -> Decoded:
-    """The highest cell of each heat map (n, k, h, w) and its value."""
+    """The highest cell of each heat map (n, k, h, w) and its value.
+
+    Examples
+    --------
+    >>> cells, scores = peaks(np.array([[[[0.0, 0.5, 0.1], [0.2, 0.3, 0.9]]]]))
+    >>> cells.tolist(), scores.tolist()
+    ([[[2.0, 1.0]]], [[0.9]])
+    """
     flat = maps.reshape(*maps.shape[:2], -1)
     best = flat.argmax(axis=-1)
     scores = np.take_along_axis(flat, best[..., None], axis=-1)[..., 0].astype(float)
@@ -36,7 +45,7 @@ def decode_quarter(maps: np.ndarray, *, needs_both_axes: bool = False) -> Decode
         moves_x = moves_y = inner_x & inner_y
     else:
         moves_x, moves_y = inner_x & (0 < y), inner_y & (0 < x)
-    at = _Neighbours(maps, cells)
+    at = _around(maps, cells)
     with np.errstate(invalid="ignore"):
         step = np.stack([at(1, 0) - at(-1, 0), at(0, 1) - at(0, -1)], axis=-1)
     moved = cells + 0.25 * np.sign(step) * np.stack([moves_x, moves_y], axis=-1)
@@ -54,7 +63,7 @@ def decode_dark(maps: np.ndarray, kernel: int = 11) -> Decoded:
     blurred = _blur(maps, kernel)
     with np.errstate(invalid="ignore"):
         factor = scores / np.maximum(blurred.max(axis=(2, 3)), np.finfo(np.float32).tiny)
-    neighbours = _Neighbours(blurred, cells)
+    neighbours = _around(blurred, cells)
 
     def log(dx: int, dy: int) -> np.ndarray:
         return np.log(np.maximum(neighbours(dx, dy) * factor, 1e-10))
@@ -130,17 +139,15 @@ def decode_roi_maps(maps: np.ndarray, boxes_px: np.ndarray) -> Decoded:
     return positions, masses
 
 
-class _Neighbours:
+def _around(maps: np.ndarray, cells: np.ndarray) -> Callable[[int, int], np.ndarray]:
     """Values of maps (n, k, h, w) beside one cell of each; the border's value beyond the border."""
+    rows, (x, y) = np.ogrid[: maps.shape[0], : maps.shape[1]], np.moveaxis(cells.astype(int), -1, 0)
 
-    def __init__(self, maps: np.ndarray, cells: np.ndarray) -> None:
-        self._maps, self._cells = maps, cells.astype(int)
-        self._rows = np.ogrid[: maps.shape[0], : maps.shape[1]]
+    def at(dx: int, dy: int) -> np.ndarray:
+        inside = np.clip(y + dy, 0, maps.shape[2] - 1), np.clip(x + dx, 0, maps.shape[3] - 1)
+        return maps[(*rows, *inside)].astype(float)
 
-    def __call__(self, dx: int, dy: int) -> np.ndarray:
-        x = np.clip(self._cells[..., 0] + dx, 0, self._maps.shape[3] - 1)
-        y = np.clip(self._cells[..., 1] + dy, 0, self._maps.shape[2] - 1)
-        return self._maps[(*self._rows, y, x)].astype(float)
+    return at
 
 
 def _blur(maps: np.ndarray, kernel: int) -> np.ndarray:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class Fact:
-    """One property of a model: what, its value, and how it is known."""
+class Fact(NamedTuple):
+    """One property of a model.
+
+    Attributes
+    ----------
+    what, value : str
+    why : str
+        How the value is known.
+    """
 
     what: str
     value: str

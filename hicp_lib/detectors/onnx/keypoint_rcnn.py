@@ -28,6 +28,15 @@ _N_KEYPOINTS = 17
 _LOGIT_MIDDLE = 2.0
 _SHORT_PX, _LONG_PX = 800, 1333
 _FAMILIES = ("detectron2", "torchvision")
+_MAX_EXPONENT = 80.0  # exp() of more is no number
+# What comes out of the network, by shape behind the number of people; None stands for any size.
+_ROLES: dict[str, tuple[int | None, ...]] = {
+    "boxes": (4,),
+    "scores": (),
+    "keypoints": (_N_KEYPOINTS, 3),
+    "logits": (_N_KEYPOINTS,),
+    "maps": (_N_KEYPOINTS, None, None),
+}
 # What fills a fixed input beside the image: the mean colour, 0 once the network has normalised it.
 _FILL = (124, 116, 104)
 
@@ -37,10 +46,15 @@ class KeypointRcnn:
 
     Parameters
     ----------
-    model : ONNX export of Detectron2's or torchvision's Keypoint R-CNN
-    family : "detectron2" or "torchvision"; told by the number of outputs' keypoint scores if None
-    min_score : least box score of a person
-    provider, threads : see `hicp_lib.detectors.onnx.session.open_model`
+    model : str or Path
+        ONNX export of Detectron2's or torchvision's Keypoint R-CNN.
+    family : str, optional
+        "detectron2" or "torchvision"; told by the number of outputs' keypoint scores if None.
+    min_score : float
+        Least box score of a person.
+    provider : str
+    threads : int
+        See `hicp_lib.detectors.onnx.session.open_model`.
     """
 
     name = "detectron2"
@@ -55,11 +69,7 @@ class KeypointRcnn:
     ) -> None:
         self._model = open_model(model, provider, threads)
         shape = self._model.inputs[0].shape
-        if (
-            len(shape) not in (3, 4)
-            or shape[-3] not in (None, 3)
-            or (len(shape) == 4 and (shape[0] or 1) != 1)
-        ):
+        if shape[:-3] not in ((), (1,), (None,)) or shape[-3:-2] not in ((3,), (None,)):
             raise InputError(f"{model}: takes an input of shape {shape}; expected one image, (3, h, w)")
         self._is_told = family is None
         self._family = family or _told_family(self._model.outputs)
@@ -76,17 +86,16 @@ class KeypointRcnn:
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
         fitted = self._fit(image)
-        boxes_px, person_scores, *rest = self._roles(self._model.run(self._feed(fitted.pixels)))
-        keep = (person_scores >= self._min_score) & np.isfinite(boxes_px).all(axis=1)
-        positions_px, scores = self._keypoints(
-            boxes_px[keep], *(part if part is None else part[keep] for part in rest)
-        )
+        roles = self._roles(self._model.run(self._feed(fitted.pixels)))
+        keep = (roles["scores"] >= self._min_score) & np.isfinite(roles["boxes"]).all(axis=1)
+        people = {name: role[keep] for name, role in roles.items()}
+        positions_px, scores = self._keypoints(people)
         positions_px = positions_px / fitted.scale
         if self._family == "detectron2":
             positions_px = positions_px - 0.5
         is_given = np.isfinite(positions_px).all(axis=-1) & (scores > 0)
         positions_px = np.where(is_given[..., None], positions_px, np.nan)
-        return Detections.of_parts(positions_px, scores, person_scores[keep], "coco17")
+        return Detections.of_parts(positions_px, scores, people["scores"], "coco17")
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""
@@ -127,44 +136,40 @@ class KeypointRcnn:
             planes(pixels, (0.0,) * 3, (255.0,) * 3, feed)
         return feed[None] if len(self._model.inputs[0].shape) == 4 else feed
 
-    def _roles(self, outputs: list[np.ndarray]) -> list[np.ndarray | None]:
-        """Boxes (n, 4), their scores (n,), keypoints (n, 17, 3), logits (n, 17) and maps (n, 17, h, w).
-
-        Exports order and name them differently; ranks and sizes tell them apart.
-        """
+    def _roles(self, outputs: list[np.ndarray]) -> dict[str, np.ndarray]:
+        """What is there of `_ROLES`; exports differ in order and names, ranks and sizes tell them apart."""
         floats = [output.astype(float) for output in outputs if output.dtype.kind == "f"]
-        wanted = [(4,), (), (_N_KEYPOINTS, 3), (_N_KEYPOINTS,), (_N_KEYPOINTS, None, None)]
-        roles = [next((output for output in floats if _fits(output, tail)), None) for tail in wanted]
-        boxes, scores, keypoints, logits, maps = roles
-        has_points = maps is not None or keypoints is not None
-        if self._family == "torchvision":
-            has_points = keypoints is not None and logits is not None
-        n_people = {len(role) for role in roles if role is not None}
-        if boxes is None or scores is None or not has_points or len(n_people) != 1:
+        fitting = {
+            name: [output for output in floats if _fits(output, tail)] for name, tail in _ROLES.items()
+        }
+        roles = {name: found[0] for name, found in fitting.items() if found}
+        is_torch = self._family == "torchvision"
+        wanted = [{"keypoints", "logits"}] if is_torch else [{"keypoints"}, {"maps"}]
+        has_points = any(points | {"boxes", "scores"} <= roles.keys() for points in wanted)
+        if not has_points or len({len(role) for role in roles.values()}) != 1:
             expected = f"{self._family}'s boxes (n, 4), scores (n), keypoints (n, 17, 3)"
-            scored = " and keypoint scores (n, 17)" if self._family == "torchvision" else ""
-            raise self._model.unexpected(outputs, expected + scored)
+            raise self._model.unexpected(outputs, expected + is_torch * " and keypoint scores (n, 17)")
         return roles
 
-    def _keypoints(
-        self,
-        boxes_px: np.ndarray,
-        keypoints: np.ndarray | None,
-        logits: np.ndarray | None,
-        maps: np.ndarray | None,
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _keypoints(self, people: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Positions (n, 17, 2) in input pixels and scores (n, 17) in [0, 1]."""
         if self._family == "torchvision":
-            return keypoints[..., :2], logistic_score(logits)
-        if keypoints is None:
-            positions_px, masses = decode_roi_maps(maps, boxes_px)
+            return people["keypoints"][..., :2], logistic_score(people["logits"])
+        if "keypoints" not in people:
+            positions_px, masses = decode_roi_maps(people["maps"], people["boxes"])
             return positions_px, np.clip(masses, 0, 1)
-        return keypoints[..., :2], np.clip(np.nan_to_num(keypoints[..., 2]), 0, 1)
+        return people["keypoints"][..., :2], np.clip(np.nan_to_num(people["keypoints"][..., 2]), 0, 1)
 
 
 def logistic_score(logits: np.ndarray) -> np.ndarray:
-    """Scores in [0, 1] for raw logits; 0.5 at 2. A logit that is not a number scores 0."""
-    return np.nan_to_num(1 / (1 + np.exp(np.clip(_LOGIT_MIDDLE - logits, -80, 80))))
+    """Scores in [0, 1] for raw logits; 0.5 at 2. A logit that is not a number scores 0.
+
+    Examples
+    --------
+    >>> logistic_score(np.array([-50, 2, 50, np.nan])).round(3).tolist()
+    [0.0, 0.5, 1.0, 0.0]
+    """
+    return np.nan_to_num(1 / (1 + np.exp(np.clip(_LOGIT_MIDDLE - logits, -_MAX_EXPONENT, _MAX_EXPONENT))))
 
 
 def _fits(array: np.ndarray, tail: tuple[int | None, ...]) -> bool:

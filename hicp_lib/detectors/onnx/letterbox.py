@@ -14,8 +14,9 @@ class Letterbox:
 
     Attributes
     ----------
-    pixels : array, shape (height, width, 3), uint8
-    scale : array (2,), input pixels per image pixel along x and y
+    pixels : array, shape (height, width, 3), dtype uint8
+    scale : array, shape (2,)
+        Input pixels per image pixel along x and y.
     """
 
     pixels: np.ndarray
@@ -27,7 +28,22 @@ class Letterbox:
 
 
 def letterbox(image: np.ndarray, size_px: tuple[int, int], fill: tuple[int, int, int]) -> Letterbox:
-    """Scale an image (height, width, 3) to fit into (width, height), bilinearly, as YOLOX does."""
+    """Scale an image to fit into an input, bilinearly, as YOLOX does.
+
+    Parameters
+    ----------
+    image : array, shape (height, width, 3), dtype uint8
+    size_px : tuple of int
+        Width and height of the input.
+    fill : tuple of int
+        Colour of the rest.
+
+    Examples
+    --------
+    >>> fitted = letterbox(np.zeros((50, 100, 3), np.uint8), (40, 40), (114, 114, 114))
+    >>> fitted.pixels[:, 0, 0].tolist() == 20 * [0] + 20 * [114], fitted.to_image_px(np.array([3.5, 1.5]))
+    (True, array([9.5, 4.5]))
+    """
     height, width = image.shape[:2]
     ratio = min(size_px[0] / width, size_px[1] / height)
     fitted = max(1, int(width * ratio)), max(1, int(height * ratio))
@@ -37,7 +53,15 @@ def letterbox(image: np.ndarray, size_px: tuple[int, int], fill: tuple[int, int,
 
 
 def planes(pixels: np.ndarray, mean: tuple[float, ...], std: tuple[float, ...], out: np.ndarray) -> None:
-    """Write (pixels - mean) / std of an image (height, width, 3) into `out` (3, height, width), float32."""
+    """Write (pixels - mean) / std of an image into `out`.
+
+    Parameters
+    ----------
+    pixels : array, shape (height, width, 3), dtype uint8
+    mean, std : tuple of float
+        One of each channel.
+    out : array, shape (3, height, width), dtype float32
+    """
     for plane, channel, centre, spread in zip(out, cv2.split(pixels), mean, std, strict=True):
         np.subtract(channel, np.float32(centre), out=plane, dtype=np.float32)
         plane *= np.float32(1 / spread)

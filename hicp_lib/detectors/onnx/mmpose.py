@@ -13,12 +13,16 @@ from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.box_source import BoxSource
 from hicp_lib.detectors.onnx.decode import decode_dark, decode_quarter
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.pose_net import PoseNet, Recipe
+from hicp_lib.detectors.onnx.pose_net import PoseNet
 from hicp_lib.detectors.onnx.pose_nms import oks_nms
 from hicp_lib.detectors.onnx.session import open_model
 
 # RTMW's head enlarges features by shuffling pixels; the other SimCC heads do not. Its scores go up to ten.
 _RTMW_OPERATOR, _RTMW_SCALE = "DepthToSpace", 10.0
+# Of ImageNet's R, G and B values.
+_MEAN, _STD = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)
+# Keypoints whose network score is above this count in a person's score.
+_MIN_COUNTED_SCORE = 0.2
 
 
 class MMPose:
@@ -26,13 +30,22 @@ class MMPose:
 
     Parameters
     ----------
-    model : ONNX export, whole body (133 points), Halpe (26, 136), COCO (17) or one hand (21)
-    person_model, boxes : see `BoxSource`
-    dark : decode heat maps aware of their distribution (the "dark" configurations)
-    flip_test : also run the mirrored crops, and average
-    score_scale : network score that counts as 1; if None, 10 for RTMW's head and 1 otherwise
-    hand : "left" or "right", what a one-hand network is shown
-    provider, threads : see `hicp_lib.detectors.onnx.session.open_model`
+    model : str or Path
+        ONNX export, whole body (133 points), Halpe (26, 136), COCO (17) or one hand (21).
+    person_model : str or Path, optional
+    boxes : str, optional
+        See `hicp_lib.detectors.onnx.box_source.BoxSource`.
+    dark : bool
+        Decode heat maps aware of their distribution (the "dark" configurations).
+    flip_test : bool
+        Also run the mirrored crops, and average.
+    score_scale : float, optional
+        Network score that counts as 1; if None, 10 for RTMW's head and 1 otherwise.
+    hand : str
+        "left" or "right", what a one-hand network is shown.
+    provider : str
+    threads : int
+        See `hicp_lib.detectors.onnx.session.open_model`.
     """
 
     name = "mmpose"
@@ -49,15 +62,8 @@ class MMPose:
         provider: str = "cpu",
         threads: int = 1,
     ) -> None:
-        opened = open_model(model, provider, threads)
-        self._dark = dark
-        recipe = Recipe(
-            mean=(123.675, 116.28, 103.53),
-            std=(58.395, 57.12, 57.375),
-            decode_maps=decode_dark if dark else decode_quarter,
-            flip_test=flip_test,
-        )
-        self._net = PoseNet(opened, recipe)
+        opened, self._dark = open_model(model, provider, threads), dark
+        self._net = PoseNet(opened, _MEAN, _STD, decode_dark if dark else decode_quarter, flip_test)
         is_rtmw = self._net.is_simcc and _RTMW_OPERATOR in opened.operators
         self._score_scale = score_scale or (_RTMW_SCALE if is_rtmw else 1.0)
         self._convention = _hand_convention(self._net.convention, hand)
@@ -84,7 +90,7 @@ class MMPose:
         regions = Regions.around(boxes, self._net.input_size_px)
         positions_px, raw_scores = self._net.find(image, regions)
         scores = np.clip(raw_scores / self._score_scale, 0, 1)
-        person_scores = box_scores * _mean_above(raw_scores, 0.2)
+        person_scores = box_scores * _mean_above(raw_scores, _MIN_COUNTED_SCORE)
         areas = regions.sizes_px.prod(axis=1)
         keep = oks_nms(positions_px, person_scores, areas, self._sigmas)
         return Detections.of_parts(positions_px[keep], scores[keep], person_scores[keep], self._convention)
@@ -92,24 +98,19 @@ class MMPose:
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""
         kind = "SimCC" if self._net.is_simcc else "heat maps" + (", DARK" if self._dark else ", quarter cell")
+        peak = "lower of the two maxima" if self._net.is_simcc else "maximum"
         why = "told by the outputs" if self._net.is_simcc else "the file does not tell; option dark"
         return [
             *self._net.describe(),
             Fact("pixels", "RGB, mean and deviation of ImageNet", "as MMPose trains"),
             Fact("decoding", kind, why),
-            Fact(
-                "keypoint score",
-                ("lower of the two maxima" if self._net.is_simcc else "maximum")
-                + f" / {self._score_scale:g}, cut off at 1",
-                "10 if the head shuffles pixels (RTMW), else 1; option score_scale",
-            ),
-            Fact(
-                "person score",
-                "box score x mean of the scores above 0.2, before they are divided",
-                "as MMPose; OKS-NMS at 0.9",
-            ),
+            Fact("keypoint score", f"{peak} / {self._score_scale:g}, cut off at 1",
+                 "10 if the head shuffles pixels (RTMW), else 1; option score_scale"),
+            Fact("person score",
+                 f"box score x mean of the scores above {_MIN_COUNTED_SCORE}, before they are divided",
+                 "as MMPose; OKS-NMS at 0.9"),
             *self._boxes.describe(),
-        ]
+        ]  # fmt: skip
 
 
 def _hand_convention(convention: str, hand: str) -> str:

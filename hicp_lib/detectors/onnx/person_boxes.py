@@ -28,40 +28,30 @@ _PERSON = 0
 # YOLOX begins by folding 2 x 2 pixels into channels.
 _FOLDED_CHANNELS = 12
 _DEFAULT_SIDE_PX = 640
+# Boxes that are kept; the overlap counts only where the export does no suppression itself.
+_MIN_SCORE, _MAX_OVERLAP = 0.3, 0.45
+# exp() of more is no size of a box
+_MAX_LOG_SIZE = 20
 
 
 class PersonBoxes:
-    """A person (or hand) detector.
+    """A person (or hand) detector, YOLOX or RTMDet as its first convolution tells.
 
     Parameters
     ----------
-    model : ONNX export of YOLOX or RTMDet
-    family : "yolox" or "rtmdet"; told apart by the first convolution if None
-    min_score, max_overlap : boxes kept; the overlap only where the export does no suppression itself
-    provider, threads : see `open_model`
+    model : str or Path
+        ONNX export.
+    provider : str
+    threads : int
+        See `hicp_lib.detectors.onnx.session.open_model`.
     """
 
-    def __init__(
-        self,
-        model: str | Path,
-        family: str | None = None,
-        min_score: float = 0.3,
-        max_overlap: float = 0.45,
-        provider: str = "cpu",
-        threads: int = 1,
-    ) -> None:
+    def __init__(self, model: str | Path, provider: str = "cpu", threads: int = 1) -> None:
         self._model = open_model(model, provider, threads)
         folds = self._model.first_convolution_channels == _FOLDED_CHANNELS
-        self._family = family or ("yolox" if folds else "rtmdet")
-        if self._family not in _NORMALISATIONS:
-            raise InputError(f"{model}: person detector {family!r} is not known; expected yolox or rtmdet")
-        self._min_score, self._max_overlap = min_score, max_overlap
-        self.settings = {
-            "family": self._family,
-            "min_score": min_score,
-            "max_overlap": max_overlap,
-            **self._model.settings,
-        }
+        self._family = "yolox" if folds else "rtmdet"
+        own = {"family": self._family, "min_score": _MIN_SCORE, "max_overlap": _MAX_OVERLAP}
+        self.settings = own | self._model.settings
         height, width = self._model.image_size_px
         self._size_px = width or _DEFAULT_SIDE_PX, height or _DEFAULT_SIDE_PX
 
@@ -71,9 +61,9 @@ class PersonBoxes:
         feed = np.empty((1, 3, self._size_px[1], self._size_px[0]), np.float32)
         planes(fitted.pixels[..., ::-1], *_NORMALISATIONS[self._family], out=feed[0])
         corners, scores = self._read(self._model.run(feed))
-        keep = (scores >= self._min_score) & np.isfinite(corners).all(axis=1)
+        keep = (scores >= _MIN_SCORE) & np.isfinite(corners).all(axis=1)
         corners = (corners[keep] / np.tile(fitted.scale, 2)).clip(0, np.tile(image.shape[1::-1], 2))
-        boxes = np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1)
+        boxes = _boxes(corners)
         is_box = (boxes[:, 2:] > 0).all(axis=1)
         return boxes[is_box], scores[keep][is_box]
 
@@ -81,10 +71,10 @@ class PersonBoxes:
         """What is taken for granted about the model."""
         width, height = self._size_px
         return [
-            Fact("person detector", self._family, "read from the first convolution, unless given"),
+            Fact("person detector", self._family, "read from the first convolution"),
             Fact("person input", f"{width} x {height}, BGR, top-left, filled with 114", "read from the file"),
-            Fact("person score", f">= {self._min_score}", "overlaps above "
-                 f"{self._max_overlap} are suppressed where the export does not do it"),
+            Fact("person score", f">= {_MIN_SCORE}",
+                 f"overlaps above {_MAX_OVERLAP} are suppressed where the export does not do it"),
         ]  # fmt: skip
 
     def _read(self, outputs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -93,16 +83,21 @@ class PersonBoxes:
         if rows is not None and rows.shape[2] == 5:
             return _suppressed(rows[0], outputs)
         if rows is not None and rows.shape[2] > 5:
-            return self._suppress(*_from_grid(rows[0], self._size_px, self._model.path))
+            return _suppress(*_from_grid(rows[0], self._size_px, self._model.path))
         expected = "(1, n, 5) boxes with scores, or YOLOX's (1, cells, 5 + classes)"
         raise self._model.unexpected(outputs, expected)
 
-    def _suppress(self, corners: np.ndarray, scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        corners, scores = corners[scores >= self._min_score], scores[scores >= self._min_score]
-        boxes = np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1)
-        keep = cv2.dnn.NMSBoxes(boxes.tolist(), scores.tolist(), self._min_score, self._max_overlap)
-        keep = np.asarray(keep, int).reshape(-1)
-        return corners[keep], scores[keep]
+
+def _suppress(corners: np.ndarray, scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    corners, scores = corners[scores >= _MIN_SCORE], scores[scores >= _MIN_SCORE]
+    rows = cv2.dnn.NMSBoxes(_boxes(corners).tolist(), scores.tolist(), _MIN_SCORE, _MAX_OVERLAP)
+    keep = np.asarray(rows, int).reshape(-1)
+    return corners[keep], scores[keep]
+
+
+def _boxes(corners: np.ndarray) -> np.ndarray:
+    """Boxes (n, 4: x, y, width, height) of corners (n, 4: left, top, right, bottom)."""
+    return np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1)
 
 
 def _suppressed(rows: np.ndarray, outputs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -114,12 +109,9 @@ def _suppressed(rows: np.ndarray, outputs: list[np.ndarray]) -> tuple[np.ndarray
 
 def _from_grid(rows: np.ndarray, size_px: tuple[int, int], path: Path) -> tuple[np.ndarray, np.ndarray]:
     """Corners and scores from YOLOX's raw rows: offset in the cell, log size, object and class scores."""
-    cells, strides = [], []
-    for stride in _STRIDES:
-        y, x = np.mgrid[: size_px[1] // stride, : size_px[0] // stride]
-        cells.append(np.stack([x.ravel(), y.ravel()], axis=1))
-        strides.append(np.full((x.size, 1), stride))
-    cell, stride = np.concatenate(cells), np.concatenate(strides)
+    shapes = [(size_px[1] // stride, size_px[0] // stride) for stride in _STRIDES]
+    cell = np.concatenate([np.argwhere(np.ones(shape))[:, ::-1] for shape in shapes])
+    stride = np.repeat(_STRIDES, np.prod(shapes, axis=1))[:, None]
     if len(rows) != len(cell):
         raise InputError(
             f"{path}: gives {len(rows)} rows for an input of {size_px[0]} x {size_px[1]}; expected the "
@@ -127,6 +119,6 @@ def _from_grid(rows: np.ndarray, size_px: tuple[int, int], path: Path) -> tuple[
         )
     rows = rows.astype(float)
     centre = (rows[:, :2] + cell) * stride
-    half = np.exp(np.minimum(rows[:, 2:4], 20)) * stride / 2
+    half = np.exp(np.minimum(rows[:, 2:4], _MAX_LOG_SIZE)) * stride / 2
     scores = rows[:, 4] * rows[:, 5 + _PERSON]
     return np.concatenate([centre - half, centre + half], axis=1), np.where(np.isfinite(scores), scores, 0.0)

@@ -1,13 +1,12 @@
 """A top-down network: crops of people in, keypoints in the image out.
 
 The size of the input, the number of keypoints and heat maps against SimCC are read from
-the file; what the file cannot tell (colours, decoding) comes as a `Recipe`.
+the file; what the file cannot tell (colours, decoding) is given.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,34 +27,35 @@ CONVENTIONS = {
     136: "halpe136",
 }
 _MAX_BATCH = 16
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """What a model file does not tell about itself.
-
-    Attributes
-    ----------
-    mean, std : of the R, G and B values 0-255, taken off and divided by
-    decode_maps : heat maps (n, k, h, w) to positions in cells and scores
-    flip_test : also run the mirrored crops, and average
-    """
-
-    mean: tuple[float, float, float]
-    std: tuple[float, float, float]
-    decode_maps: Callable[[np.ndarray], Decoded]
-    flip_test: bool = False
+Colour = tuple[float, float, float]
+Decoder = Callable[[np.ndarray], Decoded]
 
 
 class PoseNet:
-    """A top-down network and its recipe.
+    """A top-down network, and what its file does not tell about it.
+
+    Parameters
+    ----------
+    model : OnnxModel
+    mean, std : Colour
+        Of the R, G and B values 0-255, taken off and divided by.
+    decode_maps : callable
+        Heat maps, shape (n, k, h, w), to positions in cells, shape (n, k, 2), and scores, shape (n, k).
+    flip_test : bool
+        Also run the mirrored crops, and average.
 
     Attributes
     ----------
-    input_size_px : (width, height) of the crops
-    convention : what its keypoints are, a key of `hicp_lib.core.keypoints.TO_HALPE`
-    is_simcc : a vector per axis in place of a heat map
-    batch : crops per run; None if the file leaves it open
+    input_size_px : tuple of int
+        Width and height of the crops.
+    convention : str
+        What its keypoints are, a key of `hicp_lib.core.keypoints.TO_HALPE`.
+    is_simcc : bool
+        A vector per axis in place of a heat map.
+    batch : int or None
+        Crops per run; None if the file leaves it open.
+    grid_size : tuple of int
+        Width and height of the grid that the outputs' positions are on.
 
     Raises
     ------
@@ -63,14 +63,20 @@ class PoseNet:
         If the file's input or outputs are not those of a top-down pose network.
     """
 
-    def __init__(self, model: OnnxModel, recipe: Recipe) -> None:
-        self.model, self._recipe = model, recipe
+    def __init__(
+        self, model: OnnxModel, mean: Colour, std: Colour, decode_maps: Decoder, flip_test: bool
+    ) -> None:
+        self.model, self._mean, self._std = model, mean, std
+        self._decode_maps, self._flip_test = decode_maps, flip_test
         shape = model.inputs[0].shape
-        if len(shape) != 4 or shape[1] != 3 or None in shape[2:]:
-            raise InputError(
-                f"{model.path}: takes an input of shape {shape}; expected crops of a fixed size, (n, 3, h, w)"
-            )
-        self.batch, self.input_size_px = shape[0], (shape[3], shape[2])
+        match shape:
+            case (batch, 3, int(height), int(width)):
+                self.batch, self.input_size_px = batch, (width, height)
+            case _:
+                raise InputError(
+                    f"{model.path}: takes an input of shape {shape}; "
+                    "expected crops of a fixed size, (n, 3, h, w)"
+                )
         outputs = self._ordered(model.response_to_zeros)
         self.is_simcc = len(outputs) == 2
         n_keypoints = outputs[0].shape[1]
@@ -81,7 +87,6 @@ class PoseNet:
             )
         self.convention = CONVENTIONS[n_keypoints]
         self._mirror = mirror(self.convention)
-        # Width and height of the grid the outputs' positions are on.
         first, last = outputs[0], outputs[-1]
         self.grid_size = (first.shape[-1], last.shape[-1] if self.is_simcc else last.shape[-2])
 
@@ -90,10 +95,12 @@ class PoseNet:
 
         Returns
         -------
-        Positions (n, k, 2) in image pixels, NaN where the score is not positive, and scores (n, k).
+        positions_px : array, shape (n, k, 2)
+            In the image; NaN where the score is not positive.
+        scores : array, shape (n, k)
         """
         outputs = self._respond(regions.crop(image, self.input_size_px))
-        cells, scores = decode_simcc(*outputs) if self.is_simcc else self._recipe.decode_maps(outputs[0])
+        cells, scores = decode_simcc(*outputs) if self.is_simcc else self._decode_maps(outputs[0])
         return regions.to_image_px(cells, self.grid_size), scores
 
     def describe(self) -> list[Fact]:
@@ -108,18 +115,18 @@ class PoseNet:
             Fact("keypoints", self.convention, "told by their number"),
             Fact("crop", f"box x {PADDING}, grown to the input's shape, black outside the image",
                  "as the originals"),
-            Fact("flip test", "yes" if self._recipe.flip_test else "no", "option flip_test"),
+            Fact("flip test", "yes" if self._flip_test else "no", "option flip_test"),
         ]  # fmt: skip
 
     def _respond(self, crops: list[np.ndarray]) -> list[np.ndarray]:
         """The outputs for n crops, flip test included; n of each."""
         n = len(crops)
-        if self._recipe.flip_test:
+        if self._flip_test:
             crops = crops + [crop[:, ::-1] for crop in crops]
         batch = self.batch or _MAX_BATCH
         parts = [self._run(crops[start : start + batch]) for start in range(0, len(crops), batch)]
         outputs = [np.concatenate(part) for part in zip(*parts, strict=True)]
-        if not self._recipe.flip_test:
+        if not self._flip_test:
             return outputs
         return [self._average(output[:n], output[n:], axis) for axis, output in enumerate(outputs)]
 
@@ -127,7 +134,7 @@ class PoseNet:
         width, height = self.input_size_px
         feed = np.zeros((self.batch or len(crops), 3, height, width), np.float32)
         for crop, out in zip(crops, feed, strict=False):
-            planes(crop, self._recipe.mean, self._recipe.std, out)
+            planes(crop, self._mean, self._std, out)
         return [output[: len(crops)] for output in self._ordered(self.model.run(feed), len(feed))]
 
     def _average(self, straight: np.ndarray, flipped: np.ndarray, axis: int) -> np.ndarray:

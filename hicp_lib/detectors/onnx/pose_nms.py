@@ -28,9 +28,22 @@ def oks_nms(
 
     Parameters
     ----------
-    positions_px : array, shape (n, k, 2); a NaN point agrees with nothing
-    person_scores, areas_px2 : arrays, shape (n,)
+    positions_px : array, shape (n, k, 2)
+        A NaN point agrees with nothing.
+    person_scores, areas_px2 : array, shape (n,)
     sigmas : array, shape (k,)
+    max_oks : float
+
+    Returns
+    -------
+    array of int, shape (m,)
+
+    Examples
+    --------
+    >>> pose_px = np.array([[0.0, 0.0], [50.0, 100.0]])
+    >>> poses_px = np.stack([pose_px, pose_px + 1, pose_px + 200])
+    >>> oks_nms(poses_px, np.array([0.5, 0.9, 0.1]), np.full(3, 5000.0), np.full(2, 0.08)).tolist()
+    [1, 2]
     """
     areas = (areas_px2[:, None] + areas_px2[None]) / 2
     similarity = oks_terms(positions_px[:, None], positions_px[None], areas, sigmas).mean(axis=-1)
@@ -47,13 +60,20 @@ class PoseNmsRules:
 
     Attributes
     ----------
-    delta1, delta2 : scale of the scores, and of the distances in pixels
-    mu : weight of the distances against the scores
-    gamma : similarity above which two poses are one person
-    min_score : a person none of whose points reaches it is dropped
-    min_matches : this many coinciding points make two poses one person
-    reach : how far apart points may lie to coincide, as a part of the box's longer side
-    is_whole_body : compare body, face and hands each on its own
+    delta1, delta2 : float
+        Scale of the scores, and of the distances in pixels.
+    mu : float
+        Weight of the distances against the scores.
+    gamma : float
+        Similarity above which two poses are one person.
+    min_score : float
+        A person none of whose points reaches it is dropped.
+    min_matches : float
+        This many coinciding points make two poses one person.
+    reach : float
+        How far apart points may lie to coincide, as a part of the box's longer side.
+    is_whole_body : bool
+        Compare body, face and hands each on its own.
     """
 
     delta1: float = 1.0
@@ -78,14 +98,20 @@ def merge_poses(
 
     Parameters
     ----------
-    positions_px, scores : arrays, shapes (n, k, 2) and (n, k); NaN with score 0 where not given
-    boxes_px : array, shape (n, 4): x, y, width, height
-    rules : constants
+    positions_px : array, shape (n, k, 2)
+    scores : array, shape (n, k)
+        Positions that are not given are NaN, with score 0.
+    boxes_px : array, shape (n, 4: x, y, width, height)
+    rules : PoseNmsRules
+        Constants.
 
     Returns
     -------
-    rows : array (m,), the people kept, best first
-    positions_px, scores : arrays (m, k, 2), (m, k), each merged with the poses it absorbed
+    rows : array of int, shape (m,)
+        The people kept, best first.
+    positions_px : array, shape (m, k, 2)
+    scores : array, shape (m, k)
+        Each merged with the poses it absorbed.
     """
     scores = np.where(scores == 0, 1e-5, scores)
     reaches = rules.reach * boxes_px[:, 2:].max(axis=1, initial=0)

@@ -40,7 +40,16 @@ _MESSAGES: Messages = {
 
 @dataclass(frozen=True)
 class Port:
-    """An input or output of a model; `shape` has None where the model leaves a size open."""
+    """An input or output of a model.
+
+    Attributes
+    ----------
+    name : str
+    shape : tuple[int | None, ...]
+        None where the model leaves a size open.
+    dtype : str
+        ONNX's name.
+    """
 
     name: str
     shape: tuple[int | None, ...]
@@ -52,11 +61,17 @@ class OnnxModel:
 
     Attributes
     ----------
-    path, sha256 : the file, and the hash of the model in it or made from it
-    provider : where it runs, e.g. "cpu"
-    inputs, outputs : its ports
-    operators : the kinds of nodes in its graph
-    first_convolution_channels : input channels of the first convolution, None if there is none
+    path : Path
+    sha256 : str
+        The file, and the hash of the model in it or made from it.
+    provider : str
+        Where it runs, e.g. "cpu".
+    inputs, outputs : list of Port
+        Its ports.
+    operators : frozenset of str
+        The kinds of nodes in its graph.
+    first_convolution_channels : int or None
+        Input channels of the first convolution, None if there is none.
     """
 
     def __init__(self, path: Path, content: bytes, provider: str, threads: int) -> None:
@@ -143,9 +158,12 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
 
     Parameters
     ----------
-    path : the file; weights kept in a second file ("external data") are not followed
-    provider : execution provider by its short name: cpu, cuda, tensorrt, openvino, ...
-    threads : of one inference; images run side by side already, so more rarely helps
+    path : str or Path
+        The file; weights kept in a second file ("external data") are not followed.
+    provider : str
+        Execution provider by its short name: cpu, cuda, tensorrt, openvino, ...
+    threads : int
+        Of one inference; images run side by side already, so more rarely helps.
 
     Raises
     ------
@@ -165,7 +183,23 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
 
 
 def open_content(content: bytes, path: Path, provider: str = "cpu", threads: int = 1) -> OnnxModel:
-    """As `open_model`, from the bytes of an ONNX model; `path` is the file they were made from."""
+    """As `open_model`, from the bytes of an ONNX model.
+
+    Parameters
+    ----------
+    content : bytes
+    path : Path
+        The file they were made from.
+    provider : str
+    threads : int
+
+    Examples
+    --------
+    >>> open_content(b"no network", Path("a.onnx"), "abacus")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    hicp_lib.core.errors.InputError: a.onnx: execution provider 'abacus' is not available here; expected ...
+    """
     if provider not in available_providers():
         raise InputError(
             f"{path}: execution provider {provider!r} is not available here; expected one of: "

@@ -37,11 +37,21 @@ class _Person:
 def join_as_released(
     peaks: list[np.ndarray], limbs: list[list[Limb]], model: PartModel, options: PafOptions
 ) -> tuple[np.ndarray, np.ndarray]:
-    """People from the peaks (n, 3: x, y, value) of each part and the limbs of each pair.
+    """People from the peaks of each part and the limbs of each pair.
+
+    Parameters
+    ----------
+    peaks : list of array
+        Of each part, shape (n, 3): x, y, value.
+    limbs : list of list of tuple
+        Of each pair, as `hicp_lib.detectors.openpose.paf.connect` gives them.
+    model : PartModel
+    options : PafOptions
 
     Returns
     -------
-    parts : array, shape (n_people, n_parts, 3): x, y as in `peaks`, score; NaN, NaN, 0 if missing
+    parts : array, shape (n_people, n_parts, 3)
+        x, y as in `peaks`, score; NaN, NaN, 0 if missing.
     scores : array, shape (n_people,)
     """
     people: list[_Person] = []

@@ -15,6 +15,7 @@ import numpy as np
 
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.letterbox import Letterbox
 from hicp_lib.detectors.onnx.session import open_content
 from hicp_lib.detectors.openpose.paf import PafOptions, PartModel, assemble
@@ -38,10 +39,33 @@ COCO_18 = PartModel(
 )
 
 
-def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> Letterbox:
-    """Scale an RGB image to the network's height with its aspect kept; pad the right with black to 16 px.
+def check_height(net_height_px: int) -> None:
+    """Refuse a height that these networks cannot take.
 
-    With a `width_px`, it is scaled to fit into both, and the right or the bottom padded.
+    Raises
+    ------
+    InputError
+        If it is no positive multiple of 16.
+    """
+    if net_height_px <= 0 or net_height_px % 16:
+        raise InputError(f"net_height_px {net_height_px}: expected a positive multiple of 16")
+
+
+def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> Letterbox:
+    """Scale an image to the network's height with its aspect kept; pad the right with black to 16 pixels.
+
+    Parameters
+    ----------
+    image : array, shape (height, width, 3), dtype uint8
+    height_px : int
+    width_px : int, optional
+        With it, the image is scaled to fit into both, and the right or the bottom padded.
+
+    Examples
+    --------
+    >>> fitted = fit(np.zeros((50, 30, 3), np.uint8), 100)
+    >>> fitted.pixels.shape, fitted.scale.tolist()
+    ((100, 64, 3), [2.0, 2.0])
     """
     height, width = image.shape[:2]
     zoom = height_px / height if width_px is None else min(height_px / height, width_px / width)
@@ -55,7 +79,17 @@ def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> Lette
 def as_detections(
     parts: np.ndarray, person_scores: np.ndarray, net_input: Letterbox, convention: str
 ) -> Detections:
-    """People from their parts (n, n_parts, 3: x, y in input pixels, score), NaN where missing."""
+    """People from their parts.
+
+    Parameters
+    ----------
+    parts : array, shape (n, n_parts, 3)
+        x, y in input pixels, score; NaN where missing.
+    person_scores : array, shape (n,)
+    net_input : Letterbox
+    convention : str
+        A key of `hicp_lib.core.keypoints.TO_HALPE`.
+    """
     positions_px, scores = net_input.to_image_px(parts[..., :2]), np.clip(parts[..., 2], 0, 1)
     return Detections.of_parts(positions_px, scores, np.clip(person_scores, 0, 1), convention)
 
@@ -65,9 +99,13 @@ class OpenPoseMobileNet:
 
     Parameters
     ----------
-    net_height_px : height images are scaled to, a multiple of 16; 368 as in OpenPose
-    options : thresholds of peaks, limbs and people
-    provider, threads : see `hicp_lib.detectors.onnx.session.open_model`
+    net_height_px : int
+        Height images are scaled to, a multiple of 16; 368 as in OpenPose.
+    options : PafOptions, optional
+        Thresholds of peaks, limbs and people.
+    provider : str
+    threads : int
+        See `hicp_lib.detectors.onnx.session.open_model`.
     """
 
     name = "openpose-mobilenet"
@@ -79,8 +117,7 @@ class OpenPoseMobileNet:
         provider: str = "cpu",
         threads: int = 1,
     ) -> None:
-        if net_height_px <= 0 or net_height_px % 16:
-            raise ValueError(f"net_height_px must be a positive multiple of 16, not {net_height_px}")
+        check_height(net_height_px)
         self._model = open_content(load(WEIGHTS.name), WEIGHTS, provider, threads)
         self._height_px = net_height_px
         self._options = options or PafOptions()

@@ -25,12 +25,18 @@ class PartModel:
 
     Attributes
     ----------
-    convention : key of `hicp_lib.core.keypoints.TO_HALPE` for its parts
-    n_parts : number of heat maps used (the background map is not)
-    pairs : array (n_pairs, 2), parts (from, to) of each limb, in the order they are connected
-    fields : array (n_pairs, 2), channels of the limb's affinity field (x, y)
-    completing : limbs that may complete a person but never start one (ear to shoulder)
-    uncounted : parts that do not count towards the fewest parts of a person
+    convention : str
+        Key of `hicp_lib.core.keypoints.TO_HALPE` for its parts.
+    n_parts : int
+        Number of heat maps used (the background map is not).
+    pairs : array, shape (n_pairs, 2)
+        Parts (from, to) of each limb, in the order they are connected.
+    fields : array, shape (n_pairs, 2)
+        Channels of the limb's affinity field (x, y).
+    completing : frozenset of int
+        Limbs that may complete a person but never start one (ear to shoulder).
+    uncounted : frozenset of int
+        Parts that do not count towards the fewest parts of a person.
     """
 
     convention: str
@@ -47,11 +53,16 @@ class PafOptions:
 
     Attributes
     ----------
-    min_peak : least heat map value of a part
-    min_sample : least projection of the field onto the limb for a sample to agree
-    min_agreement : least fraction of samples that agree
-    min_parts : fewest parts of a person
-    min_score : least (sum of part and limb scores) / (number of parts) of a person
+    min_peak : float
+        Least heat map value of a part.
+    min_sample : float
+        Least projection of the field onto the limb for a sample to agree.
+    min_agreement : float
+        Least fraction of samples that agree.
+    min_parts : int
+        Fewest parts of a person.
+    min_score : float
+        Least (sum of part and limb scores) / (number of parts) of a person.
     """
 
     min_peak: float = 0.05
@@ -86,22 +97,25 @@ def find_peaks(heat_maps: np.ndarray, stride: int, min_peak: float) -> list[np.n
     Parameters
     ----------
     heat_maps : array, shape (n_parts, h, w)
-    stride : input pixels per cell
-    min_peak : least value
+    stride : int
+        Input pixels per cell.
+    min_peak : float
+        Least value.
 
     Returns
     -------
-    One array (n, 3) per part: x, y in input pixels, value.
+    list of array
+        One per part, shape (n, 3): x, y in input pixels, value.
     """
     cells = np.argwhere(_is_maximum(heat_maps) & (heat_maps > min_peak))
     part, row, column = cells.T
     logs = np.pad(np.log(np.maximum(heat_maps, _LEAST)), ((0, 0), (1, 1), (1, 1)), constant_values=np.nan)
-    x = column + _vertex(
-        logs[part, row + 1, column], logs[part, row + 1, column + 1], logs[part, row + 1, column + 2]
-    )
-    y = row + _vertex(
-        logs[part, row, column + 1], logs[part, row + 1, column + 1], logs[part, row + 2, column + 1]
-    )
+
+    def beside(dy: int, dx: int) -> np.ndarray:
+        return logs[part, row + 1 + dy, column + 1 + dx]
+
+    x = column + _vertex(beside(0, -1), beside(0, 0), beside(0, 1))
+    y = row + _vertex(beside(-1, 0), beside(0, 0), beside(1, 0))
     value = heat_maps[part, row, column]
     peaks = np.stack([(x + 0.5) * stride - 0.5, (y + 0.5) * stride - 0.5, value], axis=1)
     order = np.argsort(-value, kind="stable")
@@ -113,12 +127,10 @@ def _is_maximum(maps: np.ndarray) -> np.ndarray:
     height, width = maps.shape[1:]
     padded = np.pad(maps, ((0, 0), (1, 1), (1, 1)), constant_values=-np.inf)
     result = np.ones(maps.shape, dtype=bool)
-    for dy in (-1, 0, 1):
-        for dx in (-1, 0, 1):
-            if dy == dx == 0:
-                continue
-            neighbour = padded[:, 1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width]
-            result &= (maps > neighbour) if (dy, dx) < (0, 0) else (maps >= neighbour)
+    for dy, dx in np.ndindex(3, 3):
+        neighbour = padded[:, dy : dy + height, dx : dx + width]
+        if (dy, dx) != (1, 1):
+            result &= (maps > neighbour) if (dy, dx) < (1, 1) else (maps >= neighbour)
     return result
 
 
@@ -145,14 +157,22 @@ def limb_scores(
 
     Parameters
     ----------
-    limb_field : array, shape (2, h, w), x and y component
-    starts, ends : arrays (n, >= 2) and (m, >= 2), positions in input pixels
-    stride : input pixels per cell
-    sample : how the field is read between cells; bilinearly if None
+    limb_field : array, shape (2, h, w)
+        X and y component.
+    starts : array, shape (n, 2) or (n, 3)
+    ends : array, shape (m, 2) or (m, 3)
+        Positions in input pixels first.
+    stride : int
+        Input pixels per cell.
+    options : PafOptions
+        Thresholds.
+    sample : callable, optional
+        How the field is read between cells; bilinearly if None.
 
     Returns
     -------
-    array, shape (n, m); 0 where there is no limb
+    array, shape (n, m)
+        0 where there is no limb.
     """
     start, end = starts[:, None, :2], ends[None, :, :2]
     vector = end - start
@@ -205,14 +225,22 @@ def assemble(
 
     Parameters
     ----------
-    heat_maps : array, shape (n_parts, h, w), in [0, 1]
+    heat_maps : array, shape (n_parts, h, w)
+        In [0, 1].
     fields : array, shape (n_fields, h, w)
-    model, stride, options : what the maps mean, input pixels per cell, thresholds
+    model : PartModel
+        What the maps mean.
+    stride : int
+        Input pixels per cell.
+    options : PafOptions
+        Thresholds.
 
     Returns
     -------
-    parts : array, shape (n_people, n_parts, 3): x, y in input pixels, score; NaN, NaN, 0 if missing
-    scores : array, shape (n_people,): (sum of part and limb scores) / (parts + limbs)
+    parts : array, shape (n_people, n_parts, 3)
+        x, y in input pixels, score; NaN, NaN, 0 if missing.
+    scores : array, shape (n_people,)
+        (sum of part and limb scores) / (parts + limbs).
     """
     peaks = find_peaks(heat_maps, stride, options.min_peak)
     people: list[_Person] = []
@@ -231,7 +259,20 @@ def find_limbs(
     options: PafOptions,
     sample: Sampler | None = None,
 ) -> list[list[Limb]]:
-    """Limbs of each pair, from the peaks (n, 3: x, y in input pixels, value) of each part."""
+    """Limbs of each pair.
+
+    Parameters
+    ----------
+    peaks : list of array
+        Of each part, as `find_peaks` gives them.
+    fields : array, shape (n_fields, h, w)
+    model : PartModel
+    stride : int
+        Input pixels per cell.
+    options : PafOptions
+    sample : callable, optional
+        As of `limb_scores`.
+    """
     return [
         connect(limb_scores(fields[channels], peaks[a], peaks[b], stride, options, sample))
         for (a, b), channels in zip(model.pairs, model.fields, strict=True)
@@ -244,19 +285,19 @@ def _join(
     """Add the limb between peak `a` and peak `b` (part, index) to the people found so far."""
     with_a = next((person for person in people if person.peaks.get(a[0]) == a[1]), None)
     with_b = next((person for person in people if person.peaks.get(b[0]) == b[1]), None)
-    if with_a is None and with_b is None:
+    person = with_a or with_b
+    if person is None:
         if completing:
             return
-        with_a = _Person()
-        people.append(with_a)
-    elif with_a is not None and with_b is not None and with_a is not with_b:
-        if with_a.peaks.keys() & with_b.peaks.keys():
+        person = _Person()
+        people.append(person)
+    elif with_b is not None and with_b is not person:
+        if person.peaks.keys() & with_b.peaks.keys():
             return
-        with_a.peaks.update(with_b.peaks)
-        with_a.limb_score += with_b.limb_score
-        with_a.n_limbs += with_b.n_limbs
-        people[:] = [person for person in people if person is not with_b]
-    person = with_a or with_b
+        person.peaks.update(with_b.peaks)
+        person.limb_score += with_b.limb_score
+        person.n_limbs += with_b.n_limbs
+        people[:] = [other for other in people if other is not with_b]
     for part, peak in (a, b):
         if person.peaks.setdefault(part, peak) != peak:
             return

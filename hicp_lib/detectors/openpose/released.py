@@ -32,10 +32,25 @@ def assemble_released(
     options: PafOptions,
     offset_px: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """People in the maps of one image; parameters and results as of `paf.assemble`.
+    """People in the maps of one image, as `hicp_lib.detectors.openpose.paf.assemble` gives them.
 
-    Person scores are the program's, see `join_as_released`. `offset_px` is half an image pixel in pixels
-    of the network's input.
+    Parameters
+    ----------
+    heat_maps : array, shape (n_parts, h, w)
+    fields : array, shape (n_fields, h, w)
+    model : PartModel
+    stride : int
+        Input pixels per cell.
+    options : PafOptions
+    offset_px : float
+        Half an image pixel, in pixels of the network's input.
+
+    Returns
+    -------
+    parts : array, shape (n_people, n_parts, 3)
+        x, y in input pixels, score; NaN, NaN, 0 if missing.
+    scores : array, shape (n_people,)
+        The program's, see `hicp_lib.detectors.openpose.joining.join_as_released`.
     """
     heat_maps, fields = enlarge(heat_maps, stride), enlarge(fields, stride)
     peaks = [centroid_peaks(heat_map, options.min_peak) for heat_map in heat_maps]

@@ -21,7 +21,7 @@ from hicp_lib.core.keypoints import INDEX, LEFT_HAND, RIGHT_HAND
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import planes
 from hicp_lib.detectors.onnx.session import OnnxModel, open_model
-from hicp_lib.detectors.openpose.mobilenet import COCO_18, STRIDE, as_detections, fit
+from hicp_lib.detectors.openpose.mobilenet import COCO_18, STRIDE, as_detections, check_height, fit
 from hicp_lib.detectors.openpose.paf import PafOptions, PartModel, assemble
 from hicp_lib.detectors.openpose.released import assemble_released, enlarge
 
@@ -52,12 +52,17 @@ class OpenPose:
 
     Parameters
     ----------
-    model : ONNX conversion of a body network
-    hand_model : ONNX conversion of the hand network; without it no hands are given
-    net_height_px : height images are scaled to, a multiple of 16, where the file leaves it open
-    as_released : read the maps as OpenPose's program does; else the cheaper way of
-        `hicp_lib.detectors.openpose.paf`
-    provider, threads : see `hicp_lib.detectors.onnx.session.open_model`
+    model : str or Path
+        ONNX conversion of a body network.
+    hand_model : str or Path, optional
+        ONNX conversion of the hand network; without it no hands are given.
+    net_height_px : int
+        Height images are scaled to, a multiple of 16, where the file leaves it open.
+    as_released : bool
+        Read the maps as OpenPose's program does; else the cheaper way of `hicp_lib.detectors.openpose.paf`.
+    provider : str
+    threads : int
+        See `hicp_lib.detectors.onnx.session.open_model`.
     """
 
     name = "openpose"
@@ -71,8 +76,7 @@ class OpenPose:
         provider: str = "cpu",
         threads: int = 1,
     ) -> None:
-        if net_height_px <= 0 or net_height_px % 16:
-            raise InputError(f"net_height_px {net_height_px}: expected a positive multiple of 16")
+        check_height(net_height_px)
         self._model = open_model(model, provider, threads)
         height, width = self._model.image_size_px
         self._size_px = height or net_height_px, width if height else None
@@ -148,7 +152,24 @@ class OpenPoseHands:
     def find(
         self, image: np.ndarray, corner_px: np.ndarray, side_px: float, is_left: bool
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Points (21, 2) in image pixels and scores (21,) of the hand in a square; NaN where not found."""
+        """The points of the hand in a square.
+
+        Parameters
+        ----------
+        image : array, shape (height, width, 3), dtype uint8
+            RGB.
+        corner_px : array, shape (2,)
+            Top left of the square.
+        side_px : float
+        is_left : bool
+            Show it mirrored.
+
+        Returns
+        -------
+        points_px : array, shape (21, 2)
+            In the image; NaN where not found.
+        scores : array, shape (21,)
+        """
         zoom = side_px / self._side_px
         x0, step = (corner_px[0] + side_px, -zoom) if is_left else (corner_px[0], zoom)
         to_image = np.array([[step, 0, x0], [0, zoom, corner_px[1]]])
@@ -171,12 +192,27 @@ class OpenPoseHands:
 
 
 def hand_square(keypoints_px: np.ndarray, scores: np.ndarray, side: str) -> tuple[np.ndarray, float] | None:
-    """Corner (2,) and side in pixels of where OpenPose looks for the hand of a person, if it does.
+    """The square in which OpenPose looks for a hand of a person, if it does.
 
     Parameters
     ----------
-    keypoints_px, scores : arrays, shapes (136, 2) and (136,)
-    side : "left" or "right"
+    keypoints_px : array, shape (136, 2)
+    scores : array, shape (136,)
+    side : {"left", "right"}
+
+    Returns
+    -------
+    (array, float) or None
+        Its upper left corner, shape (2,), and its side in pixels.
+
+    Examples
+    --------
+    >>> keypoints_px = np.zeros((136, 2))
+    >>> joints = [INDEX[f"left_{joint}"] for joint in ("wrist", "elbow", "shoulder")]
+    >>> keypoints_px[joints] = (400, 200), (300, 200), (200, 200)
+    >>> corner_px, side_px = hand_square(keypoints_px, np.ones(136), "left")
+    >>> corner_px.tolist(), side_px
+    ([358.0, 125.0], 150.0)
     """
     joints = [INDEX[f"{side}_{joint}"] for joint in ("wrist", "elbow", "shoulder")]
     if not (scores[joints] > _MIN_ARM_SCORE).all():

@@ -1,4 +1,4 @@
-"""A detector as it runs over image files: timed, and what its parts find kept on disk.
+"""A detector as it runs over image files: timed, its parts' answers read from disk where they are kept.
 
 `mediapipe` is made of `mediapipe-pose` and `mediapipe-hands`, a combination of a body and a hand detector;
 variants of a combination look at mostly the same squares of the same images. A part looks at the same image
@@ -9,20 +9,14 @@ keeps its own.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from hicp_lib.core.detections import Detections, Detector
-from hicp_lib.detectors.runtime.results import (
-    Timed,
-    cache_folder,
-    pixels_sha256,
-    read_result,
-    result_path,
-    write_result,
-)
+from hicp_lib.detectors.runtime.results import Timed, cache_folder, cached, pixels_sha256, result_path
 
 
 @dataclass
@@ -31,9 +25,13 @@ class _Shown:
 
     Attributes
     ----------
-    workers : how many runners work side by side
-    image, image_sha256 : the image, and the hash of the file it is from; None if nothing is to be kept
-    owed_ms : for each result of a part, what the part took to find it, less what it took to get it now
+    workers : int
+        How many runners work side by side.
+    image : array, shape (height, width, 3), optional
+    image_sha256 : str, optional
+        Hash of the file that `image` is from; None if nothing is to be kept.
+    owed_ms : list of float
+        For each result of a part, what the part took to find it, less what it took to get it now.
     """
 
     workers: int
@@ -47,34 +45,36 @@ class Runner:
 
     Parameters
     ----------
-    detector : what runs; its `parts`, if it has any, are replaced by `Kept` ones
-    workers : how many such runners work side by side
+    detector : Detector
+        What runs. It stays as it is: the runner asks a copy of it, whose `parts`, if it has any, are cached.
+    workers : int
+        How many such runners work side by side.
     """
 
     def __init__(self, detector: Detector, workers: int) -> None:
         self.detector, self._shown = detector, _Shown(workers)
-        _keep_parts(detector, self._shown)
+        self._asked = _with_cached_parts(detector, self._shown)
 
     def detect(self, image: np.ndarray, boxes_px: np.ndarray | None, image_sha256: str | None) -> Timed:
-        """People in an RGB image (height, width, 3), and the time it took; of what was kept, the time then.
+        """People in an image, and the time it took; of what was kept, the time then.
 
         Parameters
         ----------
-        boxes_px : (n, 4: x, y, width, height) for detectors that take them, None for the others
-        image_sha256 : of the image's file; without it nothing is read from disk or kept there
+        image : array, shape (height, width, 3), dtype uint8
+            RGB.
+        boxes_px : array or None, shape (n, 4: x, y, width, height)
+            For detectors that take them.
+        image_sha256 : str or None
+            Of the image's file; without it nothing is read from disk or kept there.
         """
         shown = self._shown
         shown.image, shown.image_sha256 = image, image_sha256
         shown.owed_ms.clear()
-        boxes = () if boxes_px is None else (boxes_px,)
-        start(self.detector)
-        begin = time.perf_counter()
-        found = self.detector.detect(image, *boxes)
-        elapsed_ms = 1e3 * (time.perf_counter() - begin)
-        return Timed(found, elapsed_ms + sum(shown.owed_ms), shown.workers)
+        result = _timed(self._asked, shown.workers, image, *(() if boxes_px is None else (boxes_px,)))
+        return replace(result, time_ms=result.time_ms + sum(shown.owed_ms))
 
 
-class Kept:
+class CachedPart:
     """A part of a runner's detector: its results come from disk where it saw the same before."""
 
     def __init__(self, detector: Detector, shown: _Shown) -> None:
@@ -89,19 +89,16 @@ class Kept:
     def detect(self, image: np.ndarray, *boxes_px: np.ndarray) -> Detections:
         """As the detector's own."""
         begin = time.perf_counter()
-        path = None if self._shown.image_sha256 is None else self._path(image, *boxes_px)
-        result = path and read_result(path)
-        if result is None:
-            start(self._detector)
-            call = time.perf_counter()
-            found = self._detector.detect(image, *boxes_px)
-            result = Timed(found, 1e3 * (time.perf_counter() - call), self._shown.workers)
-            if path:
-                write_result(path, result)
+        result = cached(
+            self._path(image, *boxes_px),
+            lambda: _timed(self._detector, self._shown.workers, image, *boxes_px),
+        )
         self._shown.owed_ms.append(result.time_ms - 1e3 * (time.perf_counter() - begin))
         return result.detections
 
-    def _path(self, image: np.ndarray, boxes_px: np.ndarray | None = None) -> Path:
+    def _path(self, image: np.ndarray, boxes_px: np.ndarray | None = None) -> Path | None:
+        if self._shown.image_sha256 is None:
+            return None
         if image is self._shown.image:
             return result_path(self._folder, self._shown.image_sha256, boxes_px)
         return result_path(self._folder / "squares", pixels_sha256(image), boxes_px)
@@ -112,10 +109,20 @@ def start(detector: Detector) -> None:
     getattr(detector, "start", lambda: None)()
 
 
-def _keep_parts(detector: Detector, shown: _Shown) -> None:
-    parts = getattr(detector, "parts", {})
-    for name, part in parts.items():
-        if hasattr(part, "parts"):
-            _keep_parts(part, shown)
-        else:
-            parts[name] = Kept(part, shown)
+def _timed(detector: Detector, workers: int, image: np.ndarray, *boxes_px: np.ndarray) -> Timed:
+    start(detector)
+    begin = time.perf_counter()
+    found = detector.detect(image, *boxes_px)
+    return Timed(found, 1e3 * (time.perf_counter() - begin), workers)
+
+
+def _with_cached_parts(detector: Detector, shown: _Shown) -> Detector:
+    """A copy of a detector that asks cached parts; the detector itself if it has none."""
+    if not hasattr(detector, "parts"):
+        return detector
+    result = copy(detector)
+    result.parts = {
+        name: _with_cached_parts(part, shown) if hasattr(part, "parts") else CachedPart(part, shown)
+        for name, part in detector.parts.items()
+    }
+    return result

@@ -14,26 +14,28 @@ from __future__ import annotations
 import logging
 import re
 import threading
+import traceback
 import warnings
 from collections.abc import Callable, Hashable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detector
 from hicp_lib.core.errors import InputError, one_line
+from hicp_lib.core.files import sha256_bytes
 from hicp_lib.core.images import decode_image
-from hicp_lib.detectors.runtime.pool import DetectorPool, naming
+from hicp_lib.detectors.runtime.pool import DetectorPool, naming_image
 from hicp_lib.detectors.runtime.results import (
     Timed,
     cache_folder,
     identity,
-    image_sha256,
+    image_bytes,
     read_result,
     result_path,
     write_result,
@@ -62,10 +64,20 @@ def detect_on_cluster(
 
     Parameters
     ----------
-    address : Dask's scheduler, e.g. "tcp://127.0.0.1:8786"
-    name, options : of the detector, as `make_detector` takes them
-    detector : the same, made here; workers' ones must equal it in all that results depend on
-    jobs : image file, and boxes (n, 4: x, y, width, height) if the detector takes them, by any key
+    address : str
+        Of Dask's scheduler, e.g. "tcp://127.0.0.1:8786".
+    name : str
+    options : dict of str to object
+        Of the detector, as `make_detector` takes them.
+    detector : Detector
+        The same, made here; workers' ones must equal it in all that results depend on.
+    jobs : dict of object to (Path, array or None)
+        Image file, and boxes (n, 4: x, y, width, height) if the detector takes them, by any key.
+
+    Yields
+    ------
+    (object, Timed)
+        Key and result.
 
     Raises
     ------
@@ -74,20 +86,25 @@ def detect_on_cluster(
         worker cannot make the same detector, or an image cannot be read or kills its workers.
     """
     folder = cache_folder(detector)
-    kept = {key: result_path(folder, image_sha256(path), boxes_px) for key, (path, boxes_px) in jobs.items()}
+    paths = {
+        key: result_path(folder, sha256_bytes(image_bytes(path)), boxes_px)
+        for key, (path, boxes_px) in jobs.items()
+    }
     missing = []
-    for key, path in kept.items():
+    for key, path in paths.items():
         result = read_result(path)
         if result is None:
             missing.append(key)
         else:
             yield key, result
     if missing:
-        todo = ((key, (jobs[key][0].read_bytes(), str(jobs[key][0]), jobs[key][1])) for key in missing)
+        todo = ((key, (image_bytes(jobs[key][0]), str(jobs[key][0]), jobs[key][1])) for key in missing)
         with _connected(address) as client:
-            for key, result in _spread(client, todo, (name, options, identity(detector))):
-                write_result(kept[key], result)
-                yield key, result
+            for key, answer in _spread(client, address, todo, (name, options, identity(detector))):
+                if isinstance(answer, Exception):
+                    raise answer
+                write_result(paths[key], answer)
+                yield key, answer
 
 
 @contextmanager
@@ -108,12 +125,16 @@ def _connected(address: str) -> Iterator[Client]:
                 f"{address}: no Dask scheduler answers ({one_line(error)}); "
                 "give one's address, tcp://HOST:PORT"
             ) from None
-        with _explained(address), client:
-            try:
-                client.wait_for_workers(1, timeout=PATIENCE_S)
-            except TimeoutError:
-                raise InputError(f"{address}: the Dask cluster has no workers; start some") from None
+        try:
+            with _explained(address, client):
+                try:
+                    client.wait_for_workers(1, timeout=PATIENCE_S)
+                except TimeoutError:
+                    raise InputError(f"{address}: the Dask cluster has no workers; start some") from None
             yield client
+        finally:
+            with suppress(OSError, RuntimeError):  # it may be gone; what was found is here
+                client.close()
 
 
 @contextmanager
@@ -135,24 +156,27 @@ def _quiet() -> Iterator[None]:
 
 
 def _spread(
-    client: Client, todo: Iterator[tuple[Key, tuple]], detector: tuple
-) -> Iterator[tuple[Key, Timed]]:
-    """Results as they come in; no more images travel than keep all workers busy."""
+    client: Client, address: str, todo: Iterator[tuple[Key, tuple]], detector: tuple
+) -> Iterator[tuple[Key, Timed | Exception]]:
+    """Results as they come in, or what went wrong; no more images travel than keep all workers busy."""
     running: dict[Future, tuple[Key, str]] = {}
-    for key, (content, path, boxes_px) in todo:
-        with warnings.catch_warnings():
-            # Dask would have large arguments scattered; but scattered data is lost with its worker.
-            warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
-            future = client.submit(_detect_here, *detector, content, path, boxes_px, pure=False)
-        running[future] = key, path
-        while len(running) >= 2 * sum(client.nthreads().values()) > 0:
+    with _explained(address, client):
+        for key, (content, path, boxes_px) in todo:
+            with warnings.catch_warnings():
+                # Dask would have large arguments scattered; but scattered data is lost with its worker.
+                warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
+                future = client.submit(_detect_here, *detector, content, path, boxes_px, pure=False)
+            running[future] = key, path
+            while len(running) >= 2 * sum(client.nthreads().values()) > 0:
+                yield from _finished(client, running)
+        while running:
             yield from _finished(client, running)
-    while running:
-        yield from _finished(client, running)
 
 
-def _finished(client: Client, running: dict[Future, tuple[Key, str]]) -> Iterator[tuple[Key, Timed]]:
-    """The results that are there, at least one; they leave `running`."""
+def _finished(
+    client: Client, running: dict[Future, tuple[Key, str]]
+) -> Iterator[tuple[Key, Timed | Exception]]:
+    """What is there, at least one; it leaves `running`."""
     from distributed import wait
 
     def first_ones(timeout_s: float) -> set[Future]:
@@ -161,22 +185,22 @@ def _finished(client: Client, running: dict[Future, tuple[Key, str]]) -> Iterato
     for future in _patiently(client, first_ones):
         key, path = running.pop(future)
         if future.status == "error":
-            raise _told(future.exception(PATIENCE_S), path)
-        yield key, _patiently(client, future.result)
+            yield key, _not_run(future.exception(PATIENCE_S), path)
+        else:
+            yield key, _patiently(client, future.result)
 
 
-def _told(error: Exception, path: str) -> Exception:
-    """What went wrong where an image was worked on, in one line."""
+def _not_run(error: Exception, path: str) -> InputError:
+    """Why Dask could not run `_detect_here`, in one line: what goes wrong within comes back as its result."""
     from distributed import KilledWorker
 
     if isinstance(error, KilledWorker):
-        return InputError(f"{path}: every worker that took this image died, lately {_last(error)}")
-    if isinstance(error, (ImportError, AttributeError, RuntimeError)):
-        return InputError(
-            f"the Dask cluster cannot run this detector ({one_line(error)}); "
-            "install the same environment and weights on scheduler and workers"
-        )
-    return error
+        last = getattr(error.last_worker, "address", "an unknown one")
+        return InputError(f"{path}: every worker that took this image died, lately {last}")
+    return InputError(
+        f"the Dask cluster cannot run this detector ({one_line(error)}); "
+        "install the same environment and weights on scheduler and workers"
+    )
 
 
 def _patiently(client: Client, ask: Callable[[float], Answer]) -> Answer:
@@ -190,22 +214,19 @@ def _patiently(client: Client, ask: Callable[[float], Answer]) -> Answer:
 
 
 @contextmanager
-def _explained(address: str) -> Iterator[None]:
-    """Tell in one line that the connection is lost, however Dask comes to notice."""
+def _explained(address: str, client: Client) -> Iterator[None]:
+    """Around calls of Dask's alone: tell in one line that the cluster is gone, however it shows."""
     from distributed.client import ClosedClientError
 
     try:
         yield
-    except (CancelledError, OSError, ClosedClientError, RuntimeError, AttributeError) as error:
-        if getattr(error, "filename", None):  # an image here, not the connection
+    except (CancelledError, OSError, ClosedClientError, AttributeError, RuntimeError) as error:
+        # A client that has closed has no scheduler or loop to ask; of one that runs it would be a fault.
+        if isinstance(error, (AttributeError, RuntimeError)) and client.status == "running":
             raise
         raise InputError(
             f"{address}: the Dask cluster is gone ({one_line(error)}); run the same command again to go on"
         ) from None
-
-
-def _last(error: Exception) -> str:
-    return str(getattr(getattr(error, "last_worker", None), "address", "an unknown one"))
 
 
 # What follows runs on the workers.
@@ -213,7 +234,16 @@ def _last(error: Exception) -> str:
 _making = threading.Lock()
 
 
-def _detect_here(
+def _detect_here(*arguments: Any) -> Timed | Exception:
+    """What `_detect` finds or raises: an error that Dask raises in its place is then Dask's own."""
+    try:
+        return _detect(*arguments)
+    except Exception as error:
+        error.add_note(traceback.format_exc())  # errors travel without
+        return error
+
+
+def _detect(
     name: str, options: dict, expected: dict, content: bytes, path: str, boxes_px: np.ndarray | None
 ) -> Timed:
     from distributed import get_worker
@@ -230,7 +260,7 @@ def _detect_here(
             f"worker {worker.address}: would find something else, for these differ from here: "
             f"{', '.join(differing)}; install the same environment and weights, and start it anew"
         )
-    with naming(path):
+    with naming_image(path):
         return pool.detect(decode_image(content, path), boxes_px)
 
 

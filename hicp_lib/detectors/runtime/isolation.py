@@ -17,7 +17,7 @@ import tempfile
 import threading
 import weakref
 from contextlib import suppress
-from typing import BinaryIO
+from typing import IO
 
 import numpy as np
 
@@ -34,19 +34,24 @@ _FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1"}  # NumPy's, which have nothing to d
 LIMIT_S = 120.0
 
 
-class NativeError(InputError):
-    """A native library gave up, or its process ended."""
+class IsolationError(InputError):
+    """A library in a process of its own gave up, or its process ended."""
 
 
-class NativeProcess:
+class IsolatedProcess:
     """A program of this package that loads a native library, run when first asked and again after it ended.
 
     Parameters
     ----------
-    program : script that speaks as `hicp_lib.detectors.mediapipe.child` says, and its first arguments
-    head, body : the first message to it
-    name : what messages to the user begin with
-    remedy : what they end with if the program cannot start
+    program : list of str
+        Script that speaks as `hicp_lib.detectors.mediapipe.child` says, and its first arguments.
+    head : dict
+    body : bytes
+        The first message to it.
+    name : str
+        What messages to the user begin with.
+    remedy : str
+        What they end with if the program cannot start.
     """
 
     def __init__(self, program: list[str], head: dict, body: bytes, name: str, remedy: str) -> None:
@@ -60,7 +65,7 @@ class NativeProcess:
 
         Raises
         ------
-        NativeError
+        IsolationError
             If it does not start.
         """
         with self._lock:
@@ -71,7 +76,7 @@ class NativeProcess:
 
         Raises
         ------
-        NativeError
+        IsolationError
             If it cannot tell, or its process ends; the next call starts another.
         InputError
             If it is no such image.
@@ -93,25 +98,25 @@ class NativeProcess:
             try:
                 child = _Child(self._program)
             except OSError as error:
-                raise NativeError(
+                raise IsolationError(
                     f"{self._name}: no process can be started ({error.strerror}); use fewer workers"
                 ) from None
             self._answer(child, self._first, self._remedy)
             self._child = child
         return self._child
 
-    def _answer(self, child: _Child, question: tuple, remedy: str) -> tuple[dict, bytearray]:
+    def _answer(self, child: _Child, question: tuple, remedy: str) -> tuple[dict, bytes]:
         try:
             head, body = child.ask(*question)
         except (EOFError, OSError):
             self._child = None
-            raise NativeError(f"{self._name}: {child.end()}; {remedy}") from None
+            raise IsolationError(f"{self._name}: {child.end()}; {remedy}") from None
         except BaseException:  # an interrupted wait: the answer would be taken for that to the next image
             self._child = None
             child.close()
             raise
         if "error" in head:
-            raise NativeError(f"{self._name}: {head['error']}; {remedy}")
+            raise IsolationError(f"{self._name}: {head['error']}; {remedy}")
         return head, body
 
 
@@ -121,7 +126,8 @@ class _Child:
     def __init__(self, program: list[str]) -> None:
         self.owner = os.getpid()
         self._stderr = tempfile.TemporaryFile()
-        self._shared, self._pixels = _unnamed_file(), b""
+        self._shared = _unnamed_file()
+        self._pixels: bytes | mmap.mmap = b""
         self._process = subprocess.Popen(
             [sys.executable, "-P", *program, str(self._shared.fileno())],
             stdin=subprocess.PIPE,
@@ -131,7 +137,9 @@ class _Child:
             pass_fds=[self._shared.fileno()],
             start_new_session=True,  # an interrupt from the keyboard is for the caller
         )
-        files = self._process.stdin, self._process.stdout, self._stderr, self._shared
+        assert self._process.stdin and self._process.stdout
+        self._questions, self._answers = self._process.stdin, self._process.stdout
+        files = self._questions, self._answers, self._stderr, self._shared
         self.close = weakref.finalize(self, _close, self._process, files, self.owner)
 
     def show(self, image: np.ndarray) -> None:
@@ -141,10 +149,10 @@ class _Child:
             self._pixels = mmap.mmap(self._shared.fileno(), image.size)
         np.ndarray(image.shape, np.uint8, self._pixels)[...] = image
 
-    def ask(self, head: dict, body: bytes = b"") -> tuple[dict, bytearray]:
+    def ask(self, head: dict, body: bytes = b"") -> tuple[dict, bytes]:
         """Send a message and wait for the answer; EOFError or OSError if the program has ended."""
-        send(self._process.stdin, head, body)
-        return receive(self._process.stdout)
+        send(self._questions, head, body)
+        return receive(self._answers)
 
     def end(self) -> str:
         """How it ended, in words; it is about to, since it does not speak any more."""
@@ -162,14 +170,14 @@ def child_environment() -> dict[str, str]:
     return os.environ | _FEW_THREADS | nowhere
 
 
-def _unnamed_file() -> BinaryIO:
+def _unnamed_file() -> IO[bytes]:
     """A file in memory, where the system has such."""
     if hasattr(os, "memfd_create"):
         return open(os.memfd_create("pixels"), "r+b", buffering=0)
     return tempfile.TemporaryFile(buffering=0)
 
 
-def _close(process: subprocess.Popen, files: tuple[BinaryIO, ...], owner: int) -> None:
+def _close(process: subprocess.Popen, files: tuple[IO[bytes], ...], owner: int) -> None:
     for file in files:
         with suppress(OSError):  # what was not sent any more
             file.close()
@@ -191,7 +199,7 @@ def _in_words(status: int | None) -> str:
     return f"its process was ended by {signal.Signals(-status).name}{cause}"
 
 
-def _last_line(stderr: BinaryIO) -> str:
+def _last_line(stderr: IO[bytes]) -> str:
     """The last line a library wrote that is not part of a trace of the stack."""
     stderr.seek(max(0, stderr.seek(0, os.SEEK_END) - 8192))
     lines = stderr.read().decode(errors="replace").splitlines()

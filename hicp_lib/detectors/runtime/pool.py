@@ -13,7 +13,7 @@ import numpy as np
 
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.cached_parts import Runner
-from hicp_lib.detectors.runtime.isolation import NativeError
+from hicp_lib.detectors.runtime.isolation import IsolationError
 from hicp_lib.detectors.runtime.results import Timed
 
 
@@ -22,12 +22,16 @@ class DetectorPool:
 
     Parameters
     ----------
-    name, options : as `make_detector` takes them
-    workers : how many threads use them at a time
+    name : str
+    options : dict of str to object
+        As `make_detector` takes them.
+    workers : int
+        How many threads use them at a time.
 
     Attributes
     ----------
-    first : one of them, made at once; it tells the settings of all
+    first : hicp_lib.core.detections.Detector
+        One of them, made at once; it tells the settings of all.
     """
 
     def __init__(self, name: str, options: dict, workers: int) -> None:
@@ -40,7 +44,14 @@ class DetectorPool:
     def detect(
         self, image: np.ndarray, boxes_px: np.ndarray | None, image_sha256: str | None = None
     ) -> Timed:
-        """As `Runner.detect`, by one that is idle."""
+        """As `Runner.detect`, by one that is idle.
+
+        Parameters
+        ----------
+        image : array, shape (height, width, 3), dtype uint8
+        boxes_px : array or None, shape (n, 4: x, y, width, height)
+        image_sha256 : str, optional
+        """
         try:
             runner = self._idle.get_nowait()
         except queue.Empty:
@@ -54,12 +65,12 @@ class DetectorPool:
 
 
 @contextmanager
-def naming(path: str | Path) -> Iterator[None]:
+def naming_image(path: str | Path) -> Iterator[None]:
     """Name the image in what is told of a library that failed on it."""
     try:
         yield
-    except NativeError as error:
-        raise NativeError(f"{path}: {error}") from None
+    except IsolationError as error:
+        raise IsolationError(f"{path}: {error}") from None
 
 
 class _OneThread:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -20,7 +20,7 @@ import numpy as np
 from hicp_lib.core.cache import code, digest
 from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import cache_dir, sha256_bytes, sha256_file, write_bytes
+from hicp_lib.core.files import cache_dir, sha256_bytes, write_bytes
 from hicp_lib.core.keypoints import N_KEYPOINTS
 
 _N_COLUMNS = 3 * N_KEYPOINTS + 1
@@ -32,9 +32,12 @@ class Timed:
 
     Attributes
     ----------
-    detections : the people found
-    time_ms : time of the detector's call when it was made (what was kept, its parts' too, keeps its time)
-    workers : how many such calls ran side by side then; more of them make each slower
+    detections : Detections
+        The people found.
+    time_ms : float
+        Time of the detector's call when it was made (what was kept, its parts' too, keeps its time).
+    workers : int
+        How many such calls ran side by side then; more of them make each slower.
     """
 
     detections: Detections
@@ -65,8 +68,8 @@ def cache_folder(detector: Detector) -> Path:
     return cache_dir() / "detections" / detector.name / digest(identity(detector))[:32]
 
 
-def image_sha256(path: str | Path) -> str:
-    """SHA-256 of an image file.
+def image_bytes(path: str | Path) -> bytes:
+    """Content of an image file.
 
     Raises
     ------
@@ -74,22 +77,60 @@ def image_sha256(path: str | Path) -> str:
         If the file cannot be read.
     """
     try:
-        return sha256_file(path)
+        return Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); expected an image file") from None
 
 
 def pixels_sha256(image: np.ndarray) -> str:
     """SHA-256 of an image that is no file."""
-    content = hashlib.sha256(f"{image.dtype} {image.shape}".encode())
-    content.update(np.ascontiguousarray(image))
-    return content.hexdigest()
+    return sha256_bytes(f"{image.dtype} {image.shape}".encode() + image.tobytes())
 
 
 def result_path(folder: Path, image_sha256: str, boxes_px: np.ndarray | None) -> Path:
-    """Where the result of an image is kept; boxes (n, 4) count if they were given."""
+    """Where the result of an image is kept.
+
+    Parameters
+    ----------
+    folder : Path
+    image_sha256 : str
+    boxes_px : array or None, shape (n, 4)
+        They count if they were given.
+
+    Examples
+    --------
+    >>> result_path(Path("kept"), "ab12", None).as_posix()
+    'kept/ab12.bin'
+    """
     boxes_key = "" if boxes_px is None else "-" + sha256_bytes(np.asarray(boxes_px, float).tobytes())[:16]
     return folder / f"{image_sha256}{boxes_key}.bin"
+
+
+def cached(path: Path | None, make: Callable[[], Timed]) -> Timed:
+    """The result kept at `path`, or where there is none what `make` finds, kept there from then on.
+
+    Parameters
+    ----------
+    path : Path or None
+        Without one nothing is read or kept.
+    make : callable
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "a.bin"
+    ...     first = cached(path, lambda: Timed(Detections.none(), 12.5, 1))
+    ...     again = cached(path, lambda: None)
+    >>> again.time_ms, again.workers, len(again.detections)
+    (12.5, 1, 0)
+    """
+    result = read_result(path) if path else None
+    if result is None:
+        result = make()
+        if path:
+            write_result(path, result)
+    return result
 
 
 def read_result(path: Path) -> Timed | None:

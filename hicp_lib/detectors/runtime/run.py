@@ -19,15 +19,15 @@ import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.images import read_image
-from hicp_lib.detectors.runtime.pool import DetectorPool, naming, single_threaded_opencv
+from hicp_lib.core.files import sha256_bytes
+from hicp_lib.core.images import decode_image
+from hicp_lib.detectors.runtime.pool import DetectorPool, naming_image, single_threaded_opencv
 from hicp_lib.detectors.runtime.results import (
     Timed,
     cache_folder,
-    image_sha256,
-    read_result,
+    cached,
+    image_bytes,
     result_path,
-    write_result,
 )
 from hicp_lib.formats.annotations import read_annotations
 
@@ -35,7 +35,19 @@ Key = TypeVar("Key", bound=Hashable)
 
 
 def detect_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Detections]:
-    """As `time_dataset`, without the times."""
+    """As `time_dataset`, without the times.
+
+    Parameters
+    ----------
+    name : str
+    dataset_dir : path
+    **options : object
+        As of `time_dataset`.
+
+    Returns
+    -------
+    dict of int to Detections
+    """
     results = time_dataset(name, dataset_dir, **options)
     return {image_id: result.detections for image_id, result in results.items()}
 
@@ -43,7 +55,18 @@ def detect_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, D
 def time_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Timed]:
     """People in every image of a dataset folder (`images/`, `annotations.json`), by image id.
 
-    `name` and `options` are those of `detect_images`; the annotated boxes go to detectors that take them.
+    The annotated boxes go to detectors that take them.
+
+    Parameters
+    ----------
+    name : str
+    dataset_dir : path
+    **options : object
+        As of `detect_images`.
+
+    Returns
+    -------
+    dict of int to Timed
     """
     annotations = read_annotations(Path(dataset_dir) / "annotations.json")
     paths = {
@@ -68,17 +91,25 @@ def detect_images(
 
     Parameters
     ----------
-    name : detector, see `hicp_lib.detectors.registry`
-    paths : image files by any key
-    workers : threads (the cores this process may use, if None)
-    progress : show a bar; only ever on a terminal
-    boxes_px : annotated boxes (n, 4: x, y, width, height) of each image, for detectors that take them
-    dask : address of a Dask scheduler, whose workers do what threads do otherwise
-    options : options of the detector
+    name : str
+        Detector, see `hicp_lib.detectors.registry`.
+    paths : dict of object to path
+        Image files by any key.
+    workers : int, optional
+        Threads (the cores this process may use, if None).
+    progress : bool, default True
+        Show a bar; only ever on a terminal.
+    boxes_px : dict of object to array, optional
+        Annotated boxes (n, 4: x, y, width, height) of each image, for detectors that take them.
+    dask : str, optional
+        Address of a Dask scheduler, whose workers do what threads do otherwise.
+    **options : object
+        Of the detector.
 
     Returns
     -------
-    The result of each image, in the order of `paths`.
+    dict of object to Timed
+        By the keys of `paths`, in their order.
 
     Raises
     ------
@@ -87,8 +118,8 @@ def detect_images(
     """
     workers = max(1, min(workers or n_cores(), len(paths) or 1))
     pool = DetectorPool(name, options, workers)
-    takes_boxes = boxes_px is not None and getattr(pool.first, "takes_boxes", False)
-    jobs = {key: (Path(path), boxes_px[key] if takes_boxes else None) for key, path in paths.items()}
+    boxes_px = boxes_px if getattr(pool.first, "takes_boxes", False) else None
+    jobs = {key: (Path(path), None if boxes_px is None else boxes_px[key]) for key, path in paths.items()}
     if dask is None:
         results = _in_threads(pool, jobs, workers)
     else:
@@ -105,19 +136,18 @@ def _in_threads(
 ) -> Iterator[tuple[Key, Timed]]:
     folder = cache_folder(pool.first)
     with single_threaded_opencv, ThreadPoolExecutor(workers) as executor:
-        calls = executor.map(lambda job: _detect_one(pool, *job, folder), jobs.values())
+        calls = executor.map(lambda job: _detect_one(pool, folder, *job), jobs.values())
         yield from zip(jobs, calls, strict=True)
 
 
-def _detect_one(pool: DetectorPool, path: Path, boxes_px: np.ndarray | None, folder: Path) -> Timed:
-    sha256 = image_sha256(path)
-    kept = result_path(folder, sha256, boxes_px)
-    result = read_result(kept)
-    if result is None:
-        with naming(path):
-            result = pool.detect(read_image(path), boxes_px, sha256)
-        write_result(kept, result)
-    return result
+def _detect_one(pool: DetectorPool, folder: Path, path: Path, boxes_px: np.ndarray | None) -> Timed:
+    content = image_bytes(path)
+    sha256 = sha256_bytes(content)
+    with naming_image(path):
+        return cached(
+            result_path(folder, sha256, boxes_px),
+            lambda: pool.detect(decode_image(content, path), boxes_px, sha256),
+        )
 
 
 def n_cores() -> int:

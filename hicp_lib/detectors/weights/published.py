@@ -34,12 +34,20 @@ class Published:
 
     Attributes
     ----------
-    name : what users type
-    url : where its authors publish it
-    member : file name within the zip archive; None if the download is the weight file itself
-    use : detector and option that take the file, None if nothing here runs it
-    licence, size_bytes, sha256 : of the download; None where not known
-    note : what it is
+    name : str
+        What users type.
+    url : str
+        Where its authors publish it.
+    member : str or None
+        File name within the zip archive; None if the download is the weight file itself.
+    use : str or None
+        Detector and option that take the file, None if nothing here runs it.
+    licence : str or None
+    size_bytes : int or None
+    sha256 : str or None
+        Of the download; None where not known.
+    note : str
+        What it is.
     """
 
     name: str

@@ -16,10 +16,18 @@ TIMEOUT_S = 30.0
 def download(url: str, target: Path, max_bytes: int) -> str | None:
     """Write what `url` gives to `target`.
 
+    Parameters
+    ----------
+    url : str
+    target : Path
+    max_bytes : int
+        More is refused.
+
     Returns
     -------
-    None when the file is there and whole, otherwise one line saying what went wrong; `target` is then
-    not to be used.
+    str or None
+        None when the file is there and whole, otherwise one line saying what went wrong; `target` is then
+        not to be used.
     """
     request = Request(url, headers={"User-Agent": "hicp"})
     try:

@@ -14,12 +14,12 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import cache_dir, read_json, sha256_bytes, sha256_file, write_json
 
 
-def own_path() -> Path:
-    """The file of own options."""
+def user_options_path() -> Path:
+    """The file of the options kept."""
     return cache_dir() / "own_detectors.json"
 
 
-def all_own_options() -> dict[str, dict[str, Any]]:
+def all_user_options() -> dict[str, dict[str, Any]]:
     """Options kept, by detector.
 
     Raises
@@ -27,7 +27,7 @@ def all_own_options() -> dict[str, dict[str, Any]]:
     InputError
         If the file is not one of options.
     """
-    path = own_path()
+    path = user_options_path()
     kept = read_json(path) if path.is_file() else {}
     if not isinstance(kept, dict) or not all(isinstance(options, dict) for options in kept.values()):
         raise InputError(
@@ -36,21 +36,21 @@ def all_own_options() -> dict[str, dict[str, Any]]:
     return kept
 
 
-def own_options(name: str) -> dict[str, Any]:
+def user_options(name: str) -> dict[str, Any]:
     """Options kept for a detector; none where nothing was kept."""
-    return all_own_options().get(name, {})
+    return all_user_options().get(name, {})
 
 
-def keep_own(name: str, options: dict[str, Any]) -> None:
+def keep_user_options(name: str, options: dict[str, Any]) -> None:
     """Keep a detector's options, files by their absolute path, in the place of those kept before."""
     kept = {key: str(Path(value).resolve()) if _is_file(value) else value for key, value in options.items()}
-    write_json(own_path(), all_own_options() | {name: kept}, indent=2)
+    write_json(user_options_path(), all_user_options() | {name: kept}, indent=2)
 
 
-def own_sha256() -> dict[str, str]:
+def user_weights_sha256() -> dict[str, str]:
     """By detector, one SHA-256 of its options with the content of their files."""
     digests = {}
-    for name, kept in all_own_options().items():
+    for name, kept in all_user_options().items():
         content = {key: sha256_file(value) if _is_file(value) else value for key, value in kept.items()}
         digests[name] = sha256_bytes(json.dumps(content).encode())
     return digests

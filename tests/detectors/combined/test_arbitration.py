@@ -5,7 +5,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hicp_lib.detectors.combined.arbitration import Hands, assign, merge_duplicates
+from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND
+from hicp_lib.detectors.combined.arbitration import (
+    ArbitrationRule,
+    Hands,
+    assign,
+    distances,
+    merge_duplicates,
+    nearest_first,
+    without_body,
+)
+from hicp_lib.detectors.combined.hand_squares import Arms
 
 SHAPE = np.random.default_rng(0).uniform(-20, 20, (21, 2))
 SHAPE[0] = 0
@@ -70,3 +80,45 @@ def test_no_arm_takes_a_hand_it_refuses_and_no_hand_goes_to_two(n_bodies, n_hand
     # What is left has no arm that would take it and is free.
     rest = np.setdiff1d(np.arange(n_hands), taken)
     assert not np.isfinite(away[chosen < 0][:, rest]).any()
+
+
+def an_arm(wrist_px) -> Arms:
+    """A left arm along x, its forearm 100 pixels long; the right one is not given."""
+
+    def side(x):
+        return np.array([[[x, 0.0], [np.nan, np.nan]]])
+
+    return Arms(side(wrist_px), side(100.0), side(0.0), np.array([[100.0, np.nan]]))
+
+
+@pytest.mark.parametrize("wrist_px, end_px, reach", [(200.0, 200.0, 1.0), (np.nan, 100.0, 1.5)])
+def test_a_hand_is_refused_from_the_reach_on(wrist_px, end_px, reach):
+    arm = an_arm(wrist_px)
+    if np.isnan(wrist_px):
+        arm = Arms(np.full((1, 2, 2), np.nan), arm.elbows_px, arm.shoulders_px, arm.scales_px)
+    at = hands((end_px + 99.9 * reach, 0), (end_px + 100 * reach, 0), (end_px - 50, 0))
+    away = distances(arm, at, ArbitrationRule())
+    np.testing.assert_allclose(away[0, 0], [0.999 * reach, np.inf, 0.5])
+    assert np.isinf(away[0, 1]).all()
+
+
+def test_without_wrist_and_elbow_the_shoulder_tells():
+    none = np.full((1, 2, 2), np.nan)
+    arm = Arms(none, none, an_arm(200.0).shoulders_px, an_arm(200.0).scales_px)
+    away = distances(arm, hands((249.9, 0), (250, 0)), ArbitrationRule())
+    np.testing.assert_allclose(away[0, 0], [2.499, np.inf])
+
+
+def test_the_surest_hand_chooses_its_wrist_first():
+    wrists_px = np.array([[[0.0, 0], [100.0, 0]]])
+    three = hands((10, 0), (20, 0), (500, 0), scores=[0.3, 0.9, 0.1])
+    assert nearest_first(wrists_px, three, np.full((1, 2), -1)).tolist() == [[1, 0]]
+    assert nearest_first(wrists_px, three, np.array([[2, -1]])).tolist() == [[2, 1]]
+
+
+def test_nobody_has_two_left_hands():
+    people = without_body(hands((0, 0), (50, 0), (90, 0), sides=[0, 0, 0], scores=[0.5, 0.9, 0.7]))
+    # The surest two are left hands of two people; the least sure becomes the first one's right hand.
+    np.testing.assert_allclose(people.keypoints_px[:, LEFT_HAND[0], 0], [50, 90])
+    np.testing.assert_allclose(people.keypoints_px[:, RIGHT_HAND[0], 0], [0, np.nan])
+    np.testing.assert_allclose(people.person_scores, [(0.9 + 0.5) / 2, 0.7])

@@ -99,3 +99,37 @@ def test_squares_along_an_image_cover_it_and_overlap(height, width):
     assert starts[0] == 0 and starts[-1] + side == max(height, width)
     assert max(np.diff(starts)) <= side / 2 + 1
     assert all(square.side_px == side for square in squares)
+
+
+def test_the_published_numbers():
+    """A third of the forearm beyond the wrist, and 0.9 of the upper arm, are OpenPose's."""
+    rule = SquareRule()
+    assert (rule.beyond_wrist, rule.forearms_per_upper_arm, rule.min_score) == (0.33, 0.9, 0.03)
+    assert (rule.sides, rule.forearms_per_shoulders) == ((1.8, 2.7), 0.6)
+
+
+def test_a_wrist_at_the_least_score_counts_and_one_below_does_not():
+    keypoints, scores = np.zeros((1, N_KEYPOINTS, 2)), np.zeros((1, N_KEYPOINTS))
+    scores[0, [9, 10]] = 0.03, np.nextafter(0.03, 0)
+    found = Arms.of(Detections(keypoints, scores, np.ones(1)), SquareRule())
+    assert np.isfinite(found.wrists_px).all(axis=-1).tolist() == [[True, False]]
+
+
+def test_an_image_is_oblong_from_115_to_100_on():
+    assert squares_along(np.zeros((100, 114, 3))) == []
+    assert [square.left_px for square in squares_along(np.zeros((100, 115, 3)))] == [0, 15]
+    assert [(s.left_px, s.top_px) for s in squares_along(np.zeros((250, 100, 3)))] == [
+        (0, 0), (0, 50), (0, 100), (0, 150)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("left_px", "top_px", "expected"),
+    [(-9, 0, True), (-10, 0, False), (399, 0, True), (400, 0, False),
+     (0, -9, True), (0, -10, False), (0, 299, True), (0, 300, False)],
+)  # fmt: skip
+def test_a_square_overlaps_an_image_by_a_pixel_or_not_at_all(left_px, top_px, expected):
+    square = Square(left_px, top_px, 10)
+    assert square.overlaps(IMAGE) is expected
+    if expected:
+        assert square.cut(IMAGE + 1, 2).any()

@@ -9,7 +9,7 @@ import pytest
 from hicp_lib.cli import main as cli
 from hicp_lib.core.images import write_png
 from hicp_lib.detectors.registry import make_detector
-from hicp_lib.detectors.weights.user import keep_own, own_options, own_path
+from hicp_lib.detectors.weights.user import keep_user_options, user_options, user_options_path
 from hicp_lib.study.provenance import weights_sha256
 from tests.detectors.onnx.onnx_models import colour_maps_model, constant_model
 from tests.detectors.onnx.test_mmpose import dots
@@ -87,9 +87,9 @@ def test_a_model_named_once_is_taken_from_then_on(capsys, model, tmp_path):
 
 def test_files_are_kept_by_their_whole_path_however_they_were_named(model, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    keep_own("openpose", {"model": Path("m.onnx"), "hand_model": "m.onnx", "threads": 1})
+    keep_user_options("openpose", {"model": Path("m.onnx"), "hand_model": "m.onnx", "threads": 1})
     monkeypatch.chdir(tmp_path.parent)
-    assert own_options("openpose") == {"model": model, "hand_model": model, "threads": 1}
+    assert user_options("openpose") == {"model": model, "hand_model": model, "threads": 1}
 
 
 def test_detectors_with_weights_of_their_own_take_no_others(capsys, model):
@@ -97,6 +97,6 @@ def test_detectors_with_weights_of_their_own_take_no_others(capsys, model):
 
 
 def test_a_damaged_list_of_own_models_is_told_in_one_line(capsys, model):
-    own_path().parent.mkdir(parents=True, exist_ok=True)
-    own_path().write_text('["mmpose"]')
+    user_options_path().parent.mkdir(parents=True, exist_ok=True)
+    user_options_path().write_text('["mmpose"]')
     assert "name your files again" in mistake(capsys, "models", "show", "--detector", "mmpose")

@@ -82,6 +82,11 @@ def test_weak_boxes_are_left_out(tmp_path):
     model = detectron2(tmp_path / "m.onnx", np.full((2, 17), 0.5))
     assert len(KeypointRcnn(model, min_score=0.7).detect(IMAGE)) == 1
     assert len(KeypointRcnn(model, min_score=0.95).detect(IMAGE)) == 0
+    assert len(KeypointRcnn(model, min_score=float(SCORES[1])).detect(IMAGE)) == 2
+    weak = detectron2(
+        tmp_path / "weak.onnx", np.full((2, 17), 0.5), scores=np.array([0.051, 0.049], np.float32)
+    )
+    assert len(KeypointRcnn(weak).detect(IMAGE)) == 1
 
 
 def colour_echo(path, rank):
@@ -161,3 +166,14 @@ def test_everything_assumed_is_told(tmp_path):
         assert ("softmax" in facts["keypoint score"]) == (family == "detectron2")
     with pytest.raises(InputError, match="detectron2 or torchvision"):
         KeypointRcnn(model, family="caffe")
+
+
+@pytest.mark.parametrize(
+    ("shape", "size"),
+    [((600, 800), (800, 1067)), ((300, 1000), (400, 1333)), ((1600, 1600), (800, 800))],
+)
+def test_detectron2_sees_the_short_side_at_800_and_the_long_one_up_to_1333(tmp_path, shape, size):
+    detector = KeypointRcnn(colour_echo(tmp_path / "m.onnx", 3))
+    fitted = detector._fit(np.zeros((*shape, 3), np.uint8))
+    assert fitted.pixels.shape[:2] == size
+    np.testing.assert_allclose(fitted.scale, (size[1] / shape[1], size[0] / shape[0]))

@@ -72,8 +72,8 @@ def test_other_outputs_are_refused_in_one_line(tmp_path, output):
     assert str(path) in str(caught.value) and "\n" not in str(caught.value)
 
 
-def echo_model(path, channels):
-    """Shows what it was fed: box (0, 0, 60, 60) with the mean of input channel 0's first pixel as score."""
+def echo_model(path, channels, pixel=0):
+    """Shows what it was fed: box (0, 0, 60, 60) with a pixel of input channel 0 (its x and y) as score."""
     make = helper.make_node
     nodes = [
         make("Slice", ["image", "start", "stop"], ["pixel"]),
@@ -81,7 +81,8 @@ def echo_model(path, channels):
         make("Concat", ["box", "score"], ["dets"], axis=2),
     ]
     constants = {
-        "start": np.array([0, 0, 0, 0]), "stop": np.array([1, 1, 1, 1]), "row": np.array([1, 1, 1]),
+        "start": np.array([0, 0, pixel, pixel]), "stop": np.array([1, 1, pixel + 1, pixel + 1]),
+        "row": np.array([1, 1, 1]),
         "box": np.array([[[0, 0, 60, 60]]], np.float32),
         "weights": np.zeros((4, channels, 1, 1), np.float32),
     }  # fmt: skip
@@ -99,17 +100,25 @@ def test_yolox_sees_raw_bgr_and_rtmdet_normalised_bgr(tmp_path):
     assert (yolox.settings["family"], rtmdet.settings["family"]) == ("yolox", "rtmdet")
     np.testing.assert_allclose(yolox.find(image)[1], [200])
     np.testing.assert_allclose(rtmdet.find(image)[1], [(200 - 103.53) / 57.375], rtol=1e-6)
-    with pytest.raises(InputError, match="expected yolox or rtmdet"):
-        PersonBoxes(tmp_path / "yolox.onnx", family="detr")
 
 
 def test_what_lies_beside_the_image_is_grey_114(tmp_path):
-    nodes = [
-        helper.make_node("Slice", ["image", "start", "stop"], ["pixel"]),
-        helper.make_node("Reshape", ["pixel", "row"], ["score"]),
-        helper.make_node("Concat", ["box", "score"], ["dets"], axis=2),
+    assert PersonBoxes(echo_model(tmp_path / "p.onnx", 12, pixel=63)).find(IMAGE)[1] == [114]
+
+
+def test_a_box_at_the_least_score_counts_and_one_below_does_not(tmp_path):
+    least = np.float32(0.3)
+    rows = [
+        [0, 0, 9, 9, np.nextafter(least, np.float32(1))],
+        [20, 0, 29, 9, np.nextafter(least, np.float32(0))],
     ]
-    constants = {"start": np.array([0, 0, 63, 63]), "stop": np.array([1, 1, 64, 64]),
-                 "row": np.array([1, 1, 1]), "box": np.array([[[0, 0, 9, 9]]], np.float32)}  # fmt: skip
-    path = save(tmp_path / "p.onnx", nodes, {"image": [1, 3, 64, 64]}, {"dets": [1, 1, 5]}, constants)
-    assert PersonBoxes(path, family="yolox").find(IMAGE)[1] == [114]
+    assert len(PersonBoxes(with_suppression(tmp_path / "p.onnx", rows)).find(IMAGE)[0]) == 1
+
+
+@pytest.mark.parametrize(("shift_px", "n"), [(11, 1), (13, 2)])
+def test_of_raw_boxes_that_overlap_by_more_than_45_percent_one_remains(tmp_path, shift_px, n):
+    """Boxes 32 wide, shifted by d, have (32 - d) / (32 + d) of their union in common: 0.49 and 0.42."""
+    boxes = np.array([[4, 4, 32, 30], [4 + shift_px, 4, 32, 30]])
+    rows = raw_rows(boxes, [0.9, 0.8])[None].astype(np.float32)
+    path = constant_model(tmp_path / "p.onnx", (1, 3, 64, 64), {"output": rows})
+    assert len(PersonBoxes(path).find(IMAGE)[0]) == n

@@ -134,3 +134,27 @@ def test_oks_nms_keeps_the_better_of_two_equal_poses_and_far_ones():
         2,
         3,
     ]
+
+
+@pytest.mark.parametrize(("distance_px", "n"), [(7.0, 1), (7.01, 2)])
+def test_points_within_seven_pixels_coincide(distance_px, n):
+    """The box is large: a tenth of its side would allow more."""
+    positions = np.stack([np.arange(17.0), np.zeros(17)], axis=1)[None].repeat(2, axis=0) * 100
+    positions[1, :, 1] = distance_px
+    scores = np.array([[0.9] * 17, [0.8] * 17])
+    boxes = np.tile([0.0, 0, 1600, 200], (2, 1))
+    assert len(merge_poses(positions, scores, boxes, BODY_RULES)[0]) == n
+
+
+def test_oks_at_the_limit_is_another_person():
+    positions, _, _ = poses(np.random.default_rng(2), 1, 17, copies=2, jitter_px=0.0)
+    arguments = positions, np.array([0.5, 0.9]), np.full(2, 1e4), np.full(17, 0.05)
+    assert oks_nms(*arguments, max_oks=1.0).tolist() == [1, 0]
+    assert oks_nms(*arguments, max_oks=np.nextafter(1.0, 0)).tolist() == [1]
+
+
+def test_the_published_constants():
+    """Of AlphaPose's released program: bodies, whole bodies, and whole bodies by integral regression."""
+    assert dataclasses.astuple(BODY_RULES) == (1.0, 1.7, 2.65, 22.48, 0.3, 5, 0.1, False)
+    assert dataclasses.astuple(WHOLE_BODY_RULES) == (1.0, 1.7, 2.65, 22.48, 0.3, 5, 0.1, True)
+    assert dataclasses.astuple(INTEGRAL_RULES) == (1.0, 1.65, 8.0, 3.6, 0.01, 3, 0.15, True)

@@ -9,9 +9,8 @@ from hicp_lib.core.images import read_image, write_png
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.detectors.combined.detector import Combined
 from hicp_lib.detectors.registry import make_detector
-from hicp_lib.detectors.runtime import cached_parts as kept
-from hicp_lib.detectors.runtime import pool, run
-from hicp_lib.detectors.runtime.results import cache_folder
+from hicp_lib.detectors.runtime import cached_parts, pool, run
+from hicp_lib.detectors.runtime.results import _modules, cache_folder
 
 PART_S, OWN_S, START_S = 0.03, 0.005, 1.0
 
@@ -89,7 +88,7 @@ def detectors(tmp_path, monkeypatch):
     monkeypatch.setenv("HICP_CACHE", str(tmp_path / "cache"))
     made = Detectors()
     monkeypatch.setattr(pool, "make_detector", made.make)
-    monkeypatch.setattr(kept, "time", made.clock)
+    monkeypatch.setattr(cached_parts, "time", made.clock)
     return made
 
 
@@ -165,7 +164,7 @@ def test_without_a_file_nothing_is_kept(detectors, images):
     for name in ("both", "combined"):
         detectors.make(name).detect(image)
         begin_s = detectors.clock.now_s
-        took_ms = kept.Runner(detectors.make(name), workers=1).detect(image, None, None).time_ms
+        took_ms = cached_parts.Runner(detectors.make(name), workers=1).detect(image, None, None).time_ms
         assert took_ms == pytest.approx(1e3 * (detectors.clock.now_s - begin_s - 2 * START_S), abs=1e-3)
     assert detectors.n_seen("body") == 4
     assert not (cache_dir() / "detections").exists()
@@ -187,3 +186,21 @@ def test_mediapipe_shares_with_its_parts(own_cache, photograph, tmp_path):
     assert found.time_ms > sum(result.time_ms for result in alone.values())
     live = make_detector("mediapipe").detect(photograph)
     np.testing.assert_array_equal(found.detections.keypoints_px, live.keypoints_px)
+
+
+def test_the_detector_that_a_runner_is_given_stays_as_it_is(detectors):
+    given = detectors.make("combined:both+hands")
+    body, hands = given.parts["body"], given.parts["hands"]
+    inner = dict(body.parts)
+    runner = cached_parts.Runner(given, workers=1)
+    assert runner.detector is given
+    assert given.parts == {"body": body, "hands": hands} and body.parts == inner
+
+
+def test_the_key_of_a_combination_names_the_code_of_its_parts(weights):
+    first = pool.DetectorPool("combined:openpose-mobilenet+mediapipe-hands", {}, workers=1).first
+    assert set(_modules(first)) == {
+        "hicp_lib.detectors.combined.detector",
+        "hicp_lib.detectors.mediapipe.tasks",
+        "hicp_lib.detectors.openpose.mobilenet",
+    }

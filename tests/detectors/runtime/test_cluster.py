@@ -6,12 +6,14 @@ import os
 import subprocess
 import sys
 import time
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from distributed import Client
+from distributed.client import ClosedClientError
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import write_png
@@ -168,6 +170,52 @@ def test_what_workers_cannot_do_and_that_they_are_gone_is_said_in_one_line(slow,
         line = refusal(address, registered)
         assert line.startswith(f"{address}: the Dask cluster is gone (it has lost its workers)")
         assert line.endswith("run the same command again to go on") and slow.n_kept() == 20
+
+
+def test_a_fault_of_a_detector_is_told_as_what_it_is(slow, registered):
+    """Not as a cluster that is gone or runs something else, though Dask ends in such errors then."""
+    faulty = slow.folder / "faulty.png"
+    write_png(faulty, np.full((8, 9, 3), 254, np.uint8))
+    with dask_cluster(slow, ({},), *PRELOAD) as (address, _):
+        with pytest.raises(AttributeError, match="^a fault of the detector's$") as error:
+            run.detect_images("slow", {"faulty": faulty}, dask=address)
+    assert "slow_detector.py" in error.value.__notes__[0]  # where it was on the worker
+
+
+class FakeClient:
+    def __init__(self, status: str) -> None:
+        self.status = status
+
+
+@pytest.mark.parametrize("status", ["running", "closed"])
+@pytest.mark.parametrize("error", [AttributeError, RuntimeError])
+def test_only_a_client_that_is_closed_trips_over_what_it_no_longer_has(error, status):
+    expected = (
+        (error, "^no scheduler$") if status == "running" else (InputError, "is gone [(]no scheduler[)]")
+    )
+    with pytest.raises(expected[0], match=expected[1]), cluster._explained("tcp://a:1", FakeClient(status)):
+        raise error("no scheduler")
+
+
+@pytest.mark.parametrize("error", [CancelledError, ConnectionError, ClosedClientError])
+def test_a_lost_connection_is_told_whatever_the_client_says(error):
+    with pytest.raises(InputError, match="^tcp://a:1: the Dask cluster is gone [(]lost[)]; run the same"):
+        with cluster._explained("tcp://a:1", FakeClient("running")):
+            raise error("lost")
+
+
+def test_other_errors_are_not_taken_for_a_lost_cluster():
+    with pytest.raises(KeyError), cluster._explained("tcp://a:1", FakeClient("closed")):
+        raise KeyError("a fault")
+
+
+@pytest.mark.parametrize("error", [ModuleNotFoundError("no slow_detector"), RuntimeError("no slow_detector")])
+def test_what_dask_cannot_run_is_another_environment(error):
+    told = cluster._not_run(error, "a.png")
+    assert str(told) == (
+        "the Dask cluster cannot run this detector (no slow_detector); "
+        "install the same environment and weights on scheduler and workers"
+    )
 
 
 def test_an_image_that_kills_its_workers_is_named(slow, registered):

@@ -13,8 +13,8 @@ import psutil
 import pytest
 
 from hicp_lib.detectors.registry import default_detector_names, make_detector
-from hicp_lib.detectors.runtime import isolation as native
-from hicp_lib.detectors.runtime.isolation import NativeError, NativeProcess
+from hicp_lib.detectors.runtime import isolation
+from hicp_lib.detectors.runtime.isolation import IsolatedProcess, IsolationError
 
 IMAGE = np.zeros((40, 50, 3), np.uint8)
 
@@ -34,19 +34,19 @@ def wait_until(happened, within_s: float = 30.0) -> None:
 def program(tmp_path):
     """A function that gives a process running a few lines, with the first message read if `is_ready`."""
 
-    def make(lines: str, is_ready: bool = True) -> NativeProcess:
+    def make(lines: str, is_ready: bool = True) -> IsolatedProcess:
         path = tmp_path / "program.py"
         head = "import os, signal, sys, time\nfrom hicp_lib.detectors.mediapipe.child import receive, send\n"
         head += "files = sys.stdin.buffer, sys.stdout.buffer\n"
         head += "receive(files[0]); send(files[1], {}); receive(files[0])\n" if is_ready else ""
         path.write_text(head + textwrap.dedent(lines))
-        return NativeProcess([str(path)], {}, b"", "a.task", "give another file")
+        return IsolatedProcess([str(path)], {}, b"", "a.task", "give another file")
 
     return make
 
 
-def told(process: NativeProcess) -> str:
-    with pytest.raises(NativeError) as error:
+def told(process: IsolatedProcess) -> str:
+    with pytest.raises(IsolationError) as error:
         process.ask(IMAGE)
     assert "\n" not in str(error.value) and str(error.value).startswith("a.task: ")
     return str(error.value)
@@ -58,7 +58,7 @@ def test_the_caller_survives_and_the_next_call_starts_another(weights, photograp
     before = detector.detect(photograph)
     first = own_process(detector)
     first.send_signal(number)
-    with pytest.raises(NativeError, match=rf"^mediapipe-pose: .*{number.name}.*; run it again"):
+    with pytest.raises(IsolationError, match=rf"^mediapipe-pose: .*{number.name}.*; run it again"):
         detector.detect(photograph)
     assert not first.is_running()
     assert np.array_equal(detector.detect(photograph).scores, before.scores)
@@ -72,7 +72,7 @@ def test_it_may_die_in_the_middle_of_a_call(weights, photograph):
     child.suspend()
     thread = threading.Timer(0.2, child.kill)
     thread.start()
-    with pytest.raises(NativeError, match="SIGKILL, which often means that memory ran out"):
+    with pytest.raises(IsolationError, match="SIGKILL, which often means that memory ran out"):
         detector.detect(photograph)
     thread.join()
 
@@ -94,8 +94,8 @@ def test_one_that_cannot_start_says_why(program):
 
 
 def test_one_that_hangs_is_ended(weights, monkeypatch):
-    monkeypatch.setattr(native, "LIMIT_S", 0.02)  # less than it takes to start
-    with pytest.raises(NativeError, match=r"^mediapipe-hands: its process gave no answer within 0\.02 s;"):
+    monkeypatch.setattr(isolation, "LIMIT_S", 0.02)  # less than it takes to start
+    with pytest.raises(IsolationError, match=r"^mediapipe-hands: its process gave no answer within 0\.02 s;"):
         make_detector("mediapipe-hands").detect(IMAGE)
 
 
@@ -273,6 +273,6 @@ def test_an_image_that_ends_the_process_is_named(own_cache, photograph, tmp_path
     from hicp_lib.detectors.runtime import run
 
     write_png(tmp_path / "a.png", photograph)
-    monkeypatch.setattr(native, "LIMIT_S", 0.02)
-    with pytest.raises(NativeError, match=r"^.*a\.png: mediapipe-hands: its process gave no answer"):
+    monkeypatch.setattr(isolation, "LIMIT_S", 0.02)
+    with pytest.raises(IsolationError, match=r"^.*a\.png: mediapipe-hands: its process gave no answer"):
         run.detect_images("mediapipe-hands", {0: tmp_path / "a.png"}, progress=False)

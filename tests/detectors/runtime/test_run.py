@@ -146,6 +146,34 @@ def test_an_image_that_cannot_be_read_is_named(counting, images, tmp_path):
         assert "\n" not in str(error.value)
 
 
+def test_a_file_is_read_once_so_that_the_key_is_of_what_was_decoded(counting, images, monkeypatch):
+    known, read = run.image_bytes, []
+    monkeypatch.setattr(run, "image_bytes", lambda path: read.append(path) or known(path))
+    run.detect_images("counting", images)
+    assert sorted(read) == sorted(images.values())
+
+
+def test_boxes_go_only_to_detectors_that_take_them(counting, images, monkeypatch):
+    shown = []
+    monkeypatch.setattr(counting, "takes_boxes", True, raising=False)
+    plain = counting.detect
+    monkeypatch.setattr(
+        counting, "detect", lambda self, image, *boxes: shown.append(boxes) or plain(self, image)
+    )
+    boxes_px = {key: np.full((1, 4), float(key)) for key in images}
+    run.detect_images("counting", {3: images[3]}, boxes_px=boxes_px)
+    monkeypatch.setattr(counting, "takes_boxes", False)
+    run.detect_images("counting", {4: images[4]}, boxes_px=boxes_px)
+    monkeypatch.setattr(counting, "takes_boxes", True)
+    run.detect_images("counting", {5: images[5]})
+    assert [[box.tolist() for box in boxes] for boxes in shown] == [[[[3.0] * 4]], [], []]
+
+
+def test_no_more_workers_than_images(counting, images):
+    (result,) = run.detect_images("counting", {0: images[0]}, workers=8).values()
+    assert result.workers == 1
+
+
 def test_no_images_no_results(counting):
     assert run.detect_images("counting", {}) == {}
 
