@@ -46,7 +46,7 @@ class Candidates:
 
         Parameters
         ----------
-        rows : array of int or of bool
+        rows : array of int or array of bool
 
         Returns
         -------

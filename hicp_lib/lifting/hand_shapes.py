@@ -52,7 +52,7 @@ def load_hand_shapes(path: Path = SHAPES_FILE) -> np.ndarray:
 
     Returns
     -------
-    array of float32, shape (n, 21, 3)
+    array, shape (n, 21, 3), dtype float32
         Metres.
 
     Raises

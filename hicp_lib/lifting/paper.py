@@ -48,7 +48,7 @@ class Lifted:
     ----------
     points_m : array, shape (n_people, 136, 3)
         In the camera frame; NaN where not lifted.
-    reason : array of int8, shape (n_people, 136)
+    reason : array, shape (n_people, 136), dtype int8
         Index into `REASONS`.
     """
 

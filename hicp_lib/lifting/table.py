@@ -36,7 +36,7 @@ def lift_recording(
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         One row per frame x person x keypoint detected, columns frame (row of the recording), t_s, person
         (0 has the best score), keypoint (Halpe name), u_px, v_px, score, x_m, y_m, z_m (robot's base frame),
         x_cam_m, y_cam_m, z_cam_m (camera frame), reason (one of `hicp_lib.lifting.paper.REASONS`);
@@ -66,7 +66,7 @@ def lift_found(
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         Columns detector, method and those of `lift_recording`; method by method of each detector.
 
     Raises

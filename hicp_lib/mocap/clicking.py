@@ -46,7 +46,7 @@ def read_clicks(path: str | Path, recording: Recording, markers: Sequence[str]) 
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         Columns `frame` (row of the recording), `marker`, `u_px, v_px`.
 
     Raises
@@ -82,7 +82,7 @@ def record_click(
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         All clicks so far, as `read_clicks`.
 
     Raises
@@ -110,7 +110,7 @@ def show_frame(recording: Recording, frame: int, clicks: pd.DataFrame | None = N
     recording : Recording
     frame : int
         Row of the recording.
-    clicks : DataFrame, optional
+    clicks : pd.DataFrame, optional
         As from `read_clicks`.
 
     Returns

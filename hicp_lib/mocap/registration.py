@@ -77,7 +77,7 @@ def lift_clicks(
     Parameters
     ----------
     recording : Recording
-    clicks : DataFrame
+    clicks : pd.DataFrame
         As from `hicp_lib.mocap.clicking.read_clicks`.
     mocap : MotionCapture
     offset_s : float, optional
@@ -85,7 +85,7 @@ def lift_clicks(
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         Columns `frame, marker, x_m, y_m, z_m, mocap_x_m, mocap_y_m, mocap_z_m`.
     """
     clicks = clicks.sort_values("frame", kind="stable", ignore_index=True)
@@ -108,7 +108,7 @@ def measured_markers(
     Parameters
     ----------
     recording : Recording
-    clicks : DataFrame
+    clicks : pd.DataFrame
         With columns `frame` and `marker`, n rows.
     mocap : MotionCapture
     offset_s : float
@@ -132,12 +132,12 @@ def select_paper_markers(matched: pd.DataFrame) -> pd.DataFrame:
 
     Parameters
     ----------
-    matched : DataFrame
+    matched : pd.DataFrame
         As from `lift_clicks`.
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         At most eight rows of it.
     """
     matched = matched[_keeps_distances(matched)]
@@ -169,7 +169,7 @@ def register_by_camera_marker(
 
     Parameters
     ----------
-    matched : DataFrame
+    matched : pd.DataFrame
         As from `select_paper_markers`.
     recording : Recording
     mocap : MotionCapture
@@ -203,7 +203,7 @@ def register_selected(matched: pd.DataFrame) -> Registration:
 
     Parameters
     ----------
-    matched : DataFrame
+    matched : pd.DataFrame
         As from `select_paper_markers`.
 
     Returns
@@ -235,7 +235,7 @@ def register_robustly(matched: pd.DataFrame) -> Registration:
 
     Parameters
     ----------
-    matched : DataFrame
+    matched : pd.DataFrame
         As from `lift_clicks`.
 
     Returns

@@ -43,7 +43,7 @@ def register_by_reprojection(
     Parameters
     ----------
     recording : Recording
-    clicks : DataFrame
+    clicks : pd.DataFrame
         As from `hicp_lib.mocap.clicking.read_clicks`.
     mocap : MotionCapture
     start : Registration

@@ -37,7 +37,7 @@ class ClockOffset:
         To add to b's stamps to have them on a's clock.
     correlation : float
         Of the speeds at that offset, up to 1.
-    halves_s : tuple of two floats
+    halves_s : (float, float)
         The offset of each half of the recording alone; NaN where a half has too little motion. A difference
         beyond what the halves scatter by is drift.
     """
@@ -102,10 +102,14 @@ def clock_offset(
 
     Parameters
     ----------
-    times_a_s, times_b_s : array, shapes (n,) and (k,)
+    times_a_s : array, shape (n,)
         Increasing; may start at any number.
-    points_a_m, points_b_m : array, shapes (n, m, 3) and (k, m, 3)
-        NaN where missing; in any two frames.
+    points_a_m : array, shape (n, m, 3)
+        NaN where missing.
+    times_b_s : array, shape (k,)
+        Increasing; may start at any number.
+    points_b_m : array, shape (k, m, 3)
+        The same points, NaN where missing; in a frame of their own.
 
     Returns
     -------

@@ -47,7 +47,7 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
 
     Parameters
     ----------
-    path : str, Path or None
+    path : str or Path or None
     mount : str, optional
         Camera holder, for joint angles: "level" or "tilted".
 

@@ -172,7 +172,7 @@ def read_rgb(recording: Recording, k: int) -> np.ndarray:
 
     Returns
     -------
-    array of uint8, shape (height, width, 3)
+    array, shape (height, width, 3), dtype uint8
         RGB.
 
     Raises
@@ -196,7 +196,7 @@ def read_depth_m(recording: Recording, k: int) -> np.ndarray:
 
     Returns
     -------
-    array of float32, shape (height, width)
+    array, shape (height, width), dtype float32
         Along the camera's axis; NaN where there is none.
 
     Raises
@@ -218,7 +218,7 @@ def read_exact_depth_m(recording: Recording, k: int) -> np.ndarray | None:
 
     Returns
     -------
-    array of float32, shape (height, width), or None
+    array or None, shape (height, width), dtype float32
         As `read_depth_m`; None in a recording that is not simulated.
     """
     path = recording.folder / EXACT_DEPTH_DIR / recording.depth_paths[k].name
@@ -234,7 +234,7 @@ def read_truth(recording: Recording) -> pd.DataFrame | None:
 
     Returns
     -------
-    DataFrame or None
+    pd.DataFrame or None
         Columns frame (row of the recording), t_s, keypoint (Halpe name), x_m, y_m, z_m (base frame), u_px,
         v_px, visible (0 outside the image, 1 occluded, 2 visible); None in a recording that is not
         simulated.
@@ -256,7 +256,7 @@ def read_joints(recording: Recording) -> pd.DataFrame | None:
 
     Returns
     -------
-    DataFrame or None
+    pd.DataFrame or None
         Columns frame, t_s, and `<joint>_rad` for each joint; None where not recorded.
 
     Raises
@@ -290,7 +290,7 @@ def check_columns(path: str | Path, table: pd.DataFrame, columns: Sequence[str])
     ----------
     path : str or Path
         Where it was read from.
-    table : DataFrame
+    table : pd.DataFrame
     columns : sequence of str
         Those it must have.
 

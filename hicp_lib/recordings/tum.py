@@ -138,7 +138,7 @@ def associate(
 
     Parameters
     ----------
-    a_s, b_s : array, shapes (n,) and (m,)
+    a_s, b_s : array, shape (n,) or (m,)
         Increasing.
     max_difference_s : float, optional
         Times further apart are not paired.

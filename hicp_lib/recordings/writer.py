@@ -62,7 +62,7 @@ class RecordingWriter:
         Parameters
         ----------
         time_s : float
-        rgb : array of uint8, shape (height, width, 3)
+        rgb : array, shape (height, width, 3), dtype uint8
         depth_m : array, shape (height, width)
             Along the camera's axis; what is not finite is stored as no depth.
         T_base_cam : array, shape (4, 4)
@@ -121,7 +121,7 @@ def write_index(
         Camera coordinates to the robot's base frame.
     pose_s : array, shape (m,), optional
         Times of the poses; those of the images when left out.
-    names : tuple of two sequences of str, optional
+    names : (sequence of str, sequence of str), optional
         Files of colour and of depth within the folder; by `rgb_name` and `depth_name` when left out.
     """
     folder, numbers = Path(folder), range(len(times_s))
@@ -171,7 +171,7 @@ def write_rgb(path: str | Path, rgb: np.ndarray) -> None:
     Parameters
     ----------
     path : str or Path
-    rgb : array of uint8, shape (height, width, 3)
+    rgb : array, shape (height, width, 3), dtype uint8
     """
     bgr = cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR)
     _, encoded = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])

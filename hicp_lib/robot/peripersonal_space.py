@@ -87,7 +87,7 @@ class ReceptiveField:
 
         Returns
         -------
-        array of float32, shape (n,)
+        array, shape (n,), dtype float32
             0 where nothing is near.
         """
         points, gains = self._near(positions_m, np.asarray(points_m, dtype=float), np.asarray(gains))

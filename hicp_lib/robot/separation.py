@@ -81,7 +81,7 @@ def separation_table(separations: Mapping[str, Separation]) -> pd.DataFrame:
 
     Returns
     -------
-    DataFrame
+    pd.DataFrame
         A row per term and for their sum, of each detector: columns `detector`, `term`, `value` (metres).
     """
     rows = [
