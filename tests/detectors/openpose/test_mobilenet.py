@@ -16,7 +16,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import COCO_17, INDEX
 from hicp_lib.detectors.openpose import mobilenet
 from hicp_lib.detectors.registry import make_detector
-from hicp_lib.detectors.weights import default as zoo
+from hicp_lib.detectors.weights import default as default_weights
 from tests.detectors.plain_people import render_person
 
 
@@ -88,7 +88,7 @@ def test_its_maps_are_those_of_the_reference_implementation(photograph):
     """On a small part of the photograph: the reference is slow."""
     detector = mobilenet.OpenPoseMobileNet(net_height_px=96)
     net_input = mobilenet.fit(photograph, 96)
-    model = ReferenceEvaluator(onnx.load_from_string(zoo.load(mobilenet.WEIGHTS.name)))
+    model = ReferenceEvaluator(onnx.load_from_string(default_weights.load(mobilenet.WEIGHTS.name)))
     blob = cv2.dnn.blobFromImage(net_input.pixels, swapRB=True)
     expected = model.run(None, {model.input_names[0]: blob})[0][0]
     assert expected.max() > 0.5
@@ -99,15 +99,15 @@ def test_its_maps_are_those_of_the_reference_implementation(photograph):
 def test_a_damaged_weight_is_refused(tmp_path, monkeypatch, position):
     path = tmp_path / "weights" / mobilenet.WEIGHTS.name
     path.parent.mkdir()
-    content = bytearray(zoo.load(mobilenet.WEIGHTS.name))
+    content = bytearray(default_weights.load(mobilenet.WEIGHTS.name))
     content[position] ^= 1
     path.write_bytes(content)
-    shutil.copy(zoo.REGISTRY_PATH, tmp_path / "detectors.json")
-    monkeypatch.setattr(zoo, "REGISTRY_PATH", tmp_path / "detectors.json")
+    shutil.copy(default_weights.REGISTRY_PATH, tmp_path / "detectors.json")
+    monkeypatch.setattr(default_weights, "REGISTRY_PATH", tmp_path / "detectors.json")
     with pytest.raises(InputError, match=r"openpose-mobilenet\.onnx.*damaged.*: git restore data/weights"):
         make_detector("openpose-mobilenet")
     with pytest.raises(InputError, match="is corrupt; get it with: git restore"):
-        zoo.fetch(["openpose-mobilenet"])
+        default_weights.fetch(["openpose-mobilenet"])
     path.unlink()
     with pytest.raises(InputError, match="absent; get it with: git restore"):
         make_detector("openpose-mobilenet")

