@@ -34,7 +34,7 @@ from hicp_lib.detectors.mediapipe import bundles, child
 from hicp_lib.detectors.openpose import mobilenet as openpose_net
 from hicp_lib.detectors.runtime import isolation as native
 from hicp_lib.detectors.runtime import run
-from hicp_lib.detectors.weights import default as zoo
+from hicp_lib.detectors.weights import default as default_weights
 
 NAMES = ("mediapipe-pose", "mediapipe-hands", "openpose-mobilenet")
 FLOOR_PIPELINE, FLOOR_PROCESS = 1.10, 1.05
@@ -123,7 +123,7 @@ def compare_process(name: str, size_px: tuple[int, int], calls: int) -> Comparis
 
 def measure(options) -> Iterator[Comparison]:
     """All detectors on one thread and on all cores."""
-    weights = zoo.weights_dir()
+    weights = default_weights.weights_dir()
     # What runs in this process, here only, would send usage metrics.
     os.environ.update(native.child_environment())
     with tempfile.TemporaryDirectory() as folder:

@@ -23,7 +23,7 @@ from timing import Comparison, run
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.run import n_cores
-from hicp_lib.detectors.weights import default as zoo
+from hicp_lib.detectors.weights import default as default_weights
 
 FLOOR_SPEED_UP = 1.7  # of two cores
 
@@ -69,7 +69,9 @@ def compare(name: str, paths: list[str], n: int, repeats: int) -> Iterator[Compa
     """The three ways of one detector: (wall, processor) seconds, the best of the repeats."""
     make_detector(name)  # tells what is absent
     ways = (([paths], 1), ([paths], n), ([paths[i::n] for i in range(n)], 1))
-    runs_s = [[detect_times(name, *way, zoo.weights_dir()) for way in ways] for _ in range(repeats)]
+    runs_s = [
+        [detect_times(name, *way, default_weights.weights_dir()) for way in ways] for _ in range(repeats)
+    ]
     one_s, threads_s, processes_s = np.min(runs_s, axis=0).tolist()
     most = 1 / FLOOR_SPEED_UP if n == 2 else None
     for clock, (one, threads, processes) in zip(

@@ -1,6 +1,5 @@
 """Fixtures shared by the tests."""
 
-import fcntl
 import os
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from hypothesis import settings
 
 from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.core.images import read_image
-from hicp_lib.detectors.weights import default as zoo
+from hicp_lib.detectors.weights import default as default_weights
 
 # The same examples on every machine and every day; a slow machine is no failure.
 settings.register_profile("hicp", derandomize=True, deadline=None)
@@ -18,7 +17,7 @@ settings.load_profile("hicp")
 
 
 # What needs the book.
-OF_THE_BOOK = {"test_jupyterlab.py", "test_links.py", "test_notebooks.py"}
+OF_THE_BOOK = {"test_api_pages.py", "test_jupyterlab.py", "test_links.py", "test_notebooks.py"}
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -39,11 +38,15 @@ def pytest_xdist_make_scheduler(config, log):
 @pytest.fixture(scope="session")
 def weights() -> Path:
     """Folder of the fetched weights; `hicp models fetch` comes before the tests."""
-    absent = [weight.name for weight in zoo.registry().values() if zoo.status(weight) != "present"]
+    absent = [
+        weight.name
+        for weight in default_weights.registry().values()
+        if default_weights.status(weight) != "present"
+    ]
     if absent and os.environ.get("HICP_TESTS_WITHOUT_WEIGHTS"):
         pytest.skip(f"weights are absent: {', '.join(absent)}")
     assert not absent, f"weights are absent: {', '.join(absent)}; run: hicp models fetch"
-    return zoo.weights_dir()
+    return default_weights.weights_dir()
 
 
 @pytest.fixture
@@ -70,6 +73,8 @@ def book() -> Path:
 
     One worker makes it, the others wait.
     """
+    import fcntl  # not on Windows
+
     from hicp_lib.report.build import make_report  # not in every installation
 
     lock = CHECKOUT / "_build" / ".tests.lock"

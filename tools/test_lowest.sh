@@ -19,7 +19,7 @@ grep -E '^[a-z]' "$work/lowest.txt"
 "$uv" pip install -q --python "$work/env/bin/python" -r "$work/lowest.txt" hypothesis matplotlib onnx pip pytest
 PYTHONPATH=$PWD HICP_TESTS_WITHOUT_WEIGHTS=1 "$work/env/bin/python" -m pytest -q -p no:cacheprovider \
   --override-ini addopts= \
-  tests/test_annotations.py tests/test_exporters.py tests/test_hicp_dataset.py tests/test_keypoints.py \
-  tests/importers tests/evaluation/test_{bootstrap,coco,oks}.py \
-  tests/detectors/onnx tests/detectors/openpose/test_mobilenet.py tests/detectors/weights/test_default.py \
-  tests/rgbd/test_{keypoints3d,lifting,recording,robust_lifting,tum}.py tests/test_quaternions.py
+  tests/core/test_{cache,camera,keypoints,oks,quaternions}.py tests/datasets/test_subsets.py \
+  tests/formats tests/evaluation/ap tests/evaluation/statistics \
+  tests/detectors/onnx tests/detectors/weights \
+  tests/lifting tests/recordings/test_{recording,tum}.py

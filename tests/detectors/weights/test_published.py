@@ -317,10 +317,10 @@ def test_unknown_names_are_refused(server):
 
 
 def test_the_command_lists_them_and_fetches_only_what_is_named(server, capsys, monkeypatch):
-    from hicp_lib.detectors.weights import default as zoo
+    from hicp_lib.detectors.weights import default as default_weights
 
     asked = []
-    monkeypatch.setattr(zoo, "fetch", lambda names: asked.append(names) or [])
+    monkeypatch.setattr(default_weights, "fetch", lambda names: asked.append(names) or [])
     assert cli.run(["models", "fetch"]) == 0
     assert (asked, server.requests) == ([None], 0)
     assert cli.run(["models", "fetch", "net", "plain"]) == 0
