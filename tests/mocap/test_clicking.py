@@ -82,3 +82,24 @@ def test_the_image_shown_is_the_frame_with_its_clicks(recording):
     assert np.array_equal(shown, read_rgb(recording, 1))
     assert (list(marks.x), list(marks.y), list(marks.text)) == ([3.5], [4.0], ["elbow_left_1"])
     assert len(show_frame(recording, 0, clicks).data[1].x) == 0
+
+
+@pytest.mark.parametrize(
+    ("u_px", "v_px", "fits"),
+    [(-0.5, -0.5, True), (31.49, 23.49, True), (-0.51, 0, False), (31.5, 0, False), (0, 23.5, False)],
+)
+def test_a_click_is_on_a_pixel_of_the_image(recording, u_px, v_px, fits):
+    if fits:
+        assert record_click(recording, MARKERS, 0, "elbow_left_1", u_px, v_px)["u_px"].tolist() == [u_px]
+    else:
+        with pytest.raises(InputError, match="expected a pixel from 0 to (31|23)"):
+            record_click(recording, MARKERS, 0, "elbow_left_1", u_px, v_px)
+
+
+@pytest.mark.parametrize(("frame", "fits"), [(0, True), (2, True), (-1, False), (3, False), (True, False)])
+def test_a_click_is_in_a_frame_of_the_recording(recording, frame, fits):
+    if fits:
+        assert record_click(recording, MARKERS, frame, "elbow_left_1", 1, 1)["frame"].tolist() == [frame]
+    else:
+        with pytest.raises(InputError, match="expected a whole number from 0 to 2"):
+            record_click(recording, MARKERS, frame, "elbow_left_1", 1, 1)

@@ -13,6 +13,7 @@ from hicp_lib.core.files import write_json
 from hicp_lib.mocap.registration import (
     REGISTRATION_FILE,
     lift_clicks,
+    measured_markers,
     read_registration,
     register_by_camera_marker,
     register_robustly,
@@ -201,3 +202,81 @@ def test_simulated_clicks_are_on_what_can_be_seen(laboratory):
     behind[:, 3] = transform(T_mocap_cam, MARKERS_CAM[3] * 1.2)
     hidden = simulate_clicks(recording, replace(mocap, points_m=behind), T_BASE_MOCAP, 1, 0.0)
     assert set(NAMES[:9]) - set(hidden["marker"]) == {"m3"}
+
+
+def test_the_offset_is_taken_from_the_cameras_clock(laboratory, clicks):
+    """Stamps of the motion capture that are 0.37 s behind, and markers that move meanwhile."""
+    recording, mocap = laboratory
+    drift_m = mocap.times_s[:, None, None] * [0.1, 0.0, 0.0]
+    moving = replace(mocap, points_m=mocap.points_m + drift_m)
+    behind = replace(moving, times_s=mocap.times_s - 0.37)
+    expected_m = measured_markers(recording, clicks, moving, 0.0)
+    np.testing.assert_allclose(measured_markers(recording, clicks, behind, 0.37), expected_m, atol=1e-12)
+    assert np.ptp(expected_m[clicks["marker"] == "m0", 0]) == pytest.approx(0.06)  # 0.6 s at 0.1 m/s
+    matched = lift_clicks(recording, clicks, behind, 0.37)
+    np.testing.assert_allclose(matched[["mocap_x_m", "mocap_y_m", "mocap_z_m"]], expected_m, atol=1e-12)
+    eight = select_paper_markers(lift_clicks(recording, clicks, mocap))
+    late = replace(mocap, times_s=mocap.times_s - 0.37)
+    found, given = (
+        register_by_camera_marker(eight, recording, capture, offset_s).T_base_mocap
+        for capture, offset_s in ((mocap, 0.0), (late, 0.37))
+    )
+    np.testing.assert_allclose(found, given, atol=1e-9)
+
+
+def test_the_eight_are_of_the_two_images_with_most_markers_and_far_apart(laboratory, clicks):
+    matched = lift_clicks(laboratory[0], clicks, laboratory[1])
+    matched = matched[~((matched["frame"] == 1) & (matched["marker"] == "m0"))]
+    matched = matched[~((matched["frame"] == 3) & matched["marker"].isin(["m1", "m2"]))]
+    eight = select_paper_markers(matched)
+    assert eight["frame"].isin([0, 2]).all() and len(eight) == 8
+    points_m = eight[["mocap_x_m", "mocap_y_m", "mocap_z_m"]].to_numpy()
+    apart_m = np.linalg.norm(points_m[:, None] - points_m, axis=2)[np.triu_indices(8, 1)]
+    assert apart_m.min() > 0.2  # none of them twice, as a marker that stands still is in two images
+    assert (np.diff(eight["frame"]) >= 0).all()
+
+
+@pytest.mark.parametrize(("off_m", "is_chosen"), [(0.09, True), (0.11, False)])
+def test_points_that_keep_their_distances_to_a_decimetre_are_chosen(off_m, is_chosen):
+    places_m = np.zeros((8, 3))
+    places_m[:, 0] = np.arange(8)
+    matched = pd.DataFrame({"frame": 0, "marker": [f"m{k}" for k in range(8)]})
+    matched[["mocap_x_m", "mocap_y_m", "mocap_z_m"]] = places_m
+    places_m[0, 0] -= off_m
+    matched[["x_m", "y_m", "z_m"]] = places_m
+    assert ("m0" in set(select_paper_markers(matched)["marker"])) == is_chosen
+
+
+@pytest.mark.parametrize(("skew", "fits"), [(0.8e-4, True), (1.2e-4, False)])
+def test_a_given_rotation_may_be_rounded_and_no_more(tmp_path, skew, fits):
+    T = np.eye(4)
+    T[0, 1] = skew
+    write_json(tmp_path / REGISTRATION_FILE, {"T_base_mocap": T.tolist()})
+    if fits:
+        assert np.array_equal(read_registration(tmp_path / REGISTRATION_FILE).T_base_mocap, T)
+    else:
+        with pytest.raises(InputError, match="are not a rotation"):
+            read_registration(tmp_path / REGISTRATION_FILE)
+
+
+@pytest.mark.parametrize(("off_m", "n_points"), [(0.015, 36), (0.03, 35)])
+def test_a_click_that_is_two_centimetres_off_is_left_out(off_m, n_points):
+    """Beside others that are exact, three standard deviations are nothing, and 2 cm count."""
+    rng = np.random.default_rng(0)
+    measured_m = rng.uniform(-1, 1, (36, 3))
+    matched = pd.DataFrame(measured_m, columns=["mocap_x_m", "mocap_y_m", "mocap_z_m"])
+    measured_m[0] += [off_m, 0, 0]
+    matched[["x_m", "y_m", "z_m"]] = measured_m
+    assert register_robustly(matched).n_points == n_points
+
+
+def test_a_click_within_three_standard_deviations_is_kept():
+    rng = np.random.default_rng(1)
+    measured_m = rng.uniform(-1, 1, (200, 3))
+    matched = pd.DataFrame(measured_m, columns=["mocap_x_m", "mocap_y_m", "mocap_z_m"])
+    noise_m = rng.normal(0, 1, (200, 3))
+    noise_m *= 0.02 / np.linalg.norm(noise_m, axis=1, keepdims=True)  # 2 cm each: the median
+    noise_m[0] *= 3.5  # of 4.45 medians that are allowed
+    noise_m[1] *= 5.5
+    matched[["x_m", "y_m", "z_m"]] = measured_m + noise_m
+    assert register_robustly(matched).n_points == 199

@@ -94,3 +94,42 @@ def test_without_enough_movement_there_is_no_offset(seconds, moves):
     seen = walk(camera_s) if moves else np.zeros((len(camera_s), 2, 3))
     with pytest.raises(InputError, match="no clock offset"):
         clock_offset(camera_s, seen, np.arange(0, 10, 0.01), walk(np.arange(0, 10, 0.01)))
+
+
+@pytest.mark.parametrize(("gap_s", "is_bridged"), [(0.045, True), (0.0450004, True), (0.0451, False)])
+def test_gaps_end_at_45_ms_as_files_round_them(gap_s, is_bridged):
+    times_s = np.array([0.0, gap_s])
+    found_m = interpolate_mocap(times_s, np.zeros((2, 1, 3)), np.array([0.02]))
+    assert np.isfinite(found_m).all() == is_bridged
+
+
+@pytest.mark.parametrize(("seconds", "is_enough"), [(2.5, True), (2.1, False)])
+def test_two_seconds_must_be_seen_of_all_points_together(seconds, is_enough):
+    """Two seconds of one wrist, without the quarter of a second at both ends that smoothing takes."""
+    times_s = np.arange(0, 10, 0.01)
+    seen = walk(times_s)[:, :1]
+    here = times_s < seconds
+    if is_enough:
+        found = clock_offset(times_s[here], seen[here], times_s, seen)
+        assert found.offset_s == pytest.approx(0, abs=0.01)
+    else:
+        with pytest.raises(InputError, match="no clock offset"):
+            clock_offset(times_s[here], seen[here], times_s, seen)
+
+
+def test_speeds_are_of_the_smoothed_positions_and_at_most_those_of_people():
+    times_s = np.arange(0, 3, 0.01)
+    for speed_m_s, expected_m_s in ((1.5, 1.5), (3.9, 3.9), (4.5, 4.0)):
+        speeds = _speeds(times_s, times_s[:, None, None] * [0, speed_m_s, 0])
+        inner = speeds[np.isfinite(speeds)]
+        assert len(inner) == len(speeds) - 24 and inner == pytest.approx(expected_m_s)
+
+
+def test_the_halves_are_sought_near_the_whole():
+    """A second half that fits best a second away says nothing: only half a second of drift is drift."""
+    times_s = np.arange(0, 20, 0.01)
+    shown = walk(times_s)
+    for shift_s in (0.4, 3.0):
+        later = np.where((times_s < 14)[:, None, None], shown, walk(times_s + shift_s))
+        late_s = clock_offset(times_s, later, times_s, shown).halves_s[1]
+        assert np.isnan(late_s) or abs(late_s) < 0.55

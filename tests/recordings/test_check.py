@@ -12,6 +12,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.recordings.check import check_recording
 from hicp_lib.recordings.qualisys import MotionCapture, write_tsv
 from hicp_lib.recordings.recording import open_recording
+from hicp_lib.recordings.tum import read_poses, write_poses
 
 
 def edit(path, change):
@@ -126,3 +127,44 @@ def test_motion_capture_that_is_none_is_told(small):
 
 def test_a_folder_that_is_none(tmp_path):
     assert "is not a folder" in str(check_recording(tmp_path / "x")[0])
+
+
+@pytest.mark.parametrize(
+    ("scale", "is_told"), [(9900.0, False), (10100.0, True), (84.0, False), (83.0, True)]
+)
+def test_depth_is_plausible_from_a_decimetre_to_twelve_metres(small, scale, is_told):
+    """1001.5 units are 0.101, 0.099, 11.9 and 12.07 m."""
+    edit(small / "camera.json", lambda text: text.replace("1000.0", str(scale)))
+    assert [finding.is_fatal for finding in check_recording(small)] == [False] * is_told
+
+
+@pytest.mark.parametrize(("along_y_m", "is_told"), [(9.99, False), (10.01, True)])
+def test_a_camera_is_within_ten_metres_of_the_base(small, along_y_m, is_told):
+    times_s, T_base_cam = read_poses(small / "groundtruth.txt")
+    T_base_cam[2, 1, 3] = along_y_m
+    write_poses(small / "groundtruth.txt", times_s, T_base_cam)
+    assert [finding.is_fatal for finding in check_recording(small)] == [False] * is_told
+
+
+@pytest.mark.parametrize(
+    ("start_s", "duration_s", "n_told"),
+    [
+        (99.0, 1.02, 1),
+        (99.0, 0.9, 2),
+        (100.31, 0.5, 2),
+        (100.29, 0.5, 1),
+        (100.0, 0.285, 1),
+        (100.0, 0.265, 2),
+    ],
+)
+def test_motion_capture_must_overlap_and_last_long_enough(small, start_s, duration_s, n_told):
+    """The images last from 100.0 to 100.3 s; that a marker is never seen is told each time."""
+    write_mocap(small, start_s, duration_s)
+    assert len(check_recording(small)) == n_told
+
+
+def test_depth_nowhere_is_fatal(small):
+    for path in (small / "depth").iterdir():
+        cv2.imwrite(str(path), np.zeros((24, 32), np.uint16))
+    (finding,) = check_recording(small)
+    assert "4 of 4 depth images hold no depth" in str(finding) and finding.is_fatal

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.recordings import importing as recording_import
 from hicp_lib.recordings.check import check_recording
@@ -140,9 +141,54 @@ def test_frames_of_a_bag_become_a_recording(tmp_path, monkeypatch, color_format,
     np.testing.assert_allclose(recording.times_s, [1.0, 1.033])
     np.testing.assert_allclose(read_depth_m(recording, 1), 1.501, atol=1e-6)
     assert read_rgb(recording, 0)[10, 10].argmax() == channel
+    assert recording.intrinsics == Camera(32, 24, 30, 31, 15.5, 11.5) and recording.depth_units_per_m == 1000
 
 
 def test_a_bag_with_another_colour_format_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(recording_import, "_open_bag", lambda bag: FakeReader("YUYV"))
     with pytest.raises(InputError, match="colour is YUYV"):
+        import_bag(tmp_path / "x.bag", tmp_path / "r", STILL)
+
+
+@pytest.mark.parametrize("rate_hz", [0, -1.0, np.inf, np.nan])
+def test_impossible_rates_are_refused(saved, tmp_path, rate_hz):
+    with pytest.raises(InputError, match="expected frames per second"):
+        import_open3d(saved, tmp_path / "r", STILL, rate_hz)
+
+
+@pytest.mark.parametrize(("fps", "fits"), [(9999, True), (10_000, False), (True, False), ("20", False)])
+def test_the_rate_of_a_file_is_a_number_of_frames_per_second(saved, tmp_path, fps, fits):
+    (saved / "intrinsic.json").write_text(json.dumps({**FILE, "fps": fps}))
+    if fits:
+        assert import_open3d(saved, tmp_path / "r", STILL) == 3
+    else:
+        with pytest.raises(InputError, match="fps: expected frames per second"):
+            import_open3d(saved, tmp_path / "r", STILL)
+
+
+def test_the_times_of_joint_angles_increase(tmp_path):
+    path = tmp_path / "joints.csv"
+    header = ",".join(["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)])
+    path.write_text(f"{header}\n0,0,0,0,0,0,0\n0.1,0,0,0,0,0,0\n0.1,0,0,0,0,0,0\n")
+    with pytest.raises(InputError, match="row 3: expected numbers, and a t_s after the one before"):
+        read_pose_source(path)
+    path.write_text(f"{header}\n")
+    with pytest.raises(InputError, match="row 1: expected numbers"):
+        read_pose_source(path)
+
+
+def test_missing_and_empty_folders_are_told(saved, tmp_path):
+    for path in (saved / "depth").iterdir():
+        path.unlink()
+    with pytest.raises(InputError, match="depth: holds no images"):
+        import_open3d(saved, tmp_path / "r", STILL)
+    (saved / "depth").rmdir()
+    with pytest.raises(InputError, match="depth: is not a folder"):
+        import_open3d(saved, tmp_path / "r", STILL)
+
+
+def test_a_bag_without_frames_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(FakeReader, "stamps_us", ())
+    monkeypatch.setattr(recording_import, "_open_bag", lambda bag: FakeReader("RGB8"))
+    with pytest.raises(InputError, match="holds no frames"):
         import_bag(tmp_path / "x.bag", tmp_path / "r", STILL)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import pandas as pd
 import pytest
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.recordings.recording import (
+    first_frames,
     open_recording,
     read_depth_m,
     read_exact_depth_m,
@@ -107,3 +109,34 @@ def test_the_writer_refuses_what_would_not_be_a_recording(tmp_path):
     with pytest.raises(InputError, match="must both"):
         writer.add(2.0, frame[0], np.ones((24, 30)), np.eye(4))
     assert not (tmp_path / "other" / "rgb.txt").exists()
+
+
+def test_the_first_frames_are_a_recording(small):
+    recording = open_recording(small)
+    two = first_frames(recording, 2)
+    assert len(two) == len(two.rgb_paths) == len(two.depth_paths) == len(two.T_base_cam) == 2
+    assert len(first_frames(recording, 99)) == 4 and len(first_frames(recording, 1)) == 1
+    with pytest.raises(InputError, match="0 frames were asked for"):
+        first_frames(recording, 0)
+
+
+def test_all_that_fits_16_bits_is_depth(tmp_path):
+    writer = RecordingWriter(tmp_path / "r", SMALL)
+    depth_m = np.full((24, 32), 65.535)
+    depth_m[0, :3] = 65.5356, 0.0006, 0.0004
+    writer.add(0.0, np.zeros((24, 32, 3), np.uint8), depth_m, np.eye(4))
+    writer.finish()
+    read_m = read_depth_m(open_recording(tmp_path / "r"), 0)
+    np.testing.assert_allclose(read_m[1:], 65.535, rtol=1e-6)
+    assert np.isnan(read_m[0, [0, 2]]).all() and read_m[0, 1] == pytest.approx(0.001)
+
+
+def test_a_table_without_a_column_is_told(small):
+    pd.DataFrame({"frame": [0], "t_s": [0.0]}).to_parquet(small / "truth.parquet")
+    with pytest.raises(InputError, match="truth.parquet: has no column 'keypoint'; expected frame, t_s, key"):
+        read_truth(open_recording(small))
+
+
+def test_tables_end_with_the_frames(small):
+    pd.DataFrame({"frame": [0, 3, 4], "t_s": [0.0, 0.3, 0.4]}).to_parquet(small / "joints.parquet")
+    assert read_joints(open_recording(small))["frame"].tolist() == [0, 3]

@@ -119,3 +119,39 @@ TICKS = st.lists(st.integers(0, 400), max_size=15, unique=True).map(lambda ticks
 def test_times_are_paired_nearest_first(a_s, b_s):
     a, b = associate(a_s, b_s, 40 / 2048)
     assert list(zip(a.tolist(), b.tolist(), strict=True)) == _associate_plainly(a_s, b_s, 40 / 2048)
+
+
+@pytest.mark.parametrize(
+    ("length", "fits"), [(0.9901, True), (1.0099, True), (0.9899, False), (1.0101, False)]
+)
+def test_quaternions_may_be_off_by_a_hundredth(tmp_path, length, fits):
+    path = tmp_path / "groundtruth.txt"
+    path.write_text(f"0 1 2 3 0 {length} 0 0\n")
+    if fits:
+        np.testing.assert_allclose(read_poses(path)[1][0, :3, :3], np.diag([-1, 1, -1]), atol=1e-12)
+    else:
+        with pytest.raises(InputError, match="quaternion of length"):
+            read_poses(path)
+
+
+def test_numbers_beyond_any_time_or_place_are_refused(tmp_path):
+    path = tmp_path / "rgb.txt"
+    path.write_text("9e14 a.png\n")
+    assert read_file_list(path)[0].tolist() == [9e14]
+    path.write_text("1e15 a.png\n")
+    with pytest.raises(InputError, match="'1e15' is not a finite number"):
+        read_file_list(path)
+
+
+def test_by_default_times_are_paired_up_to_20_ms():
+    assert [len(rows) for rows in associate(np.array([0.0, 1.0]), np.array([0.0199, 1.0201]))] == [1, 1]
+    a, b = associate(np.array([0.0]), np.array([0.02]))
+    assert (a.tolist(), b.tolist()) == ([0], [0])
+
+
+def test_a_file_that_is_no_text_or_not_there_is_told(tmp_path):
+    (tmp_path / "rgb.txt").write_bytes(b"\xff\xfe1.0")
+    with pytest.raises(InputError, match="is not text in UTF-8"):
+        read_file_list(tmp_path / "rgb.txt")
+    with pytest.raises(InputError, match="a recording needs it"):
+        read_file_list(tmp_path / "depth.txt")

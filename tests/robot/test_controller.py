@@ -187,3 +187,35 @@ def test_joints_outside_their_limits_come_back(icub, home, controller):
     before = np.maximum(low - q, q - high).max()
     q = run(controller, home.moved("left", q), [], 100).angles("left")
     assert np.maximum(low - q, q - high).max() < 0.5 * before
+
+
+def test_the_controller_has_these_numbers():
+    """Those published are said to be; the others are what the study's avoidance was tuned to."""
+    ours, published = Settings(), PUBLISHED
+    assert (ours.period_s, ours.guard) == (published.period_s, published.guard) == (0.02, 0.025)
+    assert np.rad2deg([ours.fastest_rad_s, ours.retreat_rad_s]) == pytest.approx([30, 50])
+    assert (published.gain, published.onset, published.neutral) == (0.5, 0.2, 0.0)
+    assert (ours.gain, ours.onset, ours.neutral) == (10.0, 0.1, 0.2)
+
+
+def test_velocities_are_the_least_squares_of_their_costs(icub, home):
+    """Inside all bounds the answer is that of the normal equations, written out."""
+    settings = Settings(post_weight=7.0, rest_weight=0.3, smooth_weight=2.0, approach_s=0.4, rest_s=0.8)
+    q = home.angles("left")
+    post, rest = np.array(HOME_M["left"]) + 0.01, q + 0.02
+    controller = Controller(icub, post, rest, settings=settings)
+    jacobian = icub.chains["left"].jacobian("hand", q)
+    last, away = np.zeros(10), post - palm(icub, home)[:3, 3]
+    for _ in range(2):
+        P = 7.0 * jacobian.T @ jacobian + (0.3 + 2.0) * np.eye(10)
+        c = 7.0 * jacobian.T @ (away / 0.4) + 0.3 * (rest - q) / 0.8 + 2.0 * last
+        last = np.linalg.solve(P, c)
+        np.testing.assert_allclose(controller.velocities(home, []), last, atol=1e-6)
+
+
+def test_the_hand_comes_no_faster_than_it_may(icub, home):
+    far = Settings(rest_weight=1e-9, smooth_weight=1e-9, approach_m_s=0.05)
+    post = np.array(HOME_M["left"]) + (0.0, 0.0, 0.2)
+    controller = Controller(icub, post, home.angles("left"), settings=far)
+    velocity = icub.chains["left"].jacobian("hand", home.angles("left")) @ controller.velocities(home, [])
+    assert np.linalg.norm(velocity) == pytest.approx(0.05, rel=0.02)

@@ -367,3 +367,68 @@ def test_segments_join_up():
     # The right arm, left out, hangs from the same torso: as long as ever, and where the torso has it.
     right = icub.chains["right"].T_root_link("hand", np.deg2rad([10, 5, -15, *np.zeros(7)]))
     close(parts["right_hand"].end_m, right[:3, 3])
+
+
+def test_the_thickness_of_every_part():
+    radii_m = {segment.part: segment.radius_m for segment in body_segments(load_icub(), Posture())}
+    arm = {"upper_arm": 0.035, "forearm": 0.03, "hand": 0.025}
+    assert radii_m == {
+        "torso": 0.07, "shoulders": 0.05, "neck": 0.03, "head": 0.06,
+        **{f"{side}_{part}": radius for side in ("left", "right") for part, radius in arm.items()},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("limb", ["left", "right"])
+def test_segments_of_both_arms_follow_the_posture(limb):
+    icub, q = load_icub(), np.deg2rad(GOLDEN_ARM_DEG)
+    posture = Posture().moved(limb, q)
+    parts = {segment.part: segment for segment in body_segments(icub, posture)}
+    chain = icub.chains[limb]
+    for part, begin, end in (("upper_arm", "shoulder_pitch", "upper_arm"), ("forearm", "elbow", "forearm")):
+        segment = parts[f"{limb}_{part}"]
+        close(segment.start_m, chain.T_root_link(begin, q)[:3, 3])
+        close(segment.end_m, chain.T_root_link(end, q)[:3, 3])
+    neck = icub.chains["head"].T_root_links(posture.angles("head"))
+    close(parts["torso"].start_m, np.zeros(3))
+    close(parts["torso"].end_m, neck["torso"][:3, 3])
+    close(parts["neck"].end_m, parts["head"].start_m)
+    close(parts["head"].start_m, neck["neck_roll"][:3, 3])
+    shoulder = parts["shoulders"].start_m if limb == "left" else parts["shoulders"].end_m
+    close(shoulder, chain.T_root_link("shoulder_pitch", q)[:3, 3])
+
+
+def test_a_posture_says_which_limb_and_cannot_be_changed():
+    posture = Posture(np.full(3, 1.0), np.full(3, 2.0), np.full(7, 3.0), np.full(7, 4.0))
+    assert [posture.angles(chain)[-1] for chain in ("head", "left", "right")] == [2, 3, 4]
+    moved = posture.moved("right", np.arange(10.0))
+    assert moved.angles("right").tolist() == list(range(10))
+    assert moved.angles("head").tolist() == [0, 1, 2, 2, 2, 2]
+    assert moved.left_rad.tolist() == [3] * 7 and posture.torso_rad.tolist() == [1] * 3
+    assert posture != Posture(*(getattr(posture, name) for name in vars(posture)))  # arrays: by identity
+    with pytest.raises(AttributeError):
+        posture.torso_rad = np.zeros(3)
+
+
+def test_angles_may_overshoot_the_limits_by_five_degrees():
+    low, high = np.rad2deg(load_icub().chains["head"].limits_rad[4])
+    for limit, outward in ((low, -1), (high, 1)):
+        q = head_from_motor_order(np.zeros(3), [0, limit + 4.999 * outward, 0])
+        close(np.rad2deg(q[4]), limit + 4.999 * outward)
+        with pytest.raises(InputError, match="row 0, neck_roll: .* expected"):
+            head_from_motor_order(np.zeros(3), [0, limit + 5.001 * outward, 0])
+    assert arm_from_motor_order(np.zeros(3), [0, 10, 0, 50, 0, 0, 0]).shape == (10,)
+    with pytest.raises(InputError, match="of 7 or more"):
+        arm_from_motor_order(np.zeros(3), [0, 10, 0, 50, 0, 0])
+
+
+@pytest.mark.parametrize(("rounding", "fits"), [(0.9e-4, True), (1.1e-4, False)])
+def test_a_rotation_of_the_tables_may_be_rounded_and_no_more(tmp_path, rounding, fits):
+    data = read_json(ICUB_FILE)
+    data["T_root_base"][2][0] = 1 + rounding
+    write_json(tmp_path / "icub.json", data)
+    if fits:
+        R = read_tables(tmp_path / "icub.json").T_root_base[:3, :3]
+        close(R @ R.T, np.eye(3), 1e-12)
+    else:
+        with pytest.raises(InputError, match="not a rotation and a translation"):
+            read_tables(tmp_path / "icub.json")

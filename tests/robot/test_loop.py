@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.robot.controller import PUBLISHED, Controller, Settings
 from hicp_lib.robot.home import HOME_M, home_posture
-from hicp_lib.robot.loop import AVOIDING, FREE, STOPPED, AvoidanceLoop, Perception
+from hicp_lib.robot.loop import AVOIDING, FREE, STOPPED, AvoidanceLoop, Perception, Threat
+from hicp_lib.robot.peripersonal_space import Obstacle
 from tests.robot.keypoint_streams import first_violation
 
 PERIOD_S = 0.02
@@ -176,3 +177,22 @@ def test_no_stream_of_keypoints_breaks_a_bound(icub, home, seed):
 def test_unreachable_posts_are_refused(icub):
     with pytest.raises(ValueError, match="choose a nearer place"):
         home_posture(icub, post_m=np.array([-3.0, 0, 0]))
+
+
+def test_what_is_close_is_above_the_published_threshold():
+    def threat(magnitude):
+        return Threat(np.zeros(1), [Obstacle("left_hand", np.zeros(3), np.zeros(3), magnitude)])
+
+    assert not Threat(np.zeros(1), []).is_close
+    assert not threat(0.2).is_close and threat(0.2001).is_close
+
+
+@pytest.mark.parametrize(("distance_m", "is_known"), [(0.25, True), (0.28, False)])
+def test_obstacles_begin_where_joints_begin_to_slow_down(home, make_loop, distance_m, is_known):
+    """Below the threshold of 0.2, but from a magnitude of 0.1 on."""
+    loop = make_loop()
+    palm = loop.controller.icub.chains["left"].T_root_link("hand", home.angles("left"))
+    for now_s in (0.0, 0.03):
+        _, threat = loop.cycle(now_s, home, wrist_at(POST - distance_m * palm[:3, 2], now_s))
+    magnitudes = [obstacle.magnitude for obstacle in threat.obstacles if obstacle.part == "left_hand"]
+    assert len(magnitudes) == is_known and all(0.1 < magnitude < 0.2 for magnitude in magnitudes)

@@ -93,3 +93,31 @@ def test_obstacles_are_weighted_by_activation():
     np.testing.assert_allclose(obstacle.normal, (0, 0, -1), atol=1e-12)
     assert (obstacle.part, obstacle.magnitude) == ("left_hand", 0.8)
     assert obstacles(skin, np.zeros(len(skin))) == []
+
+
+def test_beyond_its_reach_nothing_is_activated():
+    field, up = ReceptiveField(), np.array([[0.0, 0, 1]])
+    assert response(field.reach_m - field.point_radius_m) == pytest.approx(1e-3, abs=1e-4)
+    for distance, is_felt in ((field.reach_m - 1e-3, True), (field.reach_m + 1e-3, False)):
+        assert (field.activations(np.zeros((1, 3)), up, distance * up, np.ones(1)) > 0).all() == is_felt
+
+
+def test_by_default_the_cone_is_the_published_one():
+    """50 degrees and 7 cm: at a height of 10 cm it is 18.9 cm wide."""
+    field, up = ReceptiveField(), np.array([[0.0, 0, 1]])
+    for radius, is_felt in ((0.188, True), (0.190, False)):
+        for height in (0.1, -0.1):
+            point = np.array([[radius, 0, height]])
+            found = field.activations(np.zeros((1, 3)), up, point, np.ones(1))
+            assert (found > 0).all() == (is_felt and height > 0) or height < 0
+
+
+def test_only_taxels_above_the_threshold_make_an_obstacle():
+    skin = read_skin()
+    activations = np.zeros(len(skin))
+    activations[skin.slices["torso"]] = 0.2
+    assert obstacles(skin, activations) == []
+    activations[skin.slices["torso"].start] = 0.2001
+    (obstacle,) = obstacles(skin, activations)
+    np.testing.assert_allclose(obstacle.point_m, skin.positions_m[skin.slices["torso"].start])
+    assert [one.part for one in obstacles(skin, activations, threshold=0.1)] == ["torso"]

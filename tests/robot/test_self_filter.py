@@ -17,3 +17,23 @@ def test_points_on_the_arm_go_and_others_stay(icub, home):
     np.testing.assert_allclose(self_distance_m(icub, home, points), gaps, atol=1e-9)
     kept = filter_self(icub, home, np.vstack([points, np.full(3, np.nan)]))
     assert np.isfinite(kept).all(axis=1).tolist() == [False, False, True, False]
+
+
+def test_the_margin_is_two_centimetres_and_belongs_to_others(icub, home):
+    forearm = next(s for s in body_segments(icub, home) if s.part == "left_forearm")
+    along = forearm.end_m - forearm.start_m
+    across = np.cross(along, [0, 0, 1.0])
+    across /= np.linalg.norm(across)
+    middle = (forearm.start_m + forearm.end_m) / 2
+    near, far = (middle + (forearm.radius_m + gap) * across for gap in (0.0199, 0.0201))
+    assert np.isnan(filter_self(icub, home, near)).all() and np.array_equal(filter_self(icub, home, far), far)
+    gap_m = self_distance_m(icub, home, far)
+    assert np.isfinite(filter_self(icub, home, far, margin_m=gap_m)).all()
+    assert np.isnan(filter_self(icub, home, far, margin_m=np.nextafter(gap_m, 1))).all()
+
+
+def test_beyond_its_end_a_limb_is_round(icub, home):
+    hand = next(s for s in body_segments(icub, home) if s.part == "left_hand")
+    along = (hand.end_m - hand.start_m) / np.linalg.norm(hand.end_m - hand.start_m)
+    tip = hand.end_m + np.array([[0.1], [0.2]]) * along
+    np.testing.assert_allclose(self_distance_m(icub, home, tip), [0.1 - 0.025, 0.2 - 0.025], atol=1e-9)

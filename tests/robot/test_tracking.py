@@ -129,3 +129,41 @@ def test_impossible_places_are_no_sightings(place):
     tracker = KeypointTracker()
     now_s = see(tracker, 3 * [person(place)])
     assert len(tracker.points(now_s)[0]) == 0
+
+
+@pytest.mark.parametrize(("distance_m", "is_seen"), [(19.99, True), (20.0, False), (20.01, False)])
+def test_what_is_twenty_metres_away_is_no_sighting(distance_m, is_seen):
+    tracker = KeypointTracker()
+    see(tracker, 2 * [person((0, 0, distance_m))])
+    assert (len(tracker.points(0.03)[0]) == 1) == is_seen
+
+
+@pytest.mark.parametrize(("step_m", "same"), [(0.23, True), (0.25, False)])
+def test_a_keypoint_moves_a_little_and_as_fast_as_people_do(step_m, same):
+    """0.15 m and 3 m/s: 0.24 m in 30 ms."""
+    tracker = KeypointTracker()
+    now_s = see(tracker, [person((0, 0, 0)), person((step_m, 0, 0))])
+    assert weight(tracker, now_s) == same
+
+
+@pytest.mark.parametrize(("pause_s", "remembered"), [(0.58, True), (0.62, False)])
+def test_what_was_believed_is_remembered_for_its_time(pause_s, remembered):
+    tracker = KeypointTracker()
+    now_s = see(tracker, 2 * [person()])
+    tracker.see(now_s + pause_s, *person(), now_s=now_s + pause_s)
+    assert weight(tracker, now_s + pause_s) == remembered
+
+
+def test_by_default_eight_people_are_followed():
+    tracker = KeypointTracker()
+    crowd = [person((0, 0, 1.0 + distance)) for distance in range(10)]
+    frame = tuple(np.concatenate(arrays) for arrays in zip(*crowd, strict=True))
+    points, _ = tracker.points(see(tracker, [frame, frame]))
+    assert sorted(points[:, WRIST, 2]) == list(range(1, 9))
+
+
+def test_scores_that_are_no_numbers_count_for_nothing():
+    tracker = KeypointTracker()
+    for score in (np.nan, np.inf, -np.inf):
+        now_s = see(tracker, 2 * [person(score=score)])
+        assert weight(tracker, now_s) == 0
