@@ -315,15 +315,16 @@ def arms_placed() -> list[np.ndarray]:
     found = []
     for place in placers:
         for rng in rngs(6):
+            draft = arms.Draft(rng, BODY, model, 0.01)
             joints = {
                 f"{side}_{name}": angle
                 for side in ("left", "right")
-                for name, angle in arms.hanging_arm(rng, arms.Draft(BODY, model, 0.01)).items()
+                for name, angle in arms.hanging_arm(draft).items()
             }
             joints |= {
                 f"{side}_hip_flexion": 1.4 if place is arms.in_lap else 0.1 for side in ("left", "right")
             }
-            placed = place(rng, arms.Draft(BODY, model, 0.01), joints)
+            placed = place(draft, joints)
             found.append([(placed or {}).get(name, 0.0) for name in LIMITS_DEG])
     return [*np.array_split(np.array(found), len(placers))]
 
