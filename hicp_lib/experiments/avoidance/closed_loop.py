@@ -166,7 +166,7 @@ def next_image_s(taken_s: float, delay_s: float, camera_hz: float) -> float:
 
     Examples
     --------
-    >>> next_image_s(1.0, delay_s=0.15, camera_hz=10.0)
+    >>> float(next_image_s(1.0, delay_s=0.15, camera_hz=10.0))
     1.2
     """
     return taken_s + max(1, np.ceil(delay_s * camera_hz - 1e-9)) / camera_hz
