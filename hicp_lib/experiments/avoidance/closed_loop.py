@@ -50,7 +50,7 @@ class Trial:
 
 
 class Perceiver(Protocol):
-    """What the robot perceives people with. `delay_s`: from the image to when the loop knows."""
+    """What the robot perceives people with."""
 
     @property
     def delay_s(self) -> float:
@@ -58,7 +58,20 @@ class Perceiver(Protocol):
         ...
 
     def perceive(self, script: Script, time_s: float, posture: Posture) -> Perception:
-        """Who is there, as seen from a posture."""
+        """Who is there, as seen from a posture.
+
+        Parameters
+        ----------
+        script : Script
+        time_s : float
+            From the script's beginning.
+        posture : Posture
+            The robot's.
+
+        Returns
+        -------
+        Perception
+        """
         ...
 
 
@@ -69,6 +82,20 @@ class TrueKeypoints:
     delay_s: float = 0.0
 
     def perceive(self, script: Script, time_s: float, posture: Posture) -> Perception:
+        """Where every keypoint is.
+
+        Parameters
+        ----------
+        script : Script
+        time_s : float
+            From the script's beginning.
+        posture : Posture
+            The robot's.
+
+        Returns
+        -------
+        Perception
+        """
         points_m = in_root(script.person_at(time_s).keypoints_m)[None]
         return Perception(time_s, points_m, np.ones(points_m.shape[:2]))
 
@@ -139,7 +166,7 @@ def next_image_s(taken_s: float, delay_s: float, camera_hz: float) -> float:
 
     Examples
     --------
-    >>> next_image_s(1.0, delay_s=0.15, camera_hz=10.0)
+    >>> float(next_image_s(1.0, delay_s=0.15, camera_hz=10.0))
     1.2
     """
     return taken_s + max(1, np.ceil(delay_s * camera_hz - 1e-9)) / camera_hz

@@ -75,7 +75,20 @@ class HeadCamera:
     observations: list[Observation] = field(default_factory=list)
 
     def perceive(self, script: Script, time_s: float, posture: Posture) -> Perception:
-        """Render what is to be seen, find people and lift them; remember all of it."""
+        """Render what is to be seen, find people and lift them; remember all of it.
+
+        Parameters
+        ----------
+        script : Script
+        time_s : float
+            From the script's beginning.
+        posture : Posture
+            The robot's.
+
+        Returns
+        -------
+        Perception
+        """
         rgb, depth_m = self._image(script, time_s, posture)
         start_s = time.perf_counter()
         found = self.detector.detect(rgb)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hicp_lib.core.memo import memoised
-from hicp_lib.simulation.appearance import clothing, fabrics, footwear, hair, skin
+from hicp_lib.simulation.appearance import clothing, fabrics, footwear, hair, hair_styles, skin
 from hicp_lib.simulation.body.model import (
     BODY_FILE,
     REGIONS,
@@ -66,7 +66,7 @@ class Appearance:
     shape : array, shape (n_shapes,)
         Weights over the body's shapes.
     complexion : skin.Complexion
-    style : hair.Style or None
+    style : hair_styles.Style or None
         Of the hair; None is bald.
     worn : list of Worn
     skirt : Skirt or None
@@ -78,7 +78,7 @@ class Appearance:
 
     shape: np.ndarray
     complexion: skin.Complexion
-    style: hair.Style | None
+    style: hair_styles.Style | None
     worn: list[Worn]
     skirt: Skirt | None
     shoes: footwear.Shoes | None
@@ -102,7 +102,7 @@ def random_appearance(rng: Rng) -> Appearance:
     weights = _blend(rng, body, number)
     tone = np.clip(0.12 + 0.24 * traits["asian"] + 0.62 * traits["african"] + rng.normal(0, 0.09), 0, 1)
     complexion = skin.random_complexion(rng, float(tone), woman, age)
-    style = hair.random_style(rng, woman, age)
+    style = hair_styles.random_style(rng, woman, age)
     if not woman and age > 20 and rng.random() < 0.3:
         complexion = replace(complexion, stubble=0.85)
         rng.random()  # was a beard's length; without it everybody who follows would be somebody else

@@ -169,8 +169,8 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
         albedo *= 1 + 0.02 * blotches + 0.025 * pores
         albedo *= 1 - 0.35 * complexion.freckles * freckles * np.clip(2 * c["flush"], 0, 1)
         albedo *= 1 - 0.10 * _step(c["eyelid"], 0.4, 0.9)
-        gloss, roughness = 0.035 + 0.01 * pores, np.full(len(uv[0]), 0.46, np.float32)
-        softness = np.ones(len(uv[0]), np.float32)
+        gloss, softness = 0.035 + 0.01 * pores, np.ones(len(uv[0]), np.float32)
+        roughness: np.ndarray = np.full(len(uv[0]), 0.46, np.float32)
         albedo, roughness = _paint_lips(complexion, tone, albedo, roughness, c)
         albedo = _paint_hair(complexion, scalp, albedo, c, uv, hits.footprint_m)
         nail = 0.7 * _step(c["nail"], 0.3, 0.7)

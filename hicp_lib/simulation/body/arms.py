@@ -1,8 +1,8 @@
 """Where the arms go: each function takes joints with both arms hanging and places the arms.
 
-All take a random generator, a `Draft`, and the joint angles of the whole body (radians, by joint), and
-return the angles with those of the arms changed. They return None where the limits of the joints do not
-allow what was drawn; draw again.
+All take a `Draft` and the joint angles of the whole body (radians, by joint), and return the angles
+with those of the arms changed. They return None where the limits of the joints do not allow what was drawn;
+draw again.
 """
 
 from dataclasses import dataclass
@@ -54,6 +54,7 @@ class Draft:
 
     Attributes
     ----------
+    rng : numpy.random.Generator
     body : Body
     model : CollisionModel
         Sizes of the shape that is posed.
@@ -61,6 +62,7 @@ class Draft:
         How much room to give the arms.
     """
 
+    rng: Rng
     body: Body
     model: CollisionModel
     room_m: float
@@ -85,20 +87,20 @@ def uniform(rng: Rng, ranges: Ranges, prefix: str = "") -> Joints:
     return radians({name: rng.uniform(*limits) for name, limits in ranges.items()}, prefix)
 
 
-def hanging_arm(rng: Rng, draft: Draft) -> Joints:
+def hanging_arm(draft: Draft) -> Joints:
     """One arm hanging at ease, its joints without the prefix of a side."""
-    joints = uniform(rng, _HANGING_DEG)
+    joints = uniform(draft.rng, _HANGING_DEG)
     # An arm half a metre long: this angle moves its middle away by the room.
     joints["shoulder_abduction"] += draft.room_m / 0.25
     return joints
 
 
-def hanging(rng: Rng, draft: Draft, joints: Joints) -> Joints:
+def hanging(draft: Draft, joints: Joints) -> Joints:
     """Both arms stay hanging."""
     return joints
 
 
-def swinging(rng: Rng, draft: Draft, joints: Joints) -> Joints:
+def swinging(draft: Draft, joints: Joints) -> Joints:
     """Arms swing against the legs, as in walking."""
     swung = dict(joints)
     for side, other in _OTHER.items():
@@ -107,109 +109,111 @@ def swinging(rng: Rng, draft: Draft, joints: Joints) -> Joints:
     return swung
 
 
-def one_reaching(rng: Rng, draft: Draft, joints: Joints) -> Joints | None:
+def one_reaching(draft: Draft, joints: Joints) -> Joints | None:
     """One arm reaches forward."""
-    return _to_the_front(rng, draft, joints, _side(rng), (-25, 30), (-40, 25), (0.7, 0.99))
+    return _to_the_front(draft, joints, _side(draft.rng), (-25, 30), (-40, 25), (0.7, 0.99))
 
 
-def both_reaching(rng: Rng, draft: Draft, joints: Joints) -> Joints | None:
+def both_reaching(draft: Draft, joints: Joints) -> Joints | None:
     """Both arms reach forward."""
-    left = _to_the_front(rng, draft, joints, "left", (-12, 25), (-40, 20), (0.7, 0.99))
-    return left and _to_the_front(rng, draft, left, "right", (-12, 25), (-40, 20), (0.7, 0.99))
+    left = _to_the_front(draft, joints, "left", (-12, 25), (-40, 20), (0.7, 0.99))
+    return left and _to_the_front(draft, left, "right", (-12, 25), (-40, 20), (0.7, 0.99))
 
 
-def pointing(rng: Rng, draft: Draft, joints: Joints) -> Joints | None:
+def pointing(draft: Draft, joints: Joints) -> Joints | None:
     """One arm, nearly straight, points somewhere ahead or to its side; the other hand is at ease."""
-    side = _side(rng)
-    joints = joints | {f"{_OTHER[side]}_{name}": angle for name, angle in sample_hand(rng, "relaxed").items()}
-    found = _to_the_front(rng, draft, joints, side, (-20, 70), (-35, 45), (0.88, 0.99))
-    return found and found | uniform(rng, _WRISTS_DEG["pointing"], f"{side}_")
+    side = _side(draft.rng)
+    calm = sample_hand(draft.rng, "relaxed")
+    joints = joints | {f"{_OTHER[side]}_{name}": angle for name, angle in calm.items()}
+    found = _to_the_front(draft, joints, side, (-20, 70), (-35, 45), (0.88, 0.99))
+    return found and found | uniform(draft.rng, _WRISTS_DEG["pointing"], f"{side}_")
 
 
 def _to_the_front(
-    rng: Rng, draft: Draft, joints: Joints, side: str, azimuth_deg: Range, elevation_deg: Range, share: Range
+    draft: Draft, joints: Joints, side: str, azimuth_deg: Range, elevation_deg: Range, share: Range
 ) -> Joints | None:
     """An arm towards a direction (azimuth outward from straight ahead), by a share of its length."""
     heads = _heads(draft, joints, side)
     chain = np.array([heads[bone] for bone in ("upperarm01", "lowerarm01", "wrist")])
     length = np.linalg.norm(np.diff(chain, axis=0), axis=1).sum()
-    azimuth, elevation = (np.radians(rng.uniform(*limits)) for limits in (azimuth_deg, elevation_deg))
+    azimuth, elevation = (np.radians(draft.rng.uniform(*limits)) for limits in (azimuth_deg, elevation_deg))
     direction = np.array([np.cos(azimuth), np.sin(azimuth) * _OUTWARD[side], np.tan(elevation)])
     direction /= np.linalg.norm(direction)
-    target = heads["upperarm01"] + rng.uniform(*share) * length * direction
-    return _bring(rng, draft, joints, side, target, (0, rng.uniform(0.1, 0.9), -1), "front")
+    target = heads["upperarm01"] + draft.rng.uniform(*share) * length * direction
+    return _bring(draft, joints, side, target, (0, draft.rng.uniform(0.1, 0.9), -1), "front")
 
 
-def crossed(rng: Rng, draft: Draft, joints: Joints) -> Joints | None:
+def crossed(draft: Draft, joints: Joints) -> Joints | None:
     """Forearms before the chest, one before the other, each wrist near the other elbow."""
-    under = _side(rng)
-    centre, half = draft.model.trunk_at(rng.uniform(0.52, 0.62))
+    under = _side(draft.rng)
+    centre, half = draft.model.trunk_at(draft.rng.uniform(0.52, 0.62))
     thickness = 2 * draft.model.radii_m["forearm"]
     found: Joints | None = joints
     for side, layer in ((under, 1.1), (_OTHER[under], 2.3)):
         x = centre[0] + half[0] + layer * thickness + draft.room_m
-        height = centre[2] + rng.uniform(0, 0.04) + (0.03 if side == under else 0.0)
-        target = np.array([x, -_OUTWARD[side] * half[1] * rng.uniform(0.35, 0.7), height])
-        found = _bring(rng, draft, found, side, target, (0.1, 0.7, -1), "crossed")
+        height = centre[2] + draft.rng.uniform(0, 0.04) + (0.03 if side == under else 0.0)
+        target = np.array([x, -_OUTWARD[side] * half[1] * draft.rng.uniform(0.35, 0.7), height])
+        found = _bring(draft, found, side, target, (0.1, 0.7, -1), "crossed")
     return found
 
 
-def raised(rng: Rng, draft: Draft, joints: Joints) -> Joints:
+def raised(draft: Draft, joints: Joints) -> Joints:
     """One or both arms raised: forward, sideways, or with the forearms up."""
-    ranges = _RAISED_DEG[rng.integers(len(_RAISED_DEG))] | _WRISTS_DEG["raised"]
-    for side in ("left", "right") if rng.random() < 0.5 else (_side(rng),):
-        joints = joints | uniform(rng, ranges, f"{side}_")
+    ranges = _RAISED_DEG[draft.rng.integers(len(_RAISED_DEG))] | _WRISTS_DEG["raised"]
+    for side in ("left", "right") if draft.rng.random() < 0.5 else (_side(draft.rng),):
+        joints = joints | uniform(draft.rng, ranges, f"{side}_")
     return joints
 
 
-def on_hips(rng: Rng, draft: Draft, joints: Joints) -> Joints | None:
+def on_hips(draft: Draft, joints: Joints) -> Joints | None:
     """Both hands on the hips, elbows out."""
     found: Joints | None = joints
     for side, outward in _OUTWARD.items():
-        centre, half = draft.model.trunk_at(rng.uniform(0.26, 0.34))
-        offset = (rng.uniform(-0.03, 0.02), outward * (half[1] + 0.045 + draft.room_m), 0.0)
-        found = _bring(rng, draft, found, side, centre + offset, (-0.4, 1, 0), "hips")
+        centre, half = draft.model.trunk_at(draft.rng.uniform(0.26, 0.34))
+        offset = (draft.rng.uniform(-0.03, 0.02), outward * (half[1] + 0.045 + draft.room_m), 0.0)
+        found = _bring(draft, found, side, centre + offset, (-0.4, 1, 0), "hips")
     return found
 
 
-def near_face(rng: Rng, draft: Draft, joints: Joints) -> Joints | None:
+def near_face(draft: Draft, joints: Joints) -> Joints | None:
     """One hand near the face, from before the mouth to beside the ear."""
-    side = _side(rng)
+    side = _side(draft.rng)
     centre, half = draft.model.centres_m[-1], draft.model.half_axes_m[-1]
     middle = _heads(draft, joints, side)["head"] + centre - draft.model.bone_heads_m[-1]
     # The hand, a face long, stands above the wrist.
-    turn = np.radians(rng.uniform(15, 85))
+    turn = np.radians(draft.rng.uniform(15, 85))
     away = half[:2] + 0.07 + draft.room_m
-    below = half[2] * rng.uniform(0.9, 1.4)
+    below = half[2] * draft.rng.uniform(0.9, 1.4)
     offset = (np.cos(turn) * away[0], _OUTWARD[side] * np.sin(turn) * away[1], -below)
-    return _bring(rng, draft, joints, side, middle + offset, (0.4, 0.5, -1), "face")
+    return _bring(draft, joints, side, middle + offset, (0.4, 0.5, -1), "face")
 
 
-def in_lap(rng: Rng, draft: Draft, joints: Joints) -> Joints | None:
+def in_lap(draft: Draft, joints: Joints) -> Joints | None:
     """Hands on the thighs of a sitting person."""
     found: Joints | None = joints
     above = draft.model.radii_m["thigh"] + draft.model.radii_m["forearm"] + 0.02 + draft.room_m
     for side, outward in _OUTWARD.items():
         heads = _heads(draft, joints, side)
-        along = heads["upperleg01"] + rng.uniform(0.55, 0.8) * (heads["lowerleg01"] - heads["upperleg01"])
-        target = along + np.array([0, -outward * rng.uniform(-0.02, 0.05), above])
-        found = _bring(rng, draft, found, side, target, (-0.6, 0.6, -0.5), "lap")
+        hip, knee = heads["upperleg01"], heads["lowerleg01"]
+        target = hip + draft.rng.uniform(0.55, 0.8) * (knee - hip)
+        target = target + np.array([0, -outward * draft.rng.uniform(-0.02, 0.05), above])
+        found = _bring(draft, found, side, target, (-0.6, 0.6, -0.5), "lap")
     return found
 
 
-def of_any_kind(rng: Rng, draft: Draft, joints: Joints) -> Joints | None:
+def of_any_kind(draft: Draft, joints: Joints) -> Joints | None:
     """What a sitting person does with the arms: one of the above."""
     kinds = (in_lap, in_lap, one_reaching, both_reaching, crossed, near_face)
-    return kinds[rng.integers(len(kinds))](rng, draft, joints)
+    return kinds[draft.rng.integers(len(kinds))](draft, joints)
 
 
 def _bring(
-    rng: Rng, draft: Draft, joints: Joints | None, side: str, wrist_m: np.ndarray, elbow_toward, wrist: str
+    draft: Draft, joints: Joints | None, side: str, wrist_m: np.ndarray, elbow_toward, wrist: str
 ) -> Joints | None:
     """Bring a wrist to a point, the joints beyond the elbow drawn as in `_WRISTS_DEG`; None stays None."""
     if joints is None:
         return None
-    joints = joints | uniform(rng, _WRISTS_DEG[wrist], f"{side}_")
+    joints = joints | uniform(draft.rng, _WRISTS_DEG[wrist], f"{side}_")
     return reach(draft.body, draft.model.weights, joints, side, wrist_m, elbow_toward)
 
 

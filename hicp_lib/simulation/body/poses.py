@@ -34,7 +34,22 @@ _SITTING_DEG: Ranges = {
 
 
 def sample_pose(rng: np.random.Generator, body: Body, kind: str | None = None, shape: Shape = 0) -> Pose:
-    """A random pose; parameters and errors are those of `sample_joints`."""
+    """A random pose.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    body : Body
+    kind : str, optional
+        As in `sample_joints`.
+    shape : int or str or array, shape (n_shapes,), optional
+        As in `sample_joints`.
+
+    Returns
+    -------
+    dict of str to array
+        As `pose_body` takes it.
+    """
     return pose_from_joints(sample_joints(rng, body, kind, shape))
 
 
@@ -73,7 +88,7 @@ def sample_joints(rng: np.random.Generator, body: Body, kind: str | None = None,
     model = collision_model(body, shape)
     best, best_gap_m = None, -np.inf
     for attempt in range(_N_TRIES):
-        joints = _draw(rng, Draft(body, model, attempt * _ROOM_STEP_M), kind)
+        joints = _draw(Draft(rng, body, model, attempt * _ROOM_STEP_M), kind)
         if joints is None or not within_limits(joints):
             continue
         gap_m = self_collision_distance_m(body, model, pose_from_joints(joints))
@@ -82,17 +97,17 @@ def sample_joints(rng: np.random.Generator, body: Body, kind: str | None = None,
         if gap_m > -_PENETRATION_M:
             break
     # Hardly ever needed: the pose that comes nearest to keeping clear, or none at all.
-    return best or _draw(rng, Draft(body, model, 0.0), "standing") or {}
+    return best or _draw(Draft(rng, body, model, 0.0), "standing") or {}
 
 
-def _draw(rng: np.random.Generator, draft: Draft, kind: str) -> Joints | None:
+def _draw(draft: Draft, kind: str) -> Joints | None:
     """One draw of a kind, hands included; None where an arm cannot go where it should."""
     legs, place_arms, hands = KINDS[kind]
-    joints = uniform(rng, _TRUNK_DEG) | legs(rng)
+    joints = uniform(draft.rng, _TRUNK_DEG) | legs(draft.rng)
     for side in ("left", "right"):
-        hand = sample_hand(rng, str(rng.choice(hands)))
-        joints |= {f"{side}_{name}": angle for name, angle in (arms.hanging_arm(rng, draft) | hand).items()}
-    return place_arms(rng, draft, joints)
+        hand = sample_hand(draft.rng, str(draft.rng.choice(hands)))
+        joints |= {f"{side}_{name}": angle for name, angle in (arms.hanging_arm(draft) | hand).items()}
+    return place_arms(draft, joints)
 
 
 def _stand(rng: np.random.Generator) -> Joints:

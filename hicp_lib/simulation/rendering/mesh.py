@@ -1,6 +1,7 @@
 """Triangle meshes: normals, cuts, hems and the simple solids furniture is made of."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -271,7 +272,7 @@ def turned(mesh: Mesh, yaw_rad: float, about_m: ArrayLike) -> Mesh:
     return Mesh((mesh.vertices_m - about) @ R.T + about, mesh.triangles, mesh.normals @ R.T, mesh.coords)
 
 
-def lathe(profile_m: ArrayLike, centre_m: ArrayLike, n_sides: int = 24) -> Mesh:
+def lathe(profile_m: np.ndarray | Sequence[Sequence[float]], centre_m: ArrayLike, n_sides: int = 24) -> Mesh:
     """A solid of revolution about the vertical.
 
     Parameters

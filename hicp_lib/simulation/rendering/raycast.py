@@ -55,8 +55,8 @@ class RayScene:
     >>> from hicp_lib.simulation.rendering.mesh import box
     >>> scene = RayScene([Surface(box([-1, 2, -1], [1, 3, 1]), plain(np.zeros(3)))])
     >>> rays = np.array([[0, 0, 0, 0, 1, 0], [0, 0, 0, 0, -1, 0]], np.float32)
-    >>> scene.trace(rays).depth_m, scene.trace(rays).surface
-    (array([ 2., inf], dtype=float32), array([ 0, -1], dtype=int16))
+    >>> scene.trace(rays).depth_m.tolist(), scene.trace(rays).surface.tolist()
+    ([2.0, inf], [0, -1])
     """
 
     def __init__(self, surfaces: list[Surface]):

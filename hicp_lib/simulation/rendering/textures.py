@@ -45,7 +45,7 @@ class Texture:
 
         Examples
         --------
-        >>> where = np.array([[0.1, 0.6], [0.0, 0.0]], np.float32)
+        >>> where = np.array([[0.0, 0.0], [0.1, 0.6]], np.float32)
         >>> stripes(0.5).sample(where, 0.001)
         array([[1., 0.]], dtype=float32)
         """

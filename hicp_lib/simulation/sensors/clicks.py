@@ -65,6 +65,6 @@ def simulate_clicks(
 def _is_seen(pixels_px: np.ndarray, depths_m: np.ndarray, exact_depth_m: np.ndarray) -> np.ndarray:
     """Which points are in the image with nothing in front of them."""
     height, width = exact_depth_m.shape
-    inside = np.logical_and(pixels_px >= 0, pixels_px <= [width - 1, height - 1]).all(axis=1)
+    inside = np.all((pixels_px >= 0) & (pixels_px <= [width - 1, height - 1]), axis=1)
     columns, rows = np.where(inside[:, None], pixels_px, 0).round().astype(int).T
     return inside & (exact_depth_m[rows, columns] > depths_m - _IN_FRONT_M)

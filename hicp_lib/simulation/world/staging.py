@@ -47,7 +47,7 @@ def random_stage(rng: Rng) -> Stage:
     --------
     >>> stage = random_stage(np.random.default_rng(0))
     >>> len(stage.people), (stage.camera.width_px, stage.camera.height_px)
-    (1, (640, 480))
+    (1, (480, 640))
     """
     places = _places(rng, int(rng.choice([1, 2, 3], p=[0.68, 0.24, 0.08])))
     people, dressed = zip(*(_person(rng, place, number) for number, place in enumerate(places)), strict=True)
