@@ -136,7 +136,7 @@ def flicker_rates(table: pd.DataFrame, note: str) -> Figure:
     figure, axes = new_figure(1, len(measures), 9.0, 1.3 + 0.55 * len(detectors), sharey=True)
     cases = {case: rows.set_index("detector") for case, rows in table.groupby(["tracks", "measure"])}
     for axis, measure in zip(axes, measures, strict=True):
-        for k, tracks in enumerate(("filtered", "as detected")):
+        for k, tracks in ((1, "as detected"), (0, "filtered")):
             for y, detector in enumerate(detectors):
                 case, colour = cases[tracks, measure].loc[[detector]], detector_colour(detector)
                 fill = colour if tracks == "as detected" else "white"

@@ -91,9 +91,9 @@ def class_precision(table: pd.DataFrame, note: str) -> Figure:
 def _say_too_few(axis, names: list[str], few: set[str]) -> None:
     """Words in the place of the classes with too few people."""
     behind = {"facecolor": "white", "edgecolor": "none", "pad": 1}
-    for name in few:
-        place = 0.02, names.index(name)
-        axis.text(*place, "too few to judge", va="center", fontsize=8, color="#666666", bbox=behind)
+    for y, name in enumerate(names):
+        if name in few:
+            axis.text(0.02, y, "too few to judge", va="center", fontsize=8, color="#666666", bbox=behind)
 
 
 def _dots(axis, rows: pd.DataFrame, y, detector: str, filled: bool = True, label: str = "") -> None:
