@@ -20,6 +20,13 @@ settings.load_profile("hicp")
 OF_THE_BOOK = {"test_api_pages.py", "test_jupyterlab.py", "test_links.py", "test_notebooks.py"}
 
 
+def pytest_collection_modifyitems(items):
+    """What looks at the book takes the whole way: notebooks run, pages built."""
+    for item in items:
+        if "book" in getattr(item, "fixturenames", ()):
+            item.add_marker("integration")
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
     """One worker makes the book and looks at it; with `--dist loadfile` the others would wait for it."""

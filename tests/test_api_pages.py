@@ -81,7 +81,6 @@ def test_unsound_text_is_noticed(monkeypatch):
     assert faults(".. py:function:: f()\n\n   A `name` of a\n\n   Next.\n", monkeypatch) == []
 
 
-@pytest.mark.integration
 def test_the_book_has_every_page_and_links_to_every_function(book):
     for name in MODULES:
         package = name.split(".")[1] if "." in name else ""
