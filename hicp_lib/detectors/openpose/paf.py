@@ -192,9 +192,8 @@ def limb_scores(
     count = agree.sum(axis=-1)
     mean = np.where(agree, projected, 0).sum(axis=-1) / np.maximum(count, 1)
     # Points nearly on top of each other leave the field no room; OpenPose lets them just pass.
-    is_short = (length > _LEAST_LENGTH_PX) & (
-        length < np.sqrt(limb_field[0].size) * stride / _SIDE_OVER_SHORT_LIMB
-    )
+    short_px = np.sqrt(limb_field[0].size) * stride / _SIDE_OVER_SHORT_LIMB
+    is_short = (length > _LEAST_LENGTH_PX) & (length < short_px)
     weak = np.where(is_short, options.min_peak + _LEAST_SCORE, 0.0)
     return np.where(count > options.min_agreement * n_samples, mean, weak)
 
