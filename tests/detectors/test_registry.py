@@ -47,3 +47,37 @@ def test_an_option_of_another_kind_is_refused(option, value):
 def test_an_unknown_detector_is_refused():
     with pytest.raises(InputError, match="expected one of: mediapipe"):
         make_detector("openpoze")
+
+
+@pytest.mark.parametrize(
+    ("options", "num_hands", "hands_score", "body_score"),
+    [({}, 4, 0.2, 0.5), ({"hands_num_hands": 3, "hands_min_score": 0.6, "min_score": 0.4}, 3, 0.6, 0.4)],
+)
+def test_options_of_a_combination_go_where_they_belong(weights, options, num_hands, hands_score, body_score):
+    detector = make_detector("combined:mediapipe-pose+mediapipe-hands", looks="image", **options)
+    assert (detector.settings["looks"], detector.settings["min_side_px"]) == (["image"], 320)
+    body, hands = detector.settings["body"], detector.settings["hands"]
+    assert (hands["num_hands"], hands["min_score"], body["min_score"]) == (num_hands, hands_score, body_score)
+    assert body["num_poses"] == 1 and detector.settings["arbitrate"]
+
+
+@pytest.mark.parametrize(
+    ("name", "match"),
+    [
+        ("combined:mediapipe-pose", "expected combined:BODY[+]HANDS of: mediapipe-pose"),
+        ("combined:nobody+mediapipe-hands", "expected combined:BODY[+]HANDS"),
+        ("combined:mediapipe-hands+mediapipe-hands", "mediapipe-hands finds no body"),
+        ("combined:mediapipe-pose+mediapipe-pose", "mediapipe-pose finds no hand"),
+    ],
+)
+def test_what_cannot_be_combined_is_refused(name, match):
+    with pytest.raises(InputError, match=match):
+        make_detector(name)
+
+
+def test_what_each_detector_can_be_scored_on():
+    both = {name for name, entry in DETECTORS.items() if entry.groups == ("body", "hand")}
+    assert both == {"mediapipe", "openpose", "mmpose", "alphapose"}
+    assert DETECTORS["mediapipe-hands"].groups == ("hand",)
+    assert all(entry.name == name for name, entry in DETECTORS.items())
+    assert all(DETECTORS[name].groups == ("body",) for name in set(DETECTORS) - both - {"mediapipe-hands"})

@@ -71,15 +71,9 @@ class Combined:
         self._arbitrate, self._min_side_px = arbitrate, min_side_px
         self._squares, self._rule = SquareRule(), ArbitrationRule()
         self.takes_boxes = getattr(body, "takes_boxes", False)
-        self.settings = {
-            "body": {"name": body.name, **body.settings},
-            "hands": {"name": hands.name, **hands.settings},
-            "looks": sorted(self._looks),
-            "arbitrate": arbitrate,
-            "min_side_px": min_side_px,
-            "squares": asdict(self._squares),
-            "rule": asdict(self._rule),
-        }
+        self.settings = {kind: {"name": part.name, **part.settings} for kind, part in self.parts.items()}
+        self.settings |= {"looks": sorted(self._looks), "arbitrate": arbitrate, "min_side_px": min_side_px}
+        self.settings |= {"squares": asdict(self._squares), "rule": asdict(self._rule)}
 
     def detect(self, image: np.ndarray, boxes_px: np.ndarray | None = None) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""

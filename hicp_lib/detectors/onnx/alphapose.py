@@ -75,12 +75,8 @@ class AlphaPose:
         self._rules = _rules(self._net, self.decoding)
         self._boxes = BoxSource(boxes, person_model, provider, threads)
         self.takes_boxes = self._boxes.kind == "gt"
-        self.settings = {
-            "model": opened.settings,
-            **self._boxes.settings,
-            "decoding": self.decoding,
-            "flip_test": flip_test,
-        }
+        self.settings = {"model": opened.settings, "decoding": self.decoding, "flip_test": flip_test}
+        self.settings |= self._boxes.settings
 
     def detect(self, image: np.ndarray, boxes_px: np.ndarray | None = None) -> Detections:
         """Find people in an RGB image; parameters as in `MMPose.detect`."""

@@ -76,12 +76,8 @@ class KeypointRcnn:
         if self._family not in _FAMILIES:
             raise InputError(f"{model}: family {family!r} is not known; expected {' or '.join(_FAMILIES)}")
         self._min_score = min_score
-        self.settings = {
-            "model": self._model.settings,
-            "family": self._family,
-            "min_score": min_score,
-            "opencv": cv2.__version__,
-        }
+        self.settings = {"model": self._model.settings, "family": self._family, "min_score": min_score}
+        self.settings["opencv"] = cv2.__version__
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
@@ -130,10 +126,8 @@ class KeypointRcnn:
 
     def _feed(self, pixels: np.ndarray) -> np.ndarray:
         feed = np.empty((3, *pixels.shape[:2]), np.float32)
-        if self._family == "detectron2":
-            planes(pixels[..., ::-1], (0.0,) * 3, (1.0,) * 3, feed)
-        else:
-            planes(pixels, (0.0,) * 3, (255.0,) * 3, feed)
+        step, greatest = (-1, 1.0) if self._family == "detectron2" else (1, 255.0)
+        planes(pixels[..., ::step], (0.0,) * 3, (greatest,) * 3, feed)
         return feed[None] if len(self._model.inputs[0].shape) == 4 else feed
 
     def _roles(self, outputs: list[np.ndarray]) -> dict[str, np.ndarray]:

@@ -70,14 +70,9 @@ class MMPose:
         self._boxes = BoxSource(boxes, person_model, provider, threads)
         self.takes_boxes = self._boxes.kind == "gt"
         self._sigmas = SIGMAS["wholebody"][TO_HALPE[self._convention]]
-        self.settings = {
-            "model": opened.settings,
-            **self._boxes.settings,
-            "dark": dark,
-            "flip_test": flip_test,
-            "score_scale": self._score_scale,
-            "convention": self._convention,
-        }
+        self.settings = {"model": opened.settings, "dark": dark, "flip_test": flip_test}
+        self.settings |= {"score_scale": self._score_scale, "convention": self._convention}
+        self.settings |= self._boxes.settings
 
     def detect(self, image: np.ndarray, boxes_px: np.ndarray | None = None) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8.

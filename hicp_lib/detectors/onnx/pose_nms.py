@@ -15,6 +15,9 @@ from hicp_lib.core.oks import oks_terms
 
 _N_FACE, _N_HANDS = 68, 42
 _FACE_FACTOR, _HAND_FACTOR = 1.9, 0.55
+_HAND_AGREEMENT, _HAND_NEARNESS = 0.1, 1.5  # their weights in the similarity of whole bodies
+# Points as near as these coincide, are merged, agree in their scores.
+_COINCIDENT_PX, _MERGED_PX, _AGREEING_PX = 7.0, 15.0, 1.0
 
 
 def oks_nms(
@@ -124,7 +127,7 @@ def merge_poses(
         same = _similarity(distances, scores[best], scores[left], rules) > rules.gamma
         same |= _matches(distances, scores[best], reaches[best], rules) >= rules.min_matches
         absorbed = left[same] if same.any() else np.array([best])
-        pose = _merge(best, absorbed, positions_px, scores, min(reaches[best], 15))
+        pose = _merge(best, absorbed, positions_px, scores, min(reaches[best], _MERGED_PX))
         if scores[best].max() >= rules.min_score and pose[1].max() >= rules.min_score:
             rows.append(best)
             merged.append(pose)
@@ -144,7 +147,7 @@ def _similarity(
     distances: np.ndarray, best_scores: np.ndarray, scores: np.ndarray, rules: PoseNmsRules
 ) -> np.ndarray:
     """Similarity (m,) of poses to the best one: agreeing scores where points coincide, and nearness."""
-    near = distances <= 1
+    near = distances <= _AGREEING_PX
     agreement = np.tanh(best_scores / rules.delta1) * np.tanh(scores / rules.delta1)
     if not rules.is_whole_body:
         agreement = np.where(near, agreement, 0)
@@ -156,14 +159,15 @@ def _similarity(
     nearness = np.where(weak, 0, np.exp(-distances / scale))
     body, face, hands = _part_means(agreement)
     body_near, face_near, hands_near = _part_means(nearness)
-    return body + face + 0.1 * hands + rules.mu * (body_near + face_near + 1.5 * hands_near)
+    nearness = body_near + face_near + _HAND_NEARNESS * hands_near
+    return body + face + _HAND_AGREEMENT * hands + rules.mu * nearness
 
 
 def _matches(
     distances: np.ndarray, best_scores: np.ndarray, reach_px: float, rules: PoseNmsRules
 ) -> np.ndarray:
     """Number (m,) of points that coincide with the best pose's."""
-    limit = min(reach_px, 7.0)
+    limit = min(reach_px, _COINCIDENT_PX)
     if not rules.is_whole_body:
         return (distances <= limit).sum(axis=1)
     n_sure = int((best_scores > rules.min_score / 2).sum())

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hicp_lib.detectors.openpose.paf import Limb, PafOptions, PartModel
+from hicp_lib.detectors.openpose.paf import Limb, PafOptions, PartModel, part_rows
 
 _MOST_BESIDE_FEET = 4
 
@@ -63,10 +63,7 @@ def join_as_released(
         else:
             _extend(people, a, b, limbs[index], peaks)
     kept = _keep(people, model.uncounted, options) or _keep(people, frozenset(), options)
-    parts = np.full((len(kept), model.n_parts, 3), (np.nan, np.nan, 0.0))
-    for row, person in zip(parts, kept, strict=True):
-        for part, peak in person.peaks.items():
-            row[part] = peaks[part][peak]
+    parts = np.array([part_rows(person.peaks, peaks) for person in kept]).reshape(-1, model.n_parts, 3)
     n_terms = model.n_parts + len(model.pairs)
     return parts, np.array([person.score / n_terms for person in kept])
 

@@ -101,8 +101,6 @@ class OpenPoseMobileNet:
     ----------
     net_height_px : int
         Height images are scaled to, a multiple of 16; 368 as in OpenPose.
-    options : PafOptions, optional
-        Thresholds of peaks, limbs and people.
     provider : str
     threads : int
         See `hicp_lib.detectors.onnx.session.open_model`.
@@ -110,23 +108,12 @@ class OpenPoseMobileNet:
 
     name = "openpose-mobilenet"
 
-    def __init__(
-        self,
-        net_height_px: int = 368,
-        options: PafOptions | None = None,
-        provider: str = "cpu",
-        threads: int = 1,
-    ) -> None:
+    def __init__(self, net_height_px: int = 368, provider: str = "cpu", threads: int = 1) -> None:
         check_height(net_height_px)
         self._model = open_content(load(WEIGHTS.name), WEIGHTS, provider, threads)
-        self._height_px = net_height_px
-        self._options = options or PafOptions()
-        self.settings = {
-            "net_height_px": net_height_px,
-            **asdict(self._options),
-            "model": self._model.settings,
-            "opencv": cv2.__version__,
-        }
+        self._height_px, self._options = net_height_px, PafOptions()
+        self.settings = {"net_height_px": net_height_px, **asdict(self._options)}
+        self.settings |= {"model": self._model.settings, "opencv": cv2.__version__}
 
     def maps(self, net_input: Letterbox) -> np.ndarray:
         """Run the network: (57, h / 8, w / 8) float32: 18 parts, background, 38 fields."""

@@ -89,6 +89,10 @@ Sampler = Callable[[np.ndarray, np.ndarray, int], np.ndarray]
 MAX_PEAKS = 64
 _LEAST = 1e-4
 _LEAST_LENGTH_PX = _LEAST_SCORE = 1e-6
+# Samples along a limb: so many in square root of its pixels, within limits.
+_SAMPLES_PER_PX, _MIN_SAMPLES, _MAX_SAMPLES = 5, 5, 25
+# Limbs shorter than the input's mean side over this have no room in the field.
+_SIDE_OVER_SHORT_LIMB = 150
 
 
 def find_peaks(heat_maps: np.ndarray, stride: int, min_peak: float) -> list[np.ndarray]:
@@ -178,8 +182,9 @@ def limb_scores(
     vector = end - start
     length = np.linalg.norm(vector, axis=-1)
     direction = vector / np.maximum(length, 1e-9)[..., None]
-    n_samples = np.clip(np.round(np.sqrt(5 * np.abs(vector).max(axis=-1))), 5, 25)
-    step = np.arange(25)
+    n_samples = np.round(np.sqrt(_SAMPLES_PER_PX * np.abs(vector).max(axis=-1)))
+    n_samples = np.clip(n_samples, _MIN_SAMPLES, _MAX_SAMPLES)
+    step = np.arange(_MAX_SAMPLES)
     taken = step < n_samples[..., None]
     along = start[..., None, :] + vector[..., None, :] * (step / n_samples[..., None])[..., None]
     projected = np.einsum("cijk,ijc->ijk", (sample or _sample)(limb_field, along, stride), direction)
@@ -187,8 +192,9 @@ def limb_scores(
     count = agree.sum(axis=-1)
     mean = np.where(agree, projected, 0).sum(axis=-1) / np.maximum(count, 1)
     # Points nearly on top of each other leave the field no room; OpenPose lets them just pass.
-    is_short = (length > _LEAST_LENGTH_PX) & (length < np.sqrt(limb_field[0].size) * stride / 150)
-    weak = np.where(is_short, options.min_peak + 1e-6, 0.0)
+    short_px = np.sqrt(limb_field[0].size) * stride / _SIDE_OVER_SHORT_LIMB
+    is_short = (length > _LEAST_LENGTH_PX) & (length < short_px)
+    weak = np.where(is_short, options.min_peak + _LEAST_SCORE, 0.0)
     return np.where(count > options.min_agreement * n_samples, mean, weak)
 
 
@@ -279,6 +285,12 @@ def find_limbs(
     ]
 
 
+def part_rows(person: dict[int, int], peaks: list[np.ndarray]) -> np.ndarray:
+    """A person's parts (n_parts, 3) as in `peaks`, from the row of each part's; NaN, NaN, 0 if missing."""
+    missing = (np.nan, np.nan, 0.0)
+    return np.array([peaks[part][person[part]] if part in person else missing for part in range(len(peaks))])
+
+
 def _join(
     people: list[_Person], a: tuple[int, int], b: tuple[int, int], score: float, completing: bool
 ) -> None:
@@ -310,9 +322,7 @@ def _keep(
 ) -> tuple[np.ndarray, np.ndarray]:
     parts, scores = [], []
     for person in people:
-        rows = np.full((model.n_parts, 3), (np.nan, np.nan, 0.0))
-        for part, peak in person.peaks.items():
-            rows[part] = peaks[part][peak]
+        rows = part_rows(person.peaks, peaks)
         total = rows[:, 2].sum() + person.limb_score
         n_counted = len(person.peaks.keys() - model.uncounted)
         if n_counted >= options.min_parts and total / len(person.peaks) >= options.min_score:

@@ -44,6 +44,8 @@ BODY_25 = PartModel(
 # By the number of heat maps, background included, and of fields.
 _PART_MODELS = {(19, 38): COCO_18, (26, 52): BODY_25}
 _HAND_SIDE_PX, _N_HAND, _MIN_ARM_SCORE = 368, 21, 0.03
+# Where a hand's square lies and how large it is, in lengths of the forearm; smaller ones are not looked at.
+_BEYOND_WRIST, _SQUARE_SIDE, _FOREARMS_PER_UPPER_ARM, _MIN_AREA_PX2 = 0.33, 1.5, 0.9, 10.0
 _HANDS = {"left": LEFT_HAND, "right": RIGHT_HAND}
 
 
@@ -83,14 +85,9 @@ class OpenPose:
         self._hands = OpenPoseHands(hand_model, provider, threads) if hand_model is not None else None
         self._as_released = as_released
         self._options = PafOptions()
-        self.settings = {
-            "model": self._model.settings,
-            "hand_model": self._hands.settings if self._hands else None,
-            "size_px": self._size_px,
-            "as_released": as_released,
-            "opencv": cv2.__version__,
-            **asdict(self._options),
-        }
+        hands = self._hands.settings if self._hands else None
+        self.settings = {"model": self._model.settings, "hand_model": hands, "size_px": self._size_px}
+        self.settings |= {"as_released": as_released, "opencv": cv2.__version__, **asdict(self._options)}
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
@@ -218,9 +215,10 @@ def hand_square(keypoints_px: np.ndarray, scores: np.ndarray, side: str) -> tupl
     if not (scores[joints] > _MIN_ARM_SCORE).all():
         return None
     wrist, elbow, shoulder = keypoints_px[joints]
-    side_px = 1.5 * max(np.linalg.norm(wrist - elbow), 0.9 * np.linalg.norm(elbow - shoulder))
-    centre = wrist + 0.33 * (wrist - elbow)
-    return (centre - side_px / 2, float(side_px)) if side_px**2 > 10 else None
+    upper_arm_px = np.linalg.norm(elbow - shoulder)
+    side_px = _SQUARE_SIDE * max(np.linalg.norm(wrist - elbow), _FOREARMS_PER_UPPER_ARM * upper_arm_px)
+    centre = wrist + _BEYOND_WRIST * (wrist - elbow)
+    return (centre - side_px / 2, float(side_px)) if side_px**2 > _MIN_AREA_PX2 else None
 
 
 def _feed(pixels: np.ndarray) -> np.ndarray:

@@ -88,3 +88,22 @@ def test_everything_assumed_is_told(tmp_path):
     facts = {fact.what: fact.value for fact in AlphaPose(model).describe()}
     assert facts["decoding"] == "integral" and facts["keypoints"] == "halpe136" and facts["batch"] == "1"
     assert facts["output"] == "48x64 cells" and facts["boxes"] == "image"
+
+
+@pytest.mark.parametrize(
+    ("body", "rest", "decoding"),
+    [(-0.9, -0.9, "heatmap"), (-1.1, -1.1, "integral"), (-0.9, -1.1, "combined"), (-1.1, -0.9, "heatmap")],
+)
+def test_maps_are_logits_where_they_lie_below_minus_one(tmp_path, body, rest, decoding):
+    maps = np.full((1, 136, 64, 48), body, np.float32)
+    maps[:, 26:] = rest
+    model = constant_model(tmp_path / "m.onnx", (1, 3, 256, 192), {"maps": maps})
+    assert AlphaPose(model).decoding == decoding
+
+
+@pytest.mark.parametrize(("n_logits", "decoding"), [(55, "heatmap"), (56, "combined")])
+def test_face_and_hands_are_logits_where_most_of_them_are(tmp_path, n_logits, decoding):
+    maps = np.zeros((1, 136, 64, 48), np.float32)
+    maps[:, 26 : 26 + n_logits] = -2
+    model = constant_model(tmp_path / "m.onnx", (1, 3, 256, 192), {"maps": maps})
+    assert AlphaPose(model).decoding == decoding
