@@ -43,7 +43,7 @@ from hicp_lib.simulation.rendering.surfaces import Hits, Material, Surface
 from hicp_lib.simulation.world import furniture, room, staging
 
 EXPECTED_FILE = Path(__file__).with_suffix(".json")
-N_BLOCKS = 2
+N_BLOCKS = 4
 SHAPE = "woman_25_slim"
 BODY = load_body()
 PARTS = ("albedo", "height_m", "gloss", "roughness", "softness", "glow")
@@ -424,7 +424,7 @@ def computed(case: str) -> list[np.ndarray]:
 
 if __name__ == "__main__":
     found = {
-        case: [np.vectorize(lambda x: float(f"{x:.5g}"))(s).tolist() for s in computed(case)]
+        case: [np.vectorize(lambda x: float(f"{x:.6g}"))(s).tolist() for s in computed(case)]
         for case in CASES
     }
     EXPECTED_FILE.write_text(json.dumps(found, separators=(",", ":")).replace('],"', '],\n"') + "\n")

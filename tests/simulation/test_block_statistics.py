@@ -31,6 +31,6 @@ def test_results_have_the_statistics_they_had(case):
 
 def test_statistics_tell_blocks_apart_and_keep_order():
     values = np.arange(16.0)
-    assert statistics(values)[:, 0, 0].tolist() == [3.5, 11.5]
+    assert statistics(values)[:, 0, 0].tolist() == [1.5, 5.5, 9.5, 13.5]
     assert not np.allclose(statistics(values), statistics(values[::-1]))
     assert statistics(np.ones((2, 3))).shape == (2, 2, 3)

@@ -55,7 +55,7 @@ class RayScene:
     >>> from hicp_lib.simulation.rendering.mesh import box
     >>> scene = RayScene([Surface(box([-1, 2, -1], [1, 3, 1]), plain(np.zeros(3)))])
     >>> rays = np.array([[0, 0, 0, 0, 1, 0], [0, 0, 0, 0, -1, 0]], np.float32)
-    >>> scene.trace(rays).depth_m.tolist(), scene.trace(rays).surface.tolist()
+    >>> scene.trace(rays).depth_m.round(3).tolist(), scene.trace(rays).surface.tolist()
     ([2.0, inf], [0, -1])
     """
 
