@@ -71,7 +71,9 @@ class Combined:
         self._arbitrate, self._min_side_px = arbitrate, min_side_px
         self._squares, self._rule = SquareRule(), ArbitrationRule()
         self.takes_boxes = getattr(body, "takes_boxes", False)
-        self.settings = {kind: {"name": part.name, **part.settings} for kind, part in self.parts.items()}
+        self.settings: dict[str, Any] = {
+            kind: {"name": part.name, **part.settings} for kind, part in self.parts.items()
+        }
         self.settings |= {"looks": sorted(self._looks), "arbitrate": arbitrate, "min_side_px": min_side_px}
         self.settings |= {"squares": asdict(self._squares), "rule": asdict(self._rule)}
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -86,8 +87,9 @@ class OpenPose:
         self._as_released = as_released
         self._options = PafOptions()
         hands = self._hands.settings if self._hands else None
-        self.settings = {"model": self._model.settings, "hand_model": hands, "size_px": self._size_px}
-        self.settings |= {"as_released": as_released, "opencv": cv2.__version__, **asdict(self._options)}
+        self.settings: dict[str, Any] = {"model": self._model.settings, "hand_model": hands}
+        self.settings |= {"size_px": self._size_px, "as_released": as_released}
+        self.settings |= {"opencv": cv2.__version__, **asdict(self._options)}
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
