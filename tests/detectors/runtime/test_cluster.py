@@ -177,8 +177,9 @@ def test_a_fault_of_a_detector_is_told_as_what_it_is(slow, registered):
     faulty = slow.folder / "faulty.png"
     write_png(faulty, np.full((8, 9, 3), 254, np.uint8))
     with dask_cluster(slow, ({},), *PRELOAD) as (address, _):
-        with pytest.raises(AttributeError, match="^a fault of the detector's$") as error:
+        with pytest.raises(AttributeError) as error:
             run.detect_images("slow", {"faulty": faulty}, dask=address)
+    assert str(error.value) == "a fault of the detector's"
     assert "slow_detector.py" in error.value.__notes__[0]  # where it was on the worker
 
 
