@@ -1,7 +1,5 @@
 """`hicp calibration`: keypoint scores that mean the same whoever gave them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

@@ -5,8 +5,6 @@ Exit codes: 0 done, 1 a notebook or the book failed, 2 bad input or usage; alway
 standard error, never a traceback for a user's mistake.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

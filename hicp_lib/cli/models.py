@@ -1,7 +1,5 @@
 """`hicp models`: the detectors' weights, the study's and the user's own."""
 
-from __future__ import annotations
-
 import click
 
 from hicp_lib.cli.options import detector_options, given

@@ -1,7 +1,5 @@
 """Which distribution's OpenCV is installed: four of them lay the same files, and the last one wins."""
 
-from __future__ import annotations
-
 import base64
 import csv
 import hashlib

@@ -1,7 +1,5 @@
 """Kinds of options that the `hicp` command's parts share."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

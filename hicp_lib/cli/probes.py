@@ -4,8 +4,6 @@
 process of its own: a native library may abort, or hang, and must not take anything along.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from functools import partial

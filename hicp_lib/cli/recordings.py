@@ -1,7 +1,5 @@
 """Commands for recordings of an RGB-D camera on a robot: `hicp record ...` and `hicp lift`."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -5,8 +5,6 @@ The list is held against the wheels' own word by `tests/test_system_libraries.py
 nothing but the standard library: it runs before anything else can.
 """
 
-from __future__ import annotations
-
 import ctypes
 import sys
 from importlib.util import find_spec

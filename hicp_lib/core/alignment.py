@@ -1,7 +1,5 @@
 """Rigid alignment of matched 3D points, and how far it can be trusted."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ code, or name in a string that holds nothing else, and what these import in turn
 module that moves, or is imported anew, is part of the key by itself.
 """
 
-from __future__ import annotations
-
 import ast
 import importlib.metadata
 import json

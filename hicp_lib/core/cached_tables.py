@@ -4,8 +4,6 @@ A notebook that is opened after a report so shows the report's numbers, and soon
 process has.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from pathlib import Path

@@ -3,8 +3,6 @@
 Camera coordinates: x right, y down, z forward, metres. Pixel centres lie at integers.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where the study's notebooks and book are, and where results go: never beside installed code."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from hicp_lib.core.errors import InputError

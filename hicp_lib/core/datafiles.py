@@ -3,8 +3,6 @@
 They are only read. What is made or recorded goes to the working folder, the cache or the user's data folder.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parents[1]

@@ -1,7 +1,5 @@
 """Environment variables that something reads when it starts, and only then."""
 
-from __future__ import annotations
-
 import os
 import threading
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Files: the cache folder, hashes, writes that are whole or absent, JSON read at the door."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Images in and out: RGB, 8 bit, as arrays."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

@@ -6,8 +6,6 @@ Left is always the person's left. Sources: the Halpe-FullBody, COCO-WholeBody, O
 MediaPipe documentation; see the book's conventions page for the tables in prose.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 N_KEYPOINTS = 136

@@ -1,7 +1,5 @@
 """What is made once in a process and kept: it follows from its key alone, and nobody can change it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import lru_cache, wraps

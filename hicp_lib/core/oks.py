@@ -5,8 +5,6 @@ person's area (COCO keypoint evaluation, cocodataset.org/#keypoints-eval); OKS i
 labelled keypoints. A keypoint that is not given (NaN) counts 0.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 _EPS = np.spacing(1)

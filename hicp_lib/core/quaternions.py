@@ -1,7 +1,5 @@
 """Rotation matrices and unit quaternions (x, y, z, w)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

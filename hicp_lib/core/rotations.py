@@ -1,7 +1,5 @@
 """Rotation matrices from rotation vectors, axes and directions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from math import cos, sin, sqrt
 

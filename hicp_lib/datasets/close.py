@@ -10,8 +10,6 @@ Arms and legs of rendered people or of COCO's are small: with Basic's least size
 So the crops are smaller than Basic's, and resolution differs along with the class.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice

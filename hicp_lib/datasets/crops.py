@@ -16,8 +16,6 @@ positions of head and body. The rest is chosen here:
 - The segment's area shrinks in proportion to the part of the box that remains.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Literal
 

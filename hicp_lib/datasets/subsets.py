@@ -13,8 +13,6 @@ A crop's image id, and its person's annotation id, are the person's annotation i
 the same person is found in both datasets, whatever the rules select.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor

@@ -7,8 +7,6 @@ hips) beside both whole arms, and "both arms" for shoulders without hips, so tha
 most. Who fits no rule is of the class "none of these".
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The detectors by name, as the command line and the notebooks offer them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from importlib import import_module
 from inspect import signature

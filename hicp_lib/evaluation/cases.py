@@ -4,8 +4,6 @@
 subset, a detector and a group of keypoints.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np

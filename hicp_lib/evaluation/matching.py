@@ -1,7 +1,5 @@
 """Which detection is of which person, by object keypoint similarity (OKS)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

@@ -14,8 +14,6 @@
 Keypoints that are not given are 0, 0, 0 in both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 

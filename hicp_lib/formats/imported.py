@@ -1,7 +1,5 @@
 """Detections made elsewhere, taken into the comparison beside the detectors that are run here."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import Path

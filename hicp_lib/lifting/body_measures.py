@@ -4,8 +4,6 @@ Measured on the body model by `tools/measure_body.py`, over people of 18 shapes 
 recording had a part in it.
 """
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass

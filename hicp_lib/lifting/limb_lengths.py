@@ -1,7 +1,5 @@
 """Depths of all keypoints of a person chosen together, so that limbs have lengths that people have."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import itemgetter

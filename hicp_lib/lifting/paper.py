@@ -16,8 +16,6 @@ What the paper leaves open is defined here:
 - A keypoint that is not detected (NaN) is not lifted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

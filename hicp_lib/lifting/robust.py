@@ -25,8 +25,6 @@ Measures of people come from the body model (`body_measures`, `hand_shapes`). Th
 study.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

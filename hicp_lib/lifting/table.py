@@ -1,7 +1,5 @@
 """Everyone's keypoints of a recording in space, as one tidy table."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -8,8 +8,6 @@ found so are written down by `record_click`. That needs no extension of Jupyter 
 pages, too.
 """
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Sequence
 from pathlib import Path

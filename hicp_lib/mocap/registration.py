@@ -10,8 +10,6 @@ Three ways, from the same kind of clicks (`reprojection` has a fourth, without d
   with the others.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

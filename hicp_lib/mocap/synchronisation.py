@@ -1,7 +1,5 @@
 """One clock for camera and motion capture: the offset between two, and positions at camera stamps."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """C3D files: the trajectories of markers, in and out, through ezc3d."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """camera.json: the intrinsics of a recording's camera, and the scale of its depth images."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What is missing or inconsistent in anyone's recording, in one line each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ Images of a folder are copied as they are. Poses come from the user: a text file
 line of which is a camera that stands still, or a CSV of the robot's joint angles.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from pathlib import Path

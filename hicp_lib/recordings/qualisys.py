@@ -4,8 +4,6 @@ Files are in millimetres, everything here in metres. Sources: the Qualisys docum
 data (.tsv)", and headers of exports found in public repositories; for C3D, ezc3d.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

@@ -11,8 +11,6 @@ simulated recording holds more, as parquet and images: what is true (`read_truth
 (`read_joints`), depth without the sensor's errors (`read_exact_depth_m`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -6,8 +6,6 @@ Layout and association as in the tools of Sturm et al., *A Benchmark for the Eva
 SLAM Systems*, IROS 2012.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
 

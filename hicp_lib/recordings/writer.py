@@ -1,7 +1,5 @@
 """Writing recordings: images one by one, then the lists that make them a recording."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

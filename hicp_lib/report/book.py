@@ -1,7 +1,5 @@
 """Builds the book from its pages and the executed notebooks: offline, checked, whole or not at all."""
 
-from __future__ import annotations
-
 import importlib.resources
 import os
 import re

@@ -1,7 +1,5 @@
 """The whole report in one call: notebooks brought up to date, then the book."""
 
-from __future__ import annotations
-
 import fcntl
 import time
 from collections.abc import Callable, Iterator

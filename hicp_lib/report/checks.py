@@ -1,7 +1,5 @@
 """What a built book promises: nothing loads from a network, every image has words."""
 
-from __future__ import annotations
-
 import re
 from html.parser import HTMLParser
 from pathlib import Path

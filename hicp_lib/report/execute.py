@@ -4,8 +4,6 @@
 When that end closes, however the parent died, this process ends the kernel and all its workers.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """The notebooks of the study: their declared parameters, and what each profile gives them."""
 
-from __future__ import annotations
-
 import ast
 import json
 import tomllib

@@ -13,8 +13,6 @@ In a page of `book/`, between double braces:
 A name that no result file has stops the build.
 """
 
-from __future__ import annotations
-
 import html
 import json
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ its stamp is written last. No stamp, another key, or an output that is not the s
 the notebook runs again.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

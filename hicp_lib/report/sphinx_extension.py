@@ -1,7 +1,5 @@
 """The book's Sphinx extension: pages load what they use, and nothing that would ask a network."""
 
-from __future__ import annotations
-
 from typing import Any
 
 # Not in `_static`: Jupyter Book loads every script it finds there on every page.

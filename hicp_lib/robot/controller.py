@@ -6,8 +6,6 @@ those of the shoulder's cables. After Nguyen et al. (2018), with the costs of th
 in 2022 (robotology/react-control); solved by DAQP. This is no safety function.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where the robot holds its hand when nobody is near."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import least_squares
 

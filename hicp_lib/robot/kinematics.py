@@ -6,8 +6,6 @@ three joints of the torso, in the order pitch, roll, yaw (motor boards report an
 Poses and Jacobians are Pinocchio's, on models built from the tables in data/icub.json.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@
 (YARP, ROS) around `AvoidanceLoop.cycle`. Nothing here is a safety function.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -5,8 +5,6 @@ board reports neck pitch, neck roll, neck yaw, then eyes tilt, version and verge
 arm joints, then those of the fingers. Source: the robot's documentation and iKin (data/README.md).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -7,8 +7,6 @@ here it is the hand-made histogram of reach 45 cm published beside it (data/READ
 smoothed by Parzen windows. Taxels above a threshold are summed up, part by part, to one obstacle.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache, cached_property
 

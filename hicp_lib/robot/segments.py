@@ -3,8 +3,6 @@
 Ends are origins of links; thicknesses are rough, to be looked at, not measured with.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Leaving out what is the robot itself: its camera sees its own arms, and detectors find people in them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hicp_lib.robot.kinematics import ICub

@@ -6,8 +6,6 @@ body gets before it is noticed, and how uncertain the places of both are. A yard
 nothing in this project is a safety function.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

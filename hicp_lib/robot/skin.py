@@ -5,8 +5,6 @@ front of the torso only their number is documented: they are placed on simple cy
 (data/icub_skin.json says which, data/README.md names the sources).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

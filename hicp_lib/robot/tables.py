@@ -4,8 +4,6 @@ Distal convention, as iKin and the robot's documentation have it: a row turns by
 z, moves `d` along z and `a` along x, and turns by `alpha` about x. data/README.md names the sources.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

@@ -5,8 +5,6 @@ keypoint counts from its second sighting near the first on, keeps its last belie
 ones contradict it, and fades out when it is not seen any more.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 

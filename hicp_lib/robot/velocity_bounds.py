@@ -5,8 +5,6 @@ an obstacle does not add a motion, it narrows what the joints may do until they 
 before they push is ours, in the spirit of the authors' later controller (HARMONIOUS, 2023).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

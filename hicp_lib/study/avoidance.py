@@ -1,7 +1,5 @@
 """What a run of avoidance was worth: how near the person came, how soon the robot gave way and came back."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

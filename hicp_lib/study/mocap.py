@@ -5,8 +5,6 @@ holds `clicks.csv` (markers clicked in images, see `hicp_lib.mocap.clicking`), o
 the transform is known from elsewhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

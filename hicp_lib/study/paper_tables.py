@@ -1,7 +1,5 @@
 """The paper's Tables III and IV (section IV-C), beside what was measured here."""
 
-from __future__ import annotations
-
 import pandas as pd
 
 from hicp_lib.core.datafiles import DATA_DIR

@@ -4,8 +4,6 @@ The same hashes decide whether a result is still fresh (`hicp_lib.report.runs`) 
 printed below it (`hicp_lib.study.page`), so the two can never disagree.
 """
 
-from __future__ import annotations
-
 import functools
 import html
 import importlib.metadata

@@ -4,8 +4,6 @@ A *view* is one recording: "upper" and "lower" when simulated, as the paper's tw
 lab's own are called after their folders.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

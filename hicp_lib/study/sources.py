@@ -1,7 +1,5 @@
 """Where the study's people come from: rendered scenes, or COCO images with Halpe annotations."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 from pathlib import Path

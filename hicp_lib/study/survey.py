@@ -1,7 +1,5 @@
 """The survey of data sets and detectors (the paper's Tables I and II, `data/survey.json`)."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 import pandas as pd

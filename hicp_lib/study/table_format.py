@@ -1,7 +1,5 @@
 """Tables for people to read: columns in their units, values with their intervals, a column per case."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 

@@ -14,8 +14,6 @@ the body says that they are elsewhere, and they are refused. Where no hand is fo
 hand that the body detector itself gave, if it did.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 

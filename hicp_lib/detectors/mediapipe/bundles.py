@@ -7,8 +7,6 @@ this model takes [0, 1], as MediaPipe's own graph for the same file feeds it. Wh
 plain Python and is loaded file by file: MediaPipe itself runs in a process of its own only.
 """
 
-from __future__ import annotations
-
 import io
 import zipfile
 from functools import cache, lru_cache

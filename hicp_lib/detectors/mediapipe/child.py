@@ -7,8 +7,6 @@ bytes. The first one's head tells the task's options and its body is the bundle;
 a pipe a call would take a tenth longer. Answers are arrays of float64 (`shape`) or an `error` in one line.
 """
 
-from __future__ import annotations
-
 import json
 import mmap
 import os

@@ -6,8 +6,6 @@ OpenCV. So no extra names the wheel: pip installs it by itself, held against the
 `data/mediapipe.txt`, into a folder where only MediaPipe's own process looks for it.
 """
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Sequence

@@ -16,8 +16,6 @@ What MediaPipe gives and what is made of it:
   tests hold this against rendered hands, of which about four in five get the true label.
 """
 
-from __future__ import annotations
-
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 

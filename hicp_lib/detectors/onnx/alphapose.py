@@ -1,7 +1,5 @@
 """AlphaPose's networks on the user's own weights: boxes, one pass per person, poses merged."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Where the boxes of the people come from: the annotations, the whole image, or a person detector."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -5,8 +5,6 @@ these networks are trained: cell i stands for the input pixel stride * i. A keyp
 score is not a positive number is not given: NaN with score 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import cv2

@@ -1,7 +1,5 @@
 """What a detector takes for granted about a model file, for people to read."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 

@@ -10,8 +10,6 @@ in what a keypoint's score is:
   a number in [0, 1] here by a logistic curve with its middle at 2, where Detectron draws points.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

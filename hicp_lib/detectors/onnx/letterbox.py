@@ -1,7 +1,5 @@
 """Images fitted into a detector's input: aspect kept, top-left, the rest filled."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

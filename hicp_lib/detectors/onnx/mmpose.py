@@ -1,7 +1,5 @@
 """MMPose's top-down networks on the user's own weights: boxes, one pass per person, one pose each."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -6,8 +6,6 @@ return `dets` (x1, y1, x2, y2, score) and mostly `labels`; those without return 
 of the grids of stride 8, 16 and 32 (Ge et al., "YOLOX", 2021).
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import cv2

@@ -4,8 +4,6 @@ The size of the input, the number of keypoints and heat maps against SimCC are r
 the file; what the file cannot tell (colours, decoding) is given.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -5,8 +5,6 @@ parametric distance and merges those it takes for one (Fang et al., "RMPE", ICCV
 variant for whole bodies and the constants are those of its released program).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

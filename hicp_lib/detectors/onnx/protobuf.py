@@ -1,7 +1,5 @@
 """Protobuf messages with only the fields that are needed; a parser passes over the others."""
 
-from __future__ import annotations
-
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from google.protobuf.message import Message
 

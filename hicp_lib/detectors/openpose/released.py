@@ -10,8 +10,6 @@ reads the fields, and leaves it in its results. The fields are read there, too (
 given have pixel centres at integers, as everywhere here.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import cv2

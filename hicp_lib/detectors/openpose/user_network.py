@@ -7,8 +7,6 @@ third of the forearm beyond the wrist (Simon et al., "Hand keypoint detection in
 multiview bootstrapping", CVPR 2017), the left one mirrored: the network knows right hands.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any

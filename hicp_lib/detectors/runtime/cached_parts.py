@@ -6,8 +6,6 @@ or square once, whoever asks: its results for whole images lie where the part al
 keeps its own.
 """
 
-from __future__ import annotations
-
 import time
 from copy import copy
 from dataclasses import dataclass, field, replace

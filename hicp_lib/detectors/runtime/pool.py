@@ -1,7 +1,5 @@
 """Detectors of one kind for the threads of a process."""
 
-from __future__ import annotations
-
 import queue
 import threading
 from collections.abc import Iterator

@@ -6,8 +6,6 @@ decode and compute, and the source of this package's detectors. A stale or damag
 never an answer: it is computed again.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 from collections.abc import Callable, Iterator

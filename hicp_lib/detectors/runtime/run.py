@@ -7,8 +7,6 @@ and threads need no start-up. Every thread has its own detector, and OpenCV is h
 thread in each, so the results do not depend on how many there are.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Hashable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor

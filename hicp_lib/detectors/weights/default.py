@@ -6,8 +6,6 @@ keeps only these members; `load` hands out bytes that were hashed at that moment
 or executed.
 """
 
-from __future__ import annotations
-
 import tempfile
 import zipfile
 from collections.abc import Iterable

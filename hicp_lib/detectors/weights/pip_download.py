@@ -1,7 +1,5 @@
 """Get wheels from the package index through pip, which checks their hashes; nothing in them is executed."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

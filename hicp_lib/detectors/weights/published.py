@@ -6,8 +6,6 @@ SHA-256. Where the hash is not known, the first fetch records it in the cache, i
 refused. Of an archive one member is read, in memory; nothing is unpacked and nothing fetched is executed.
 """
 
-from __future__ import annotations
-
 import re
 import stat
 import tempfile

@@ -1,7 +1,5 @@
 """Get one file from a web address: whole or not at all, and never waiting without end."""
 
-from __future__ import annotations
-
 from http.client import HTTPException
 from pathlib import Path
 from urllib.parse import urlsplit

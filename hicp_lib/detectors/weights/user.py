@@ -4,8 +4,6 @@ Notebooks and the report name detectors, not files. `hicp models use` writes dow
 other options, such a detector takes (`own_detectors.json` in the cache); options given at a call come first.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

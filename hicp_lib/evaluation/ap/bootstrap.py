@@ -4,8 +4,6 @@ What is resampled are the matches pycocotools made, so a thousand draws cost sec
 together (crops of one photograph) can be drawn together through `clusters`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Mapping, Sequence
 
 import numpy as np

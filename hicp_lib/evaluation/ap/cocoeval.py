@@ -1,7 +1,5 @@
 """pycocotools, fed with arrays and kept quiet; and the matches it made, from which AP can be had again."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from importlib.util import find_spec, module_from_spec
 from typing import Any

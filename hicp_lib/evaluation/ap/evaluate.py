@@ -17,8 +17,6 @@ A keypoint the detection does not give adds 0 to OKS. Crowds are ignored. The 20
 image take part.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args, get_type_hints

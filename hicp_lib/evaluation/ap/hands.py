@@ -4,8 +4,6 @@ A labelled hand counts as found when some detection places its points, on the ri
 of the hand alone (its labelled points, the person's area) above .5.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -4,8 +4,6 @@ Throughout, `truth` and `found` are as `hicp_lib.evaluation.cases` says. Crops o
 together in the bootstrap.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import pandas as pd

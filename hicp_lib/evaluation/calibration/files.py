@@ -4,8 +4,6 @@ The table is the one the report saves: columns `detector, group, score, rate`, a
 (`calibration.calibration_table`), as Parquet there and as CSV here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 A keypoint is a *hit* when its term of OKS is at least `HIT_TERM`, if nothing else is said (see `oks`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from functools import partial
 

@@ -1,7 +1,5 @@
 """AP and AR by which parts of a person a picture shows (the paper's section IV-D)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pandas as pd

@@ -5,8 +5,6 @@ set doses come together: who is near is cropped as well. There a curve shows wha
 the dose does.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -15,8 +15,6 @@ there is nothing to judge: *not given* by a detection that matches the person, a
 detection does (an OKS of .1 is asked for, as in the paper).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

@@ -11,8 +11,6 @@ What the paper says of each system in a few words becomes a measure that every d
 - OpenPose gives "fingers only with a wrist": of hands given, the share whose body wrist is not given.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

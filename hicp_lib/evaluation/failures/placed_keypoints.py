@@ -5,8 +5,6 @@ is not in the picture it can be said, too, whether a detector gives it, how sure
 whether that is right. Bodies only: the 17 keypoints all detectors share.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -1,7 +1,5 @@
 """The head's part in it: what changes for each keypoint when the head is cut off, and heads hallucinated."""
 
-from __future__ import annotations
-
 import pandas as pd
 
 from hicp_lib.core.keypoints import NAMES

@@ -8,8 +8,6 @@
 Equal cases follow in the order of their ids; of each source image only the worst case counts.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -16,8 +16,6 @@ Consecutive frames show nearly the same view when the recording's rate is high a
 that find hands and faces are judged on the 17 body keypoints all detectors share.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -5,8 +5,6 @@ may lift more of them, which is counted beside the errors and not in them. The p
 an image counts.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

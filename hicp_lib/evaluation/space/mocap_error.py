@@ -7,8 +7,6 @@ Throughout, `errors` is the table of `mocap_errors`: one row per detector, metho
 where nothing was found, so that what is missing counts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

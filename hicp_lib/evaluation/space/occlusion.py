@@ -3,8 +3,6 @@
 Both come from motion capture and the depth image, so any recording has them.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

@@ -1,7 +1,5 @@
 """What a registration adds to the errors, where the exact transform is known."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

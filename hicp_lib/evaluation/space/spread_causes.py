@@ -8,8 +8,6 @@ Joint readings are wrong in two ways: by the same amount in every view, as with 
 calibrated, or anew in every view.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 

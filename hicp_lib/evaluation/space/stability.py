@@ -11,8 +11,6 @@ with the best score of each image counts; a keypoint counts as found when its sc
 and it could be lifted.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 

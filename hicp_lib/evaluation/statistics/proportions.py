@@ -1,7 +1,5 @@
 """Proportions of rows that are something, with intervals from drawing whole source images."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

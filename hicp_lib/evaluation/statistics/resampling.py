@@ -3,8 +3,6 @@
 The first draw is the sample itself, each image once; the others are the bootstrap's.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ Künsch (Annals of Statistics 1989). The draws are weights per frame, for
 `hicp_lib.evaluation.statistics.resampling`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN

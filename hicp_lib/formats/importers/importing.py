@@ -5,8 +5,6 @@ scores come into [0, 1], and what belonged where is summed up. `hicp_lib.formats
 writes the detections with the tool's own scores and keys (`Imported.extras`) beside them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

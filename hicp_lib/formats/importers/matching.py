@@ -1,7 +1,5 @@
 """Which annotated image a prediction belongs to: by its name, its id, or the number in its name."""
 
-from __future__ import annotations
-
 import re
 from collections import defaultdict
 from collections.abc import Callable, Mapping

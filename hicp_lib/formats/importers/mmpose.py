@@ -10,8 +10,6 @@
 Sources: MMPose's inferencer, `split_instances`, and `CocoMetric` ("bbox_keypoint").
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from itertools import chain
 from pathlib import Path

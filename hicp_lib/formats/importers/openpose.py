@@ -12,8 +12,6 @@
 Source: OpenPose's output documentation.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 

@@ -17,8 +17,6 @@ Sources: the COCO results format, and the writers of Detectron2 (`coco_evaluatio
 (`pPose_nms.py`) and OpenPose (`cocoJsonSaver.cpp`).
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path

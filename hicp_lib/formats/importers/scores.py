@@ -10,8 +10,6 @@ not 0.3 of another.
 - Scores above 20 belong to no known scale, which must then be given.
 """
 
-from __future__ import annotations
-
 from hicp_lib.core.errors import InputError
 from hicp_lib.formats.importers.people import People
 

@@ -55,16 +55,16 @@ def simulate_clicks(
         exact_depth_m = read_exact_depth_m(recording, int(frame))
         if exact_depth_m is None:
             raise InputError(f"{recording.folder}: has no exact depth; give a simulated recording")
-        seen = _is_seen(pixels_px, points_m[:, 2], exact_depth_m)
+        seen = _is_seen(recording.intrinsics.contains(pixels_px), pixels_px, points_m[:, 2], exact_depth_m)
         u_px, v_px = (pixels_px + rng.normal(0, noise_px, pixels_px.shape)).T
         columns = {"frame": int(frame), "marker": list(mocap.names), "u_px": u_px, "v_px": v_px}
         tables.append(pd.DataFrame(columns)[seen])
     return pd.concat(tables, ignore_index=True)
 
 
-def _is_seen(pixels_px: np.ndarray, depths_m: np.ndarray, exact_depth_m: np.ndarray) -> np.ndarray:
+def _is_seen(
+    inside: np.ndarray, pixels_px: np.ndarray, depths_m: np.ndarray, exact_depth_m: np.ndarray
+) -> np.ndarray:
     """Which points are in the image with nothing in front of them."""
-    height, width = exact_depth_m.shape
-    inside = np.all((pixels_px >= 0) & (pixels_px <= [width - 1, height - 1]), axis=1)
-    columns, rows = np.where(inside[:, None], pixels_px, 0).round().astype(int).T
+    columns, rows = np.floor(np.where(inside[:, None], pixels_px, 0) + 0.5).astype(int).T
     return inside & (exact_depth_m[rows, columns] > depths_m - _IN_FRONT_M)

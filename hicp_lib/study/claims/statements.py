@@ -9,8 +9,6 @@
 Margins and tolerances are fixed in the file, before any result is seen.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any

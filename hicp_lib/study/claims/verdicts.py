@@ -6,8 +6,6 @@ with intervals of their own, from paired draws; the difference of two rows with 
 widest: that asks for more than a paired comparison would, never for less.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Figures of avoidance: distance, activation and retreat over time, joints, and separation's terms."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -3,8 +3,6 @@
 Robot and person are drawn in parallel projection; a taxel is the darker red the more it is threatened.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 

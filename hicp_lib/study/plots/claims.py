@@ -1,7 +1,5 @@
 """Figure of the claims: how many of the paper's got which verdict, by section."""
 
-from __future__ import annotations
-
 import pandas as pd
 
 from hicp_lib.core.errors import InputError

@@ -1,7 +1,5 @@
 """Figures of the combination: what its ingredients buy, and what scores are worth."""
 
-from __future__ import annotations
-
 import pandas as pd
 
 from hicp_lib.evaluation.calibration.curves import N_BINS

@@ -1,7 +1,5 @@
 """Figures of the data: whole scenes, the cut that takes the head off, examples, what is labelled."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

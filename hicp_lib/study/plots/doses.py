@@ -1,7 +1,5 @@
 """Figures of doses: what was varied, and how detection falls with it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of the 2D comparison: precision against recall, the loss without a head, OKS, time."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures of the failure analysis: classes of what is seen, kinds of error, the head, scores, worst cases."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

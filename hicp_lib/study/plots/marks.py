@@ -1,7 +1,5 @@
 """What charts of the study are put together from: panels, names of rows, whiskers, boxes, legends."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any

@@ -3,8 +3,6 @@
 Tables are those of `hicp_lib.evaluation.space.mocap_error`, with one lifting method.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 

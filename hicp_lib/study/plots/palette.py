@@ -1,7 +1,5 @@
 """Colours and markers: a fixed colour per detector, on every page."""
 
-from __future__ import annotations
-
 # Okabe and Ito's colour-blind-safe palette; a detector keeps its colour on every page.
 DETECTOR_COLOURS: dict[str, str] = {
     "mediapipe": "#0072B2",

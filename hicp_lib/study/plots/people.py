@@ -1,7 +1,5 @@
 """People drawn on images: keypoints and limbs, for one detector, for the truth, or side by side."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Figure of the registration: markers clicked, where each solution puts them, what each adds to errors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.patheffects import withStroke

@@ -1,7 +1,5 @@
 """Figures of the relative 3D test: what the robot saw, median skeletons, stability, accuracy, causes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ All in the robot's base frame (x backward, y to its right, z up), metres. Kept l
 one line or one cloud for Plotly, in single precision, so the page stays small.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Skeletons from tables as lines to draw."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One style for all figures, what a figure carries, and its numbers in words."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Tables are those of `hicp_lib.evaluation.space.stability.within_distance`, with one reference.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import pandas as pd
