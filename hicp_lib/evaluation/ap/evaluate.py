@@ -224,7 +224,7 @@ def _areas(people: Annotations, area: str) -> np.ndarray:
 def _source_area(people: Annotations, i: int) -> float:
     if people.is_crowd[i]:
         return float(people.areas_px2[i])
-    value = people.extras[i].get("source_area")
+    value: Any = people.extras[i].get("source_area")
     if type(value) not in (int, float):
         raise InputError(
             f"annotation {people.ids[i]}: has no 'source_area'; area 'source' is for HiCP folders"

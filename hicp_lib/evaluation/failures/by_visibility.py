@@ -8,7 +8,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.datasets.visibility import CLASSES, MIN_PEOPLE, people_classes
 from hicp_lib.evaluation.ap.metric_table import compare
 from hicp_lib.evaluation.cases import Found, Truth
-from hicp_lib.formats.annotations import Annotations
+from hicp_lib.formats.annotations import Annotations, ImageInfo
 
 
 def compare_classes(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
@@ -66,7 +66,8 @@ def pooled(truth: Truth, found: Found) -> tuple[Annotations, dict[str, dict[int,
         By detector and image id.
     """
     n, place = len(truth), {subset: k for k, subset in enumerate(truth)}
-    parts, images = [], {}
+    parts: list[Annotations] = []
+    images: dict[int, ImageInfo] = {}
     for k, people in enumerate(truth.values()):
         parts.append(replace(people, image_ids=people.image_ids * n + k))
         images |= {i * n + k: replace(image, id=i * n + k) for i, image in people.images.items()}

@@ -100,7 +100,7 @@ def _triples(rows: FileRows) -> tuple[np.ndarray, Counter[str], np.ndarray]:
 def _lists(rows: FileRows, key: str, by_length: dict[int, str]) -> dict[int, list]:
     """The rows that have this part. Only the body's key must be there."""
     names = ", ".join(f"{length} ({name})" for length, name in by_length.items())
-    needed = {} if key == _BODY else {"default": []}
+    needed: dict[str, list] = {} if key == _BODY else {"default": []}
     allowed = (0, *by_length)
     expected = f"x, y, c per part: {names}, or 0 numbers"
     values = rows.column(key, lambda v: isinstance(v, list) and len(v) in allowed, expected, **needed)
