@@ -20,9 +20,32 @@ settings.load_profile("hicp")
 OF_THE_BOOK = {"test_api_pages.py", "test_jupyterlab.py", "test_links.py", "test_notebooks.py"}
 
 
+# What takes long, as measured; a file, or one test of it.
+SLOW = (
+    "tests/core/test_cache.py::test_200_random_changes",
+    "tests/core/test_cache.py::test_all_that_python_loads",
+    "tests/datasets/test_subsets.py::test_no_head_keypoint_ever_stays",
+    "tests/detectors/mediapipe/test_tasks.py",
+    "tests/detectors/runtime/test_cluster.py",
+    "tests/detectors/runtime/test_isolation.py",
+    "tests/detectors/runtime/test_run.py",
+    "tests/report/test_book.py",
+    "tests/report/test_kills.py",
+    "tests/report/test_runs.py",
+    "tests/simulation/test_same_bytes.py",
+    "tests/simulation/world/test_scenes.py",
+    "tests/test_bare_machine.py",
+    "tests/test_benchmarks.py",
+    "tests/test_docstrings.py::test_what_is_pending_is_not_done",
+    "tests/tools/test_mutate.py",
+)
+
+
 def pytest_collection_modifyitems(items):
-    """What looks at the book takes the whole way: notebooks run, pages built."""
+    """Mark what takes long, and what looks at the book: notebooks run, pages built."""
     for item in items:
+        if item.nodeid.startswith(SLOW):
+            item.add_marker("slow")
         if "book" in getattr(item, "fixturenames", ()):
             item.add_marker("integration")
 
