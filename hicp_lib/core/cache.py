@@ -130,8 +130,7 @@ def code(
             continue
         path = _path(name, library)
         if path is not None:
-            state = path.stat()
-            modules[name] = _read(path, state.st_mtime_ns, state.st_size)
+            modules[name] = _read(path, *_state(path))
             waiting += [name.rpartition(".")[0], *modules[name].imports]
         elif name.startswith("hicp_lib."):
             waiting.append(name.rpartition(".")[0])  # something within a module
@@ -250,7 +249,7 @@ def _path(name: str, library: Path) -> Path | None:
 
 @cache
 def _read(path: Path, *state: int) -> _Module:
-    """A module's file; `state` differs when it was written anew."""
+    """A module's file, by its `_state`."""
     source = path.read_bytes()
     names = imports_of(source) | set(_NAMED.findall(source.decode()))
     data = frozenset(name or ALL_DATA for name in _DATA.findall(_IMPORT.sub("", source.decode())))
@@ -279,7 +278,18 @@ def _imported(statement: ast.Import | ast.ImportFrom) -> Iterator[str]:
 
 def _data_sha256(patterns: Iterable[str], data: Path) -> dict[str, str]:
     paths = {path for pattern in patterns for path in data.glob(pattern) if path.is_file()}
-    return {path.relative_to(data).as_posix(): sha256_file(path) for path in sorted(paths)}
+    return {path.relative_to(data).as_posix(): _file_sha256(path, *_state(path)) for path in sorted(paths)}
+
+
+def _state(path: Path) -> tuple[int, int]:
+    """What differs when a file was written anew."""
+    state = path.stat()
+    return state.st_mtime_ns, state.st_size
+
+
+@cache
+def _file_sha256(path: Path, *state: int) -> str:
+    return sha256_file(path)
 
 
 @cache
