@@ -28,6 +28,7 @@ import numpy as np
 from timing import Comparison, processor_s
 from timing import run as run_benchmark
 
+from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.images import read_image, write_png
 from hicp_lib.detectors import registry
 from hicp_lib.detectors.mediapipe import bundles, child
@@ -132,7 +133,7 @@ def measure(options) -> Iterator[Comparison]:
         (Path(folder) / "images").mkdir()
         paths = make_images(Path(folder) / "images", options.images)
         for name in NAMES[: options.detectors]:
-            for workers in sorted({1, min(options.workers or run.n_cores(), run.n_cores())}):
+            for workers in sorted({1, min(options.workers or usable_cores(), usable_cores())}):
                 yield from compare(name, paths, workers, options.repeats)
         for name, size_px in PROCESS_CASES[: options.processes]:
             yield compare_process(name, size_px, options.images)

@@ -20,9 +20,9 @@ import numpy as np
 from detectors import NAMES, make_images
 from timing import Comparison, run
 
+from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.registry import make_detector
-from hicp_lib.detectors.runtime.run import n_cores
 from hicp_lib.detectors.weights import default as default_weights
 
 FLOOR_SPEED_UP = 1.7  # of two cores
@@ -83,7 +83,7 @@ def compare(name: str, paths: list[str], n: int, repeats: int) -> Iterator[Compa
 
 
 def measure(options) -> Iterator[Comparison]:
-    n = n_cores()
+    n = usable_cores()
     if n == 1:
         raise InputError("this process may use one core only; two are needed to compare")
     with tempfile.TemporaryDirectory() as folder:

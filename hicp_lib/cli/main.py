@@ -135,6 +135,7 @@ def detect(
 
     What was found in an image is kept: after an interruption, the same command does only the rest.
     """
+    from hicp_lib.detectors.runtime.results import detections_of
     from hicp_lib.detectors.runtime.run import detect_dataset, detect_images
     from hicp_lib.formats.annotations import write_detections
 
@@ -146,8 +147,7 @@ def detect(
         found = detect_dataset(detector, dataset_dir, workers=workers, dask=dask, **given(**chosen))
     elif images_dir is not None:
         paths = _numbered_images(images_dir)
-        results = detect_images(detector, paths, workers, dask=dask, **given(**chosen))
-        found = {key: result.detections for key, result in results.items()}
+        found = detections_of(detect_images(detector, paths, workers, dask=dask, **given(**chosen)))
         # COCO's result layout has no place for names: beside it, the image of each id.
         names = [{"id": number, "file_name": path.name} for number, path in paths.items()]
         write_json(out.with_suffix(".images.json"), names, indent=1)

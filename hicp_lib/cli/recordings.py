@@ -90,6 +90,7 @@ def lift(folder: Path, detector: str, method: str, out: Path, workers: int | Non
     """Find people in a recording and where their keypoints are in the robot's base frame."""
     from hicp_lib.core.extras import require
     from hicp_lib.core.files import atomic_path
+    from hicp_lib.detectors.runtime.results import detections_of
     from hicp_lib.detectors.runtime.run import detect_images
     from hicp_lib.lifting.table import lift_recording, steps_of
     from hicp_lib.recordings.recording import open_recording
@@ -100,7 +101,7 @@ def lift(folder: Path, detector: str, method: str, out: Path, workers: int | Non
     recording = open_recording(folder)
     steps_of(method)  # a wrong name is told before anybody is looked for
     found = detect_images(detector, dict(enumerate(recording.rgb_paths)), workers, **given(**chosen))
-    table = lift_recording(recording, [found[k].detections for k in range(len(recording))], method)
+    table = lift_recording(recording, list(detections_of(found).values()), method)
     with atomic_path(out) as temporary:
         table.to_csv(temporary, index=False) if is_csv else table.to_parquet(temporary, index=False)
     n_lifted = table["x_m"].notna().sum()

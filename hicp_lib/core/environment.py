@@ -1,4 +1,4 @@
-"""Environment variables that something reads when it starts, and only then."""
+"""What a process is given by its surroundings: cores, and variables that something reads when it starts."""
 
 import os
 import threading
@@ -6,6 +6,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _lock = threading.RLock()
+
+
+def usable_cores() -> int:
+    """Cores that this process may use; at least 1."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager

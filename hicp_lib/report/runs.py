@@ -20,6 +20,7 @@ import nbformat
 import psutil
 
 from hicp_lib.core.cache import code, digest, input_sha256
+from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, sha256_file, write_json
 from hicp_lib.report.notebooks import is_path
@@ -78,7 +79,7 @@ def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None], only:
 def n_parallel() -> int:
     """Notebooks to run at a time: one per core this process may use, as far as there is memory for them."""
     fitting = psutil.virtual_memory().available // MEMORY_PER_RUN_BYTES
-    return max(1, min(provenance.usable_cores(), fitting))
+    return max(1, min(usable_cores(), fitting))
 
 
 class _SkippedError(Exception):

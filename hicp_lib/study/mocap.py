@@ -14,6 +14,7 @@ import pandas as pd
 from hicp_lib.core.cached_tables import cached
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
+from hicp_lib.detectors.runtime.results import detections_of
 from hicp_lib.detectors.runtime.run import detect_images
 from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_ablation
 from hicp_lib.evaluation.space.mocap_error import MIN_SCORES, TABLE_JOINTS, marker_means, mocap_errors
@@ -77,10 +78,7 @@ def detect_frames(recording: Recording, detectors: Sequence[str]) -> dict[str, l
         By detector, in the order of the frames.
     """
     paths = dict(enumerate(recording.rgb_paths))
-    return {
-        detector: [result.detections for result in detect_images(detector, paths).values()]
-        for detector in detectors
-    }
+    return {detector: list(detections_of(detect_images(detector, paths)).values()) for detector in detectors}
 
 
 def lift_frames(

@@ -20,6 +20,7 @@ from typing import Any
 from hicp_lib.core.cache import LIBRARY_DIR, digest, files_sha256
 from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.files import read_json, sha256_file
 from hicp_lib.detectors.weights.user import user_weights_sha256
 
@@ -88,11 +89,6 @@ def weights_sha256() -> dict[str, str]:
     """
     weights = read_json(DATA_DIR / "detectors.json")["weights"]
     return {name: row["sha256"] for name, row in weights.items()} | user_weights_sha256()
-
-
-def usable_cores() -> int:
-    """Cores that this process may use; at least 1."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def machine() -> dict[str, Any]:

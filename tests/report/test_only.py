@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 
 from hicp_lib.cli import main as cli
+from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.report import build, runs
 from hicp_lib.report.build import make_report
 from hicp_lib.report.run import Children, Folders, RunError
 from hicp_lib.report.runs import n_parallel
-from hicp_lib.study import provenance
 from tests.report.tiny_study import FINISH, START, pretend_to_execute, write_notebook
 
 
@@ -85,19 +87,19 @@ def test_as_many_at_a_time_as_cores_and_memory_allow(monkeypatch, cores, availab
     class Memory:
         available = int(available_gb * 1e9)
 
-    monkeypatch.setattr(provenance, "usable_cores", lambda: cores)
+    monkeypatch.setattr(runs, "usable_cores", lambda: cores)
     monkeypatch.setattr(runs.psutil, "virtual_memory", lambda: Memory)
     assert n_parallel() == expected
 
 
 def test_the_cores_that_count_are_those_this_process_may_use(monkeypatch):
-    monkeypatch.setattr(provenance.os, "sched_getaffinity", lambda pid: {3}, raising=False)
-    assert provenance.usable_cores() == 1
-    monkeypatch.delattr(provenance.os, "sched_getaffinity")
-    monkeypatch.setattr(provenance.os, "cpu_count", lambda: 6)
-    assert provenance.usable_cores() == 6
-    monkeypatch.setattr(provenance.os, "cpu_count", lambda: None)
-    assert provenance.usable_cores() == 1
+    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {3}, raising=False)
+    assert usable_cores() == 1
+    monkeypatch.delattr(os, "sched_getaffinity")
+    monkeypatch.setattr(os, "cpu_count", lambda: 6)
+    assert usable_cores() == 6
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert usable_cores() == 1
 
 
 def test_a_report_that_fails_says_so_for_one_notebook_too(study, lines, monkeypatch):

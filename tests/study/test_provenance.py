@@ -11,6 +11,7 @@ import pytest
 
 from hicp_lib.core.cache import input_sha256
 from hicp_lib.core.checkout import CHECKOUT
+from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.study import provenance
 
@@ -68,7 +69,7 @@ def test_an_input_folder_is_known_by_names_sizes_and_times(tmp_path):
 def test_the_stamp_tells_code_data_machine_and_libraries():
     stamp = provenance.provenance({"seed": 3})
     assert stamp["parameters"] == {"seed": 3}
-    assert stamp["machine"]["cores"] == provenance.usable_cores() >= 1
+    assert stamp["machine"]["cores"] == usable_cores() >= 1
     assert stamp["versions"]["python"] and stamp["versions"]["numpy"]
     assert not {"pip", "setuptools"} & set(stamp["versions"]), "only what can move a number"
     assert all(len(sha256) == 64 for sha256 in stamp["weights_sha256"].values())

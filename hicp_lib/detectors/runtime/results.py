@@ -8,10 +8,11 @@ never an answer: it is computed again.
 
 import hashlib
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import cache_dir, sha256_bytes, write_bytes
 from hicp_lib.core.keypoints import N_KEYPOINTS
 
+Key = TypeVar("Key", bound=Hashable)
 _N_COLUMNS = 3 * N_KEYPOINTS + 1
 
 
@@ -41,6 +43,11 @@ class Timed:
     detections: Detections
     time_ms: float
     workers: int
+
+
+def detections_of(results: Mapping[Key, Timed]) -> dict[Key, Detections]:
+    """Results without their times, by the same keys in the same order."""
+    return {key: result.detections for key, result in results.items()}
 
 
 def identity(detector: Detector) -> dict:

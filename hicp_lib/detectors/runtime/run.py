@@ -7,29 +7,28 @@ and threads need no start-up. Every thread has its own detector, and OpenCV is h
 thread in each, so the results do not depend on how many there are.
 """
 
-import os
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.core.detections import Detections
+from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.core.images import decode_image
 from hicp_lib.detectors.runtime.pool import DetectorPool, naming_image, single_threaded_opencv
 from hicp_lib.detectors.runtime.results import (
+    Key,
     Timed,
     cache_folder,
     cached,
+    detections_of,
     image_bytes,
     result_path,
 )
 from hicp_lib.formats.annotations import read_annotations
-
-Key = TypeVar("Key", bound=Hashable)
 
 
 def detect_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Detections]:
@@ -46,8 +45,7 @@ def detect_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, D
     -------
     dict of int to Detections
     """
-    results = time_dataset(name, dataset_dir, **options)
-    return {image_id: result.detections for image_id, result in results.items()}
+    return detections_of(time_dataset(name, dataset_dir, **options))
 
 
 def time_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Timed]:
@@ -114,7 +112,7 @@ def detect_images(
     InputError
         If an image cannot be read, or the detector cannot be made.
     """
-    workers = max(1, min(workers or n_cores(), len(paths) or 1))
+    workers = max(1, min(workers or usable_cores(), len(paths) or 1))
     pool = DetectorPool(name, options, workers)
     boxes_px = boxes_px if getattr(pool.first, "takes_boxes", False) else None
     jobs = {key: (Path(path), None if boxes_px is None else boxes_px[key]) for key, path in paths.items()}
@@ -146,8 +144,3 @@ def _detect_one(pool: DetectorPool, folder: Path, path: Path, boxes_px: np.ndarr
             result_path(folder, sha256, boxes_px),
             lambda: pool.detect(decode_image(content, path), boxes_px, sha256),
         )
-
-
-def n_cores() -> int:
-    """Cores this process may run on."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
