@@ -50,3 +50,28 @@ def test_the_steps_to_an_end_are_counted_from_the_beginning():
         of_steps = np.where(np.arange(-1, 2) == step, 0.0, 9.0)
         limb = Limbs(np.array([0]), np.array([1]), np.tile(of_steps, (1, 8, 1)))
         assert choose_along_limbs(costs, [limb]).tolist() == [4, place]
+
+
+def test_a_limb_may_reach_from_one_end_of_the_grid_to_the_other():
+    found, rays = np.array([INDEX["left_elbow"], INDEX["left_wrist"]]), np.tile([0.0, 0.0, 1.0], (2, 1))
+    (limbs,) = limbs_outwards(np.array([1.0, 1.1, 1.2]), rays, found, load_measures())
+    assert limbs.costs.shape == (1, 3, 5)
+    costs = np.array([[0.0, 1e3, 1e3], [1e3, 1e3, 0.0]])
+    assert choose_along_limbs(costs, [limbs]).tolist() == [0, 2]
+
+
+@pytest.mark.parametrize("widths", [(3, 7), (7, 3)])
+def test_limbs_of_any_reach_go_together(widths):
+    """A chain of three; the second limb may be as much longer or shorter as it likes."""
+    costs = np.full((3, 9), 50.0)
+    costs[0, 4] = costs[1, 5] = costs[2, 6] = 0.0
+    limbs = [Limbs(np.array([k]), np.array([k + 1]), np.zeros((1, 9, w))) for k, w in enumerate(widths)]
+    assert choose_along_limbs(costs, limbs).tolist() == [4, 5, 6]
+    limbs = []
+    for k, width in enumerate(widths):
+        one_back = np.where(np.arange(width) == width // 2 - 1, 0.0, 30.0)
+        limbs.append(Limbs(np.array([k]), np.array([k + 1]), np.tile(one_back, (1, 9, 1))))
+    flat = np.zeros((3, 9))
+    flat[0] = 100.0
+    flat[0, 8] = 0.0
+    assert choose_along_limbs(flat, limbs).tolist() == [8, 7, 6]
