@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hicp_lib.core.errors import InputError
+from hicp_lib.robot import home
 from hicp_lib.robot.home import HOME_M, home_posture
 
 BENT_DEG = [0, 0, 0, -25, 20, 0, 50, 0, 0, 0]
@@ -34,3 +35,18 @@ def test_of_all_postures_one_like_the_bent_elbow_is_chosen(icub):
 def test_a_post_out_of_reach_is_refused(icub):
     with pytest.raises(InputError, match=r"the left palm cannot be held at \[-1.0, 0.0, 0.0\] m"):
         home_posture(icub, "left", np.array([-1.0, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize(("beyond_m", "is_held"), [(0.9e-3, True), (1.1e-3, False)])
+def test_the_palm_is_held_to_a_millimetre(icub, monkeypatch, beyond_m, is_held):
+    far_m = np.array([-0.6, -0.2, 0.1])
+    with monkeypatch.context() as patched:
+        patched.setattr(home, "_REACHED_M", np.inf)
+        q = home_posture(icub, "left", far_m).angles("left")
+    nearest_m = icub.chains["left"].T_root_link("hand", q)[:3, 3]
+    post_m = nearest_m + beyond_m * (far_m - nearest_m) / np.linalg.norm(far_m - nearest_m)
+    if is_held:
+        home_posture(icub, "left", post_m)
+    else:
+        with pytest.raises(InputError, match="cannot be held"):
+            home_posture(icub, "left", post_m)
