@@ -165,3 +165,20 @@ def test_fingers_cost_their_best_shapes_and_lie_in_the_mean_of_the_likely_ones()
     depths_m = shapes_m[..., 2] + palms.z_m[0]
     np.testing.assert_allclose(mean_m[:, 0], weights @ depths_m / weights.sum(), atol=1e-4)
     np.testing.assert_allclose(square_m2[:, 0], weights @ depths_m**2 / weights.sum(), atol=1e-5)
+
+
+def test_every_finger_bends_by_itself():
+    palms = _place_palm(seen_hand(PALM), True)
+    alone = [_bend(seen_hand(finger), palms) for finger in FINGERS]
+    together = _bend(seen_hand(np.concatenate(FINGERS)), palms)
+    np.testing.assert_allclose(together[0], sum(cost for cost, _, _ in alone), rtol=1e-4)
+    np.testing.assert_allclose(together[1], np.concatenate([mean_m for _, mean_m, _ in alone]), atol=1e-6)
+
+
+@pytest.mark.parametrize(("n_of_palm", "tells"), [(3, False), (4, True)])
+def test_four_keypoints_of_the_palm_tell_how_it_is_turned(n_of_palm, tells):
+    which = np.sort(np.concatenate([PALM[-n_of_palm:], np.concatenate(FINGERS)]))
+    points_m = seen_from_the_thumb(True)[which]
+    costs = costs_of(points_m[:, 2])
+    more = with_hand_shapes(costs, GRID_M, points_m / points_m[:, 2:], RIGHT_HAND[which]) - costs
+    assert more.any() == tells
