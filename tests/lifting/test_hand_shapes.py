@@ -182,3 +182,11 @@ def test_four_keypoints_of_the_palm_tell_how_it_is_turned(n_of_palm, tells):
     costs = costs_of(points_m[:, 2])
     more = with_hand_shapes(costs, GRID_M, points_m / points_m[:, 2:], RIGHT_HAND[which]) - costs
     assert more.any() == tells
+
+
+@pytest.mark.parametrize(
+    ("along_m", "is_hidden"), [(-0.016, False), (-0.014, True), (0.054, True), (0.056, False)]
+)
+def test_a_limb_hides_no_further_than_its_ends_and_their_surroundings(along_m, is_hidden):
+    places_m = np.array([[0.0, 0.0, 1.0], [0.04, 0.0, 1.0], [along_m, 0.0, 1.02]])
+    assert hidden_by_limbs(places_m[:, :2], places_m[:, 2], np.array([5, 6, 20]))[2] == is_hidden

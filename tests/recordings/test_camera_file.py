@@ -4,8 +4,9 @@ import json
 
 import pytest
 
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
-from hicp_lib.recordings.camera_file import is_number, read_camera
+from hicp_lib.recordings.camera_file import is_number, read_camera, write_camera
 
 SOUND = {
     "width": 640, "height": 480, "depth_scale": 1000,
@@ -62,3 +63,10 @@ def test_images_have_at_most_a_hundred_thousand_pixels_a_side(tmp_path):
 
 def test_a_number_that_no_float_holds_is_none():
     assert not is_number(10**400) and is_number(10**300)
+
+
+def test_what_is_written_is_the_layout_others_read(tmp_path):
+    path = tmp_path / "camera.json"
+    write_camera(path, Camera(640, 480, 600.0, 610.0, 320.0, 240.0), 1000)
+    assert json.loads(path.read_text()) == SOUND
+    assert path.read_text().splitlines()[1] == ' "width": 640,'

@@ -255,3 +255,9 @@ def test_the_groups_score_is_the_mean_of_what_was_given_be_it_one_keypoint(annot
     scores[0, HANDS[0]], scores[1, HANDS] = 0.8, 0.6
     annotations = annotated([PERSON], [1], visibility=only_one)
     assert evaluate(annotations, {1: replace(found, scores=scores)}, "hand", score="group").AP == ONE
+
+
+def test_the_smallest_person_counts(annotated, detected):
+    annotations = annotated([PERSON], [1], areas_px2=0.5)
+    assert evaluate(annotations, {1: detected([PERSON])}).AP == ONE
+    assert evaluate(annotations, {1: detected([PERSON])}).n_people == 1
