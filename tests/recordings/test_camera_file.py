@@ -70,3 +70,7 @@ def test_what_is_written_is_the_layout_others_read(tmp_path):
     write_camera(path, Camera(640, 480, 600.0, 610.0, 320.0, 240.0), 1000)
     assert json.loads(path.read_text()) == SOUND
     assert path.read_text().splitlines()[1] == ' "width": 640,'
+
+
+def test_any_positive_focal_length_is_one(tmp_path):
+    assert read(tmp_path, intrinsic_matrix=[0.5, 0, 0, 0, 0.25, 0, 320, 240, 1])[0].fy_px == 0.25
