@@ -53,3 +53,21 @@ def test_the_best_of_an_image_counts_for_who_counts():
     found = {0: make_detections(np.stack([moved(0.4), moved(0.6)]))}
     assert dict(best_oks(people, found, COCO_17, BODY_SIGMAS)) == pytest.approx({0: 0.6})
     assert dict(best_oks(people, {}, COCO_17, BODY_SIGMAS)) == {0: 0.0}
+
+
+def test_occluded_keypoints_count_and_unlabelled_ones_do_not():
+    flags = np.full((1, 136), 1.0)
+    flags[0, COCO_17[3]] = 0
+    people = make_annotations(POINTS[:1], [0], visibility=flags, areas_px2=AREA_PX2)
+    found = make_detections(moved(0.6)[None])
+    assert pairwise_oks(people, found, COCO_17, BODY_SIGMAS)[0, 0] == pytest.approx(0.6)
+    assert dict(best_oks(people, {0: found}, COCO_17, BODY_SIGMAS)) == pytest.approx({0: 0.6})
+    assert matched_people(people, found, COCO_17, BODY_SIGMAS) == {0: 0}
+
+
+def test_people_without_a_labelled_keypoint_take_no_detection():
+    flags = np.full((2, 136), 2.0)
+    flags[0, COCO_17] = 0
+    people = make_annotations(POINTS[[0, 0]], [0, 0], visibility=flags, areas_px2=AREA_PX2)
+    found = make_detections(np.stack([moved(0.6), moved(0.5)]), [0.9, 0.8])
+    assert matched_people(people, found, COCO_17, BODY_SIGMAS) == {1: 0}

@@ -96,3 +96,15 @@ def test_what_cannot_be_exported(tmp_path, images, found):
     with pytest.raises(InputError, match="image 8: not among"):
         export_detections("fiftyone", {8: found[9]}, out, images)
     assert not out.exists()
+
+
+def test_a_person_of_the_fiftyone_data_set_is_as_large_as_what_was_given_of_them(tmp_path, images):
+    points, scores = np.full((1, N_KEYPOINTS, 2), np.nan), np.zeros((1, N_KEYPOINTS))
+    points[0, :3], scores[0, :3] = [[10, 20], [30, 25], [14, 60]], [0.5, 0.25, 1.0]
+    found = {7: Detections(points, scores, np.array([0.75]))}
+    export_detections("fiftyone", found, tmp_path / "d.json", images, "coco17")
+    (person,) = json.loads((tmp_path / "d.json").read_text())["annotations"]
+    assert person["bbox"] == [10, 20, 20, 40] and person["area"] == 800
+    assert person["keypoints"] == [10, 20, 2, 30, 25, 2, 14, 60, 2, *[0] * 42]
+    assert person["confidence"] == [0.5, 0.25, 1.0, *[0] * 14]
+    assert (person["id"], person["iscrowd"], person["num_keypoints"], person["score"]) == (1, 0, 3, 0.75)

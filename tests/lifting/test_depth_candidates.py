@@ -88,3 +88,50 @@ def test_beyond_the_image_and_in_holes_there_is_no_surface():
     assert np.isnan(found.depth_m).sum() == 49 - 16  # a quarter of the neighbourhood, its corner included
     depth_m[:] = 0
     assert np.isnan(around(WRIST, (30.0, 20.0), depth_m).depth_m).all()
+
+
+@pytest.mark.parametrize("n_surfaces", [1, 4])
+def test_costs_are_those_of_a_plain_loop_on_the_whole_grid(n_surfaces):
+    rng, grid_m = np.random.default_rng(3), np.arange(0.9, 1.2, 0.02)
+    seen_m, cost = rng.uniform(0.8, 1.3, (200, n_surfaces)), rng.uniform(0, 2, (200, n_surfaces))
+    found = depth_costs(candidates(seen_m, cost, sigma_m=0.012), grid_m)
+    for k in range(200):
+        unexplained = np.where(grid_m > seen_m[k].min(), 6.0, 20.0)
+        explained = ((grid_m - seen_m[k][:, None]) / 0.012) ** 2 + cost[k][:, None]
+        np.testing.assert_allclose(found[k], np.minimum(unexplained, explained.min(axis=0)), atol=1e-9)
+
+
+def test_one_dear_candidate_is_its_own_mean():
+    assert refine_depths(candidates([1.01], 2.0), np.array([1.0]), 0.001)[0] == pytest.approx(1.01)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_depth_step_costs_one(axis):
+    depth_m = np.full((48, 64), 1.0)
+    flat = around(WRIST, (30.0, 30.0), depth_m).cost
+    depth_m[(slice(None), slice(31, None)) if axis else slice(31, None)] += 0.05
+    dearer = around(WRIST, (30.0, 30.0), depth_m).cost - flat
+    assert np.unique(dearer.round(9)).tolist() == [0, 1]
+    # Lines 30 and 31 of 27 to 33 have pixels of both depths beside them.
+    is_dearer = (dearer > 0.5).reshape(7, 7)
+    assert is_dearer.any(axis=1 - axis).tolist() == [False] * 3 + [True] * 2 + [False] * 2
+
+
+def test_at_the_border_the_line_next_to_it_is_sampled():
+    rows_m, columns_m = np.meshgrid(1 + np.arange(48) / 1e3, 1 + np.arange(64) / 1e3, indexing="ij")
+    for depth_m, n, places in (
+        (rows_m, 48, ((30.0, 0.0), (30.0, 47.0))),
+        (columns_m, 64, ((0.0, 20.0), (63.0, 20.0))),
+    ):
+        first, last = (around(WRIST, place, depth_m).depth_m for place in places)
+        assert np.nanmin(first) == pytest.approx(1.001) and np.nanmax(last) == pytest.approx(
+            1 + (n - 2) / 1e3
+        )
+
+
+def test_two_pixels_are_looked_at_around_the_finest_keypoint():
+    depth_m = np.full((48, 64), 2.0)
+    depth_m[18:23, 28:33] = 1.0
+    assert np.unique(around(FINGER, (30.0, 20.0), depth_m).depth_m).tolist() == [1]
+    depth_m[18:23, 28] = 2.0
+    assert np.unique(around(FINGER, (30.0, 20.0), depth_m).depth_m).tolist() == [1, 2]

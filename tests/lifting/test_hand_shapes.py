@@ -8,6 +8,10 @@ from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND
 from hicp_lib.lifting.hand_shapes import (
     FINGERS,
     PALM,
+    _bend,
+    _place_palm,
+    _SeenHand,
+    _turns,
     fit_hand,
     hidden_by_limbs,
     load_hand_shapes,
@@ -83,3 +87,106 @@ def test_another_file_is_named(tmp_path):
     np.savez(path, other=np.zeros(3))
     with pytest.raises(InputError, match="shapes.npz: not shapes of hands"):
         load_hand_shapes(path)
+
+
+@pytest.mark.parametrize(
+    ("beside_m", "behind_m", "is_hidden"),
+    [(0.0149, 0.0101, True), (0.0151, 0.0101, False), (0.0149, 0.0099, False)],
+)
+def test_a_keypoint_is_hidden_close_behind_a_limb(beside_m, behind_m, is_hidden):
+    """Behind the middle of the index finger's first limb, which runs along x at a metre."""
+    places_m = np.array([[0.0, 0.0, 1.0], [0.04, 0.0, 1.0], [0.02, beside_m, 1.0 + behind_m]])
+    slopes = places_m[:, :2]  # as measured at the median depth
+    hidden = hidden_by_limbs(slopes, places_m[:, 2], np.array([5, 6, 20]))
+    assert hidden.tolist() == [False, False, is_hidden]
+
+
+def test_what_is_hidden_costs_by_how_far_it_is_from_the_hands_shape():
+    points_m = seen_from_the_thumb(True)
+    rays, costs = points_m / points_m[:, 2:], costs_of(points_m[:, 2])
+    mean_m, spread_m = fit_hand(costs, GRID_M, rays, np.arange(21), True)
+    hidden = hidden_by_limbs(rays[:, :2], mean_m, np.arange(21))
+    more = with_hand_shapes(costs, GRID_M, rays, RIGHT_HAND) - costs
+    square = (GRID_M - mean_m[:, None]) ** 2 / (0.010**2 + spread_m[:, None] ** 2)
+    np.testing.assert_allclose(more[hidden], np.minimum(square, 20)[hidden], atol=1e-9)
+    assert hidden.any() and not more[~hidden].any()
+
+
+@pytest.mark.parametrize("is_right", [True, False])
+def test_palms_are_tried_in_four_sizes_and_all_turns(is_right):
+    turns, prior, points_m = _turns(is_right)
+    determinants = np.linalg.det(turns.astype(float))
+    assert (np.sign(determinants) == (1 if is_right else -1)).all()
+    sizes = abs(determinants) ** (1 / 3)
+    np.testing.assert_allclose(sizes.reshape(4, 600), np.tile([[0.88], [0.96], [1.04], [1.12]], 600), 1e-5)
+    np.testing.assert_allclose(prior.reshape(4, 600)[:, 0], [0.72, 0.08, 0.08, 0.72], rtol=1e-5)
+    np.testing.assert_allclose(points_m[:, :, 7].T, load_hand_shapes()[0, PALM] @ turns[7].T, atol=1e-6)
+    rotations = turns[:600].astype(float) / 0.88
+    angles_deg = np.rad2deg(np.arccos((np.einsum("aij,bij->ab", rotations, rotations) - 1).clip(-2, 2) / 2))
+    nearest_deg = np.sort(angles_deg, axis=1)[:, 1]
+    assert 18 < nearest_deg.min() and nearest_deg.max() < 32  # about 25 everywhere: evenly spread
+
+
+def seen_hand(which: np.ndarray) -> _SeenHand:
+    """Keypoints of a right hand where they appear, at depths that cost nothing."""
+    points_m = seen_from_the_thumb(True)[which]
+    costs = np.zeros((len(which), len(GRID_M)))
+    known = 1.0, (points_m[:, :2] / points_m[:, 2:]).T, GRID_M - 1.0, costs
+    return _SeenHand(which, *(np.float32(array) for array in known))
+
+
+def misfits_m2(places_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
+    """Of points (..., 3) about a middle a metre away, once the mean shift is taken off."""
+    apart_m = places_m.T - points_m[..., :2] / (1 + points_m[..., 2:])
+    return ((apart_m - apart_m[..., :5, :].mean(axis=-2, keepdims=True)) ** 2).sum(axis=-1)
+
+
+def test_palms_cost_their_size_and_their_misfit():
+    seen = seen_hand(PALM)
+    palms = _place_palm(seen, True)
+    assert len(palms.cost) == 40
+    assert np.unique(palms.z_m.round(4)) == pytest.approx(np.arange(-15, 16) / 100)  # all as good
+    points_m = np.einsum("kj,pij->pki", load_hand_shapes()[0, PALM], palms.turns)
+    sizes = np.linalg.det(palms.turns.astype(float)) ** (1 / 3)
+    misfit = np.minimum(misfits_m2(seen.places_m, points_m) / 0.008**2, 9).sum(axis=1)
+    np.testing.assert_allclose(palms.cost, 0.5 * ((sizes - 1) / 0.1) ** 2 + misfit, rtol=2e-3, atol=1e-3)
+    np.testing.assert_allclose(palms.behind_m, points_m[..., 2].T + palms.z_m, atol=1e-6)
+
+
+def test_fingers_cost_their_best_shapes_and_lie_in_the_mean_of_the_likely_ones():
+    palms = _place_palm(seen_hand(PALM), True)
+    index_finger, seen = FINGERS[1], seen_hand(FINGERS[1])
+    cost, mean_m, square_m2 = _bend(seen, palms)
+    shapes_m = np.einsum("skj,ij->ski", load_hand_shapes()[:, index_finger], palms.turns[0])
+    apart_m = seen.places_m.T - shapes_m[..., :2] / (1 + shapes_m[..., 2:]) - palms.shift_m[:, 0]
+    of_shape = np.minimum((apart_m**2).sum(axis=2) / 0.010**2, 9).sum(axis=1)
+    assert cost[0] == pytest.approx(of_shape.min(), rel=1e-3, abs=1e-3)
+    weights = np.exp(-(of_shape - of_shape.min()) / 2)
+    depths_m = shapes_m[..., 2] + palms.z_m[0]
+    np.testing.assert_allclose(mean_m[:, 0], weights @ depths_m / weights.sum(), atol=1e-4)
+    np.testing.assert_allclose(square_m2[:, 0], weights @ depths_m**2 / weights.sum(), atol=1e-5)
+
+
+def test_every_finger_bends_by_itself():
+    palms = _place_palm(seen_hand(PALM), True)
+    alone = [_bend(seen_hand(finger), palms) for finger in FINGERS]
+    together = _bend(seen_hand(np.concatenate(FINGERS)), palms)
+    np.testing.assert_allclose(together[0], sum(cost for cost, _, _ in alone), rtol=1e-4)
+    np.testing.assert_allclose(together[1], np.concatenate([mean_m for _, mean_m, _ in alone]), atol=1e-6)
+
+
+@pytest.mark.parametrize(("n_of_palm", "tells"), [(3, False), (4, True)])
+def test_four_keypoints_of_the_palm_tell_how_it_is_turned(n_of_palm, tells):
+    which = np.sort(np.concatenate([PALM[-n_of_palm:], np.concatenate(FINGERS)]))
+    points_m = seen_from_the_thumb(True)[which]
+    costs = costs_of(points_m[:, 2])
+    more = with_hand_shapes(costs, GRID_M, points_m / points_m[:, 2:], RIGHT_HAND[which]) - costs
+    assert more.any() == tells
+
+
+@pytest.mark.parametrize(
+    ("along_m", "is_hidden"), [(-0.016, False), (-0.014, True), (0.054, True), (0.056, False)]
+)
+def test_a_limb_hides_no_further_than_its_ends_and_their_surroundings(along_m, is_hidden):
+    places_m = np.array([[0.0, 0.0, 1.0], [0.04, 0.0, 1.0], [along_m, 0.0, 1.02]])
+    assert hidden_by_limbs(places_m[:, :2], places_m[:, 2], np.array([5, 6, 20]))[2] == is_hidden

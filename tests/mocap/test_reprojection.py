@@ -89,3 +89,27 @@ def test_too_few_clicks_are_refused():
     _, recording, mocap, clicks, start = laboratory(0)
     with pytest.raises(InputError, match="5 clicked markers were measured"):
         register_by_reprojection(recording, clicks[:5], mocap, start, offset_s=7.0)
+
+
+def test_six_clicks_are_enough():
+    exact, recording, mocap, clicks, start = laboratory(0)
+    found = register_by_reprojection(recording, clicks[:6], mocap, start, offset_s=7.0)
+    assert found.n_points == 6 and displacement_m(found.T_base_mocap, exact, mocap) < 1e-5
+
+
+def test_clicks_count_less_from_two_pixels_on():
+    """The transform is where the sum of log(1 + (pixels / 2)^2) over all coordinates is least."""
+    _, recording, mocap, clicks, start = laboratory(3, noise_px=2.0)
+    found = register_by_reprojection(recording, clicks, mocap, start, offset_s=7.0).T_base_mocap
+    points_m = np.concatenate([mocap.points_m[10 * k] for k in range(N_IMAGES)])
+    T_cam_base = np.linalg.inv(recording.T_base_cam[clicks["frame"]])
+
+    def cost(step: np.ndarray) -> float:
+        T = T_cam_base @ found @ rigid(Rotation.from_rotvec(step[:3]), step[3:])
+        off_px = project(CAMERA, transform(T, points_m[:, None])[:, 0]) - clicks[["u_px", "v_px"]].to_numpy()
+        return np.log1p((off_px / 2) ** 2).sum()
+
+    steps = 1e-5 * np.eye(6)
+    slopes = np.array([(cost(step) - cost(-step)) / 2e-5 for step in steps])
+    curvatures = np.array([(cost(step) - 2 * cost(0 * step) + cost(-step)) / 1e-10 for step in steps])
+    assert abs(slopes / curvatures).max() < 2e-5  # radians, metres: how far the least is along each axis

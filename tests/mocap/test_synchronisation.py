@@ -7,7 +7,14 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.mocap.synchronisation import MAX_GAP_S, _speeds, clock_offset, interpolate_mocap
+from hicp_lib.mocap.synchronisation import (
+    MAX_GAP_S,
+    _best_lag,
+    _correlations,
+    _speeds,
+    clock_offset,
+    interpolate_mocap,
+)
 
 
 def test_between_samples_positions_lie_on_the_line():
@@ -133,3 +140,28 @@ def test_the_halves_are_sought_near_the_whole():
         later = np.where((times_s < 14)[:, None, None], shown, walk(times_s + shift_s))
         late_s = clock_offset(times_s, later, times_s, shown).halves_s[1]
         assert np.isnan(late_s) or abs(late_s) < 0.55
+
+
+@pytest.mark.parametrize(("later_s", "is_enough"), [(4.0, True), (6.0, False)])
+def test_half_of_what_one_clock_saw_is_enough_on_the_other(later_s, is_enough):
+    """Ten seconds each, of which six or four are the same."""
+    a_s, b_s = np.arange(0, 10, 0.01), later_s + np.arange(0, 10, 0.01)
+    offset_s = clock_offset(a_s, walk(a_s), b_s, walk(b_s)).offset_s
+    assert (abs(offset_s) < 0.01) == is_enough
+
+
+@pytest.mark.parametrize(("variance", "moves"), [(1.2e-6, True), (0.8e-6, False)])
+def test_what_hardly_moves_stands(variance, moves):
+    speeds = np.random.default_rng(0).normal(size=(400, 1))
+    speeds *= np.sqrt(variance / ((speeds - speeds.mean()) ** 2).sum())
+    assert np.isfinite(_correlations(speeds, speeds)).any() == moves
+
+
+def test_at_its_peak_a_parabola_through_three_lags_gives_the_offset():
+    rng = np.random.default_rng(1)
+    a = rng.normal(size=(600, 1))
+    values = _correlations(a, np.roll(a, -3, axis=0) + np.roll(a, -2, axis=0))
+    peak = int(np.nanargmax(values))
+    lag, top = _best_lag(a, np.roll(a, -3, axis=0) + np.roll(a, -2, axis=0))
+    curve = np.polynomial.Polynomial.fit([-1, 0, 1], values[peak - 1 : peak + 2], 2)
+    assert lag == pytest.approx(peak - 599 + curve.deriv().roots().item()) and top == values[peak]

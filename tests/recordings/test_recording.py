@@ -18,7 +18,7 @@ from hicp_lib.recordings.recording import (
     read_simulation,
     read_truth,
 )
-from hicp_lib.recordings.writer import RecordingWriter
+from hicp_lib.recordings.writer import RecordingWriter, depth_name, rgb_name, write_rgb
 from tests.recordings.conftest import SMALL, write_small
 
 
@@ -140,3 +140,15 @@ def test_a_table_without_a_column_is_told(small):
 def test_tables_end_with_the_frames(small):
     pd.DataFrame({"frame": [0, 3, 4], "t_s": [0.0, 0.3, 0.4]}).to_parquet(small / "joints.parquet")
     assert read_joints(open_recording(small))["frame"].tolist() == [0, 3]
+
+
+def test_colour_is_stored_as_jpeg_of_quality_95(tmp_path):
+    rgb = np.random.default_rng(0).integers(0, 255, (24, 32, 3), dtype=np.uint8)
+    write_rgb(tmp_path / "0.jpg", rgb)
+    _, expected = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 95])
+    assert (tmp_path / "0.jpg").read_bytes() == expected.tobytes()
+
+
+def test_frames_are_numbered_from_nothing_with_six_digits(small):
+    assert (rgb_name(7), depth_name(1_234_567)) == ("rgb/000007.jpg", "depth/1234567.png")
+    assert sorted(path.name for path in (small / "rgb").iterdir()) == [f"{k:06d}.jpg" for k in range(4)]

@@ -196,6 +196,11 @@ def test_the_controller_has_these_numbers():
     assert np.rad2deg([ours.fastest_rad_s, ours.retreat_rad_s]) == pytest.approx([30, 50])
     assert (published.gain, published.onset, published.neutral) == (0.5, 0.2, 0.0)
     assert (ours.gain, ours.onset, ours.neutral) == (10.0, 0.1, 0.2)
+    assert (
+        (ours.post_weight, ours.smooth_weight) == (published.post_weight, published.smooth_weight) == (10, 1)
+    )
+    assert (published.rest_weight, published.rest_s) == (0.01, 0.3)
+    assert (ours.rest_weight, ours.rest_s, ours.approach_s, ours.approach_m_s) == (0.1, 1.0, 0.3, 0.3)
 
 
 def test_velocities_are_the_least_squares_of_their_costs(icub, home):
@@ -219,3 +224,13 @@ def test_the_hand_comes_no_faster_than_it_may(icub, home):
     controller = Controller(icub, post, home.angles("left"), settings=far)
     velocity = icub.chains["left"].jacobian("hand", home.angles("left")) @ controller.velocities(home, [])
     assert np.linalg.norm(velocity) == pytest.approx(0.05, rel=0.02)
+
+
+@pytest.mark.parametrize(("share", "slowed"), [(0.25, -2.5), (0.4, -1.0), (0.6, 1.0), (0.75, 2.5)])
+def test_over_the_guard_the_bound_rises_as_a_hyperbolic_tangent(share, slowed):
+    """Ten times the share of the guard beyond its middle is the tangent's argument."""
+    q = np.array([-1 + share * 0.025 * 2, 2 - share * 0.025 * 2])  # which is 50 mrad wide
+    low, high = guarded_bounds(q, LIMITS, 0.5, 0.025, 1e-6)
+    expected = 0.25 * (1 + np.tanh(slowed))
+    assert (-low[0], high[1]) == pytest.approx((expected, expected))
+    assert (high[0], -low[1]) == pytest.approx((0.5, 0.5))

@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hicp_lib.robot.peripersonal_space import ReceptiveField, gains, obstacles, response
+from hicp_lib.robot.peripersonal_space import (
+    BIN_M,
+    HISTOGRAM_START_M,
+    NEGATIVES,
+    POSITIVES,
+    ReceptiveField,
+    gains,
+    obstacles,
+    response,
+)
 from hicp_lib.robot.skin import read_skin
 
 TABLE = {
@@ -121,3 +130,34 @@ def test_only_taxels_above_the_threshold_make_an_obstacle():
     (obstacle,) = obstacles(skin, activations)
     np.testing.assert_allclose(obstacle.point_m, skin.positions_m[skin.slices["torso"].start])
     assert [one.part for one in obstacles(skin, activations, threshold=0.1)] == ["torso"]
+
+
+def test_the_histogram_is_the_published_one_of_reach_45_cm():
+    """robotology/peripersonal-space: 20 bins of 2.5 cm from -5 to 45 cm, with 100 negatives each."""
+    edges_m = -0.05 + 0.025 * np.arange(20)
+    touches = {
+        -0.05: 480, -0.025: 555, 0.0: 480, 0.025: 160, 0.05: 80, 0.075: 60, 0.1: 50, 0.125: 40, 0.15: 35,
+        0.175: 25, 0.2: 15, 0.225: 10, 0.25: 6, 0.275: 3, 0.3: 1,
+    }  # fmt: skip
+    expected = [touches.get(edge_m, 0) for edge_m in edges_m.round(3).tolist()]
+    assert expected == POSITIVES.tolist() and NEGATIVES.tolist() == [100] * 20
+    assert (BIN_M, HISTOGRAM_START_M) == (0.025, -0.05)
+
+
+def test_every_keypoint_is_a_ball_of_three_and_a_half_centimetres():
+    up = np.array([[0.0, 0, 1]])
+    found = ReceptiveField().activations(np.zeros((1, 3)), up, up * 0.135, np.ones(1))
+    np.testing.assert_allclose(found, response(0.1), atol=1e-3)
+
+
+def test_responses_are_looked_up_in_tenths_of_a_millimetre():
+    field, up = ReceptiveField(), np.array([[0.0, 0, 1]])
+    heights_m = field.point_radius_m + np.linspace(0.10, 0.11, 1001)
+    found = [field.activations(np.zeros((1, 3)), up, up * height, np.ones(1))[0] for height in heights_m]
+    assert 99 <= len(np.unique(found)) <= 102
+    np.testing.assert_allclose(found, response(heights_m - field.point_radius_m), atol=2e-4)
+
+
+def test_the_reach_ends_where_a_thousandth_is_left():
+    reach_m = ReceptiveField().reach_m - 0.035
+    assert response(reach_m + 1e-4) <= 1e-3 < response(reach_m - 1e-6)

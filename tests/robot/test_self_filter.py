@@ -2,7 +2,9 @@
 
 import numpy as np
 
-from hicp_lib.robot.segments import body_segments
+from hicp_lib.robot import self_filter
+from hicp_lib.robot.posture import Posture
+from hicp_lib.robot.segments import Segment, body_segments
 from hicp_lib.robot.self_filter import MARGIN_M, filter_self, self_distance_m
 
 
@@ -37,3 +39,26 @@ def test_beyond_its_end_a_limb_is_round(icub, home):
     along = (hand.end_m - hand.start_m) / np.linalg.norm(hand.end_m - hand.start_m)
     tip = hand.end_m + np.array([[0.1], [0.2]]) * along
     np.testing.assert_allclose(self_distance_m(icub, home, tip), [0.1 - 0.025, 0.2 - 0.025], atol=1e-9)
+
+
+def test_limbs_run_between_the_origins_of_links(icub, home):
+    """Ends worked out for arms that hang down: the shoulder 17.5 cm, the wrist 11.4 cm below the root."""
+    radii_m = {s.part: s.radius_m for s in body_segments(icub, home)}
+    assert radii_m == {
+        "torso": 0.07, "shoulders": 0.05, "neck": 0.03, "head": 0.06,
+        "left_upper_arm": 0.035, "left_forearm": 0.03, "left_hand": 0.025,
+        "right_upper_arm": 0.035, "right_forearm": 0.03, "right_hand": 0.025,
+    }  # fmt: skip
+    hanging = {s.part: s for s in body_segments(icub, Posture())}
+    np.testing.assert_allclose(hanging["shoulders"].start_m, (-0.010817, -0.110116, 0.1753), atol=1e-6)
+    np.testing.assert_allclose(hanging["shoulders"].end_m, (-0.010817, 0.110116, 0.1753), atol=1e-6)
+    np.testing.assert_allclose(hanging["left_forearm"].end_m, (-0.010817, -0.110116, -0.11428), atol=1e-6)
+    np.testing.assert_allclose(hanging["right_hand"].end_m, (-0.010817, 0.094116, -0.17678), atol=1e-6)
+    assert not hanging["torso"].start_m.any()
+
+
+def test_a_limb_without_length_is_a_ball(icub, home, monkeypatch):
+    ball = Segment("head", np.zeros(3), np.zeros(3), 0.06)
+    monkeypatch.setattr(self_filter, "body_segments", lambda icub, posture: [ball])
+    gaps_m = self_distance_m(icub, home, np.array([[0.1, 0, 0], [0, -0.03, 0]]))
+    np.testing.assert_allclose(gaps_m, [0.04, -0.03])

@@ -167,3 +167,21 @@ def test_scores_that_are_no_numbers_count_for_nothing():
     for score in (np.nan, np.inf, -np.inf):
         now_s = see(tracker, 2 * [person(score=score)])
         assert weight(tracker, now_s) == 0
+
+
+def test_by_default_sightings_hold_two_tenths_of_a_second_and_fade_in_as_much():
+    """To 1/e in 0.19 s: a tenth less in every period of 20 ms."""
+    tracker = KeypointTracker()
+    now_s = see(tracker, [person(), person()])
+    assert weight(tracker, now_s + 0.199) == 1 > weight(tracker, now_s + 0.201)
+    assert weight(tracker, now_s + 0.39) == pytest.approx(np.exp(-1))
+
+
+def test_before_the_first_frame_there_is_nobody():
+    assert KeypointTracker().points(0.0)[0].shape == (0, 136, 3)
+
+
+def test_twice_as_many_people_are_remembered_as_are_followed():
+    tracker = KeypointTracker(Trust(max_people=1))
+    see(tracker, [person((0, 0, 1.0 + distance)) for distance in range(5)])
+    assert sorted(tracker._memory["seen_m"][:, WRIST, 2]) == [3, 4, 5]  # two, and the newest

@@ -244,3 +244,20 @@ def test_other_shapes_unknown_images_groups_and_options_are_refused(annotated, d
         evaluate(annotations, {1: good}, "foot")
     with pytest.raises(InputError, match="option area='bbox': expected one of segment, box"):
         evaluate(annotations, {1: good}, area="bbox")
+
+
+def test_the_groups_score_is_the_mean_of_what_was_given_be_it_one_keypoint(annotated, detected):
+    only_one = np.where(np.arange(136) == HANDS[0], 2.0, 0.0)[None]
+    points = np.array([PERSON, AWAY])
+    points[0, HANDS[1:]] = np.nan
+    found = detected(points)
+    scores = found.scores.copy()
+    scores[0, HANDS[0]], scores[1, HANDS] = 0.8, 0.6
+    annotations = annotated([PERSON], [1], visibility=only_one)
+    assert evaluate(annotations, {1: replace(found, scores=scores)}, "hand", score="group").AP == ONE
+
+
+def test_the_smallest_person_counts(annotated, detected):
+    annotations = annotated([PERSON], [1], areas_px2=0.5)
+    assert evaluate(annotations, {1: detected([PERSON])}).AP == ONE
+    assert evaluate(annotations, {1: detected([PERSON])}).n_people == 1

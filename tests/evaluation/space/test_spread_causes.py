@@ -1,5 +1,7 @@
 """Causes of spread, on a wall that a robot looks at with errors that are known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -160,3 +162,37 @@ def test_real_recordings_have_no_causes(recording, tmp_path):
     real = open_recording(tmp_path / "real")
     assert is_simulated(recording) and not is_simulated(real)
     assert spread_causes({"own": real}, {("own", "mediapipe"): [Detections.none()]}, pd.DataFrame()).empty
+
+
+def test_spread_is_the_median_and_the_ninth_decile_of_distances_to_the_median():
+    """Two draws, the second spread twice as far; what does not count lies anywhere."""
+    along_m = np.array([-0.04, -0.01, 0.0, 0.02, 0.1, 7.0])
+    positions_m = np.zeros((2, 6, 1, 3))
+    positions_m[:, :, 0, 0] = along_m, 2 * along_m
+    counts = np.arange(6)[:, None] < 5
+    true_m = np.full((6, 1, 3), (0.0, 0.3, 0.0))
+    spread_m, p90_m, bias_m = module._spread(positions_m, true_m, counts)
+    assert spread_m == pytest.approx((0.02 + 0.04) / 2)
+    assert p90_m == pytest.approx((0.076 + 0.152) / 2)  # six tenths of the way from 4 to 10 cm
+    assert bias_m == pytest.approx(0.3)
+
+
+def test_joints_are_half_a_degree_off_in_twenty_draws(recording):
+    by_default, said = wrong_poses(recording), wrong_poses(recording, np.deg2rad(0.5), 20, 0)
+    for cause in (JOINT_OFFSET, JOINT_NOISE):
+        np.testing.assert_array_equal(by_default[cause], said[cause])
+    of_frames = by_default[JOINT_OFFSET][:, :2] @ np.linalg.inv(recording.T_base_cam[:2])
+    assert np.ptp(of_frames, axis=0).max() > 0.01  # one error for all frames of a draw, another per draw
+
+
+@pytest.mark.parametrize(("off_m", "is_same"), [(0.9e-3, True), (1.1e-3, False)])
+def test_poses_agree_to_a_millimetre(recording, off_m, is_same):
+    icub, angles_rad = load_icub(), np.zeros((2, 6))
+    T_base_cam = icub.T_root_camera(angles_rad, "tilted")
+    T_base_cam[1, 2, 3] += off_m
+    other = replace(recording, T_base_cam=T_base_cam)
+    if is_same:
+        assert module._mount(icub, angles_rad, other) == "tilted"
+    else:
+        with pytest.raises(InputError, match="do not give the camera poses"):
+            module._mount(icub, angles_rad, other)

@@ -79,3 +79,13 @@ def test_eight_frames_are_the_fewest_and_a_quarter_of_them_the_longest():
 
 def test_ten_blocks_are_drawn_again_and_nine_are_not():
     assert len(draw_blocks(100, 10, 5, 0)) == 6 and len(draw_blocks(90, 10, 5, 0)) == 1
+
+
+def test_a_single_pair_of_neighbours_counts_in_full():
+    errors = np.full((40, 1), np.nan)
+    errors[[0, 1, 4, 6], 0] = 2, 2, 0, 0
+    assert block_length(errors) == 10  # the longest: as alike as neighbours can be
+
+
+def test_of_few_frames_every_one_is_a_block():
+    assert [block_length(np.arange(n)[:, None] * 1.0) for n in (1, 3, 7)] == [1, 1, 1]

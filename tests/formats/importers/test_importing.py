@@ -20,7 +20,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.evaluation.ap.evaluate import check_detections
 from hicp_lib.formats.annotations import read_detections, write_detections
-from hicp_lib.formats.importers.importing import import_predictions
+from hicp_lib.formats.importers.importing import Summary, import_predictions
 from tests.formats.importers.native_people import NAMES, annotated, make_person
 
 IDS = {name: i for i, name in NAMES.items()}
@@ -263,3 +263,9 @@ def test_mmpose_without_boxes_ranks_by_keypoints(tmp_path, images):
     del rows[0]["bbox"], rows[0]["bbox_score"]
     path.write_text(json.dumps(rows))
     assert import_predictions("mmpose", tmp_path, images).detections[785].person_scores.tolist() == [0.5]
+
+
+@pytest.mark.parametrize(("names", "told"), [("abc", "'a', 'b', 'c'"), ("abcd", "'a', 'b', 'c', ...")])
+def test_of_images_that_are_not_annotated_three_are_named(names, told):
+    summary = Summary("coco", 1, 0, 0, 1, tuple(names), 0, {}, (0.0, 0.0, 0.0), 1.0, 0, 0, 0)
+    assert summary.lines()[-1] == f"not annotated and left out: {len(names)} images ({told})"

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
+from hicp_lib.detectors.registry import COMBINED
 from hicp_lib.study.claims import verdicts as v
 from hicp_lib.study.claims.statements import Claim, Comparison, Selection, read_claims
 
@@ -326,3 +327,63 @@ def test_the_least_and_the_greatest_row_are_picked_and_scaled(write):
     for pick, expected in (("least", (-400, -500, -300)), ("greatest", (200, 100, 300))):
         (found,) = v.select(Selection("02", "loss", {}, "change", {}, pick, "low", "high", 1000.0), results)
         assert (found.value, found.low, found.high) == pytest.approx(expected)
+
+
+SOUND = {"id": "a", "section": "IV", "text": "t", "statement": "s", "reason": "no robot"}
+SELECTED = {"table": "02/loss", "where": {}, "value": "change"}
+
+
+def read(tmp_path, content) -> list[Claim]:
+    path = tmp_path / "claims.json"
+    path.write_text(json.dumps(content))
+    return read_claims(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({"claims": []}, "expected a list of claims, each an object"),
+        ([SOUND, 3], "expected a list of claims, each an object"),
+        ([SOUND, SOUND], "claim a is there twice; give each its own id"),
+        ([SOUND, {"section": "IV"}], "claim number 1: "),
+    ],
+)
+def test_what_is_no_list_of_claims_is_refused(tmp_path, content, message):
+    with pytest.raises(InputError, match=message):
+        read(tmp_path, content)
+
+
+def test_a_selection_takes_each_row_and_names_its_detector_unless_told_otherwise(tmp_path):
+    tests = [{"relation": ">", "left": SELECTED, "right": 1}]
+    tests.append(
+        {"relation": "within", "left": SELECTED | {"pick": "least"}, "right": 2.5, "tolerance": 0.01}
+    )
+    (found,) = read(tmp_path, [SOUND | {"tests": tests}])
+    first, second = found.tests
+    assert first == Comparison(">", Selection("02", "loss", {}, "change", pick="each", scale=1.0), 1.0)
+    assert first.left.name == ("detector",) and (first.margin, first.tolerance) == (0.0, 0.0)
+    assert (second.left.pick, second.right, second.tolerance) == ("least", 2.5, 0.01)
+    wrong = [SOUND | {"tests": [{"relation": ">", "left": SELECTED | {"pick": "best"}, "right": 1}]}]
+    with pytest.raises(InputError, match="claim a: pick 'best' is unknown"):
+        read(tmp_path, wrong)
+
+
+def test_only_whole_tables_of_numbers_are_selected_from(write):
+    """A row whose number is missing or infinite is left out, and nothing else."""
+    results = write(rows(a=(-0.4, -0.5, -0.3), b=(float("inf"), 0.1, 0.3), c=(0.0, 0.0, 0.0)))
+    found = v.select(Selection("02", "loss", {}, "change", name=("detector",)), results)
+    assert [quantity.name for quantity in found] == ["a", "c"]
+    assert [(quantity.low, quantity.high) for quantity in found] == [(-0.4, -0.4), (0.0, 0.0)]
+
+
+def test_labels_are_shown_for_reading():
+    assert [v._plain(label) for label in (160.0, 0.25, "left_wrist", 3)] == ["160", "0.25", "left wrist", "3"]
+
+
+def test_a_combination_is_run_with_its_body_detector(write):
+    combined = Selection("02", "loss", {"detector": "mediapipe+openpose-mobilenet"}, "change")
+    found = verdict(claim(Comparison(">", combined, LOSS)), write(rows(a=(-0.4, -0.5, -0.3))))
+    assert found.reason == "mediapipe+openpose-mobilenet was not run"
+    other = Selection("02", "loss", {"detector": f"{COMBINED}openpose-mobilenet"}, "change")
+    found = verdict(claim(Comparison(">", other, LOSS)), write(rows(a=(-0.4, -0.5, -0.3))))
+    assert found.command == "hicp report -p detectors mediapipe,openpose-mobilenet -p body openpose-mobilenet"

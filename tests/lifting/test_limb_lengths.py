@@ -1,0 +1,77 @@
+"""What lengths of limbs cost, and the choice between near and far ends."""
+
+import numpy as np
+import pytest
+
+from hicp_lib.core.keypoints import INDEX
+from hicp_lib.lifting.body_measures import load_measures
+from hicp_lib.lifting.limb_lengths import Limbs, choose_along_limbs, limbs_outwards
+
+STEP_M = 0.002
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "share", "more_m", "most_short"),
+    [
+        ("left_elbow", "left_wrist", 0.05, 0.010, 4.0),
+        ("left_index_2", "left_index_3", 0.03, 0.003, 20.0),
+        ("left_wrist", "left_hand_root", 0.03, 0.003, 20.0),  # a limb is of what it ends in
+    ],
+)
+def test_lengths_cost_the_square_beyond_what_people_have(begin, end, share, more_m, most_short):
+    found, measures = np.array([INDEX[begin], INDEX[end]]), load_measures()
+    grid_m, rays = np.arange(1.0, 2.2, STEP_M), np.tile([0.0, 0.0, 1.0], (2, 1))  # one behind the other
+    (limbs,) = limbs_outwards(grid_m, rays, found, measures)
+    assert (limbs.begin.tolist(), limbs.end.tolist()) == ([0], [1])
+    least_m, most_m = measures.closest_m[*found], measures.farthest_m[*found]
+    sigma_m = share * most_m + more_m
+    reach = limbs.costs.shape[2] // 2
+    assert reach * STEP_M == pytest.approx(most_m + np.sqrt(40) * sigma_m, abs=STEP_M)
+    length_m = STEP_M * abs(np.arange(-reach, reach + 1))
+    short = np.minimum((np.maximum(least_m - length_m, 0) / sigma_m) ** 2, most_short)
+    long = np.minimum((np.maximum(length_m - most_m, 0) / sigma_m) ** 2, 40)
+    np.testing.assert_allclose(limbs.costs[0, len(grid_m) // 2], short + long, rtol=5e-3, atol=5e-3)
+
+
+@pytest.mark.parametrize(("near_cost", "chosen"), [(39.9, 5), (40.1, 0)])
+def test_an_end_out_of_reach_costs_forty(near_cost, chosen):
+    costs = np.full((2, 8), 1000.0)
+    costs[0, 5] = 0.0
+    costs[1, [0, 5]] = 0.0, near_cost
+    limb = Limbs(np.array([0]), np.array([1]), np.zeros((1, 8, 3)))
+    assert choose_along_limbs(costs, [limb]).tolist() == [5, chosen]
+
+
+def test_the_steps_to_an_end_are_counted_from_the_beginning():
+    costs = np.full((2, 8), 100.0)
+    costs[0, 4] = 0.0
+    costs[1] = 0.0
+    for step, place in ((-1, 3), (0, 4), (1, 5)):
+        of_steps = np.where(np.arange(-1, 2) == step, 0.0, 9.0)
+        limb = Limbs(np.array([0]), np.array([1]), np.tile(of_steps, (1, 8, 1)))
+        assert choose_along_limbs(costs, [limb]).tolist() == [4, place]
+
+
+def test_a_limb_may_reach_from_one_end_of_the_grid_to_the_other():
+    found, rays = np.array([INDEX["left_elbow"], INDEX["left_wrist"]]), np.tile([0.0, 0.0, 1.0], (2, 1))
+    (limbs,) = limbs_outwards(np.array([1.0, 1.1, 1.2]), rays, found, load_measures())
+    assert limbs.costs.shape == (1, 3, 5)
+    costs = np.array([[0.0, 1e3, 1e3], [1e3, 1e3, 0.0]])
+    assert choose_along_limbs(costs, [limbs]).tolist() == [0, 2]
+
+
+@pytest.mark.parametrize("widths", [(3, 7), (7, 3)])
+def test_limbs_of_any_reach_go_together(widths):
+    """A chain of three; the second limb may be as much longer or shorter as it likes."""
+    costs = np.full((3, 9), 30.0)  # less than an end out of reach
+    costs[0, 4] = costs[1, 5] = costs[2, 6] = 0.0
+    limbs = [Limbs(np.array([k]), np.array([k + 1]), np.zeros((1, 9, w))) for k, w in enumerate(widths)]
+    assert choose_along_limbs(costs, limbs).tolist() == [4, 5, 6]
+    limbs = []
+    for k, width in enumerate(widths):
+        one_back = np.where(np.arange(width) == width // 2 - 1, 0.0, 30.0)
+        limbs.append(Limbs(np.array([k]), np.array([k + 1]), np.tile(one_back, (1, 9, 1))))
+    flat = np.zeros((3, 9))
+    flat[0] = 100.0
+    flat[0, 8] = 0.0
+    assert choose_along_limbs(flat, limbs).tolist() == [8, 7, 6]
