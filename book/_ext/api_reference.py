@@ -20,6 +20,7 @@ import hicp_lib
 
 FOLDER = "api"
 _STYLE = Config(napoleon_use_param=False, napoleon_use_rtype=False, napoleon_use_ivar=True)
+_SEVERAL = re.compile(r"^(\w+(?:, \w+)+) : (.*\n?)", re.MULTILINE)
 _SECTION = re.compile(r"^(Parameters|Returns|Yields)\n-+$", re.MULTILINE)
 
 
@@ -111,7 +112,10 @@ def _class_signature(node: ast.ClassDef) -> str:
 
 
 def _docstring(node: ast.Module | ast.ClassDef | ast.FunctionDef, kind: str) -> str:
-    return f"{NumpyDocstring(ast.get_docstring(node) or '', _STYLE, what=kind)}\n"
+    text = ast.get_docstring(node) or ""
+    if isinstance(node, ast.ClassDef):  # where each attribute has a field of its own
+        text = _SEVERAL.sub(lambda found: "".join(f"{n} : {found[2]}" for n in found[1].split(", ")), text)
+    return f"{NumpyDocstring(text, _STYLE, what=kind)}\n"
 
 
 def _heading(text: str, line: str) -> str:

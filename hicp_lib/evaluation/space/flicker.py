@@ -35,6 +35,7 @@ MAJORITY_OF = 3
 MIN_CUTOFF_HZ, BETA = 1.5, 0.02  # of the One Euro filter; beta in Hz per px/s
 MAX_GAP_S = 0.5  # over which frames still count as consecutive
 _ANY_RATE_HZ = 1.0  # the filter takes the true one from the stamps
+_ALMOST_0_S = np.finfo(float).tiny  # the filter takes a stamp of 0 for none
 _BLOCK_S = 1.0  # stretches of time that are drawn together in the bootstrap
 
 
@@ -74,7 +75,8 @@ def _filtered_keypoint(track_px: np.ndarray, times_s: np.ndarray) -> np.ndarray:
         if given[i]:
             if time_s - seen_s > MAX_GAP_S:
                 axes = [OneEuroFilter(_ANY_RATE_HZ, MIN_CUTOFF_HZ, BETA) for _ in range(2)]
-            place = np.array([axis(float(x), time_s) for axis, x in zip(axes, track_px[i], strict=True)])
+            stamp_s = time_s or _ALMOST_0_S
+            place = np.array([axis(float(x), stamp_s) for axis, x in zip(axes, track_px[i], strict=True)])
             seen_s = time_s
         recent = given[max(0, i + 1 - MAJORITY_OF) : i + 1]
         if 2 * recent.sum() > len(recent):

@@ -153,14 +153,15 @@ def test_intervals_are_over_stretches_of_a_second():
     assert np.isnan([few["low"], few["high"]]).all()  # nine stretches
 
 
-def test_the_filter_is_a_one_euro_filter_of_one_and_a_half_hertz():
+@pytest.mark.parametrize("start_s", [0.0, 1.0])
+def test_the_filter_is_a_one_euro_filter_of_one_and_a_half_hertz(start_s):
     """Casiez, Roussel and Vogel (2012): the cutoff is 1.5 Hz and 0.02 Hz more for every pixel per second."""
 
     def smoothing(cutoff_hz: float) -> float:
         return 1 / (1 + 1 / (2 * np.pi * cutoff_hz * 0.1))
 
     tracks = np.array([[0.0, 0.0], [100.0, -10.0]])[:, None]
-    filtered = causal_filter(tracks, np.array([1.0, 1.1]))[1, 0]
+    filtered = causal_filter(tracks, start_s + np.array([0.0, 0.1]))[1, 0]
     speeds_px_s = smoothing(1.0) * np.array([1000.0, 100.0])  # the speed itself is smoothed at 1 Hz
     expected = [smoothing(1.5 + 0.02 * speed) * x for speed, x in zip(speeds_px_s, (100, -10), strict=True)]
     np.testing.assert_allclose(filtered, expected, rtol=1e-6)
