@@ -22,6 +22,7 @@ from hicp_lib.cli.opencv_files import WANTED, overwritten
 from hicp_lib.cli.probes import EXIT_ABSENT, EXIT_FAILED, probes
 from hicp_lib.cli.system_libraries import LIBRARIES, missing_packages
 from hicp_lib.core.checkout import working_folder
+from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import cache_dir
 from hicp_lib.study import provenance
@@ -148,7 +149,7 @@ def _installed(name: str) -> str:
 
 def check_probes() -> list[Check]:
     """That detectors, renderer and controller run: as many trials at a time as there are processors."""
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
+    with ThreadPoolExecutor(usable_cores()) as threads:
         return list(threads.map(check_probe, probes()))
 
 

@@ -30,7 +30,6 @@ _DISTRIBUTIONS = {
     "PIL": ("pillow",),
     "cv2": ("opencv-python-headless", "opencv-python", "opencv-contrib-python"),
     "google": ("protobuf",),
-    "jupyter_book": ("jupyter-book",),
     "open3d": ("open3d-cpu", "open3d"),
     "pinocchio": ("pin",),
 }
@@ -116,6 +115,11 @@ def code(
         Modules that are left out, with what only they import.
     library, data : Path, optional
         Folders of the library's code and of its data, where they are not those that are running.
+
+    Raises
+    ------
+    InputError
+        If data that the code names are not there.
 
     Examples
     --------
@@ -277,7 +281,14 @@ def _imported(statement: ast.Import | ast.ImportFrom) -> Iterator[str]:
 
 
 def _data_sha256(patterns: Iterable[str], data: Path) -> dict[str, str]:
-    paths = {path for pattern in patterns for path in data.glob(pattern) if path.is_file()}
+    paths: set[Path] = set()
+    for pattern in patterns:
+        found = [path for path in data.glob(pattern) if path.is_file()]
+        if not found:
+            raise InputError(
+                f"{data / pattern}: is not there, and a result follows from it; install hicp anew"
+            )
+        paths.update(found)
     return {path.relative_to(data).as_posix(): _file_sha256(path, *_state(path)) for path in sorted(paths)}
 
 

@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from hicp_lib.core.cache import key
-from hicp_lib.core.files import cache_dir, sha256_bytes, write_bytes
+from hicp_lib.core.files import cache_dir, read_checked, write_checked
 
 
 def cached(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> pd.DataFrame:
@@ -48,19 +48,12 @@ def cached(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> 
     if table is None:
         made = pa.BufferOutputStream()
         pq.write_table(pa.Table.from_pandas(make(*arguments, **named)), made)
-        payload = made.getvalue().to_pybytes()
-        write_bytes(path, sha256_bytes(payload).encode() + payload)
+        write_checked(path, made.getvalue().to_pybytes())
         table = _read(path)
     return table
 
 
 def _read(path: Path) -> pd.DataFrame | None:
-    """The table of a file that is a SHA-256 and the Parquet it is of; None if it is absent or damaged."""
-    try:
-        content = path.read_bytes()
-    except OSError:
-        return None
-    stated, payload = content[:64], content[64:]
-    if sha256_bytes(payload).encode() != stated:
-        return None
-    return pq.read_table(pa.BufferReader(payload)).to_pandas()
+    """The table of a file of Parquet; None if it is absent or damaged."""
+    payload = read_checked(path)
+    return None if payload is None else pq.read_table(pa.BufferReader(payload)).to_pandas()

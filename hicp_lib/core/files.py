@@ -43,6 +43,30 @@ def write_bytes(path: str | Path, content: bytes) -> None:
         temporary.write_bytes(content)
 
 
+def write_checked(path: str | Path, payload: bytes) -> None:
+    """Write `payload` after its SHA-256, so that `read_checked` knows it again; whole or not at all."""
+    write_bytes(path, hashlib.sha256(payload).digest() + payload)
+
+
+def read_checked(path: str | Path) -> bytes | None:
+    """What `write_checked` wrote; None if there is none or it is damaged.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_checked(Path(folder, "a"), b"kept")
+    ...     read_checked(Path(folder, "a")), read_checked(Path(folder, "b"))
+    (b'kept', None)
+    """
+    try:
+        content = Path(path).read_bytes()
+    except OSError:
+        return None
+    stated, payload = content[:32], content[32:]
+    return payload if hashlib.sha256(payload).digest() == stated else None
+
+
 def write_json(path: str | Path, value: Any, *, indent: int | None = None) -> None:
     """Write strict JSON, whole or not at all.
 

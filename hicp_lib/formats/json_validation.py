@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -241,6 +242,30 @@ def _is_finite(value: Any) -> bool:
 def _keypoint_namer(convention: str) -> Callable[[int], str]:
     indices = TO_HALPE[convention]
     return lambda j: f"keypoints[{j}] ({NAMES[indices[j // 3]]} {'xyv'[j % 3]})"
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether something read from outside is a finite number; truth values are none.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    bool
+
+    Examples
+    --------
+    >>> [is_number(value) for value in (3, 0.5, True, float("nan"), "3")]
+    [True, True, False, False, False]
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number beyond what a float holds
+        return False
 
 
 def shown(value: Any) -> str:

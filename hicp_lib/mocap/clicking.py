@@ -20,7 +20,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
 from hicp_lib.core.files import write_bytes
 from hicp_lib.core.images import inside
-from hicp_lib.recordings.camera_file import is_number
+from hicp_lib.formats.json_validation import is_number
 from hicp_lib.recordings.recording import Recording, read_rgb
 
 with needs("report"):

@@ -1,16 +1,13 @@
 """camera.json: the intrinsics of a recording's camera, and the scale of its depth images."""
 
-import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeGuard
-
-import numpy as np
+from typing import Any
 
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
-from hicp_lib.formats.json_validation import shown
+from hicp_lib.formats.json_validation import is_number, shown
 
 MAX_SIDE_PX = 100_000
 _LAYOUT = "fx, 0, 0, 0, fy, 0, cx, cy, 1"
@@ -83,30 +80,6 @@ def write_camera(path: str | Path, intrinsics: Camera, depth_units_per_m: float)
         "depth_scale": float(depth_units_per_m),
     }
     write_json(path, content, indent=1)
-
-
-def is_number(value: object) -> TypeGuard[float]:
-    """Whether something read from outside is a finite number; truth values are none.
-
-    Parameters
-    ----------
-    value : object
-
-    Returns
-    -------
-    bool
-
-    Examples
-    --------
-    >>> [is_number(value) for value in (3, 0.5, True, float("nan"), "3")]
-    [True, True, False, False, False]
-    """
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # a whole number beyond what a float holds
-        return False
 
 
 def _is_side(value: object) -> bool:

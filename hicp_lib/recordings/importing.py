@@ -17,7 +17,8 @@ from hicp_lib.core.environment import with_variables
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
 from hicp_lib.core.files import atomic_path, read_json
-from hicp_lib.recordings.camera_file import is_number, read_camera
+from hicp_lib.formats.json_validation import is_number
+from hicp_lib.recordings.camera_file import read_camera
 from hicp_lib.recordings.recording import check_columns
 from hicp_lib.recordings.tum import read_poses
 from hicp_lib.recordings.writer import (

@@ -19,7 +19,7 @@ from typing import Any
 import nbformat
 import psutil
 
-from hicp_lib.core.cache import code, digest, input_sha256
+from hicp_lib.core.cache import Code, code, digest, input_sha256
 from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, sha256_file, write_json
@@ -120,7 +120,7 @@ def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
     InputError
         If a parameter names a file or folder that does not exist.
     """
-    made_by = code([*run.notebook.imports, "hicp_lib.report.execute"])
+    made_by = _made_by(run)
     inputs = {name: input_sha256(path) for name, path in _input_paths(run).items()}
     return {
         "notebook": run.notebook.source_sha256,
@@ -133,6 +133,10 @@ def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
         "input files": digest(inputs),
         "earlier notebooks": digest(before or []),
     }
+
+
+def _made_by(run: Run) -> Code:
+    return code([*run.notebook.imports, "hicp_lib.report.execute"])
 
 
 def _input_paths(run: Run) -> dict[str, Path]:
@@ -206,7 +210,7 @@ def run_notebook(run: Run, key: dict[str, Any], folders: Folders, children: Chil
         try:
             status = children.execute(run, copy, staging, folders)
             _check(run, status, copy, staging)
-            if run_key(run)["library"] != key["library"]:
+            if digest(_made_by(run).modules) != key["library"]:
                 raise RunError("hicp_lib was changed while it ran; run the report again")
         except RunError as error:
             raise RunError(f"{name}: {error}{_keep_failed(copy, staging, folders)}") from None

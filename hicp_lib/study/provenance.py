@@ -1,7 +1,7 @@
 """What a result was made with: code, data, environment, machine.
 
-The same hashes decide whether a result is still fresh (`hicp_lib.report.runs`) and are
-printed below it (`hicp_lib.study.page`), so the two can never disagree.
+Printed below a page (`hicp_lib.study.page`): the library and the data as a whole. Whether the page is still
+fresh (`hicp_lib.report.runs`) follows from the part of them that it uses.
 """
 
 import functools

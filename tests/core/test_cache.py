@@ -18,6 +18,7 @@ from hicp_lib.core import cache
 from hicp_lib.core.cache import LIBRARY_DIR, code, imports_of, key
 from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.errors import InputError
 from hicp_lib.report.notebooks import read_notebooks
 from hicp_lib.report.run import Run
 from hicp_lib.report.runs import run_key
@@ -83,6 +84,12 @@ def test_one_byte_of_the_code_or_the_data_changes_the_key_and_none_outside_does(
     assert found() == before
 
 
+def test_data_that_are_named_and_not_there_are_told(copy):
+    (copy / "data" / "icub.json").unlink()
+    with pytest.raises(InputError, match=r"icub\.json: is not there, and a result follows from it"):
+        code(["hicp_lib.robot.tables"], library=copy / "hicp_lib", data=copy / "data")
+
+
 def test_another_detector_makes_nobody_look_again():
     of_mediapipe = code(["hicp_lib.detectors.mediapipe.tasks"]).modules
     of_mmpose = code(["hicp_lib.detectors.onnx.mmpose"]).modules
@@ -109,6 +116,8 @@ def test_whoever_imports_by_name_names_the_whole_module():
             if isinstance(node, ast.JoinedStr):
                 parts = [part.value for part in node.values if isinstance(part, ast.Constant)]
                 assert not any(part.startswith("hicp_lib.") and "`" not in part for part in parts), path
+            if isinstance(node, ast.ImportFrom):
+                assert node.level == 0, path  # a relative import does not say what it imports
             if isinstance(node, ast.Name):
                 assert node.id != "__import__", path
 

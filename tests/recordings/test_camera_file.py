@@ -6,7 +6,8 @@ import pytest
 
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
-from hicp_lib.recordings.camera_file import is_number, read_camera, write_camera
+from hicp_lib.formats.json_validation import is_number
+from hicp_lib.recordings.camera_file import read_camera, write_camera
 
 SOUND = {
     "width": 640, "height": 480, "depth_scale": 1000,

@@ -1,12 +1,10 @@
 """Detections kept on disk, one small file per image, found again only if nothing changed.
 
-The key is the SHA-256 of everything a result depends on: the image file's bytes, the
-detector's name and settings (with its weights' hashes), the versions of the libraries that
-decode and compute, and the source of this package's detectors. A stale or damaged file is
-never an answer: it is computed again.
+The key is the SHA-256 of everything a result depends on: the image file's bytes, the detector's name and
+settings (with its weights' hashes), and what the code of the detector and of its parts imports
+(`hicp_lib.core.cache`). A stale or damaged file is never an answer: it is computed again.
 """
 
-import hashlib
 import io
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
@@ -19,7 +17,7 @@ import numpy as np
 from hicp_lib.core.cache import code, digest
 from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import cache_dir, sha256_bytes, write_bytes
+from hicp_lib.core.files import cache_dir, read_checked, sha256_bytes, write_checked
 from hicp_lib.core.keypoints import N_KEYPOINTS
 
 Key = TypeVar("Key", bound=Hashable)
@@ -140,12 +138,8 @@ def cached(path: Path | None, make: Callable[[], Timed]) -> Timed:
 
 def read_result(path: Path) -> Timed | None:
     """The result kept at `path`; None if there is none or it is damaged."""
-    try:
-        content = path.read_bytes()
-    except OSError:
-        return None
-    digest, payload = content[:32], content[32:]
-    if hashlib.sha256(payload).digest() != digest:
+    payload = read_checked(path)
+    if payload is None:
         return None
     timing, *people = np.load(io.BytesIO(payload), allow_pickle=False)
     rows = np.array(people).reshape(-1, _N_COLUMNS)
@@ -157,8 +151,8 @@ def read_result(path: Path) -> Timed | None:
 def write_result(path: Path, result: Timed) -> None:
     """Keep a result at `path`; another process may do the same at the same time.
 
-    The file is a SHA-256 digest and the `.npy` array it is of: a row with the timing, then one
-    row per person with positions, scores and person score.
+    The file is checked (`hicp_lib.core.files.write_checked`) and holds a `.npy` array: a row with the timing,
+    then one row per person with positions, scores and person score.
     """
     found = result.detections
     rows = np.zeros((len(found) + 1, _N_COLUMNS))
@@ -168,4 +162,4 @@ def write_result(path: Path, result: Timed) -> None:
     rows[1:, -1] = found.person_scores
     payload = io.BytesIO()
     np.save(payload, rows)
-    write_bytes(path, hashlib.sha256(payload.getvalue()).digest() + payload.getvalue())
+    write_checked(path, payload.getvalue())

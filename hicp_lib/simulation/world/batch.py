@@ -2,7 +2,6 @@
 
 import multiprocessing
 import multiprocessing.pool
-import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import TypeVar
 
 import cv2
 
-from hicp_lib.core.environment import with_variables
+from hicp_lib.core.environment import usable_cores, with_variables
 from hicp_lib.core.errors import InputError
 
 Result = TypeVar("Result")
@@ -39,7 +38,7 @@ def run_jobs(jobs: Sequence[Callable[[], Result]], workers: int | None = None) -
     jobs : sequence of callable
         Functions of modules, or partials of them, so that processes can be given them.
     workers : int, optional
-        Processes; as many as there are processors when left out.
+        Processes; one for each core that this process may use when left out.
 
     Yields
     ------
@@ -52,7 +51,7 @@ def run_jobs(jobs: Sequence[Callable[[], Result]], workers: int | None = None) -
     >>> list(run_jobs([partial(max, 1, 2), partial(max, 4, 3)], workers=1))
     [2, 4]
     """
-    n_workers = min(workers or os.cpu_count() or 1, len(jobs))
+    n_workers = min(workers or usable_cores(), len(jobs))
     if n_workers < 2:
         yield from map(_call, jobs)
         return
