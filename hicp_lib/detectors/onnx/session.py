@@ -18,6 +18,7 @@ from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.protobuf import Messages, message_class
+from hicp_lib.detectors.weights.default import find, load
 from hicp_lib.detectors.weights.published import check_use
 
 # ONNX Runtime would tell its vendor of every model that is opened, and keep an identifier for that in the
@@ -211,6 +212,24 @@ def open_content(content: bytes, path: Path, provider: str = "cpu", threads: int
         if model is None:
             model = _open[key] = OnnxModel(path, content, provider, threads)
         return model
+
+
+def open_committed(name: str, provider: str = "cpu", threads: int = 1) -> OnnxModel:
+    """As `open_model`, one of the networks that come with the library.
+
+    Parameters
+    ----------
+    name : str
+        File in `data/weights`.
+    provider : str
+    threads : int
+
+    Examples
+    --------
+    >>> open_committed("movenet-lightning.onnx").inputs[0].shape
+    (1, 3, 192, 192)
+    """
+    return open_content(load(name), find(name).path, provider, threads)
 
 
 def available_providers() -> dict[str, str]:

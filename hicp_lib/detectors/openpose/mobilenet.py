@@ -11,15 +11,12 @@ from dataclasses import asdict
 import cv2
 import numpy as np
 
-from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.letterbox import Letterbox
-from hicp_lib.detectors.onnx.session import open_content
+from hicp_lib.detectors.onnx.session import open_committed
 from hicp_lib.detectors.openpose.paf import PafOptions, PartModel, assemble
-from hicp_lib.detectors.weights.default import load
 
-WEIGHTS = DATA_DIR / "weights/openpose-mobilenet.onnx"
 STRIDE = 8
 
 _COCO_18_LIMBS = {
@@ -108,7 +105,7 @@ class OpenPoseMobileNet:
 
     def __init__(self, net_height_px: int = 368, provider: str = "cpu", threads: int = 1) -> None:
         check_height(net_height_px)
-        self._model = open_content(load(WEIGHTS.name), WEIGHTS, provider, threads)
+        self._model = open_committed(f"{self.name}.onnx", provider, threads)
         self._height_px, self._options = net_height_px, PafOptions()
         self.settings = {"net_height_px": net_height_px, **asdict(self._options)}
         self.settings |= {"model": self._model.settings, "opencv": cv2.__version__}

@@ -88,7 +88,9 @@ def test_its_maps_are_those_of_the_reference_implementation(photograph):
     """On a small part of the photograph: the reference is slow."""
     detector = mobilenet.OpenPoseMobileNet(net_height_px=96)
     net_input = mobilenet.fit(photograph, 96)
-    model = ReferenceEvaluator(onnx.load_from_string(default.load(mobilenet.WEIGHTS.name)))
+    model = ReferenceEvaluator(
+        onnx.load_from_string(default.load(f"{mobilenet.OpenPoseMobileNet.name}.onnx"))
+    )
     blob = cv2.dnn.blobFromImage(net_input.pixels, swapRB=True)
     expected = model.run(None, {model.input_names[0]: blob})[0][0]
     assert expected.max() > 0.5
@@ -97,9 +99,9 @@ def test_its_maps_are_those_of_the_reference_implementation(photograph):
 
 @pytest.mark.parametrize("position", [0, 1000, -1])
 def test_a_damaged_weight_is_refused(tmp_path, monkeypatch, position):
-    path = tmp_path / "weights" / mobilenet.WEIGHTS.name
+    path = tmp_path / "weights" / f"{mobilenet.OpenPoseMobileNet.name}.onnx"
     path.parent.mkdir()
-    content = bytearray(default.load(mobilenet.WEIGHTS.name))
+    content = bytearray(default.load(f"{mobilenet.OpenPoseMobileNet.name}.onnx"))
     content[position] ^= 1
     path.write_bytes(content)
     shutil.copy(default.REGISTRY_PATH, tmp_path / "detectors.json")

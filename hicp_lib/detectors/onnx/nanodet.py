@@ -1,0 +1,81 @@
+"""The person finder that comes with the library: NanoDet-g, trained on COCO, of which only people are kept.
+
+(R. Lyu, github.com/RangiLyu/nanodet.) The image is fitted into the middle of the input, in BGR, normalised.
+Each cell of three grids gives the scores of 80 kinds of things and, for each side of the box, how likely it is
+0, 1, ... or 10 strides away (Li et al., "Generalized focal loss", NeurIPS 2020). `tools/bake_tfjs.py` made its
+file.
+"""
+
+import cv2
+import numpy as np
+
+from hicp_lib.detectors.onnx.affine import Regions
+from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.letterbox import planes
+from hicp_lib.detectors.onnx.session import open_committed
+
+FILE = "nanodet.onnx"
+_MEAN, _STD = (103.53, 116.28, 123.675), (57.375, 57.12, 58.395)
+_STRIDES_PX = (8, 16, 32)
+_PERSON, _N_BINS = 0, 11
+
+
+class NanoDet:
+    """A person finder that needs no file of the user's.
+
+    Parameters
+    ----------
+    min_score : float
+    max_overlap : float
+        Of two boxes that overlap more (intersection over union), the surer is kept.
+    provider : str
+    threads : int
+        See `hicp_lib.detectors.onnx.session.open_model`.
+    """
+
+    def __init__(
+        self, min_score: float = 0.3, max_overlap: float = 0.6, provider: str = "cpu", threads: int = 1
+    ) -> None:
+        self._model = open_committed(FILE, provider, threads)
+        self._side_px = self._model.inputs[0].shape[-1] or 0
+        self._min_score, self._max_overlap = min_score, max_overlap
+        self.settings = {"min_score": min_score, "max_overlap": max_overlap} | self._model.settings
+
+    def find(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """People in an RGB image (height, width, 3): boxes (n, 4: x, y, width, height) and scores (n,)."""
+        size_px = self._side_px, self._side_px
+        whole = Regions.around([[0, 0, image.shape[1], image.shape[0]]], size_px, padding=1.0)
+        feed = np.empty((1, 3, *size_px), np.float32)
+        planes(whole.crop(image, size_px)[0][..., ::-1], _MEAN, _STD, out=feed[0])
+        corners_px, scores = self._read(self._model.run(feed))
+        ends_px = whole.to_image_px(corners_px.reshape(1, -1, 2), size_px)[0].reshape(-1, 2, 2)
+        ends_px = ends_px.clip(0, image.shape[1::-1])
+        boxes_px = np.concatenate([ends_px[:, 0], ends_px[:, 1] - ends_px[:, 0]], axis=1)
+        kept = cv2.dnn.NMSBoxes(boxes_px.tolist(), scores.tolist(), self._min_score, self._max_overlap)
+        rows = [row for row in np.asarray(kept, int).reshape(-1).tolist() if (boxes_px[row, 2:] > 0).all()]
+        return boxes_px[rows], scores[rows]
+
+    def describe(self) -> list[Fact]:
+        """What it is, and what it keeps."""
+        return [
+            Fact("person detector", "NanoDet-g", "comes with the library; option person_model takes another"),
+            Fact(
+                "person score", f">= {self._min_score}", f"overlaps above {self._max_overlap} are suppressed"
+            ),
+        ]
+
+    def _read(self, outputs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (n, 2, 2: left-top, right-bottom; x, y) and scores (n,), in input pixels."""
+        by_name = dict(zip((port.name for port in self._model.outputs), outputs, strict=True))
+        corners, scores = [], []
+        for stride_px in _STRIDES_PX:
+            of_people = by_name[f"scores_{stride_px}"][0, :, _PERSON]
+            cells = np.flatnonzero(of_people >= self._min_score)
+            bins = by_name[f"sides_{stride_px}"][0][cells].astype(float).reshape(-1, 4, _N_BINS)
+            likely = np.exp(bins - bins.max(axis=-1, keepdims=True))
+            sides_px = stride_px * (likely @ np.arange(_N_BINS)) / likely.sum(axis=-1)
+            columns = self._side_px // stride_px
+            middle_px = (np.stack([cells % columns, cells // columns], axis=1) + 0.5) * stride_px
+            corners.append(np.stack([middle_px - sides_px[:, :2], middle_px + sides_px[:, 2:]], axis=1))
+            scores.append(of_people[cells].astype(float))
+        return np.concatenate(corners), np.concatenate(scores)

@@ -1,0 +1,126 @@
+"""People from PoseNet's maps: roots first, then along the tree of the body (Papandreou et al., ECCV 2018).
+
+The network gives, on a grid of cells, a heat map of each keypoint, the offset from a cell to the keypoint near
+it, and along each edge of the tree the displacement from a parent to its child and back. The highest cell that
+no person has yet is the root of the next one, whose other keypoints are walked to.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+# Parent and child, indices of COCO's 17, in the order of the displacements' channels.
+EDGES = (
+    (0, 1), (1, 3), (0, 2), (2, 4), (0, 5), (5, 7), (7, 9), (5, 11), (11, 13), (13, 15),
+    (0, 6), (6, 8), (8, 10), (6, 12), (12, 14), (14, 16),
+)  # fmt: skip
+_N_PARTS, _N_REFINEMENTS = 17, 2
+
+
+@dataclass(frozen=True)
+class DecodingRule:
+    """Thresholds of the decoding, as published with the network.
+
+    Attributes
+    ----------
+    max_people : int
+    min_root_score : float
+        Of the cell a person begins at.
+    same_part_px : float
+        A keypoint this near to one of an earlier person's of its kind is that person's, in input pixels.
+    """
+
+    max_people: int = 5
+    min_root_score: float = 0.5
+    same_part_px: float = 20.0
+
+
+@dataclass(frozen=True)
+class Maps:
+    """What the network says of each cell, (h, w) cells that are `stride_px` apart.
+
+    Attributes
+    ----------
+    heat : array, shape (17, h, w)
+        Scores in [0, 1].
+    offsets_px : array, shape (17, h, w, 2)
+        x, y from the cell to the keypoint.
+    to_child_px, to_parent_px : array, shape (16, h, w, 2)
+        x, y along each of `EDGES`.
+    stride_px : int
+    """
+
+    heat: np.ndarray
+    offsets_px: np.ndarray
+    to_child_px: np.ndarray
+    to_parent_px: np.ndarray
+    stride_px: int
+
+    def cell(self, position_px: np.ndarray) -> tuple[int, int]:
+        """Row and column of the cell nearest to a position (2: x, y)."""
+        x, y = np.floor(position_px / self.stride_px + 0.5)
+        height, width = self.heat.shape[1:]
+        return int(min(max(y, 0), height - 1)), int(min(max(x, 0), width - 1))
+
+    def keypoint(self, part: int, cell: tuple[int, int]) -> np.ndarray:
+        """Position (2: x, y) of a keypoint near a cell."""
+        return np.array(cell[::-1]) * self.stride_px + self.offsets_px[part][cell]
+
+
+def decode(maps: Maps, rule: DecodingRule) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """People of the maps, in falling order of their roots' scores.
+
+    Parameters
+    ----------
+    maps : Maps
+    rule : DecodingRule
+
+    Returns
+    -------
+    positions_px : array, shape (n, 17, 2)
+        In input pixels.
+    scores : array, shape (n, 17)
+    person_scores : array, shape (n,)
+        Sum of the scores of keypoints that no earlier person has, over 17.
+    """
+    people: list[np.ndarray] = []
+    person_scores: list[float] = []
+    for part, *cell in _roots(maps.heat, rule.min_root_score).tolist():
+        if len(people) == rule.max_people:
+            break
+        if _is_taken(people, part, maps.keypoint(part, (cell[0], cell[1])), rule):
+            continue
+        person = _walk(maps, part, (cell[0], cell[1]))
+        is_new = [not _is_taken(people, k, person[k, :2], rule) for k in range(_N_PARTS)]
+        person_scores.append(person[is_new, 2].sum() / _N_PARTS)
+        people.append(person)
+    rows = np.array(people).reshape(-1, _N_PARTS, 3)
+    return rows[..., :2], rows[..., 2], np.array(person_scores)
+
+
+def _roots(heat: np.ndarray, least: float) -> np.ndarray:
+    """Part, row and column (n, 3) of cells that none of their eight neighbours exceeds, highest first."""
+    window = np.ones((3, 3), np.uint8)
+    highest = np.stack([cv2.dilate(one, window, borderType=cv2.BORDER_REPLICATE) for one in heat])
+    rows = np.argwhere((heat >= least) & (heat >= highest))
+    return rows[np.argsort(-heat[tuple(rows.T)], kind="stable")]
+
+
+def _is_taken(people: list[np.ndarray], part: int, position_px: np.ndarray, rule: DecodingRule) -> bool:
+    return any(((person[part, :2] - position_px) ** 2).sum() <= rule.same_part_px**2 for person in people)
+
+
+def _walk(maps: Maps, root: int, cell: tuple[int, int]) -> np.ndarray:
+    """x, y, score (17, 3) of the person with this root: up the tree from it, then down to all others."""
+    person = np.full((_N_PARTS, 3), np.nan)
+    person[root] = *maps.keypoint(root, cell), maps.heat[root][cell]
+    up = [(edge, child, parent, maps.to_parent_px) for edge, (parent, child) in enumerate(EDGES)]
+    down = [(edge, parent, child, maps.to_child_px) for edge, (parent, child) in enumerate(EDGES)]
+    for edge, source, target, steps_px in [*up[::-1], *down]:
+        if np.isfinite(person[source, 2]) and np.isnan(person[target, 2]):
+            at = person[source, :2] + steps_px[edge][maps.cell(person[source, :2])]
+            for _ in range(_N_REFINEMENTS):
+                at = maps.keypoint(target, maps.cell(at))
+            person[target] = *at, maps.heat[target][maps.cell(at)]
+    return person
