@@ -37,7 +37,8 @@ from hicp_lib.detectors.runtime import isolation as native
 from hicp_lib.detectors.runtime import run
 from hicp_lib.detectors.weights import default as default_weights
 
-NAMES = ("mediapipe-pose", "mediapipe-hands", "openpose-mobilenet")
+SQUARE_NETS = ("movenet-thunder", "movenet-lightning", "movenet-multipose", "posenet")
+NAMES = ("mediapipe-pose", "mediapipe-hands", "openpose-mobilenet", *SQUARE_NETS)
 FLOOR_PIPELINE, FLOOR_PROCESS = 1.10, 1.05
 PROCESS_CASES = [
     *(("mediapipe-pose", size_px) for size_px in ((640, 480), (256, 256))),
@@ -63,6 +64,9 @@ def bare_call(name: str) -> Callable[[np.ndarray], object]:
     detector = registry.make_detector(name)
     if isinstance(detector, openpose_net.OpenPoseMobileNet):
         return lambda image: detector.maps(openpose_net.fit(image, 368))
+    if name in SQUARE_NETS:
+        model, side_px = detector._model, detector._side_px
+        return lambda image: model.run(cv2.dnn.blobFromImage(cv2.resize(image, (side_px, side_px))))
     return detector._process.ask
 
 
@@ -142,7 +146,7 @@ def measure(options) -> Iterator[Comparison]:
 if __name__ == "__main__":
     run_benchmark(
         measure, __doc__,
-        images=(100, 1), repeats=(3, 1), detectors=(3, 1), workers=(0, 1), processes=(5, 1),
+        images=(100, 1), repeats=(3, 1), detectors=(7, 1), workers=(0, 1), processes=(5, 1),
     )  # fmt: skip
     sys.stdout.flush()
     os._exit(0)  # tasks of MediaPipe are not closed well when an interpreter ends

@@ -1,8 +1,8 @@
 """MoveNet's single-person networks, Thunder and Lightning, as top-down detectors: one pose per box.
 
-Each box (the whole image, unless told otherwise) becomes a square of the network's side, black where the image
-ends. The network decodes itself: y, x (as fractions of the square) and score of COCO's 17 keypoints, of the
-person nearest to the square's middle. `tools/bake_tfjs.py` made its files.
+Each box (the whole image, unless told otherwise) becomes a square of the network's side, black where the
+image ends. The network decodes itself: y, x (as fractions of the square) and score of COCO's 17 keypoints, of
+the person nearest to the square's middle. `tools/bake_tfjs.py` made its files.
 """
 
 from pathlib import Path

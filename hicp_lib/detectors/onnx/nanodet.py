@@ -1,9 +1,9 @@
 """The person finder that comes with the library: NanoDet-g, trained on COCO, of which only people are kept.
 
 (R. Lyu, github.com/RangiLyu/nanodet.) The image is fitted into the middle of the input, in BGR, normalised.
-Each cell of three grids gives the scores of 80 kinds of things and, for each side of the box, how likely it is
-0, 1, ... or 10 strides away (Li et al., "Generalized focal loss", NeurIPS 2020). `tools/bake_tfjs.py` made its
-file.
+Each cell of three grids gives the scores of 80 kinds of things and, for each side of the box, how likely it
+is 0, 1, ... or 10 strides away (Li et al., "Generalized focal loss", NeurIPS 2020). `tools/bake_tfjs.py` made
+its file.
 """
 
 import cv2
@@ -26,6 +26,8 @@ class NanoDet:
     Parameters
     ----------
     min_score : float
+        Of rendered people in whole scenes of seed 11, 0.3 finds 91 %, and 99 % of its boxes are people's; 0.2
+        finds 95 %, of which one box in six is nobody's.
     max_overlap : float
         Of two boxes that overlap more (intersection over union), the surer is kept.
     provider : str

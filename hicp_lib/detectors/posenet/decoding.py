@@ -1,8 +1,8 @@
 """People from PoseNet's maps: roots first, then along the tree of the body (Papandreou et al., ECCV 2018).
 
-The network gives, on a grid of cells, a heat map of each keypoint, the offset from a cell to the keypoint near
-it, and along each edge of the tree the displacement from a parent to its child and back. The highest cell that
-no person has yet is the root of the next one, whose other keypoints are walked to.
+The network gives, on a grid of cells, a heat map of each keypoint, the offset from a cell to the keypoint
+near it, and along each edge of the tree the displacement from a parent to its child and back. The highest
+cell that no person has yet is the root of the next one, whose other keypoints are walked to.
 """
 
 from dataclasses import dataclass

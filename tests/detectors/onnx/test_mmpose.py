@@ -159,7 +159,6 @@ def test_person_boxes_detected_given_and_missing(tmp_path):
     assert len(given_box.detect(image, np.zeros((0, 4)))) == 0
     for options in (
         {"boxes": "gt"},
-        {"boxes": "detected"},
         {"boxes": "some"},
         {"boxes": "gt", "person_model": person},
     ):
