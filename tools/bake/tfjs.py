@@ -15,7 +15,7 @@ import onnx
 import tensorflow as tf
 import tf2onnx
 from google.protobuf.json_format import ParseDict
-from onnx import helper, numpy_helper
+from onnx import NodeProto, TensorProto, helper, numpy_helper
 
 OPSET = 17
 _FUSED = {"_FusedConv2D": "Conv2D", "FusedDepthwiseConv2dNative": "DepthwiseConv2dNative"}
@@ -94,9 +94,8 @@ def to_onnx(graph: GraphDef, source: str, outputs: dict[str, str]) -> onnx.Model
         inputs_as_nchw=[name for name in images if name == source],
         outputs_as_nchw=[name for name in images if name != source],
     )
-    for new, old in {"image": source, **outputs}.items():
-        _rename(model.graph, old, new)
-    return model
+    names = {source: "image"} | {old: new for new, old in outputs.items()}
+    return _in_order(model, names)
 
 
 def channels_first(values: np.ndarray) -> np.ndarray:
@@ -179,10 +178,45 @@ def _plain(node: _Def) -> Iterator[_Def]:
         yield follower
 
 
-def _rename(graph: onnx.GraphProto, old: str, new: str) -> None:
-    for port in [*graph.input, *graph.output]:
-        if port.name == old:
-            port.name = new
-    for node in graph.node:
-        node.input[:] = [new if name == old else name for name in node.input]
-        node.output[:] = [new if name == old else name for name in node.output]
+def _in_order(model: onnx.ModelProto, names: dict[str, str]) -> onnx.ModelProto:
+    """The model with nodes, weights and names in the order the outputs need them.
+
+    tf2onnx's own order and names differ from run to run.
+
+    Parameters
+    ----------
+    model : onnx.ModelProto
+    names : dict of str to str
+        What inputs and outputs are to be called.
+    """
+    source = {name: node for node in model.graph.node for name in node.output}
+    weights = {tensor.name: tensor for tensor in model.graph.initializer}
+    new, nodes, kept = {"": "", **names}, [], []
+    waiting = [port.name for port in model.graph.output][::-1]
+    done: set[str] = set(new) - {port.name for port in model.graph.output}
+    while waiting:
+        name = waiting[-1]
+        node = source.get(name)
+        missing = [part for part in node.input if part not in done] if node else []
+        if missing:
+            waiting += missing[::-1]
+            continue
+        waiting.pop()
+        if name in done:
+            continue
+        for k, output in enumerate(node.output if node else [name]):
+            new.setdefault(output, f"{'weights' if node is None else node.op_type}_{len(done)}_{k}")
+            done.add(output)
+        if node is None:
+            kept.append(TensorProto.FromString(weights[name].SerializeToString()))
+            kept[-1].name = new[name]
+        else:
+            nodes.append(NodeProto.FromString(node.SerializeToString()))
+            nodes[-1].name = ""
+            nodes[-1].input[:] = [new[part] for part in node.input]
+            nodes[-1].output[:] = [new[part] for part in node.output]
+    ports = [*model.graph.input, *model.graph.output]
+    for port in ports:
+        port.name = new[port.name]
+    graph = helper.make_graph(nodes, "network", model.graph.input, model.graph.output, kept)
+    return helper.make_model(graph, opset_imports=model.opset_import, ir_version=model.ir_version)
