@@ -2,9 +2,9 @@
 
     python tools/export_detectron2.py configs/COCO-Keypoints/keypoint_rcnn_R_50_FPN_3x.yaml model.pkl out.onnx
 
-runs where Detectron2 and PyTorch are installed (its compiled extension is not needed) and uses nothing of this
-project. The maps are left undecoded: Detectron2's own last step, a loop over people, does not survive
-tracing. Opset 16 or later is a must: before it ROIAlign knows no half pixel.
+runs where PyTorch and Detectron2 are (its compiled extension is not needed) and uses nothing of this project.
+The maps are left undecoded: Detectron2's own last step, a loop over people, does not survive tracing.
+Operator set 16 or later is a must: before it ROIAlign knows no half pixel.
 """
 
 import argparse
@@ -57,7 +57,10 @@ def main() -> None:
         opset_version=OPSET,
         input_names=["image"],
         output_names=["boxes", "scores", "maps"],
-        dynamic_axes={"image": {1: "height", 2: "width"}, **{name: {0: "n"} for name in ("boxes", "scores", "maps")}},
+        dynamic_axes={
+            "image": {1: "height", 2: "width"},
+            **{name: {0: "n"} for name in ("boxes", "scores", "maps")},
+        },
     )
 
 

@@ -20,7 +20,7 @@ from hicp_lib.core.files import write_bytes
 from hicp_lib.detectors.onnx.protobuf import Messages, message_class
 
 # Of Caffe's own `caffe.proto`, what these networks use; `layers` is how files of before 2014 call `layer`.
-_MESSAGES: Messages = {
+MESSAGES: Messages = {
     "Net": {"input": (3, "[string]"), "layer": (100, "[Layer]"), "layers": (2, "[OldLayer]")},
     "Layer": {
         "name": (1, "string"),
@@ -33,7 +33,13 @@ _MESSAGES: Messages = {
     },
     "OldLayer": {"name": (4, "string"), "blobs": (6, "[Blob]")},
     "Blob": {"data": (5, "[float]")},
-    "Convolution": {"num_output": (1, "uint32"), "pad": (3, "[uint32]"), "kernel_size": (4, "[uint32]")},
+    "Convolution": {
+        "num_output": (1, "uint32"),
+        "pad": (3, "[uint32]"),
+        "kernel_size": (4, "[uint32]"),
+        "stride": (6, "[uint32]"),
+        "dilation": (18, "[uint32]"),
+    },
     "Pooling": {"kernel_size": (2, "uint32"), "stride": (3, "uint32")},
 }
 _OPSET, _IR_VERSION = 17, 8
@@ -45,11 +51,15 @@ def to_onnx(description: str, weights: bytes) -> ModelProto:
     Raises
     ------
     SystemExit
-        If the weights are no Caffe file, lack a layer's, or a layer is of a kind these networks do not have.
+        If either is no Caffe file, the weights lack a layer's or are of another size, or a layer is of a
+        kind these networks do not have.
     """
-    net = text_format.Parse(description, message_class(_MESSAGES, "Net")(), allow_unknown_field=True)
+    net_class = message_class(MESSAGES, "Net")
     try:
-        trained = message_class(_MESSAGES, "Net").FromString(weights)
+        net = text_format.Parse(description, net_class(), allow_unknown_field=True)
+        trained = net_class.FromString(weights)
+    except text_format.ParseError as error:
+        raise SystemExit(f"the description is not a .prototxt file ({error})") from None
     except DecodeError:
         raise SystemExit("the weights are not a .caffemodel file, or it is cut off") from None
     blobs = {layer.name: layer.blobs for layer in (*trained.layers, *trained.layer) if layer.blobs}
@@ -78,18 +88,27 @@ def _parameters(layer: Message, blobs: dict) -> dict[str, np.ndarray]:
     if layer.type == "PReLU":
         return {f"{layer.name}_slope": values[0].reshape(-1, 1, 1)}
     convolution = layer.convolution_param
-    shape = convolution.num_output, -1, convolution.kernel_size[0], convolution.kernel_size[0]
-    return {f"{layer.name}_weights": values[0].reshape(shape), f"{layer.name}_bias": values[1]}
+    side = convolution.kernel_size[0]
+    if (
+        len(values) != 2
+        or len(values[1]) != convolution.num_output
+        or len(values[0]) % (len(values[1]) * side**2)
+    ):
+        raise SystemExit(
+            f"layer {layer.name!r} has weights of another size; give the .caffemodel of this .prototxt"
+        )
+    weights = values[0].reshape(len(values[1]), -1, side, side)
+    return {f"{layer.name}_weights": weights, f"{layer.name}_bias": values[1]}
 
 
 def _node(layer: Message, inputs: list[str]) -> NodeProto:
+    convolution, pool = layer.convolution_param, layer.pooling_param
     kinds: dict[str, tuple[str, dict]] = {
-        "Convolution": ("Conv", {"pads": 4 * [*layer.convolution_param.pad, 0][:1]}),
-        "Pooling": (
-            "MaxPool",
-            {"kernel_shape": 2 * [layer.pooling_param.kernel_size], "strides": 2 * [layer.pooling_param.stride],
-             "ceil_mode": 1},
-        ),
+        "Convolution": ("Conv", {"pads": 4 * [*convolution.pad, 0][:1],
+                                 "strides": 2 * [*convolution.stride, 1][:1],
+                                 "dilations": 2 * [*convolution.dilation, 1][:1]}),
+        "Pooling": ("MaxPool", {"kernel_shape": 2 * [pool.kernel_size], "strides": 2 * [pool.stride],
+                                "ceil_mode": 1}),
         "Concat": ("Concat", {"axis": 1}),
         "ReLU": ("Relu", {}),
         "PReLU": ("PRelu", {}),
