@@ -6,6 +6,10 @@
     >, <      the difference left - right lies above `margin`, or below -`margin`
     within    left and right differ by at most `tolerance`
 
+A claim that names systems is tested on these systems only. Beside it may stand a statement about the class
+that they belong to (`class_statement`, `class_tests`), tested on whatever of that class was run: it says how
+far a claim carries, and never decides its verdict.
+
 Margins and tolerances are fixed in the file, before any result is seen.
 """
 
@@ -33,7 +37,8 @@ class Selection:
         The file `<notebook>/<table>.parquet` of the results.
     where : dict of str to object
         Column -> the value rows must have there, or a list of such values; imported detections
-        (`mmpose-imported`) count as the detector's.
+        (`mmpose-imported`) count as the detector's. "@top-down" and "@bottom-up" are all detectors of the
+        registry that are so.
     value : str
         Column of the quantity.
     unlike : dict of str to object
@@ -107,6 +112,10 @@ class Claim:
         "rendered people": its tables hold nothing else, whatever data the run was given.
     reason, command : str
         For what no result can test here: why not, and what would.
+    class_statement : str
+        The same about the class the named systems belong to, for readers; "" for none.
+    class_tests : tuple of Comparison
+        What that asks.
     """
 
     id: str
@@ -119,6 +128,8 @@ class Claim:
     only_on: str = ""
     reason: str = ""
     command: str = ""
+    class_statement: str = ""
+    class_tests: tuple[Comparison, ...] = ()
 
 
 def read_claims(path: Path = CLAIMS_FILE) -> list[Claim]:
@@ -163,9 +174,12 @@ def read_claims(path: Path = CLAIMS_FILE) -> list[Claim]:
 
 
 def _claim(row: dict[str, Any]) -> Claim:
-    claim = Claim(**row | {"tests": tuple(_test(test) for test in row.get("tests", []))})
+    tests = {key: tuple(_test(test) for test in row.get(key, [])) for key in ("tests", "class_tests")}
+    claim = Claim(**row | tests)
     if not claim.tests and not claim.reason:
         raise ValueError("has neither tests nor a reason why it has none")
+    if bool(claim.class_tests) != bool(claim.class_statement):
+        raise ValueError("needs both a class_statement and class_tests, or neither")
     if claim.only_on not in ("", *ONLY_ON):
         raise ValueError(f"only_on is {claim.only_on!r}; expected one of {', '.join(ONLY_ON)}")
     return claim

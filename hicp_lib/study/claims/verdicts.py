@@ -7,7 +7,7 @@ widest: that asks for more than a paired comparison would, never for less.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,8 @@ NOT_REPRODUCED = "not reproduced"
 NOT_TESTABLE = "not testable here"
 VERDICTS = (REPRODUCED, ON_RENDERED_DATA, NOT_REPRODUCED, NOT_TESTABLE)
 
-_TABLE_COLUMNS = ["section", "claim", "tested", "paper", "ours", "verdict", "why_not", "command"]
+_TABLE_COLUMNS = ["section", "claim", "tested", "paper", "ours", "verdict", "why_not", "command", "of_class"]
+_CLASS = "@"
 _PHOTOGRAPHS = "hicp report -p source halpe -p annotations_path HALPE.json -p images_dir DIR"
 
 
@@ -42,6 +43,8 @@ class Verdict:
         The evidence.
     reason, command : str
         Why the claim was not tested, and what would test it.
+    of_class : str
+        What the run says of the class that the claim's systems belong to; no part of the verdict.
     """
 
     claim: Claim
@@ -49,6 +52,7 @@ class Verdict:
     ours: str = ""
     reason: str = ""
     command: str = ""
+    of_class: str = ""
 
 
 @dataclass(frozen=True)
@@ -99,13 +103,23 @@ def judge_claims(claims: list[Claim], results: Path) -> list[Verdict]:
     InputError
         If a claim asks for a column that its table does not have.
     """
-    return [_judge_claim(claim, results) for claim in claims]
+    return [_with_class(_judge_claim(claim, results), results) for claim in claims]
 
 
 def verdict_table(verdicts: list[Verdict]) -> pd.DataFrame:
-    """One row per claim: `section, claim, tested, paper, ours, verdict, why_not, command`."""
+    """One row per claim: `section, claim, tested, paper, ours, verdict, why_not, command, of_class`."""
     rows = [
-        (c.section, c.text, c.statement, c.paper or "–", v.ours or "–", v.verdict, v.reason, v.command)
+        (
+            c.section,
+            c.text,
+            c.statement,
+            c.paper or "–",
+            v.ours or "–",
+            v.verdict,
+            v.reason,
+            v.command,
+            v.of_class or "–",
+        )
         for c, v in ((verdict.claim, verdict) for verdict in verdicts)
     ]
     return pd.DataFrame(rows, columns=_TABLE_COLUMNS)
@@ -115,20 +129,32 @@ def for_reading(table: pd.DataFrame, verdict: str) -> pd.DataFrame:
     """The claims with one verdict, for a page.
 
     `table` from `verdict_table`; columns `section, claim` (with what was tested), `paper` and `ours`, or in
-    the place of the last, for what could not be tested, `why not, and what would test it`.
+    the place of the last, for what could not be tested, `why not, and what would test it`; and, where some
+    claim has one, `of its class`.
     """
     rows = table[table["verdict"] == verdict]
     shown = rows[["section"]].assign(claim=rows["claim"] + " Tested: " + rows["tested"], paper=rows["paper"])
+    of_class = {"of its class": rows["of_class"]} if (rows["of_class"] != "–").any() else {}
     if verdict != NOT_TESTABLE:
-        return shown.assign(ours=rows["ours"])
+        return shown.assign(ours=rows["ours"], **of_class)
     open_at = rows["ours"].map(lambda ours: "" if ours == "–" else f" ({ours})")
     reasons = rows["why_not"] + open_at + ": " + rows["command"]
-    return shown.assign(**{"why not, and what would test it": reasons})
+    return shown.assign(**{"why not, and what would test it": reasons}, **of_class)
 
 
 def verdict_counts(table: pd.DataFrame) -> dict[str, int]:
     """How many claims got each verdict, by `VERDICTS`; `table` from `verdict_table`."""
     return {verdict: int((table["verdict"] == verdict).sum()) for verdict in VERDICTS}
+
+
+def _with_class(verdict: Verdict, results: Path) -> Verdict:
+    """The verdict, with what the run says of the class beside it."""
+    claim = verdict.claim
+    if not claim.class_tests:
+        return verdict
+    of_class = _judge_claim(replace(claim, tests=claim.class_tests), results)
+    said = of_class.ours or of_class.reason
+    return replace(verdict, of_class=f"{claim.class_statement} {of_class.verdict.capitalize()}: {said}")
 
 
 def _judge_claim(claim: Claim, results: Path) -> Verdict:
@@ -233,9 +259,17 @@ def select(selection: Selection, results: Path) -> list[Quantity]:
 
 
 def _values(given: Any) -> list:
-    """The values a column may have, imported detections of a detector among them."""
+    """The values a column may have, imported detections of a detector and members of a class among them."""
     values = given if isinstance(given, list) else [given]
+    values = [member for value in values for member in _members(value)]
     return values + [f"{value}-imported" for value in values if isinstance(value, str)]
+
+
+def _members(value: Any) -> list:
+    """What a value stands for: "@top-down" for the detectors of that paradigm, any other for itself."""
+    if not (isinstance(value, str) and value.startswith(_CLASS)):
+        return [value]
+    return [name for name, entry in DETECTORS.items() if entry.facts.paradigm == value.removeprefix(_CLASS)]
 
 
 def _absent(selection: Selection, present: set[str]) -> _MissingError:
@@ -244,6 +278,8 @@ def _absent(selection: Selection, present: set[str]) -> _MissingError:
         names = selection.where.get(column, [])
         for name in [names] if isinstance(names, str) else names:
             if not present & set(_values(name)):
+                if name.startswith(_CLASS):
+                    return _MissingError(f"no {name.removeprefix(_CLASS)} detector was run", "hicp report")
                 return _MissingError(f"{name} was not run", _command_to_run(name))
     asked = ", ".join(f"{column} {value}" for column, value in selection.where.items())
     return _MissingError(f"{selection.notebook} has no result for {asked}", "hicp report")

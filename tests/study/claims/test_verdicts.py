@@ -108,6 +108,38 @@ def test_without_an_interval_a_claim_stays_open(write):
     assert (found.verdict, found.ours) == (v.NOT_TESTABLE, "a -0.4")
 
 
+CLASS = Comparison(
+    "<", Selection("02", "loss", {"detector": "@top-down"}, "change", low="low", high="high"), 0.0
+)
+NAMED = Comparison(
+    "<", Selection("02", "loss", {"detector": "mmpose"}, "change", low="low", high="high"), 0.0
+)
+
+
+def test_what_holds_of_a_class_never_stands_in_for_the_named_system(write):
+    """The named one was not run; of its class two were, and one of another."""
+    results = write(
+        rows(movenet_thunder=(-0.4, -0.5, -0.3), mediapipe=(-0.2, -0.3, -0.1), posenet=(0.4, 0.3, 0.5))
+    )
+    found = verdict(claim(NAMED, class_tests=(CLASS,), class_statement="Every one."), results)
+    assert (found.verdict, found.reason) == (v.NOT_TESTABLE, "mmpose was not run")
+    assert found.of_class == (
+        "Every one. Reproduced: movenet-thunder -0.4 [-0.5, -0.3]; mediapipe -0.2 [-0.3, -0.1]"
+    )
+
+
+def test_a_class_statement_has_its_own_verdict(write):
+    results = write(rows(mmpose=(-0.4, -0.5, -0.3), mediapipe=(0.2, 0.1, 0.3)))
+    found = verdict(claim(NAMED, class_tests=(CLASS,), class_statement="Every one."), results)
+    assert found.verdict == v.REPRODUCED and found.of_class.startswith("Every one. Not reproduced: ")
+    nobody = verdict(
+        claim(NAMED, class_tests=(CLASS,), class_statement="Every one."), write(rows(posenet=(1, 1, 1)))
+    )
+    assert nobody.of_class == "Every one. Not testable here: no top-down detector was run"
+    shown = v.for_reading(v.verdict_table([found]), v.REPRODUCED)
+    assert shown["of its class"].tolist() == [found.of_class]
+
+
 def test_what_is_always_rendered_stays_so_when_the_run_had_photographs(write):
     results = write(rows(a=(-0.4, -0.5, -0.3)), {"source": "halpe"})
     assert verdict(claim(LOSES, only_on="rendered people"), results).verdict == v.ON_RENDERED_DATA
