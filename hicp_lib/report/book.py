@@ -7,8 +7,11 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+import nbformat
 
 from hicp_lib.core.files import sha256_file, write_json
 from hicp_lib.report.checks import book_problems
@@ -29,13 +32,15 @@ _SCRIPTS = (
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 
 
-def build_book(folders: Folders) -> tuple[Path, bool]:
+def build_book(folders: Folders, left_out: Mapping[str, str] | None = None) -> tuple[Path, bool]:
     """Build the book of one profile, unless nothing it is made of changed.
 
     Parameters
     ----------
     folders : Folders
         The sources of its pages, and the profile's executed notebooks and results.
+    left_out : dict of str to str, optional
+        Why a notebook was not run, by its name; its page says so.
 
     Returns
     -------
@@ -53,7 +58,8 @@ def build_book(folders: Folders) -> tuple[Path, bool]:
     """
     book = folders.root / "_build" / "book" / folders.profile
     stamp = book.with_suffix(".json")
-    key = _key(folders)
+    left_out = left_out or {}
+    key = provenance.digest([_key(folders), dict(left_out)])
     if read_stamp(stamp) == {"key": key, "outputs": _hashes(book)}:
         return book / "index.html", False
     book.parent.mkdir(parents=True, exist_ok=True)
@@ -62,7 +68,7 @@ def build_book(folders: Folders) -> tuple[Path, bool]:
         shutil.rmtree(left_behind, ignore_errors=True)
     with tempfile.TemporaryDirectory(prefix=prefix, dir=book.parent, ignore_cleanup_errors=True) as temporary:
         staging = Path(temporary)
-        _assemble(staging / "source", folders)
+        _assemble(staging / "source", folders, left_out)
         built = _run_sphinx(staging, book.parent / f"{folders.profile}.log")
         shutil.copytree(folders.results, built / "results" / folders.profile)
         if problems := book_problems(built):
@@ -92,7 +98,7 @@ def _hashes(folder: Path) -> dict[str, str]:
     return {path.relative_to(folder).as_posix(): sha256_file(path) for path in files}
 
 
-def _assemble(source: Path, folders: Folders) -> None:
+def _assemble(source: Path, folders: Folders, left_out: Mapping[str, str]) -> None:
     """Fill the pages, put the executed notebooks and the scripts beside them."""
     shutil.copytree(folders.sources / "book", source)
     results = Results(folders.results, folders.profile)
@@ -104,10 +110,20 @@ def _assemble(source: Path, folders: Folders) -> None:
     notebooks.mkdir(exist_ok=True)
     for executed in folders.executed.glob("*.ipynb"):
         (notebooks / executed.name).write_text(executed.read_text().replace(*_LINK_TO_PAGE))
+    for name, reason in left_out.items():
+        _write_stub(folders.sources / "notebooks" / f"{name}.ipynb", notebooks / f"{name}.ipynb", reason)
     scripts = source / SCRIPTS_DIR
     scripts.mkdir()
     for package, path, name in _SCRIPTS:
         shutil.copy(str(importlib.resources.files(package) / path), scripts / name)
+
+
+def _write_stub(original: Path, stub: Path, reason: str) -> None:
+    """A page with a notebook's title that says why it was not run."""
+    whole = nbformat.read(original, as_version=4)
+    title = whole.cells[0].source.splitlines()[0]
+    text = nbformat.v4.new_markdown_cell(f"{title}\n\nNot run: {reason}.", id="not-run")
+    nbformat.write(nbformat.v4.new_notebook(cells=[text], metadata=whole.metadata), stub)
 
 
 def _book_stamp(folders: Folders) -> dict:

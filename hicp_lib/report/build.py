@@ -2,12 +2,14 @@
 
 import fcntl
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.report.book import build_book
+from hicp_lib.report.lacking import without_absent
 from hicp_lib.report.notebooks import parse_overrides, read_notebooks, read_profile
 from hicp_lib.report.run import Folders, Run
 from hicp_lib.report.runs import run_all
@@ -50,11 +52,13 @@ def make_report(
         When a notebook fails, or the book has a fault.
     """
     start_s = time.perf_counter()
-    runs = _plan(profile, pairs, sources / "notebooks", only)
+    runs, left_out = _without_absent(_plan(profile, pairs, sources / "notebooks", only), dict(pairs), log)
+    if only in left_out:
+        raise InputError(f"--only {only}: {left_out[only]}")
     folders = Folders(sources, root.resolve(), profile)
     with _alone(folders):
         run_all(runs, folders, log, only)
-        page, is_new = build_book(folders) if only is None else (None, False)
+        page, is_new = build_book(folders, left_out) if only is None else (None, False)
     took = f"({time.perf_counter() - start_s:.0f} s)"
     if only is not None:
         log(f"The results are in {folders.results / only}; no book was built {took}")
@@ -78,6 +82,23 @@ def _plan(profile: str, pairs: list[tuple[str, str]], folder: Path, only: str | 
         parameters = notebook.defaults | chosen.parameters.get(name, {}) | overrides[name]
         runs.append(Run(notebook, parameters, chosen.after.get(name, [])))
     return runs
+
+
+def _without_absent(
+    runs: list[Run], asked_for: Collection[str], log: Callable[[str], None]
+) -> tuple[list[Run], dict[str, str]]:
+    """The runs without detectors whose weights are absent, and why some are left out, by name."""
+    able, left_out = [], {}
+    for run in runs:
+        parameters, dropped, can_run = without_absent(run.parameters, asked_for)
+        if dropped:
+            said = f"the weights of {', '.join(sorted(dropped))} are absent; hicp models fetch gets them"
+            log(f"{run.notebook.name}: {'runs without some detectors' if can_run else 'left out'}: {said}")
+        if can_run:
+            able.append(replace(run, parameters=parameters))
+        else:
+            left_out[run.notebook.name] = said
+    return able, left_out
 
 
 @contextmanager
