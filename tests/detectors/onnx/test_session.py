@@ -30,7 +30,7 @@ def test_ports_hash_and_response(model):
     assert opened.inputs[0].shape == (1, 3, 8, 8)
     assert opened.settings["sha256"] == sha256_file(model)
     assert opened.settings["provider"] == "cpu"
-    np.testing.assert_array_equal(opened.response_to_zeros[0], np.ones((1, 2, 4, 4)))
+    np.testing.assert_array_equal(opened.response_to_zeros()[0], np.ones((1, 2, 4, 4)))
 
 
 def test_one_session_per_process_until_the_file_changes(model):

@@ -7,7 +7,8 @@ from onnx import helper
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND, TO_HALPE
 from hicp_lib.detectors.openpose.mobilenet import COCO_18
-from hicp_lib.detectors.openpose.user_network import BODY_25, OpenPose, hand_square
+from hicp_lib.detectors.openpose.hands import hand_square
+from hicp_lib.detectors.openpose.user_network import BODY_25, OpenPose
 from tests.detectors.onnx.onnx_models import constant_model, save
 from tests.detectors.openpose.test_paf import STANDING, draw
 
