@@ -81,7 +81,7 @@ def read_model(path: Path, content: bytes) -> ModelFile:
         file = next((entry.value for entry in outside.external if entry.key == "location"), "?")
         raise InputError(
             f"{path}: keeps weights outside the file ({outside.name or 'a constant'} in {file!r}), which are "
-            "not read; export one file: torch.onnx.export(..., external_data=False), or load it with "
+            "not read; export it in one file: torch.onnx.export(..., external_data=False), or load it with "
             "onnx.load and save it with onnx.save"
         )
     operators = frozenset(node.op_type for node in model.graph.node)

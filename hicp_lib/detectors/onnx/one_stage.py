@@ -14,13 +14,14 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import letterbox, planes
 from hicp_lib.detectors.onnx.person_boxes import unsuppressed
-from hicp_lib.detectors.onnx.pose_net import convention_of
+from hicp_lib.detectors.onnx.pose_net import CONVENTIONS, convention_of
 from hicp_lib.detectors.onnx.session import open_model
 
 _FILL = (114, 114, 114)
 _DEFAULT_SIDE_PX = 640
 # x, y, size and score
 _N_BOX = 5
+_N_COLUMNS = {_N_BOX + 3 * n_keypoints for n_keypoints in CONVENTIONS}
 
 
 class OneStage:
@@ -95,12 +96,12 @@ class OneStage:
         match [output.shape for output in outputs]:
             case [(1, n, 5), (1, m, _, 3)] if n == m:
                 return outputs[0][0].astype(float), outputs[1][0].astype(float)
-            case [(1, n_columns, _)] if n_columns > _N_BOX and (n_columns - _N_BOX) % 3 == 0:
+            case [(1, n_columns, _)] if n_columns in _N_COLUMNS:
                 rows = outputs[0][0].T.astype(float)
                 half = rows[:, 2:4] / 2
                 corners = np.concatenate([rows[:, :2] - half, rows[:, :2] + half, rows[:, 4:5]], axis=1)
                 return corners, rows[:, _N_BOX:].reshape(len(rows), -1, 3)
-            case [(1, _, n_columns)] if n_columns > _N_BOX and n_columns % 3 == 0:
+            case [(1, _, n_columns)] if n_columns - 1 in _N_COLUMNS:
                 rows = outputs[0][0].astype(float)
                 return rows[:, :_N_BOX], rows[:, _N_BOX + 1 :].reshape(len(rows), -1, 3)
         raise self._model.refusal("expected RTMO's or YOLO-pose's outputs, of one class", outputs)

@@ -195,7 +195,7 @@ def _input_size(model: OnnxModel, given: list[int] | None) -> tuple[tuple[int, i
     """Width and height of a network's crops, and how they are known."""
     shape = model.inputs[0].shape
     if len(shape) != 4 or shape[1] not in (None, 3):
-        raise model.refusal("expected an input of crops, (n, 3, h, w)")
+        raise model.refusal("expected crops of a fixed size, (n, 3, h, w)")
     read = (shape[3], shape[2])
     told = (model.metadata.get("input_w"), model.metadata.get("input_h"))
     sources = {"read from the file": read, "told by its metadata": told, "option input_size_px": given or ()}
@@ -207,7 +207,9 @@ def _input_size(model: OnnxModel, given: list[int] | None) -> tuple[tuple[int, i
     if given and "option input_size_px" not in whole:
         raise InputError(f"input_size_px {given}: expected width and height in pixels, as in [192, 256]")
     if not whole:
-        raise model.refusal("its input is open; give width and height: -o input_size_px [192, 256]")
+        raise model.refusal(
+            "expected crops of a fixed size, (n, 3, h, w); or say which: -o input_size_px '[192, 256]'"
+        )
     why, size = next(iter(whole.items()))
     for other in (*whole.values(), read):
         if any(side not in (None, known) for side, known in zip(other, size, strict=True)):

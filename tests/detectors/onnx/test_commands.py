@@ -63,6 +63,46 @@ def test_detect_with_a_model_of_ones_own(capsys, model, tmp_path):
     )
 
 
+@pytest.mark.parametrize("name", ["mmpose", "alphapose", "openpose", "detectron2", "one-stage"])
+def test_show_use_and_detect_refuse_the_same_networks_in_the_same_words(capsys, tmp_path, name):
+    """What is wrong with a network is known before it sees an image: nothing is kept that would not run."""
+    model = constant_model(tmp_path / "m.onnx", (1, 3, 64, 48), {"out": np.zeros((1, 40, 9, 9), np.float32)})
+    write_png(tmp_path / "images" / "7.png", np.zeros((9, 9, 3), np.uint8))
+    detect = ["detect", "--images", str(tmp_path / "images"), "--out", str(tmp_path / "found.json")]
+    chosen = ["--detector", name, "--model", str(model)]
+    errors = {
+        mistake(capsys, *command, *chosen) for command in (["models", "show"], ["models", "use"], detect)
+    }
+    (error,) = errors
+    assert "takes image (1, 3, 64, 48) tensor(float) and gives out (1, 40, 9, 9)" in error
+    assert all(
+        f" {known} (" in error for known in ("mmpose", "alphapose", "openpose", "detectron2", "one-stage")
+    )
+
+
+def test_a_person_model_is_looked_at_before_an_image_is_shown(capsys, model, tmp_path):
+    person = constant_model(tmp_path / "p.onnx", (1, 3, 64, 64), {"out": np.zeros((1, 9, 7), np.float32)})
+    show = ["models", "show", "--detector", "mmpose", "--model", model]
+    assert "(1, 84, 5 + classes)" in mistake(capsys, *show, "--person-model", str(person))
+    assert "leave them out" in mistake(capsys, *show, "-o", "person_min_score", "0.5")
+    rows = constant_model(tmp_path / "q.onnx", (1, 3, 64, 64), {"dets": np.zeros((1, 0, 5), np.float32)})
+    chosen = ["--person-model", str(rows), "-o", "person_min_score", "0.5", "-o", "person_family", "yolox"]
+    assert cli.run([*show, *chosen]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "person detector  yolox  (given; option person_family)" in lines
+    assert any(line.startswith("person score     >= 0.5  ") for line in lines)
+
+
+def test_the_transform_is_printed_and_may_be_given(capsys, model):
+    show = ["models", "show", "--detector", "mmpose", "--model", model]
+    for options, expected in (
+        ([], "classic, not UDP  (ASSUMED"),
+        (["-o", "udp", "true"], "UDP: sizes less one"),
+    ):
+        assert cli.run([*show, *options]) == 0
+        assert f"transform        {expected}" in capsys.readouterr().out
+
+
 def test_a_model_named_once_is_taken_from_then_on(capsys, model, tmp_path):
     use = ["models", "use", "--detector", "mmpose"]
     before = weights_sha256()

@@ -60,6 +60,21 @@ def plain_dark(heat, kernel):
     return x + step[0], y + step[1], heat[y, x]
 
 
+def plain_dark_udp(heat, kernel):
+    height, width = heat.shape
+    y, x = np.unravel_index(np.argmax(heat), heat.shape)
+    half = kernel // 2
+    blurred = cv2.GaussianBlur(np.pad(heat, half), (kernel, kernel), 0)[half:-half, half:-half]
+    log = np.pad(np.log(np.clip(blurred * heat.max() / blurred.max(), 1e-3, 50.0)), 1, mode="edge")
+    log = log[y : y + 3, x : x + 3].astype(float)
+    gradient = np.array([log[1, 2] - log[1, 0], log[2, 1] - log[0, 1]]) / 2
+    dxx, dyy = log[1, 2] - 2 * log[1, 1] + log[1, 0], log[2, 1] - 2 * log[1, 1] + log[0, 1]
+    dxy = (log[2, 2] - log[1, 2] - log[2, 1] + 2 * log[1, 1] - log[1, 0] - log[0, 1] + log[0, 0]) / 2
+    least = np.finfo(np.float32).eps
+    step = np.linalg.solve([[dxx + least, dxy], [dxy, dyy + least]], gradient)
+    return x - step[0], y - step[1], heat[y, x]
+
+
 def plain_integral(logits):
     heat = 1 / (1 + np.exp(-logits.astype(float)))
     total = sum(heat.ravel())
@@ -93,6 +108,13 @@ def test_quarter_offset(needs_both, seed):
 def test_dark(kernel, seed):
     maps, _ = gaussians(np.random.default_rng(seed), noise=0.003)
     agree(decode.decode_dark(maps, kernel), maps, lambda heat: plain_dark(heat, kernel))
+
+
+@given(seed=SEEDS)
+@settings(max_examples=20)
+def test_dark_of_udp(seed):
+    maps, _ = gaussians(np.random.default_rng(seed))
+    agree(decode.decode_dark_udp(maps), maps, lambda heat: plain_dark_udp(heat, 11))
 
 
 @given(seed=SEEDS)
