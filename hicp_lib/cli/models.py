@@ -70,15 +70,18 @@ def models_show(detector: str, **chosen) -> None:
 @detector_options
 def models_use(detector: str, **chosen) -> None:
     """Say once which model file a detector runs on; notebooks and commands then take it by its name."""
-    from hicp_lib.detectors.registry import DETECTORS, make_detector
+    from hicp_lib.detectors.registry import DETECTORS, describe, make_detector
     from hicp_lib.detectors.weights.user import keep_user_options
 
     options = given(**chosen)
     if detector in DETECTORS and not DETECTORS[detector].needs_model:
         raise InputError(f"detector {detector!r} has weights of its own; it takes none of yours")
-    make_detector(detector, **options)
+    made = make_detector(detector, **options)
     if "model" not in options:
         raise InputError(f"detector {detector!r}: no model is named; give it with --model FILE.onnx")
     keep_user_options(detector, options)
     command = f"hicp report -p detectors {detector}"
     click.echo(f"{detector}: {options['model']}; run it in the report with: {command}")
+    for what, value, why in describe(made):
+        if why.startswith("ASSUMED"):
+            click.echo(f"{what}: {value} ({why})")

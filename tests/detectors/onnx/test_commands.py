@@ -110,7 +110,8 @@ def test_a_model_named_once_is_taken_from_then_on(capsys, model, tmp_path):
     assert "/no.onnx: cannot be read" in mistake(capsys, *use, "--model", "/no.onnx")
     assert weights_sha256() == before
     assert cli.run([*use, "--model", model, "-o", "flip_test", "true"]) == 0
-    assert "hicp report -p detectors mmpose" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "hicp report -p detectors mmpose" in told and "transform: classic, not UDP (ASSUMED" in told
     assert make_detector("mmpose").settings == make_detector("mmpose", model=model, flip_test=True).settings
     # What is given at a call comes first; a model given there stands for itself.
     assert make_detector("mmpose", flip_test=False).settings["flip_test"] is False

@@ -98,7 +98,7 @@ def echo_model(path, kind):
     return save(path, nodes, {"image": [1, 3, 64, 64]}, outputs, constants)
 
 
-@pytest.mark.parametrize("shape", [(1, 3, 5), (1, 84, 8), (2, 56, 9), (1, 57, 8400), (56, 9), (1, 53, 4)])
+@pytest.mark.parametrize("shape", [(1, 3, 5), (1, 84, 8), (2, 56, 9), (1, 57, 500), (56, 9), (1, 53, 4)])
 def test_other_outputs_are_refused_in_one_line(tmp_path, shape):
     model = constant_model(tmp_path / "m.onnx", (1, 3, 64, 64), {"o": np.zeros(shape, np.float32)})
     with pytest.raises(InputError) as caught:

@@ -104,7 +104,7 @@ def plain_demonstration(rows, scale, min_score, max_overlap):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_boxes_are_those_of_yoloxs_own_demonstration(tmp_path, seed):
-    """Any class suppresses, overlaps are counted with a pixel more, and no box is cut at the image's border."""
+    """Any class suppresses, overlaps are counted with a pixel more, no box is cut at the image's border."""
     rng = np.random.default_rng(seed)
     rows = rng.uniform(0, 1, (84, 8))
     rows[:, 2:4] = rng.normal(0.5, 0.5, (84, 2))

@@ -87,7 +87,7 @@ def test_an_image_of_another_shape_is_padded_not_bent(tmp_path):
     [((640, 480), 496), ((640, 429), 544), ((1280, 425), 656), ((1280, 720), 656), ((429, 640), 240)],
 )
 def test_the_input_is_as_large_as_openposes(image_size, net_width):
-    """Width in proportion, to the nearest multiple of 16, at most 16 / 9 of 368; centres of corner pixels meet."""
+    """Width in proportion, to a multiple of 16, at most 16 / 9 of 368; corner pixels' centres meet."""
     width, height = image_size
     image = np.zeros((height, width, 3), np.uint8)
     image[: height // 2, : width // 2] = 255
