@@ -2,7 +2,7 @@
 
 import click
 
-from hicp_lib.cli.options import detector_options, given
+from hicp_lib.cli.options import detector_options, given, tell_assumed
 from hicp_lib.core.errors import InputError
 
 
@@ -82,6 +82,4 @@ def models_use(detector: str, **chosen) -> None:
     keep_user_options(detector, options)
     command = f"hicp report -p detectors {detector}"
     click.echo(f"{detector}: {options['model']}; run it in the report with: {command}")
-    for what, value, why in describe(made):
-        if why.startswith("ASSUMED"):
-            click.echo(f"{what}: {value} ({why})")
+    tell_assumed(describe(made))

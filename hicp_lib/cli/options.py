@@ -26,6 +26,19 @@ def detector_options(command: Callable) -> Callable:
     return command
 
 
+def tell_assumed(facts: list[tuple[str, str, str]]) -> None:
+    """Say on the error stream what is assumed about a detector's model and could be otherwise.
+
+    Parameters
+    ----------
+    facts : list of (str, str, str)
+        What `hicp_lib.detectors.registry.describe` gives.
+    """
+    for what, value, why in facts:
+        if why.startswith("ASSUMED"):
+            click.echo(f"{what}: {value} ({why})", err=True)
+
+
 def given(model: Path | None, person_model: Path | None, boxes: str | None, pairs) -> dict[str, Any]:
     """The detector's options out of the command line's.
 

@@ -82,7 +82,7 @@ class PersonBoxes:
         feed = np.empty((1, 3, self._size_px[1], self._size_px[0]), np.float32)
         planes(fitted.pixels[..., ::-1], *_NORMALISATIONS[self._family], out=feed[0])
         outputs = self._model.run(feed)
-        rows = self._rows(outputs).astype(float)
+        rows = self._rows(outputs)
         suppressed = rows.shape[1] == _N_BOX
         corners, scores, labels = (_listed if suppressed else self._from_grid)(rows, outputs)
         keep = (scores >= self._min_score) & np.isfinite(corners).all(axis=1)
@@ -124,13 +124,14 @@ class PersonBoxes:
         self, rows: np.ndarray, _outputs: list[np.ndarray]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Corners, scores and classes of YOLOX's rows: centre, size, object and class scores."""
-        centre, size = rows[:, :2], rows[:, 2:4]
+        centre, size = rows[:, :2].astype(float), rows[:, 2:4].astype(float)
         if not self._is_decoded:
             stride = self._cells[:, 2:]
             centre = (centre + self._cells[:, :2]) * stride
             size = np.exp(np.minimum(size, _MAX_LOG_SIZE)) * stride
         labels = rows[:, _N_BOX:].argmax(axis=1)
-        scores = np.nan_to_num(rows[:, 4] * rows[:, _N_BOX:].max(axis=1), posinf=0.0, neginf=0.0)
+        scores = rows[:, 4].astype(float) * rows[:, _N_BOX:].max(axis=1)
+        scores = np.where(np.isfinite(scores), scores, 0.0)
         return np.concatenate([centre - size / 2, centre + size / 2], axis=1), scores, labels
 
 
@@ -175,7 +176,7 @@ def _listed(rows: np.ndarray, outputs: list[np.ndarray]) -> tuple[np.ndarray, np
     """Corners, scores and classes of an export that did its own suppression; people, if not labelled."""
     none = np.full((1, len(rows)), _PERSON)
     labels = next((output for output in outputs if output.shape == (1, len(rows))), none)
-    return rows[:, :4], rows[:, 4], labels[0]
+    return rows[:, :4].astype(float), rows[:, 4].astype(float), labels[0]
 
 
 def _cells(size_px: tuple[int, int]) -> np.ndarray:

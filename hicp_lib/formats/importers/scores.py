@@ -7,7 +7,7 @@ not 0.3 of another.
 - OpenPose, AlphaPose, Detectron2: scale 1. OpenPose's confidences lie in [0, 1]; heat-map maxima and
   Detectron2's softmax mass can pass 1 by a little.
 - MMPose and plain COCO results: 1, or 10 when a score is above 2, which only RTMW's are (up to about 10).
-  Between 1 and 2 both may be meant, and the same network's next folder could fall on the other side: asked for.
+  Between 1 and 2 both may be meant, and the network's next folder could fall on the other side: asked for.
 - Scores above 20 belong to no known scale, which must then be given.
 """
 

@@ -51,7 +51,7 @@ def test_detect_with_a_model_of_ones_own(capsys, model, tmp_path):
     found = np.array(row["keypoints"]).reshape(136, 3)
     assert np.abs(found[:17, :2] - positions[np.arange(17) % 3]).max() < 0.5
     assert (found[17:20] == 0).all()
-    capsys.readouterr()
+    assert capsys.readouterr().err.startswith("transform: classic, not UDP (ASSUMED")
     assert "--model FILE.onnx" in mistake(capsys, *arguments)
     assert "boxes 'gt'" in mistake(capsys, *arguments, "--model", model, "--boxes", "gt")
     assert "boxes 'all'" in mistake(capsys, *arguments, "--model", model, "--boxes", "all")
@@ -110,8 +110,9 @@ def test_a_model_named_once_is_taken_from_then_on(capsys, model, tmp_path):
     assert "/no.onnx: cannot be read" in mistake(capsys, *use, "--model", "/no.onnx")
     assert weights_sha256() == before
     assert cli.run([*use, "--model", model, "-o", "flip_test", "true"]) == 0
-    told = capsys.readouterr().out
-    assert "hicp report -p detectors mmpose" in told and "transform: classic, not UDP (ASSUMED" in told
+    told = capsys.readouterr()
+    assert "hicp report -p detectors mmpose" in told.out
+    assert told.err.startswith("transform: classic, not UDP (ASSUMED") and told.err.count("\n") == 1
     assert make_detector("mmpose").settings == make_detector("mmpose", model=model, flip_test=True).settings
     # What is given at a call comes first; a model given there stands for itself.
     assert make_detector("mmpose", flip_test=False).settings["flip_test"] is False
