@@ -82,7 +82,7 @@ class MMPose:
         if self._udp and (self._net.is_simcc or not dark):
             raise opened.refusal("UDP is for heat maps decoded by DARK; leave out udp, or dark false")
         self._decode = decode_dark_udp if self._udp else decode_dark if dark else decode_quarter
-        is_rtmw = self._net.is_simcc and _RTMW_OPERATOR in opened.operators
+        is_rtmw = self._net.is_simcc and _RTMW_OPERATOR in opened.told.operators
         self._score_scale = score_scale or (_RTMW_SCALE if is_rtmw else 1.0)
         self._convention = _hand_convention(self._net.convention, hand)
         own = {"family": person_family, "min_score": person_min_score, "max_overlap": person_max_overlap}
@@ -139,10 +139,10 @@ def _told_udp(model: OnnxModel, is_simcc: bool, given: bool | None) -> tuple[boo
     """Whether a network was trained with unbiased data processing, and how that is known."""
     if given is not None:
         return given, "option udp"
-    told = model.metadata.get("udp")
+    told = model.told.metadata.get("udp")
     if isinstance(told, bool):
         return told, "told by its metadata"
-    patch_px = min(model.first_convolution[2:], default=0)
+    patch_px = min(model.told.first_convolution[2:], default=0)
     if is_simcc:
         return False, "told by the outputs"
     if patch_px >= _MIN_PATCH_PX:

@@ -61,7 +61,7 @@ class PersonBoxes:
         max_overlap: float = 0.45,
     ) -> None:
         self._model = open_model(model, provider, threads)
-        folds = self._model.first_convolution[1:2] == (_FOLDED_CHANNELS,)
+        folds = self._model.told.first_convolution[1:2] == (_FOLDED_CHANNELS,)
         self._is_told = family is None
         self._family = family or ("yolox" if folds else "rtmdet")
         if self._family not in _NORMALISATIONS:

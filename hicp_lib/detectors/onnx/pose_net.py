@@ -5,7 +5,8 @@ the file; what the file cannot tell (colours, decoding) is given. What its metad
 `input_h`, `split_ratio`, alone or in a `cigpose_meta`) is taken, and must be so.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -85,7 +86,7 @@ class PoseNet:
         self._mirror = mirror(self.convention)
         first, last = outputs[0], outputs[-1]
         self.grid_size = (first.shape[-1], last.shape[-1] if self.is_simcc else last.shape[-2])
-        ratio = model.metadata.get("split_ratio")
+        ratio = model.told.metadata.get("split_ratio")
         if self.is_simcc and ratio and self.grid_size != tuple(side * ratio for side in self.input_size_px):
             size = "{} x {}".format(*self.input_size_px)
             raise model.refusal(f"its metadata say {ratio} bins per pixel of its {size}", answer)
@@ -180,6 +181,13 @@ class PoseNet:
 def convention_of(model: OnnxModel, n_keypoints: int, outputs: list[np.ndarray] | None = None) -> str:
     """The set of keypoints that a network gives, by their number.
 
+    Parameters
+    ----------
+    model : OnnxModel
+    n_keypoints : int
+    outputs : list of array, optional
+        What it gave.
+
     Raises
     ------
     InputError
@@ -196,15 +204,17 @@ def _input_size(model: OnnxModel, given: list[int] | None) -> tuple[tuple[int, i
     shape = model.inputs[0].shape
     if len(shape) != 4 or shape[1] not in (None, 3):
         raise model.refusal("expected crops of a fixed size, (n, 3, h, w)")
-    read = (shape[3], shape[2])
-    told = (model.metadata.get("input_w"), model.metadata.get("input_h"))
-    sources = {"read from the file": read, "told by its metadata": told, "option input_size_px": given or ()}
+    read, metadata = (shape[3], shape[2]), model.told.metadata
     whole = {
-        why: tuple(size)
-        for why, size in sources.items()
-        if len(size) == 2 and all(isinstance(side, int) and side > 0 for side in size)
+        why: size
+        for why, size in (
+            ("read from the file", _size(read)),
+            ("told by its metadata", _size([metadata.get("input_w"), metadata.get("input_h")])),
+            ("option input_size_px", _size(given or [])),
+        )
+        if size is not None
     }
-    if given and "option input_size_px" not in whole:
+    if given is not None and "option input_size_px" not in whole:
         raise InputError(f"input_size_px {given}: expected width and height in pixels, as in [192, 256]")
     if not whole:
         raise model.refusal(
@@ -215,3 +225,11 @@ def _input_size(model: OnnxModel, given: list[int] | None) -> tuple[tuple[int, i
         if any(side not in (None, known) for side, known in zip(other, size, strict=True)):
             raise model.refusal(f"its input is {size[0]} x {size[1]} ({why}), not {other[0]} x {other[1]}")
     return size, why
+
+
+def _size(sides: Sequence[Any]) -> tuple[int, int] | None:
+    """Width and height, if that is what is given."""
+    match sides:
+        case [int(width), int(height)] if min(width, height) > 0:
+            return width, height
+    return None

@@ -15,7 +15,7 @@ from hicp_lib.core.environment import with_variables
 from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.detectors.onnx.facts import KNOWN_NETWORKS, Fact
-from hicp_lib.detectors.onnx.model_file import read_model
+from hicp_lib.detectors.onnx.model_file import ModelFile, read_model
 from hicp_lib.detectors.weights.default import find, load
 from hicp_lib.detectors.weights.published import check_use
 
@@ -58,15 +58,13 @@ class OnnxModel:
         Where it runs, e.g. "cpu".
     inputs, outputs : list of Port
         Its ports.
-    operators, first_convolution, metadata
-        See `hicp_lib.detectors.onnx.model_file.ModelFile`.
+    told : ModelFile
+        What its file tells.
     """
 
     def __init__(self, path: Path, content: bytes, provider: str, threads: int) -> None:
-        told = read_model(path, content)
+        self.told: ModelFile = read_model(path, content)
         self.path, self.sha256, self.provider = path, sha256_bytes(content), provider
-        self.operators, self.first_convolution = told.operators, told.first_convolution
-        self.metadata = told.metadata
         self._session = _start(path, content, provider, threads)
         self._responses: dict[tuple[int, ...], list[np.ndarray]] = {}
         self.inputs = [_port(node) for node in self._session.get_inputs()]

@@ -284,7 +284,7 @@ def test_an_open_input_is_asked_for_or_told_by_metadata(tmp_path):
     model = colour_maps_model(tmp_path / "m.onnx", (None, None), 17)
     with pytest.raises(InputError, match="-o input_size_px"):
         MMPose(model)
-    for wrong in ([96], [96, 0], ["96", 128], [96.0, 128.0]):
+    for wrong in ([], [96], [96, 0], ["96", 128], [96.0, 128.0]):
         with pytest.raises(InputError, match="expected width and height in pixels"):
             MMPose(model, input_size_px=wrong)
     image = dots([[50.0, 70.0], [75.0, 60.0], [66.0, 88.0]])

@@ -123,9 +123,14 @@ def test_a_second_file_is_refused_in_attributes_branches_functions_and_sparse_we
 
 
 def test_metadata_are_read_and_a_contract_in_them_comes_first(tmp_path, model):
-    assert open_model(model).metadata == {}
+    assert open_model(model).told.metadata == {}
     told(model, udp="true", source="a lab", input_w="1", cigpose_meta='{"input_w": 192, "split_ratio": 2.0}')
-    assert open_model(model).metadata == {"udp": True, "source": "a lab", "input_w": 192, "split_ratio": 2.0}
+    assert open_model(model).told.metadata == {
+        "udp": True,
+        "source": "a lab",
+        "input_w": 192,
+        "split_ratio": 2.0,
+    }
     told(model, cigpose_meta="[1]")
     refused(model, "expected a JSON object")
 
