@@ -136,6 +136,8 @@ def test_files_are_kept_by_their_whole_path_however_they_were_named(model, tmp_p
 
 def test_detectors_with_weights_of_their_own_take_no_others(capsys, model):
     assert "takes none of yours" in mistake(capsys, "models", "use", "--detector", "mediapipe")
+    combined = ["--detector", "combined:mmpose+mmpose", "--model", model]
+    assert "name the weights of each by itself" in mistake(capsys, "models", "use", *combined)
 
 
 def test_a_damaged_list_of_own_models_is_told_in_one_line(capsys, model):
