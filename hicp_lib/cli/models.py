@@ -76,8 +76,8 @@ def models_use(detector: str, **chosen) -> None:
     options = given(**chosen)
     if detector in DETECTORS and not DETECTORS[detector].needs_model:
         raise InputError(
-            f"detector {detector!r} has weights of its own; it takes none of yours for good, and where it has "
-            "an option model, at each call"
+            f"detector {detector!r} has weights of its own; it takes none of yours for good, and where it "
+            "has an option model, at each call"
         )
     if detector.startswith(COMBINED):
         raise InputError(f"detector {detector!r} is made of two; name the weights of each by itself")

@@ -50,7 +50,7 @@ def letterbox(
     --------
     >>> fitted = letterbox(np.zeros((50, 100, 3), np.uint8), (40, 40), (114, 114, 114))
     >>> fitted.pixels[:, 0, 0].tolist() == 20 * [0] + 20 * [114], fitted.to_image_px(np.array([3.5, 1.5]))
-    (True, array([8.75, 3.75]))
+    (True, array([9.5, 4.5]))
     """
     height, width = image.shape[:2]
     ratio = min(size_px[0] / width, size_px[1] / height)
@@ -61,7 +61,7 @@ def letterbox(
     resized = cv2.resize(image, fitted, interpolation=cv2.INTER_LINEAR)
     pixels[top : top + fitted[1], left : left + fitted[0]] = resized
     scale = np.array(fitted) / (width, height)
-    return Letterbox(pixels, scale, (left, top), 0.0)
+    return Letterbox(pixels, scale, (left - 0.5, top - 0.5))
 
 
 def planes(pixels: np.ndarray, mean: tuple[float, ...], std: tuple[float, ...], out: np.ndarray) -> None:

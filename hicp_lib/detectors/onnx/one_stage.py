@@ -68,7 +68,8 @@ class OneStage:
         boxes, keypoints = self._read(self._model.run(feed))
         keep = np.flatnonzero(boxes[:, 4] >= self._min_score)
         keep = keep[unsuppressed(boxes[keep, :4], boxes[keep, 4], self._max_overlap)]
-        positions_px = fitted.to_image_px(keypoints[keep, :, :2])
+        # Both families count from the corners of the input and of the image, not from pixels' centres.
+        positions_px = fitted.to_image_px(keypoints[keep, :, :2] - 0.5) + 0.5
         scores = np.clip(np.nan_to_num(keypoints[keep, :, 2]), 0, 1)
         is_given = np.isfinite(positions_px).all(axis=-1) & (scores > 0)
         positions_px = np.where(is_given[..., None], positions_px, np.nan)

@@ -168,6 +168,8 @@ def test_person_boxes_detected_given_and_missing(tmp_path):
     assert len(given_box.detect(image, np.zeros((0, 4)))) == 0
     for options in (
         {"boxes": "gt"},
+        {"boxes": "image", "person_min_score": 0.5},
+        {"boxes": "detected", "person_family": "yolox"},
         {"boxes": "some"},
         {"boxes": "gt", "person_model": person},
     ):
