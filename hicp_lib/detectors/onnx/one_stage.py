@@ -53,7 +53,11 @@ class OneStage:
         self._model = open_model(model, provider, threads)
         self._min_score, self._max_overlap = min_score, max_overlap
         height, width = self._model.image_size_px
-        self._size_px = width or _DEFAULT_SIDE_PX, height or _DEFAULT_SIDE_PX
+        match self._model.told.metadata.get("imgsz"):  # so Ultralytics calls what it exported for
+            case [int(open_height), int(open_width)]:
+                self._size_px = width or open_width, height or open_height
+            case _:
+                self._size_px = width or _DEFAULT_SIDE_PX, height or _DEFAULT_SIDE_PX
         outputs = self._model.response_to_zeros(*self._size_px[::-1])
         self._is_rtmo = len(outputs) > 1
         self._convention = convention_of(self._model, self._read(outputs)[1].shape[1], outputs)
@@ -80,7 +84,7 @@ class OneStage:
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""
         width, height = self._size_px
-        size = "read from the file" if None not in self._model.image_size_px else f"open: {_DEFAULT_SIDE_PX}"
+        size = "read from the file, its metadata imgsz, or else 640"
         where = "BGR 0-255, top-left" if self._is_rtmo else "RGB 0-1, in the middle"
         return [
             *self._model.describe(),

@@ -110,15 +110,16 @@ class PersonBoxes:
 
     def _rows(self, outputs: list[np.ndarray]) -> np.ndarray:
         """Rows (n, 5) of an export that does its own suppression, or YOLOX's (cells, 5 + classes)."""
-        rows = next((output for output in outputs if output.ndim == 3 and len(output) == 1), None)
-        n_columns = 0 if rows is None else rows.shape[2]
-        if rows is None or n_columns < _N_BOX or n_columns > _N_BOX and len(rows[0]) != len(self._cells):
+        tables = [output for output in outputs if output.ndim == 3]
+        rows = tables[0][0] if len(tables) == 1 and len(tables[0]) == 1 else np.empty((0, 0))
+        n_columns = rows.shape[1]
+        if n_columns < _N_BOX or n_columns > _N_BOX and len(rows) != len(self._cells):
             size = "{} x {}".format(*self._size_px)
             raise self._model.refusal(
                 f"expected (1, n, 5) boxes with scores, or (1, {len(self._cells)}, 5 + classes) of YOLOX's "
                 f"strides 8, 16 and 32 in {size}", outputs
             )  # fmt: skip
-        return rows[0]
+        return rows
 
     def _from_grid(
         self, rows: np.ndarray, _outputs: list[np.ndarray]

@@ -140,11 +140,11 @@ class OnnxModel:
         Parameters
         ----------
         *size_px : int
-            Height and width, where the model leaves them open; what else it leaves open counts as 1.
+            Height and width, where the model leaves them open.
         """
         if size_px not in self._responses:
-            shape = self.inputs[0].shape
-            sizes = (1,) * (len(shape) - len(size_px)) + size_px
+            shape, one_image = self.inputs[0].shape, (1, 3, *size_px)
+            sizes = one_image if len(shape) == len(one_image) else [1] * len(shape)
             zeros = np.zeros([size or given for size, given in zip(shape, sizes, strict=True)], np.float32)
             self._responses[size_px] = self.run(zeros)
         return self._responses[size_px]

@@ -117,6 +117,31 @@ def test_dark_of_udp(seed):
     agree(decode.decode_dark_udp(maps), maps, lambda heat: plain_dark_udp(heat, 11))
 
 
+@pytest.mark.parametrize(
+    ("decoder", "expected"),
+    [
+        (decode.decode_dark, [(5.29996, 7.80009), (0, 15), (4.11388, 4.81933), (11, 1)]),
+        (decode.decode_dark_udp, [(5.30019, 7.79997), (-0.5, 15.5), (4.11477, 4.81221), (11.5, 1.38903)]),
+    ],
+)
+def test_what_mmposes_own_code_gives(decoder, expected):
+    """Peaks in the middle, at a corner, of two people, and at a border."""
+    y, x = np.mgrid[:16, :12]
+
+    def bump(cx, cy, sigma, top):
+        return top * np.exp(-((x - cx) ** 2 + (y - cy) ** 2) / (2 * sigma**2))
+
+    maps = np.stack(
+        [
+            bump(5.3, 7.8, 2, 1),
+            bump(0.2, 15.4, 2, 1),
+            bump(3.5, 3.5, 2, 0.4) + bump(6, 9, 3, 0.3),
+            bump(10.7, 1.1, 1.5, 1),
+        ]
+    )
+    np.testing.assert_allclose(decoder(maps[None].astype(np.float32))[0][0], expected, atol=1e-4)
+
+
 @given(seed=SEEDS)
 @settings(max_examples=20)
 def test_dark_finds_the_centre_of_a_gaussian_far_better_than_the_cell(seed):

@@ -1,6 +1,7 @@
 """MMPose on networks with known answers: peaks through the whole path, from colours to image pixels."""
 
 import numpy as np
+import onnx
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -294,6 +295,12 @@ def test_an_open_input_is_asked_for_or_told_by_metadata(tmp_path):
     opened = MMPose(model, input_size_px=[96, 128])
     np.testing.assert_array_equal(opened.detect(image).keypoints_px, fixed.keypoints_px)
     assert opened.settings["input_size_px"] == (96, 128)
+    proto = onnx.load(model)
+    proto.graph.input[0].type.tensor_type.shape.dim[1].dim_param = "channels"
+    onnx.save(proto, model)
+    np.testing.assert_array_equal(
+        MMPose(model, input_size_px=[96, 128]).detect(image).keypoints_px, fixed.keypoints_px
+    )
     told(model, cigpose_meta='{"input_w": 96, "input_h": 128, "split_ratio": 2.0, "num_keypoints": 17}')
     np.testing.assert_array_equal(MMPose(model).detect(image).keypoints_px, fixed.keypoints_px)
     with pytest.raises(InputError, match=r"96 x 128 \(told by its metadata\), not 192 x 256"):

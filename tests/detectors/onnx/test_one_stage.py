@@ -7,7 +7,7 @@ from onnx import helper
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import COCO_17, TO_HALPE
 from hicp_lib.detectors.onnx.one_stage import OneStage
-from tests.detectors.onnx.onnx_models import constant_model, save
+from tests.detectors.onnx.onnx_models import constant_model, save, told
 
 IMAGE = np.zeros((120, 200, 3), np.uint8)  # into 64 x 64: 64 x 38 pixels, in the middle 13 lower
 SCALE = np.array([64 / 200, 38 / 120])
@@ -69,7 +69,7 @@ def test_rtmo_sees_bgr_0_to_255_and_yolo_pose_rgb_0_to_1(tmp_path):
         np.testing.assert_allclose(found[COCO_17], seen, rtol=1e-6)
 
 
-def echo_model(path, kind):
+def echo_model(path, kind, size=(64, 64)):
     make = helper.make_node
     nodes = [
         make("Slice", ["image", "start", "stop"], ["pixel"]),
@@ -95,7 +95,7 @@ def echo_model(path, kind):
             make("Concat", ["box", "row"], ["o"], axis=1),
         ]
         outputs = {"o": [1, 56, 1]}
-    return save(path, nodes, {"image": [1, 3, 64, 64]}, outputs, constants)
+    return save(path, nodes, {"image": [1, 3, *size]}, outputs, constants)
 
 
 @pytest.mark.parametrize("shape", [(1, 3, 5), (1, 84, 8), (2, 56, 9), (1, 57, 500), (56, 9), (1, 53, 4)])
@@ -104,6 +104,14 @@ def test_other_outputs_are_refused_in_one_line(tmp_path, shape):
     with pytest.raises(InputError) as caught:
         OneStage(model)
     assert f"gives o {shape}" in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_an_open_input_is_as_large_as_the_metadata_say(tmp_path):
+    model = echo_model(tmp_path / "m.onnx", "yolo", size=(None, None))
+    facts = [{fact.what: fact.value for fact in OneStage(model).describe()}]
+    told(model, imgsz="[320, 256]")
+    facts.append({fact.what: fact.value for fact in OneStage(model).describe()})
+    assert [fact["input"] for fact in facts] == ["640 wide, 640 high", "256 wide, 320 high"]
 
 
 def test_what_is_assumed_is_told(tmp_path):

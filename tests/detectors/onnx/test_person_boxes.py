@@ -140,6 +140,13 @@ def test_an_empty_answer_and_broken_numbers(tmp_path):
     assert len(PersonBoxes(with_suppression(tmp_path / "b.onnx", rows)).find(IMAGE)[0]) == 0
 
 
+def test_boxes_apart_from_their_scores_are_refused(tmp_path):
+    """A table of class scores beside one of boxes has as many rows as YOLOX's, and is not it."""
+    outputs = {"scores": np.zeros((1, 84, 80), np.float32), "boxes": np.zeros((1, 84, 4), np.float32)}
+    with pytest.raises(InputError, match="gives scores .1, 84, 80., boxes .1, 84, 4.; expected"):
+        PersonBoxes(constant_model(tmp_path / "p.onnx", (1, 3, 64, 64), outputs))
+
+
 @pytest.mark.parametrize(
     "output",
     [
