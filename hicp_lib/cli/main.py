@@ -18,7 +18,7 @@ import click
 from hicp_lib import __version__
 from hicp_lib.cli.calibration import calibration
 from hicp_lib.cli.models import models
-from hicp_lib.cli.options import PATH, WORKERS, detector_options, given
+from hicp_lib.cli.options import PATH, WORKERS, detector_options, given, tell_assumed
 from hicp_lib.cli.recordings import lift, record
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import write_json
@@ -135,6 +135,7 @@ def detect(
 
     What was found in an image is kept: after an interruption, the same command does only the rest.
     """
+    from hicp_lib.detectors.registry import DETECTORS, describe, make_detector
     from hicp_lib.detectors.runtime.results import detections_of
     from hicp_lib.detectors.runtime.run import detect_dataset, detect_images
     from hicp_lib.formats.annotations import write_detections
@@ -143,6 +144,8 @@ def detect(
         raise click.UsageError("Give either --dataset DIR or --images DIR.", click.get_current_context())
     if workers and dask:
         raise click.UsageError("Give either --workers N or --dask ADDRESS.", click.get_current_context())
+    needs_model = detector in DETECTORS and DETECTORS[detector].needs_model
+    facts = describe(make_detector(detector, **given(**chosen))) if needs_model else []
     if dataset_dir is not None:
         found = detect_dataset(detector, dataset_dir, workers=workers, dask=dask, **given(**chosen))
     elif images_dir is not None:
@@ -153,6 +156,7 @@ def detect(
         write_json(out.with_suffix(".images.json"), names, indent=1)
     write_detections(out, found)
     click.echo(f"{out}: {sum(len(people) for people in found.values())} people in {len(found)} images")
+    tell_assumed(facts)
 
 
 def _numbered_images(folder: Path) -> dict[int, Path]:

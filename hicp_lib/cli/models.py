@@ -2,7 +2,7 @@
 
 import click
 
-from hicp_lib.cli.options import detector_options, given
+from hicp_lib.cli.options import detector_options, given, tell_assumed
 from hicp_lib.core.errors import InputError
 
 
@@ -70,15 +70,21 @@ def models_show(detector: str, **chosen) -> None:
 @detector_options
 def models_use(detector: str, **chosen) -> None:
     """Say once which model file a detector runs on; notebooks and commands then take it by its name."""
-    from hicp_lib.detectors.registry import DETECTORS, make_detector
+    from hicp_lib.detectors.registry import COMBINED, DETECTORS, describe, make_detector
     from hicp_lib.detectors.weights.user import keep_user_options
 
     options = given(**chosen)
     if detector in DETECTORS and not DETECTORS[detector].needs_model:
-        raise InputError(f"detector {detector!r} has weights of its own; it takes none of yours")
-    make_detector(detector, **options)
+        raise InputError(
+            f"detector {detector!r} has weights of its own; it takes none of yours for good, and where it "
+            "has an option model, at each call"
+        )
+    if detector.startswith(COMBINED):
+        raise InputError(f"detector {detector!r} is made of two; name the weights of each by itself")
+    made = make_detector(detector, **options)
     if "model" not in options:
         raise InputError(f"detector {detector!r}: no model is named; give it with --model FILE.onnx")
     keep_user_options(detector, options)
     command = f"hicp report -p detectors {detector}"
     click.echo(f"{detector}: {options['model']}; run it in the report with: {command}")
+    tell_assumed(describe(made))

@@ -1,11 +1,12 @@
 """Kinds of options that the `hicp` command's parts share."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
+
+from hicp_lib.core.files import json_or_text
 
 PATH = click.Path(path_type=Path)
 WORKERS = click.IntRange(min=1)
@@ -25,6 +26,19 @@ def detector_options(command: Callable) -> Callable:
     return command
 
 
+def tell_assumed(facts: list[tuple[str, str, str]]) -> None:
+    """Say on the error stream what is assumed about a detector's model and could be otherwise.
+
+    Parameters
+    ----------
+    facts : list of (str, str, str)
+        What `hicp_lib.detectors.registry.describe` gives.
+    """
+    for what, value, why in facts:
+        if why.startswith("ASSUMED"):
+            click.echo(f"{what}: {value} ({why})", err=True)
+
+
 def given(model: Path | None, person_model: Path | None, boxes: str | None, pairs) -> dict[str, Any]:
     """The detector's options out of the command line's.
 
@@ -42,13 +56,5 @@ def given(model: Path | None, person_model: Path | None, boxes: str | None, pair
     """
     named = {"model": model, "person_model": person_model, "boxes": boxes}
     return {name: value for name, value in named.items() if value is not None} | {
-        name: _value(text) for name, text in pairs
+        name: json_or_text(text) for name, text in pairs
     }
-
-
-def _value(text: str) -> Any:
-    """true, 1 or 0.5 as such, anything else as text."""
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError):
-        return text

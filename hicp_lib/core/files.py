@@ -88,6 +88,20 @@ def write_json(path: str | Path, value: Any, *, indent: int | None = None) -> No
     write_bytes(path, (text + "\n").encode())
 
 
+def json_or_text(text: str) -> Any:
+    """What a text says as JSON (true, 1, 0.5, [1, 2]), or else the text.
+
+    Examples
+    --------
+    >>> json_or_text("0.5"), json_or_text("gt")
+    (0.5, 'gt')
+    """
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return text
+
+
 def read_json(path: str | Path) -> Any:
     """Read JSON from outside.
 

@@ -91,6 +91,7 @@ TO_HALPE: dict[str, np.ndarray] = {
         # Halpe without its face, as AlphaPose has models for.
         "halpe68_noface": [*range(26), *range(94, 136)],
         "coco17": range(17),
+        "crowdpose14": range(5, 19),
         "wholebody133": [*range(17), 20, 22, 24, 21, 23, 25, *range(26, 136)],
         "openpose_coco18": [0, 18, 6, 8, 10, 5, 7, 9, 12, 14, 16, 11, 13, 15, 2, 1, 4, 3],
         "openpose_body25": [

@@ -16,8 +16,8 @@ class Facts:
 
     Attributes
     ----------
-    paradigm : {"top-down", "bottom-up"}
-        Whether people are looked for first and then their keypoints, or keypoints first.
+    paradigm : {"top-down", "bottom-up", "one-stage"}
+        Whether people are looked for first and then their keypoints, or keypoints first, or both at once.
     keypoints : str
         How many, and of what.
     training_data : str
@@ -77,6 +77,7 @@ _RCNN = "hicp_lib.detectors.onnx.keypoint_rcnn"
 _THUNDER = "hicp_lib.detectors.movenet.single_pose"
 _MULTIPOSE = "hicp_lib.detectors.movenet.multi_pose"
 _POSENET = "hicp_lib.detectors.posenet.detector"
+_ONE_STAGE = "hicp_lib.detectors.onnx.one_stage"
 _TOP_DOWN, _BOTTOM_UP = "top-down", "bottom-up"
 _COCO, _COCO_ACTIVE = "COCO", "COCO, Active (Google's own)"
 _OWN_WEIGHTS = "as the weights"
@@ -112,6 +113,8 @@ _ENTRIES = (
           Facts(_TOP_DOWN, "136 of the whole body", "Halpe", _OWN_WEIGHTS), needs_model=True),
     Entry("detectron2", "Detectron2", _BODY, _RCNN, "KeypointRcnn",
           Facts(_TOP_DOWN, "17 of the body", _COCO, "800 on the short side"), needs_model=True),
+    Entry("one-stage", "RTMO, YOLO-pose", _BODY, _ONE_STAGE, "OneStage",
+          Facts("one-stage", "17 of the body", "COCO and others", _OWN_WEIGHTS), needs_model=True),
 )  # fmt: skip
 COMBINED = "combined:"
 # Within a combination the body vouches for the hands: the hand model may be less sure, and others' hands
@@ -225,7 +228,8 @@ def _check_options(name: str, detector_class: type, options: dict) -> None:
                 f"detector {name!r} has no option {option!r}; expected one of: {', '.join(kinds)}"
             )
         kind = kinds[option] | int if float in (kinds[option], *get_args(kinds[option])) else kinds[option]
-        if not isinstance(value, kind) or (isinstance(value, bool) and kinds[option] is not bool):
+        takes_bool = bool in (kinds[option], *get_args(kinds[option]))
+        if not isinstance(value, kind) or (isinstance(value, bool) and not takes_bool):
             wanted = getattr(kinds[option], "__name__", None) or str(kinds[option])
             raise InputError(f"detector {name!r}: option {option!r} is {value!r}; expected {wanted}")
 

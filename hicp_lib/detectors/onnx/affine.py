@@ -1,10 +1,11 @@
 """From person boxes to the pixels a top-down network sees, and back.
 
-The classic transform of top-down pose estimation (Xiao et al., "Simple baselines for human pose
-estimation and tracking", ECCV 2018; not the later UDP variant): the box is padded, grown to the
-network's aspect ratio about its centre, and mapped so that the centre falls on
-(width / 2, height / 2) of the input. Keypoints go back by the fraction of the grid they lie
-at, whatever the grid: the heat map's cells or the bins of SimCC.
+The box is padded and grown to the network's aspect ratio about its centre. The classic transform
+(Xiao et al., "Simple baselines for human pose estimation and tracking", ECCV 2018) maps it onto the
+input so that the centre falls on (width / 2, height / 2), and keypoints go back by the fraction of the
+grid they lie at, whatever the grid: the heat map's cells or the bins of SimCC. Unbiased data
+processing (Huang et al., "The devil is in the details", UDP, CVPR 2020) measures all three, box, input
+and grid, from the first pixel's centre to the last one's: their sizes less one.
 """
 
 from __future__ import annotations
@@ -26,14 +27,21 @@ class Regions:
     centres_px : array, shape (n, 2)
     sizes_px : array, shape (n, 2)
         Width and height.
+    udp : bool
+        Measured as in unbiased data processing.
     """
 
     centres_px: np.ndarray
     sizes_px: np.ndarray
+    udp: bool = False
 
     @classmethod
     def around(
-        cls, boxes_px: np.ndarray, input_size_px: tuple[int, int], padding: float = PADDING
+        cls,
+        boxes_px: np.ndarray,
+        input_size_px: tuple[int, int],
+        padding: float = PADDING,
+        udp: bool = False,
     ) -> Regions:
         """The regions of boxes for a network's input.
 
@@ -44,6 +52,7 @@ class Regions:
             Width and height.
         padding : float
             What the boxes are grown by.
+        udp : bool
 
         Examples
         --------
@@ -56,7 +65,7 @@ class Regions:
         aspect = input_size_px[0] / input_size_px[1]
         widths = np.maximum(sizes[:, 0], sizes[:, 1] * aspect)
         grown = np.stack([widths, widths / aspect], axis=1) * padding
-        return cls(boxes_px[:, :2] + boxes_px[:, 2:] / 2, grown)
+        return cls(boxes_px[:, :2] + boxes_px[:, 2:] / 2, grown, udp)
 
     def __len__(self) -> int:
         return len(self.centres_px)
@@ -64,11 +73,9 @@ class Regions:
     def crop(self, image: np.ndarray, input_size_px: tuple[int, int]) -> list[np.ndarray]:
         """What lies in each region, scaled to (width, height) bilinearly; black outside the image."""
         crops = []
-        for (x, y), (width, _) in zip(self.centres_px, self.sizes_px, strict=True):
-            zoom = input_size_px[0] / width
-            matrix = np.array(
-                [[zoom, 0, input_size_px[0] / 2 - zoom * x], [0, zoom, input_size_px[1] / 2 - zoom * y]]
-            )
+        spans = self._span(input_size_px)
+        for centre, zoom in zip(self.centres_px, spans / self.sizes_px, strict=True):
+            matrix = np.column_stack([np.diag(zoom), spans / 2 - zoom * centre])
             crops.append(cv2.warpAffine(image, matrix, input_size_px, flags=cv2.INTER_LINEAR))
         return crops
 
@@ -82,4 +89,7 @@ class Regions:
             (width, height) of the grid, in the unit of `positions`.
         """
         corners = self.centres_px - self.sizes_px / 2
-        return corners[:, None] + positions / np.asarray(grid_size, float) * self.sizes_px[:, None]
+        return corners[:, None] + positions / self._span(grid_size) * self.sizes_px[:, None]
+
+    def _span(self, size: tuple[int, int]) -> np.ndarray:
+        return np.asarray(size, float) - self.udp

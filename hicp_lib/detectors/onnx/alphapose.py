@@ -13,17 +13,15 @@ from hicp_lib.detectors.onnx.box_source import BoxSource
 from hicp_lib.detectors.onnx.decode import decode_combined, decode_integral, decode_quarter
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.pose_net import Decoder, PoseNet
-from hicp_lib.detectors.onnx.session import open_model
+from hicp_lib.detectors.onnx.session import OnnxModel, open_model
 
-_N_FACE_AND_HANDS = 110
-# By the name of the decoding: how heat maps are read, and what a keypoint's score is.
-_DECODINGS: dict[str, tuple[Decoder, str]] = {
-    "heatmap": (partial(decode_quarter, needs_both_axes=True), "maximum of the map"),
-    "integral": (decode_integral, "maximum of the map's sigmoid"),
-    "combined": (
-        partial(decode_combined, n_integral=_N_FACE_AND_HANDS),
-        "maximum of the map; of its sigmoid for face and hands",
-    ),
+# Points of face and hands at the end of a set, or of the hands alone.
+_N_INTEGRAL = {"halpe136": 110, "wholebody133": 110, "halpe68_noface": 42}
+# By the name of the decoding: what a keypoint's score is.
+_SCORES = {
+    "heatmap": "maximum of the map",
+    "integral": "maximum of the map's sigmoid",
+    "combined": "maximum of the map; of its sigmoid for face and hands",
 }
 # Taken off the R, G and B values, which are then divided.
 _MEAN, _STD = (0.406 * 255, 0.457 * 255, 0.480 * 255), (255.0,) * 3
@@ -41,10 +39,14 @@ class AlphaPose:
     person_model : str or Path, optional
     boxes : str, optional
         See `hicp_lib.detectors.onnx.box_source.BoxSource`.
+    person_family : str, optional
+    person_min_score, person_max_overlap : float, optional
+        See `hicp_lib.detectors.onnx.person_boxes.PersonBoxes`.
     decoding : str, optional
         "heatmap", "integral" (symmetric integral regression) or "combined" (face and hands integral); if
         None, told by the network's answer to the mean colour.
     flip_test : bool
+    input_size_px : list of int, optional
     provider : str
     threads : int
         As for `hicp_lib.detectors.onnx.mmpose.MMPose`.
@@ -57,21 +59,26 @@ class AlphaPose:
         model: str | Path,
         person_model: str | Path | None = None,
         boxes: str | None = None,
+        person_family: str | None = None,
+        person_min_score: float | None = None,
+        person_max_overlap: float | None = None,
         decoding: str | None = None,
         flip_test: bool = False,
+        input_size_px: list | None = None,
         provider: str = "cpu",
         threads: int = 1,
     ) -> None:
         opened = open_model(model, provider, threads)
-        self._is_told = decoding is None
-        self.decoding = decoding or _told_decoding(opened.response_to_zeros)
-        if self.decoding not in _DECODINGS:
-            raise InputError(f"decoding {decoding!r}: not known; expected one of: {', '.join(_DECODINGS)}")
-        self._net = PoseNet(opened, _MEAN, _STD, _DECODINGS[self.decoding][0], flip_test)
+        self._net = PoseNet(opened, _MEAN, _STD, flip_test, input_size_px)
         if self._net.is_simcc:
-            raise InputError(f"{model}: gives SimCC vectors; expected heat maps, or use detector mmpose")
-        self._rules = _rules(self._net, self.decoding)
-        self._boxes = BoxSource(boxes, person_model, provider, threads)
+            raise opened.refusal("SimCC vectors are not AlphaPose's; expected heat maps, or use mmpose")
+        n_integral = _N_INTEGRAL.get(self._net.convention, 0)
+        self._is_told = decoding is None
+        self.decoding = decoding or _told_decoding(self._net.answer[0], n_integral)
+        self._decode = _decoder(opened, self.decoding, n_integral)
+        self._rules = _rules(self._net.convention, self.decoding)
+        own = {"family": person_family, "min_score": person_min_score, "max_overlap": person_max_overlap}
+        self._boxes = BoxSource(boxes, person_model, provider, threads, **own)
         self.takes_boxes = self._boxes.kind == "gt"
         self.settings = {"model": opened.settings, "decoding": self.decoding, "flip_test": flip_test}
         self.settings |= self._boxes.settings
@@ -82,7 +89,7 @@ class AlphaPose:
         if not len(boxes):
             return Detections.none()
         regions = Regions.around(boxes, self._net.input_size_px)
-        positions_px, scores = self._net.find(image, regions)
+        positions_px, scores = self._net.find(image, regions, self._decode)
         rows, positions_px, scores = pose_nms.merge_poses(positions_px, scores, boxes, self._rules)
         greatest = scores.max(axis=1, initial=0)
         person_scores = scores.mean(axis=1) + box_scores[rows] + _GREATEST_WEIGHT * greatest
@@ -95,30 +102,33 @@ class AlphaPose:
             *self._net.describe(),
             Fact("pixels", "RGB / 255 - (0.406, 0.457, 0.480)", "as AlphaPose trains"),
             Fact("decoding", self.decoding, f"{told}; option decoding"),
-            Fact("keypoint score", _DECODINGS[self.decoding][1] + ", cut off at 1", "as AlphaPose"),
+            Fact("transform", "classic", "as AlphaPose"),
+            Fact("keypoint score", _SCORES[self.decoding] + ", cut off at 1", "as AlphaPose"),
             Fact("person score", f"mean + {_GREATEST_WEIGHT} x greatest keypoint score + box score",
                  "as AlphaPose; pose-NMS"),
             *self._boxes.describe(),
         ]  # fmt: skip
 
 
-def _told_decoding(outputs: list[np.ndarray]) -> str:
+def _told_decoding(maps: np.ndarray, n_integral: int) -> str:
     """Heat maps stay near 0 where nobody is; logits for integral regression lie far below."""
-    if len(outputs) != 1 or outputs[0].ndim != 4:
-        return "heatmap"
-    is_logits = np.median(outputs[0][0], axis=(1, 2)) < -1
+    is_logits = np.median(maps[0], axis=(1, 2)) < -1
     if is_logits.all():
         return "integral"
-    n_keypoints = len(is_logits)
-    whole_body = n_keypoints > _N_FACE_AND_HANDS and is_logits[-_N_FACE_AND_HANDS:].mean() > 0.5
-    return "combined" if whole_body else "heatmap"
+    return "combined" if n_integral and is_logits[-n_integral:].mean() > 0.5 else "heatmap"
 
 
-def _rules(net: PoseNet, decoding: str) -> pose_nms.PoseNmsRules:
-    if net.convention not in ("halpe136", "wholebody133"):
-        if decoding == "combined":
-            raise InputError(
-                f"{net.model.path}: has no face and hands; expected decoding heatmap or integral for it"
-            )
+def _decoder(model: OnnxModel, decoding: str, n_integral: int) -> Decoder:
+    if decoding not in _SCORES:
+        raise InputError(f"decoding {decoding!r}: not known; expected one of: {', '.join(_SCORES)}")
+    if decoding == "combined":
+        if not n_integral:
+            raise InputError(f"{model.path}: has no face and hands; expected decoding heatmap or integral")
+        return partial(decode_combined, n_integral=n_integral)
+    return decode_integral if decoding == "integral" else partial(decode_quarter, needs_both_axes=True)
+
+
+def _rules(convention: str, decoding: str) -> pose_nms.PoseNmsRules:
+    if convention not in ("halpe136", "wholebody133"):
         return pose_nms.BODY_RULES
     return pose_nms.WHOLE_BODY_RULES if decoding == "heatmap" else pose_nms.INTEGRAL_RULES

@@ -27,11 +27,17 @@ class BoxSource:
         default detected with a person model, and otherwise the image.
     person_model : str or Path or None
         ONNX export of YOLOX or RTMDet; without it, NanoDet, which comes with the library, detects.
+    provider : str
+    threads : int
+    **own : object
+        Further options of `hicp_lib.detectors.onnx.person_boxes.PersonBoxes`, or of NanoDet; None stands for
+        the default.
     """
 
     def __init__(
-        self, boxes: str | None, person_model: str | Path | None, provider: str, threads: int
+        self, boxes: str | None, person_model: str | Path | None, provider: str, threads: int, **own: Any
     ) -> None:
+        own = {name: value for name, value in own.items() if value is not None}
         self.kind = boxes or ("detected" if person_model else "image")
         if self.kind not in _MEANINGS:
             raise InputError(f"boxes {boxes!r}: not known; expected one of: {', '.join(_MEANINGS)}")
@@ -40,14 +46,16 @@ class BoxSource:
                 f"boxes {self.kind!r}: do not use a person model; give boxes 'detected' together with "
                 "person_model (--person-model FILE.onnx), or neither"
             )
+        if own and (self.kind != "detected" or person_model is None and "family" in own):
+            raise InputError(
+                f"boxes {self.kind!r}: do not use person_{', person_'.join(own)}; leave them out, or give "
+                "boxes 'detected' and, for person_family, a person_model"
+            )
         self._finder: PersonBoxes | NanoDet | None = None
         self.settings: dict[str, Any] = {"boxes": self.kind}
         if self.kind == "detected":
-            self._finder = (
-                NanoDet(provider=provider, threads=threads)
-                if person_model is None
-                else PersonBoxes(person_model, provider, threads)
-            )
+            own |= {"provider": provider, "threads": threads}
+            self._finder = NanoDet(**own) if person_model is None else PersonBoxes(person_model, **own)
             self.settings["person_model"] = self._finder.settings
 
     def find(self, image: np.ndarray, boxes_px: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:

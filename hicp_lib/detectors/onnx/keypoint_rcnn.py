@@ -68,11 +68,12 @@ class KeypointRcnn:
         self._model = open_model(model, provider, threads)
         shape = self._model.inputs[0].shape
         if shape[:-3] not in ((), (1,), (None,)) or shape[-3:-2] not in ((3,), (None,)):
-            raise InputError(f"{model}: takes an input of shape {shape}; expected one image, (3, h, w)")
+            raise self._model.refusal("expected an input of one image, (3, h, w)")
         self._is_told = family is None
         self._family = family or _told_family(self._model.outputs)
         if self._family not in _FAMILIES:
             raise InputError(f"{model}: family {family!r} is not known; expected {' or '.join(_FAMILIES)}")
+        self._check([port.shape for port in self._model.outputs])
         self._min_score = min_score
         self.settings = {"model": self._model.settings, "family": self._family, "min_score": min_score}
         self.settings["opencv"] = cv2.__version__
@@ -132,16 +133,23 @@ class KeypointRcnn:
         """What is there of `_ROLES`; exports differ in order and names, ranks and sizes tell them apart."""
         floats = [output.astype(float) for output in outputs if output.dtype.kind == "f"]
         fitting = {
-            name: [output for output in floats if _fits(output, tail)] for name, tail in _ROLES.items()
+            name: [output for output in floats if _fits(output.shape, tail)] for name, tail in _ROLES.items()
         }
         roles = {name: found[0] for name, found in fitting.items() if found}
+        self._check([role.shape for role in roles.values()], outputs)
+        if len({len(role) for role in roles.values()}) != 1:
+            raise self._model.refusal("its outputs are of different numbers of people", outputs)
+        return roles
+
+    def _check(self, shapes: list[tuple[int | None, ...]], outputs: list[np.ndarray] | None = None) -> None:
+        """Refuse a network whose outputs cannot be those of its family; an open size may be any."""
+        found = {name for name, tail in _ROLES.items() if any(_fits(shape, tail) for shape in shapes)}
         is_torch = self._family == "torchvision"
         wanted = [{"keypoints", "logits"}] if is_torch else [{"keypoints"}, {"maps"}]
-        has_points = any(points | {"boxes", "scores"} <= roles.keys() for points in wanted)
-        if not has_points or len({len(role) for role in roles.values()}) != 1:
-            expected = f"{self._family}'s boxes (n, 4), scores (n), keypoints (n, 17, 3)"
-            raise self._model.unexpected(outputs, expected + is_torch * " and keypoint scores (n, 17)")
-        return roles
+        # A file need not tell a port's rank.
+        if () not in shapes and not any(points | {"boxes", "scores"} <= found for points in wanted):
+            expected = f"expected {self._family}'s boxes (n, 4), scores (n), keypoints (n, 17, 3)"
+            raise self._model.refusal(expected + is_torch * " and keypoint scores (n, 17)", outputs)
 
     def _keypoints(self, people: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Positions (n, 17, 2) in input pixels and scores (n, 17) in [0, 1]."""
@@ -164,10 +172,10 @@ def logistic_score(logits: np.ndarray) -> np.ndarray:
     return np.nan_to_num(1 / (1 + np.exp(np.clip(_LOGIT_MIDDLE - logits, -_MAX_EXPONENT, _MAX_EXPONENT))))
 
 
-def _fits(array: np.ndarray, tail: tuple[int | None, ...]) -> bool:
-    """Whether an array is (n, *tail), None standing for any size."""
-    sizes = zip(array.shape[1:], tail, strict=False)
-    return array.ndim == 1 + len(tail) and all(want in (None, size) for size, want in sizes)
+def _fits(shape: tuple[int | None, ...], tail: tuple[int | None, ...]) -> bool:
+    """Whether a shape is (n, *tail), None standing for any size."""
+    sizes = zip(shape[1:], tail, strict=False)
+    return len(shape) == 1 + len(tail) and all(None in (size, want) or size == want for size, want in sizes)
 
 
 def _told_family(outputs: list[Port]) -> str:

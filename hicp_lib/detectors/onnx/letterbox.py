@@ -15,17 +15,25 @@ class Letterbox:
     pixels : array, shape (height, width, 3), dtype uint8
     scale : array, shape (2,)
         Input pixels per image pixel along x and y.
+    corner_px : tuple of float
+        Where the image's own (`origin_px`, `origin_px`) lies in the input, x and y.
+    origin_px : float
+        -0.5 where the pixels' corners fall on each other, 0 where the first pixels' centres do.
     """
 
     pixels: np.ndarray
     scale: np.ndarray
+    corner_px: tuple[float, float] = (-0.5, -0.5)
+    origin_px: float = -0.5
 
     def to_image_px(self, positions_px: np.ndarray) -> np.ndarray:
-        """Positions (..., 2) in input pixels as image pixels; pixel centres at integers in both."""
-        return (positions_px + 0.5) / self.scale - 0.5
+        """Positions (..., 2) in input pixels as image pixels."""
+        return (positions_px - np.array(self.corner_px)) / self.scale + self.origin_px
 
 
-def letterbox(image: np.ndarray, size_px: tuple[int, int], fill: tuple[int, int, int]) -> Letterbox:
+def letterbox(
+    image: np.ndarray, size_px: tuple[int, int], fill: tuple[int, int, int], is_centred: bool = False
+) -> Letterbox:
     """Scale an image to fit into an input, bilinearly, as YOLOX does.
 
     Parameters
@@ -35,6 +43,8 @@ def letterbox(image: np.ndarray, size_px: tuple[int, int], fill: tuple[int, int,
         Width and height of the input.
     fill : tuple of int
         Colour of the rest.
+    is_centred : bool
+        In the middle of the input, as YOLO-pose does.
 
     Examples
     --------
@@ -44,10 +54,14 @@ def letterbox(image: np.ndarray, size_px: tuple[int, int], fill: tuple[int, int,
     """
     height, width = image.shape[:2]
     ratio = min(size_px[0] / width, size_px[1] / height)
-    fitted = max(1, int(width * ratio)), max(1, int(height * ratio))
+    whole = round if is_centred else int
+    fitted = max(1, whole(width * ratio)), max(1, whole(height * ratio))
+    left, top = ((size - side) // 2 * is_centred for size, side in zip(size_px, fitted, strict=True))
     pixels = np.full((size_px[1], size_px[0], 3), fill, np.uint8)
-    pixels[: fitted[1], : fitted[0]] = cv2.resize(image, fitted, interpolation=cv2.INTER_LINEAR)
-    return Letterbox(pixels, np.array(fitted) / (width, height))
+    resized = cv2.resize(image, fitted, interpolation=cv2.INTER_LINEAR)
+    pixels[top : top + fitted[1], left : left + fitted[0]] = resized
+    scale = np.array(fitted) / (width, height)
+    return Letterbox(pixels, scale, (left - 0.5, top - 0.5))
 
 
 def planes(pixels: np.ndarray, mean: tuple[float, ...], std: tuple[float, ...], out: np.ndarray) -> None:

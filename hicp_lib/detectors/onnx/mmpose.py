@@ -9,14 +9,17 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import SIGMAS, TO_HALPE
 from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.box_source import BoxSource
-from hicp_lib.detectors.onnx.decode import decode_dark, decode_quarter
+from hicp_lib.detectors.onnx.decode import decode_dark, decode_dark_udp, decode_quarter
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.pose_net import PoseNet
 from hicp_lib.detectors.onnx.pose_nms import oks_nms
-from hicp_lib.detectors.onnx.session import open_model
+from hicp_lib.detectors.onnx.session import OnnxModel, open_model
 
 # RTMW's head enlarges features by shuffling pixels; the other SimCC heads do not. Its scores go up to ten.
 _RTMW_OPERATOR, _RTMW_SCALE = "DepthToSpace", 10.0
+# Vision transformers (ViTPose, Sapiens) first cut the crop into patches, and all were trained with UDP;
+# convolutional networks (HRNet, CSPNeXt) look the same with and without.
+_MIN_PATCH_PX = 14
 # Of ImageNet's R, G and B values.
 _MEAN, _STD = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)
 # Keypoints whose network score is above this count in a person's score.
@@ -24,23 +27,31 @@ _MIN_COUNTED_SCORE = 0.2
 
 
 class MMPose:
-    """MMPose's top-down networks: heat maps (HRNet) and SimCC (RTMPose, DWPose, RTMW).
+    """MMPose's top-down networks: heat maps (HRNet, ViTPose) and SimCC (RTMPose, DWPose, RTMW, RTMW3D).
 
     Parameters
     ----------
     model : str or Path
-        ONNX export, whole body (133 points), Halpe (26, 136), COCO (17) or one hand (21).
+        ONNX export, whole body (133 points), Halpe (26, 136), COCO (17), CrowdPose (14) or one hand (21).
     person_model : str or Path, optional
     boxes : str, optional
         See `hicp_lib.detectors.onnx.box_source.BoxSource`.
+    person_family : str, optional
+    person_min_score, person_max_overlap : float, optional
+        See `hicp_lib.detectors.onnx.person_boxes.PersonBoxes`.
     dark : bool
         Decode heat maps aware of their distribution (the "dark" configurations).
+    udp : bool, optional
+        The network was trained with unbiased data processing ("udp" configurations, ViTPose, Sapiens): its
+        transform and decoding; if None, told by the file's metadata `udp` or its patches, else not.
     flip_test : bool
         Also run the mirrored crops, and average.
     score_scale : float, optional
         Network score that counts as 1; if None, 10 for RTMW's head and 1 otherwise.
     hand : str
         "left" or "right", what a one-hand network is shown.
+    input_size_px : list of int, optional
+        Width and height of the crops, where the file leaves them open.
     provider : str
     threads : int
         See `hicp_lib.detectors.onnx.session.open_model`.
@@ -53,23 +64,34 @@ class MMPose:
         model: str | Path,
         person_model: str | Path | None = None,
         boxes: str | None = None,
+        person_family: str | None = None,
+        person_min_score: float | None = None,
+        person_max_overlap: float | None = None,
         dark: bool = True,
+        udp: bool | None = None,
         flip_test: bool = False,
         score_scale: float | None = None,
         hand: str = "right",
+        input_size_px: list | None = None,
         provider: str = "cpu",
         threads: int = 1,
     ) -> None:
         opened, self._dark = open_model(model, provider, threads), dark
-        self._net = PoseNet(opened, _MEAN, _STD, decode_dark if dark else decode_quarter, flip_test)
-        is_rtmw = self._net.is_simcc and _RTMW_OPERATOR in opened.operators
+        self._net = PoseNet(opened, _MEAN, _STD, flip_test, input_size_px)
+        self._udp, self._udp_from = _told_udp(opened, self._net.is_simcc, udp)
+        if self._udp and (self._net.is_simcc or not dark):
+            raise opened.refusal("UDP is for heat maps decoded by DARK; leave out udp, or dark false")
+        self._decode = decode_dark_udp if self._udp else decode_dark if dark else decode_quarter
+        is_rtmw = self._net.is_simcc and _RTMW_OPERATOR in opened.told.operators
         self._score_scale = score_scale or (_RTMW_SCALE if is_rtmw else 1.0)
         self._convention = _hand_convention(self._net.convention, hand)
-        self._boxes = BoxSource(boxes, person_model, provider, threads)
+        own = {"family": person_family, "min_score": person_min_score, "max_overlap": person_max_overlap}
+        self._boxes = BoxSource(boxes, person_model, provider, threads, **own)
         self.takes_boxes = self._boxes.kind == "gt"
         self._sigmas = SIGMAS["wholebody"][TO_HALPE[self._convention]]
         self.settings = {"model": opened.settings, "dark": dark, "flip_test": flip_test}
         self.settings |= {"score_scale": self._score_scale, "convention": self._convention}
+        self.settings |= {"udp": self._udp, "input_size_px": self._net.input_size_px}
         self.settings |= self._boxes.settings
 
     def detect(self, image: np.ndarray, boxes_px: np.ndarray | None = None) -> Detections:
@@ -80,8 +102,8 @@ class MMPose:
         boxes, box_scores = self._boxes.find(image, boxes_px)
         if not len(boxes):
             return Detections.none()
-        regions = Regions.around(boxes, self._net.input_size_px)
-        positions_px, raw_scores = self._net.find(image, regions)
+        regions = Regions.around(boxes, self._net.input_size_px, udp=self._udp)
+        positions_px, raw_scores = self._net.find(image, regions, self._decode)
         scores = np.clip(raw_scores / self._score_scale, 0, 1)
         person_scores = box_scores * _mean_above(raw_scores, _MIN_COUNTED_SCORE)
         areas = regions.sizes_px.prod(axis=1)
@@ -96,6 +118,7 @@ class MMPose:
         return [
             *self._net.describe(),
             Fact("pixels", "RGB, mean and deviation of ImageNet", "as MMPose trains"),
+            Fact("transform", "UDP: sizes less one" if self._udp else "classic, not UDP", self._udp_from),
             Fact("decoding", kind, why),
             Fact("keypoint score", f"{peak} / {self._score_scale:g}, cut off at 1",
                  "10 if the head shuffles pixels (RTMW), else 1; option score_scale"),
@@ -110,6 +133,21 @@ def _hand_convention(convention: str, hand: str) -> str:
     if hand not in ("left", "right"):
         raise InputError(f"hand {hand!r}: not known; expected left or right")
     return f"{hand}_hand21" if convention.endswith("hand21") else convention
+
+
+def _told_udp(model: OnnxModel, is_simcc: bool, given: bool | None) -> tuple[bool, str]:
+    """Whether a network was trained with unbiased data processing, and how that is known."""
+    if given is not None:
+        return given, "option udp"
+    told = model.told.metadata.get("udp")
+    if isinstance(told, bool):
+        return told, "told by its metadata"
+    patch_px = min(model.told.first_convolution[2:], default=0)
+    if is_simcc:
+        return False, "told by the outputs"
+    if patch_px >= _MIN_PATCH_PX:
+        return True, f"told by its patches of {patch_px} pixels (ViTPose, Sapiens); option udp"
+    return False, "ASSUMED, the file does not tell; -o udp true for networks named udp"
 
 
 def _mean_above(scores: np.ndarray, least: float) -> np.ndarray:

@@ -3,12 +3,13 @@
 The image is fitted into the input's top-left corner, the rest filled with 114, in BGR order:
 YOLOX takes it as it is (0-255), RTMDet normalised. Exports with non-maximum suppression inside
 return `dets` (x1, y1, x2, y2, score) and mostly `labels`; those without return one row per cell
-of the grids of stride 8, 16 and 32 (Ge et al., "YOLOX", 2021).
+of the grids of stride 8, 16 and 32 (Ge et al., "YOLOX", 2021), decoded or not. As in YOLOX's own
+demonstration a box of any class suppresses the lesser ones it overlaps, and boxes may reach beyond
+the image.
 """
 
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from hicp_lib.core.errors import InputError
@@ -26,14 +27,14 @@ _PERSON = 0
 # YOLOX begins by folding 2 x 2 pixels into channels.
 _FOLDED_CHANNELS = 12
 _DEFAULT_SIDE_PX = 640
-# Boxes that are kept; the overlap counts only where the export does no suppression itself.
-_MIN_SCORE, _MAX_OVERLAP = 0.3, 0.45
 # exp() of more is no size of a box
 _MAX_LOG_SIZE = 20
+# x, y, size and score
+_N_BOX = 5
 
 
 class PersonBoxes:
-    """A person (or hand) detector, YOLOX or RTMDet as its first convolution tells.
+    """A person (or hand) detector, YOLOX or RTMDet.
 
     Parameters
     ----------
@@ -42,81 +43,154 @@ class PersonBoxes:
     provider : str
     threads : int
         See `hicp_lib.detectors.onnx.session.open_model`.
+    family : str, optional
+        "yolox" or "rtmdet"; told by the first convolution if None.
+    min_score : float
+        Least score of a box.
+    max_overlap : float
+        Part of their union that two boxes may share, where the export does no suppression itself.
     """
 
-    def __init__(self, model: str | Path, provider: str = "cpu", threads: int = 1) -> None:
+    def __init__(
+        self,
+        model: str | Path,
+        provider: str = "cpu",
+        threads: int = 1,
+        family: str | None = None,
+        min_score: float = 0.3,
+        max_overlap: float = 0.45,
+    ) -> None:
         self._model = open_model(model, provider, threads)
-        folds = self._model.first_convolution_channels == _FOLDED_CHANNELS
-        self._family = "yolox" if folds else "rtmdet"
-        own = {"family": self._family, "min_score": _MIN_SCORE, "max_overlap": _MAX_OVERLAP}
-        self.settings = own | self._model.settings
+        folds = self._model.told.first_convolution[1:2] == (_FOLDED_CHANNELS,)
+        self._is_told = family is None
+        self._family = family or ("yolox" if folds else "rtmdet")
+        if self._family not in _NORMALISATIONS:
+            raise InputError(f"person_family {family!r}: expected one of {', '.join(_NORMALISATIONS)}")
+        self._min_score, self._max_overlap = min_score, max_overlap
         height, width = self._model.image_size_px
         self._size_px = width or _DEFAULT_SIDE_PX, height or _DEFAULT_SIDE_PX
+        self._cells = _cells(self._size_px)
+        outputs = self._model.response_to_zeros(*self._size_px[::-1])
+        rows = self._rows(outputs)
+        self._is_decoded = rows.shape[1] > _N_BOX and _is_decoded(rows, self._cells)
+        own = {"family": self._family, "min_score": min_score, "max_overlap": max_overlap}
+        self.settings = own | {"decoded": self._is_decoded} | self._model.settings
 
     def find(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """People in an RGB image (height, width, 3): boxes (n, 4: x, y, width, height) and scores (n,)."""
         fitted = letterbox(image, self._size_px, _FILL)
         feed = np.empty((1, 3, self._size_px[1], self._size_px[0]), np.float32)
         planes(fitted.pixels[..., ::-1], *_NORMALISATIONS[self._family], out=feed[0])
-        corners, scores = self._read(self._model.run(feed))
-        keep = (scores >= _MIN_SCORE) & np.isfinite(corners).all(axis=1)
-        corners = (corners[keep] / np.tile(fitted.scale, 2)).clip(0, np.tile(image.shape[1::-1], 2))
-        boxes = _boxes(corners)
-        is_box = (boxes[:, 2:] > 0).all(axis=1)
-        return boxes[is_box], scores[keep][is_box]
+        outputs = self._model.run(feed)
+        rows = self._rows(outputs)
+        suppressed = rows.shape[1] == _N_BOX
+        corners, scores, labels = (_listed if suppressed else self._from_grid)(rows, outputs)
+        keep = (scores >= self._min_score) & np.isfinite(corners).all(axis=1)
+        keep &= (corners[:, 2:] > corners[:, :2]).all(axis=1)
+        corners, scores, labels = corners[keep] / np.tile(fitted.scale, 2), scores[keep], labels[keep]
+        if not suppressed:
+            rest = unsuppressed(corners, scores, self._max_overlap, side_px=1.0)
+            corners, scores, labels = corners[rest], scores[rest], labels[rest]
+        corners, scores = corners[labels == _PERSON], scores[labels == _PERSON]
+        return np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1), scores
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""
         width, height = self._size_px
+        told = "read from the first convolution" if self._is_told else "given"
         return [
-            Fact("person detector", self._family, "read from the first convolution"),
+            Fact("person detector", self._family, f"{told}; option person_family"),
             Fact("person input", f"{width} x {height}, BGR, top-left, filled with 114", "read from the file"),
-            Fact("person score", f">= {_MIN_SCORE}",
-                 f"overlaps above {_MAX_OVERLAP} are suppressed where the export does not do it"),
+            Fact("person boxes", "decoded" if self._is_decoded else "as the network gives them",
+                 "told by its answer to zeros"),
+            Fact("person score", f">= {self._min_score:g}",
+                 f"overlaps above {self._max_overlap:g} are suppressed where the export does not do it; "
+                 "options person_min_score, person_max_overlap"),
         ]  # fmt: skip
 
-    def _read(self, outputs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Corners (n, 4) and scores (n,) of people, in input pixels."""
-        rows = next((output for output in outputs if output.ndim == 3 and len(output) == 1), None)
-        if rows is not None and rows.shape[2] == 5:
-            return _suppressed(rows[0], outputs)
-        if rows is not None and rows.shape[2] > 5:
-            return _suppress(*_from_grid(rows[0], self._size_px, self._model.path))
-        expected = "(1, n, 5) boxes with scores, or YOLOX's (1, cells, 5 + classes)"
-        raise self._model.unexpected(outputs, expected)
+    def _rows(self, outputs: list[np.ndarray]) -> np.ndarray:
+        """Rows (n, 5) of an export that does its own suppression, or YOLOX's (cells, 5 + classes)."""
+        tables = [output for output in outputs if output.ndim == 3]
+        rows = tables[0][0] if len(tables) == 1 and len(tables[0]) == 1 else np.empty((0, 0))
+        n_columns = rows.shape[1]
+        if n_columns < _N_BOX or n_columns > _N_BOX and len(rows) != len(self._cells):
+            size = "{} x {}".format(*self._size_px)
+            raise self._model.refusal(
+                f"expected (1, n, 5) boxes with scores, or (1, {len(self._cells)}, 5 + classes) of YOLOX's "
+                f"strides 8, 16 and 32 in {size}", outputs
+            )  # fmt: skip
+        return rows
+
+    def _from_grid(
+        self, rows: np.ndarray, _outputs: list[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Corners, scores and classes of YOLOX's rows: centre, size, object and class scores."""
+        centre, size = rows[:, :2].astype(float), rows[:, 2:4].astype(float)
+        if not self._is_decoded:
+            stride = self._cells[:, 2:]
+            centre = (centre + self._cells[:, :2]) * stride
+            size = np.exp(np.minimum(size, _MAX_LOG_SIZE)) * stride
+        labels = rows[:, _N_BOX:].argmax(axis=1)
+        scores = rows[:, 4].astype(float) * rows[:, _N_BOX:].max(axis=1)
+        scores = np.where(np.isfinite(scores), scores, 0.0)
+        return np.concatenate([centre - size / 2, centre + size / 2], axis=1), scores, labels
 
 
-def _suppress(corners: np.ndarray, scores: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    corners, scores = corners[scores >= _MIN_SCORE], scores[scores >= _MIN_SCORE]
-    rows = cv2.dnn.NMSBoxes(_boxes(corners).tolist(), scores.tolist(), _MIN_SCORE, _MAX_OVERLAP)
-    keep = np.asarray(rows, int).reshape(-1)
-    return corners[keep], scores[keep]
+def unsuppressed(
+    corners: np.ndarray, scores: np.ndarray, max_overlap: float, side_px: float = 0.0
+) -> np.ndarray:
+    """Rows of the boxes that remain of those that overlap, best first.
 
+    Parameters
+    ----------
+    corners : array, shape (n, 4: left, top, right, bottom)
+    scores : array, shape (n,)
+    max_overlap : float
+        Part of their union that two may share.
+    side_px : float
+        What a box is wider and higher than its corners' difference.
 
-def _boxes(corners: np.ndarray) -> np.ndarray:
-    """Boxes (n, 4: x, y, width, height) of corners (n, 4: left, top, right, bottom)."""
-    return np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1)
+    Returns
+    -------
+    array of int, shape (m,)
 
-
-def _suppressed(rows: np.ndarray, outputs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Rows x1, y1, x2, y2, score of an export that did its own suppression; people only, if labelled."""
-    labels = next((output for output in outputs if output.shape == (1, len(rows))), None)
-    people = rows if labels is None else rows[labels[0] == _PERSON]
-    return people[:, :4].astype(float), people[:, 4].astype(float)
-
-
-def _from_grid(rows: np.ndarray, size_px: tuple[int, int], path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Corners and scores from YOLOX's raw rows: offset in the cell, log size, object and class scores."""
-    shapes = [(size_px[1] // stride, size_px[0] // stride) for stride in _STRIDES]
-    cell = np.concatenate([np.argwhere(np.ones(shape))[:, ::-1] for shape in shapes])
-    stride = np.repeat(_STRIDES, np.prod(shapes, axis=1))[:, None]
-    if len(rows) != len(cell):
-        raise InputError(
-            f"{path}: gives {len(rows)} rows for an input of {size_px[0]} x {size_px[1]}; expected the "
-            f"{len(cell)} of YOLOX's strides 8, 16 and 32"
+    Examples
+    --------
+    >>> boxes = np.array([[0, 0, 10, 10], [0, 0, 10, 11], [20, 0, 30, 10]])
+    >>> unsuppressed(boxes, np.array([0.8, 0.9, 0.1]), 0.5).tolist()
+    [1, 2]
+    """
+    areas = np.prod(corners[:, 2:] - corners[:, :2] + side_px, axis=1)
+    left, keep = np.argsort(-scores, kind="stable"), []
+    while len(left):
+        best, left = left[0], left[1:]
+        keep.append(best)
+        sides = np.minimum(corners[best, 2:], corners[left, 2:]) - np.maximum(
+            corners[best, :2], corners[left, :2]
         )
-    rows = rows.astype(float)
-    centre = (rows[:, :2] + cell) * stride
-    half = np.exp(np.minimum(rows[:, 2:4], _MAX_LOG_SIZE)) * stride / 2
-    scores = rows[:, 4] * rows[:, 5 + _PERSON]
-    return np.concatenate([centre - half, centre + half], axis=1), np.where(np.isfinite(scores), scores, 0.0)
+        common = np.maximum(sides + side_px, 0).prod(axis=1)
+        left = left[common <= max_overlap * (areas[best] + areas[left] - common)]
+    return np.array(keep, int)
+
+
+def _listed(rows: np.ndarray, outputs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Corners, scores and classes of an export that did its own suppression; people, if not labelled."""
+    none = np.full((1, len(rows)), _PERSON)
+    labels = next((output for output in outputs if output.shape == (1, len(rows))), none)
+    return rows[:, :4].astype(float), rows[:, 4].astype(float), labels[0]
+
+
+def _cells(size_px: tuple[int, int]) -> np.ndarray:
+    """Column, row and stride (n, 3) of the grids' cells, in the order of YOLOX's rows."""
+    grids = [
+        np.pad(np.argwhere(np.ones((size_px[1] // stride, size_px[0] // stride)))[:, ::-1], ((0, 0), (0, 1)),
+               constant_values=stride)
+        for stride in _STRIDES
+    ]  # fmt: skip
+    return np.concatenate(grids)
+
+
+def _is_decoded(rows: np.ndarray, cells: np.ndarray) -> bool:
+    """Whether centres lie near their cells in pixels; those not decoded yet lie near 0, in cells."""
+    decoded = np.abs(rows[:, :2] / cells[:, 2:] - cells[:, :2] - 0.5)
+    return bool(np.median(decoded) < np.median(np.abs(rows[:, :2] - 0.5)))

@@ -1,10 +1,12 @@
 """A top-down network: crops of people in, keypoints in the image out.
 
 The size of the input, the number of keypoints and heat maps against SimCC are read from
-the file; what the file cannot tell (colours, decoding) is given.
+the file; what the file cannot tell (colours, decoding) is given. What its metadata says (`input_w`,
+`input_h`, `split_ratio`, alone or in a `cigpose_meta`) is taken, and must be so.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +19,7 @@ from hicp_lib.detectors.onnx.letterbox import planes
 from hicp_lib.detectors.onnx.session import OnnxModel
 
 CONVENTIONS = {
+    14: "crowdpose14",
     17: "coco17",
     21: "right_hand21",
     26: "halpe26",
@@ -24,6 +27,8 @@ CONVENTIONS = {
     133: "wholebody133",
     136: "halpe136",
 }
+# Sets that networks are published for and that have no place among Halpe's points.
+_STRANGERS = {15: "MPI's body", 16: "MPII's body", 98: "WFLW's face", 106: "LaPa's face", 308: "Goliath"}
 _MAX_BATCH = 16
 Colour = tuple[float, float, float]
 Decoder = Callable[[np.ndarray], Decoded]
@@ -37,10 +42,10 @@ class PoseNet:
     model : OnnxModel
     mean, std : Colour
         Of the R, G and B values 0-255, taken off and divided by.
-    decode_maps : callable
-        Heat maps, shape (n, k, h, w), to positions in cells, shape (n, k, 2), and scores, shape (n, k).
     flip_test : bool
         Also run the mirrored crops, and average.
+    input_size_px : list of int, optional
+        Width and height of the crops, where neither the file's input nor its metadata tells.
 
     Attributes
     ----------
@@ -50,6 +55,8 @@ class PoseNet:
         What its keypoints are, a key of `hicp_lib.core.keypoints.TO_HALPE`.
     is_simcc : bool
         A vector per axis in place of a heat map.
+    answer : list of array
+        The outputs for zeros.
     batch : int or None
         Crops per run; None if the file leaves it open.
     grid_size : tuple of int
@@ -62,34 +69,37 @@ class PoseNet:
     """
 
     def __init__(
-        self, model: OnnxModel, mean: Colour, std: Colour, decode_maps: Decoder, flip_test: bool
+        self,
+        model: OnnxModel,
+        mean: Colour,
+        std: Colour,
+        flip_test: bool,
+        input_size_px: list[int] | None = None,
     ) -> None:
-        self.model, self._mean, self._std = model, mean, std
-        self._decode_maps, self._flip_test = decode_maps, flip_test
-        shape = model.inputs[0].shape
-        match shape:
-            case (batch, 3, int(height), int(width)):
-                self.batch, self.input_size_px = batch, (width, height)
-            case _:
-                raise InputError(
-                    f"{model.path}: takes an input of shape {shape}; "
-                    "expected crops of a fixed size, (n, 3, h, w)"
-                )
-        outputs = self._ordered(model.response_to_zeros)
+        self.model, self._mean, self._std, self._flip_test = model, mean, std, flip_test
+        self.batch = model.inputs[0].shape[0] if model.inputs[0].shape else None
+        self.input_size_px, self._size_from = _input_size(model, input_size_px)
+        answer = model.response_to_zeros(*self.input_size_px[::-1])
+        self.answer = outputs = self._ordered(answer)
         self.is_simcc = len(outputs) == 2
-        n_keypoints = outputs[0].shape[1]
-        if n_keypoints not in CONVENTIONS:
-            raise InputError(
-                f"{model.path}: gives {n_keypoints} keypoints; expected one of "
-                f"{', '.join(map(str, CONVENTIONS))} (COCO, hand, Halpe, COCO-WholeBody)"
-            )
-        self.convention = CONVENTIONS[n_keypoints]
+        self.convention = convention_of(model, outputs[0].shape[1], answer)
         self._mirror = mirror(self.convention)
         first, last = outputs[0], outputs[-1]
         self.grid_size = (first.shape[-1], last.shape[-1] if self.is_simcc else last.shape[-2])
+        ratio = model.told.metadata.get("split_ratio")
+        if self.is_simcc and ratio and self.grid_size != tuple(side * ratio for side in self.input_size_px):
+            size = "{} x {}".format(*self.input_size_px)
+            raise model.refusal(f"its metadata say {ratio} bins per pixel of its {size}", answer)
 
-    def find(self, image: np.ndarray, regions: Regions) -> Decoded:
+    def find(self, image: np.ndarray, regions: Regions, decode_maps: Decoder) -> Decoded:
         """Keypoints of the people in some regions of an RGB image.
+
+        Parameters
+        ----------
+        image : array, shape (height, width, 3), dtype uint8
+        regions : Regions
+        decode_maps : callable
+            Heat maps, shape (n, k, h, w), to positions in cells, shape (n, k, 2), and scores, shape (n, k).
 
         Returns
         -------
@@ -97,8 +107,8 @@ class PoseNet:
             In the image; NaN where the score is not positive.
         scores : array, shape (n, k)
         """
-        outputs = self._respond(regions.crop(image, self.input_size_px))
-        cells, scores = decode_simcc(*outputs) if self.is_simcc else self._decode_maps(outputs[0])
+        outputs = self._respond(regions.crop(image, self.input_size_px), regions.udp)
+        cells, scores = decode_simcc(*outputs) if self.is_simcc else decode_maps(outputs[0])
         return regions.to_image_px(cells, self.grid_size), scores
 
     def describe(self) -> list[Fact]:
@@ -106,7 +116,7 @@ class PoseNet:
         width, height = self.input_size_px
         return [
             *self.model.describe(),
-            Fact("input", f"{width} wide, {height} high", "read from the file"),
+            Fact("input", f"{width} wide, {height} high", self._size_from),
             Fact("batch", str(self.batch or "any"), "read from the file"),
             Fact("output", f"{'x'.join(map(str, self.grid_size))} {'bins' if self.is_simcc else 'cells'}",
                  "read from the file"),
@@ -116,7 +126,7 @@ class PoseNet:
             Fact("flip test", "yes" if self._flip_test else "no", "option flip_test"),
         ]  # fmt: skip
 
-    def _respond(self, crops: list[np.ndarray]) -> list[np.ndarray]:
+    def _respond(self, crops: list[np.ndarray], udp: bool) -> list[np.ndarray]:
         """The outputs for n crops, flip test included; n of each."""
         n = len(crops)
         if self._flip_test:
@@ -126,7 +136,8 @@ class PoseNet:
         outputs = [np.concatenate(part) for part in zip(*parts, strict=True)]
         if not self._flip_test:
             return outputs
-        return [self._average(output[:n], output[n:], axis) for axis, output in enumerate(outputs)]
+        shifts = not (self.is_simcc or udp)
+        return [self._average(out[:n], out[n:], axis, shifts) for axis, out in enumerate(outputs)]
 
     def _run(self, crops: list[np.ndarray]) -> list[np.ndarray]:
         width, height = self.input_size_px
@@ -135,12 +146,12 @@ class PoseNet:
             planes(crop, self._mean, self._std, out)
         return [output[: len(crops)] for output in self._ordered(self.model.run(feed), len(feed))]
 
-    def _average(self, straight: np.ndarray, flipped: np.ndarray, axis: int) -> np.ndarray:
+    def _average(self, straight: np.ndarray, flipped: np.ndarray, axis: int, shifts: bool) -> np.ndarray:
         """Mean of an output and the one for mirrored crops, with its sides put right."""
         back = flipped[:, self._mirror]
         if axis == 0:
             back = back[..., ::-1]
-        if not self.is_simcc:
+        if shifts:
             # A strided map lies half a stride off when mirrored; the originals shift it by a cell.
             back = np.concatenate([back[..., :1], back[..., :-1]], axis=-1)
         return (straight + back) / 2
@@ -154,13 +165,71 @@ class PoseNet:
         is_fine = all(output.shape[0] == n and 0 not in output.shape for output in maps + vectors)
         if is_fine and len(maps) == 1 and not vectors:
             return maps
-        if is_fine and len(vectors) == 2 and not maps and vectors[0].shape[1] == vectors[1].shape[1]:
-            ratios = [vector.shape[2] / side for vector, side in zip(vectors, (width, height), strict=True)]
-            if ratios[0] == ratios[1]:
-                return vectors
-            if vectors[1].shape[2] * height == vectors[0].shape[2] * width:
-                return vectors[::-1]
-        expected = (
-            f"heat maps ({n}, keypoints, h, w), or SimCC of {width}s and {height}s, ({n}, keypoints, bins)"
+        if is_fine and len(vectors) in (2, 3) and not maps and len({v.shape[1] for v in vectors}) == 1:
+            # Of three the last is the depth (RTMW3D), which is not asked for.
+            x, y = vectors[:2]
+            if x.shape[2] * height == y.shape[2] * width:
+                return [x, y]
+            if len(vectors) == 2 and y.shape[2] * height == x.shape[2] * width:
+                return [y, x]
+        raise self.model.refusal(
+            f"expected heat maps ({n}, keypoints, h, w), or SimCC of {width}s and {height}s, "
+            f"({n}, keypoints, bins)", outputs
+        )  # fmt: skip
+
+
+def convention_of(model: OnnxModel, n_keypoints: int, outputs: list[np.ndarray] | None = None) -> str:
+    """The set of keypoints that a network gives, by their number.
+
+    Parameters
+    ----------
+    model : OnnxModel
+    n_keypoints : int
+    outputs : list of array, optional
+        What it gave.
+
+    Raises
+    ------
+    InputError
+        If it is none that has its place among Halpe's points.
+    """
+    if n_keypoints not in CONVENTIONS:
+        name = f" ({_STRANGERS[n_keypoints]})" if n_keypoints in _STRANGERS else ""
+        raise model.refusal(f"{n_keypoints} keypoints{name} are not a set known here", outputs)
+    return CONVENTIONS[n_keypoints]
+
+
+def _input_size(model: OnnxModel, given: list[int] | None) -> tuple[tuple[int, int], str]:
+    """Width and height of a network's crops, and how they are known."""
+    shape = model.inputs[0].shape
+    if len(shape) != 4 or shape[1] not in (None, 3):
+        raise model.refusal("expected crops of a fixed size, (n, 3, h, w)")
+    read, metadata = (shape[3], shape[2]), model.told.metadata
+    whole = {
+        why: size
+        for why, size in (
+            ("read from the file", _size(read)),
+            ("told by its metadata", _size([metadata.get("input_w"), metadata.get("input_h")])),
+            ("option input_size_px", _size(given or [])),
         )
-        raise self.model.unexpected(outputs, expected)
+        if size is not None
+    }
+    if given is not None and "option input_size_px" not in whole:
+        raise InputError(f"input_size_px {given}: expected width and height in pixels, as in [192, 256]")
+    if not whole:
+        raise model.refusal(
+            "expected crops of a fixed size, (n, 3, h, w); or say which: -o input_size_px '[192, 256]'"
+        )
+    why, size = next(iter(whole.items()))
+    for other in (*whole.values(), read):
+        if any(side not in (None, known) for side, known in zip(other, size, strict=True)):
+            raise model.refusal(f"its input is {size[0]} x {size[1]} ({why}), not {other[0]} x {other[1]}")
+    return size, why
+
+
+def _size(sides: Sequence[Any]) -> tuple[int, int] | None:
+    """Width and height, if that is what is given."""
+    match sides:
+        case [int(width), int(height)] if min(width, height) > 0:
+            return width, height
+    return None

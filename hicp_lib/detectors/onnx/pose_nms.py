@@ -11,7 +11,7 @@ import numpy as np
 
 from hicp_lib.core.oks import oks_terms
 
-_N_FACE, _N_HANDS = 68, 42
+_N_BODY, _N_FACE, _N_HANDS = 26, 68, 42
 _FACE_FACTOR, _HAND_FACTOR = 1.9, 0.55
 _HAND_AGREEMENT, _HAND_NEARNESS = 0.1, 1.5  # their weights in the similarity of whole bodies
 # Points as near as these coincide, are merged, agree in their scores.
@@ -153,7 +153,8 @@ def _similarity(
     # As released: in whole bodies agreement counts at points of low score, nearness at the others.
     weak = scores < rules.min_score
     agreement = np.where(near & weak, agreement, 0)
-    scale = rules.delta2 * _per_part(distances.shape[1], 1, _FACE_FACTOR, _HAND_FACTOR)
+    n_body = distances.shape[1] - _N_FACE - _N_HANDS
+    scale = rules.delta2 * np.repeat([1, _FACE_FACTOR, _HAND_FACTOR], [n_body, _N_FACE, _N_HANDS])
     nearness = np.where(weak, 0, np.exp(-distances / scale))
     body, face, hands = _part_means(agreement)
     body_near, face_near, hands_near = _part_means(nearness)
@@ -172,7 +173,9 @@ def _matches(
     if n_sure == 0:
         return np.zeros(len(distances))
     n_poses, n_keypoints = distances.shape
-    count = (distances <= limit * _per_part(n_keypoints, 1, _FACE_FACTOR, _HAND_FACTOR)).sum(axis=1)
+    # As released: Halpe's groups, which end at 26 and 94, for COCO-WholeBody's 133 points too.
+    factors = np.repeat([1, _FACE_FACTOR, _HAND_FACTOR], [_N_BODY, _N_FACE, n_keypoints - _N_BODY - _N_FACE])
+    count = (distances <= limit * factors).sum(axis=1)
     # As released: the count is divided by the sure points of all poses compared, twice over.
     return count / (4 * n_poses * n_sure) * n_keypoints
 
@@ -188,11 +191,6 @@ def _merge(
     points = (np.where(near[..., None], positions_px[absorbed], 0.0) * shares[..., None]).sum(axis=0)
     given = total > 0
     return np.where(given[:, None], points, np.nan), (weights * shares).sum(axis=0)
-
-
-def _per_part(n_keypoints: int, body: float, face: float, hands: float) -> np.ndarray:
-    n_body = n_keypoints - _N_FACE - _N_HANDS
-    return np.repeat([body, face, hands], [n_body, _N_FACE, _N_HANDS])
 
 
 def _part_means(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

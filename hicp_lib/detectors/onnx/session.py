@@ -7,17 +7,15 @@ Runtime allows its sessions to be run from several threads at a time.
 import threading
 import weakref
 from dataclasses import dataclass
-from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
-from google.protobuf.message import DecodeError, Message
 
 from hicp_lib.core.environment import with_variables
 from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.files import sha256_bytes
-from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.protobuf import Messages, message_class
+from hicp_lib.detectors.onnx.facts import KNOWN_NETWORKS, Fact
+from hicp_lib.detectors.onnx.model_file import ModelFile, read_model
 from hicp_lib.detectors.weights.default import find, load
 from hicp_lib.detectors.weights.published import check_use
 
@@ -28,13 +26,6 @@ with with_variables(ORT_DISABLE_TELEMETRY="1"):
 
 _DTYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
 _FATAL_ONLY = 4
-# Of ONNX's own `onnx.proto`, what is asked of a model before it runs; the package `onnx` can do far more.
-_MESSAGES: Messages = {
-    "Model": {"graph": (7, "Graph")},
-    "Graph": {"node": (1, "[Node]"), "initializer": (5, "[Tensor]")},
-    "Node": {"input": (1, "[string]"), "op_type": (4, "string")},
-    "Tensor": {"dims": (1, "[int64]"), "name": (8, "string")},
-}
 
 
 @dataclass(frozen=True)
@@ -67,25 +58,19 @@ class OnnxModel:
         Where it runs, e.g. "cpu".
     inputs, outputs : list of Port
         Its ports.
-    operators : frozenset of str
-        The kinds of nodes in its graph.
-    first_convolution_channels : int or None
-        Input channels of the first convolution, None if there is none.
+    told : ModelFile
+        What its file tells.
     """
 
     def __init__(self, path: Path, content: bytes, provider: str, threads: int) -> None:
-        graph = _read_graph(path, content)
+        self.told: ModelFile = read_model(path, content)
         self.path, self.sha256, self.provider = path, sha256_bytes(content), provider
-        self.operators = frozenset(node.op_type for node in graph.node)
-        self.first_convolution_channels = _first_convolution_channels(graph)
         self._session = _start(path, content, provider, threads)
+        self._responses: dict[tuple[int, ...], list[np.ndarray]] = {}
         self.inputs = [_port(node) for node in self._session.get_inputs()]
         self.outputs = [_port(node) for node in self._session.get_outputs()]
         if len(self.inputs) != 1 or self.inputs[0].dtype not in _DTYPES:
-            raise InputError(
-                f"{path}: takes {', '.join(f'{p.name}: {p.dtype}' for p in self.inputs) or 'nothing'}; "
-                "expected a network with one input, an image in floating point"
-            )
+            raise self.refusal("expected a network with one input, an image in floating point")
 
     @property
     def settings(self) -> dict:
@@ -103,15 +88,25 @@ class OnnxModel:
         """
         shape = self.inputs[0].shape
         if len(shape) != 4 or shape[0] not in (None, 1) or shape[1] not in (None, 3):
-            raise InputError(
-                f"{self.path}: takes an input of shape {shape}; expected one image, (1, 3, h, w)"
-            )
+            raise self.refusal("expected an input of one image, (1, 3, h, w)")
         return shape[2], shape[3]
 
-    def unexpected(self, outputs: list[np.ndarray], expected: str) -> InputError:
-        """What to raise where the outputs are not those `expected`."""
-        shapes = ", ".join(str(output.shape) for output in outputs)
-        return InputError(f"{self.path}: gives outputs of shape {shapes}; expected {expected}")
+    def refusal(self, why: str, outputs: list[np.ndarray] | None = None) -> InputError:
+        """What to raise for a network that is not the one wanted: what was found, why not, what is known.
+
+        Parameters
+        ----------
+        why : str
+        outputs : list of array, optional
+            What it gave, where that tells more than the file.
+        """
+        shapes = [port.shape for port in self.outputs] if outputs is None else [out.shape for out in outputs]
+        gives = [f"{port.name} {_text(shape)}" for port, shape in zip(self.outputs, shapes, strict=True)]
+        takes = [f"{port.name} {_text(port.shape)} {port.dtype}" for port in self.inputs]
+        return InputError(
+            f"{self.path}: takes {', '.join(takes) or 'nothing'} and gives {', '.join(gives) or 'nothing'}; "
+            f"{why}. Known are {KNOWN_NETWORKS}"
+        )
 
     def describe(self) -> list[Fact]:
         """What it is and where it runs."""
@@ -139,13 +134,20 @@ class OnnxModel:
             ) from None
         return [np.asarray(output) for output in outputs]
 
-    @cached_property
-    def response_to_zeros(self) -> list[np.ndarray]:
+    def response_to_zeros(self, *size_px: int) -> list[np.ndarray]:
         """The outputs for an input of zeros: their shapes, and what the network says of nobody.
 
-        Sizes that the model leaves open count as 1.
+        Parameters
+        ----------
+        *size_px : int
+            Height and width, where the model leaves them open.
         """
-        return self.run(np.zeros([size or 1 for size in self.inputs[0].shape], np.float32))
+        if size_px not in self._responses:
+            shape, one_image = self.inputs[0].shape, (1, 3, *size_px)
+            sizes = one_image if len(shape) == len(one_image) else [1] * len(shape)
+            zeros = np.zeros([size or given for size, given in zip(shape, sizes, strict=True)], np.float32)
+            self._responses[size_px] = self.run(zeros)
+        return self._responses[size_px]
 
 
 _open: weakref.WeakValueDictionary[tuple, OnnxModel] = weakref.WeakValueDictionary()
@@ -158,7 +160,7 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
     Parameters
     ----------
     path : str or Path
-        The file; weights kept in a second file ("external data") are not followed.
+        The file; one that keeps weights in a second file ("external data") is refused.
     provider : str
         Execution provider by its short name: cpu, cuda, tensorrt, openvino, ...
     threads : int
@@ -263,24 +265,8 @@ def _start(path: Path, content: bytes, provider: str, threads: int) -> onnxrunti
     return session
 
 
-@cache
-def _model_class() -> type[Message]:
-    return message_class(_MESSAGES, "Model")
-
-
-def _read_graph(path: Path, content: bytes) -> Message:
-    try:
-        return _model_class().FromString(content).graph
-    except DecodeError:
-        raise InputError(
-            f"{path}: is not an ONNX file or is cut off ({len(content)} bytes); get it again, or export it"
-        ) from None
-
-
-def _first_convolution_channels(graph: Message) -> int | None:
-    dims = {tensor.name: tensor.dims for tensor in graph.initializer}
-    weights = [node.input[1] for node in graph.node if node.op_type == "Conv" and len(node.input) > 1]
-    return next((int(dims[name][1]) for name in weights if len(dims.get(name, ())) > 1), None)
+def _text(shape: tuple[int | None, ...]) -> str:
+    return f"({', '.join('?' if size is None else str(size) for size in shape)})"
 
 
 def _port(node: onnxruntime.NodeArg) -> Port:

@@ -46,15 +46,13 @@ def check_height(net_height_px: int) -> None:
         raise InputError(f"net_height_px {net_height_px}: expected a positive multiple of 16")
 
 
-def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> Letterbox:
+def fit(image: np.ndarray, height_px: int) -> Letterbox:
     """Scale an image to the network's height with its aspect kept; pad the right with black to 16 pixels.
 
     Parameters
     ----------
     image : array, shape (height, width, 3), dtype uint8
     height_px : int
-    width_px : int, optional
-        With it, the image is scaled to fit into both, and the right or the bottom padded.
 
     Examples
     --------
@@ -63,11 +61,11 @@ def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> Lette
     ((100, 64, 3), [2.0, 2.0])
     """
     height, width = image.shape[:2]
-    zoom = height_px / height if width_px is None else min(height_px / height, width_px / width)
-    size = max(1, round(width * zoom)), max(1, round(height * zoom))
+    zoom = height_px / height
+    size = max(1, round(width * zoom)), height_px
     resized = cv2.resize(image, size, interpolation=cv2.INTER_AREA if zoom < 1 else cv2.INTER_CUBIC)
-    pixels = np.zeros((height_px, width_px or -(-size[0] // 16) * 16, 3), np.uint8)
-    pixels[: size[1], : size[0]] = resized
+    pixels = np.zeros((height_px, -(-size[0] // 16) * 16, 3), np.uint8)
+    pixels[:, : size[0]] = resized
     return Letterbox(pixels, np.array(size) / (width, height))
 
 

@@ -7,6 +7,7 @@ not 0.3 of another.
 - OpenPose, AlphaPose, Detectron2: scale 1. OpenPose's confidences lie in [0, 1]; heat-map maxima and
   Detectron2's softmax mass can pass 1 by a little.
 - MMPose and plain COCO results: 1, or 10 when a score is above 2, which only RTMW's are (up to about 10).
+  Between 1 and 2 both may be meant, and the network's next folder could fall on the other side: asked for.
 - Scores above 20 belong to no known scale, which must then be given.
 """
 
@@ -14,7 +15,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.formats.importers.people import People
 
 _WITH_RTMW = ("mmpose", "coco")
-_RTMW_SCALE, _RTMW_FROM, _RTMW_UP_TO = 10.0, 2.0, 20.0
+_RTMW_SCALE, _SURELY_RTMW_FROM, _RTMW_UP_TO = 10.0, 2.0, 20.0
 
 
 def score_scale(format: str, people: People) -> float:
@@ -34,7 +35,7 @@ def score_scale(format: str, people: People) -> float:
     Raises
     ------
     InputError
-        If the scores fit no known scale.
+        If the scores fit no known scale, or more than one.
     """
     highest = people.raw_scores.max(initial=0.0)
     if highest > _RTMW_UP_TO:
@@ -42,4 +43,11 @@ def score_scale(format: str, people: People) -> float:
             f"{people.path}: keypoint scores go up to {highest:g}; expected at most {_RTMW_UP_TO:g}, "
             "or give --score-scale, the score that is to become 1"
         )
-    return _RTMW_SCALE if format in _WITH_RTMW and highest > _RTMW_FROM else 1.0
+    if format not in _WITH_RTMW or highest <= 1:
+        return 1.0
+    if highest <= _SURELY_RTMW_FROM:
+        raise InputError(
+            f"{people.path}: keypoint scores go up to {highest:g}, as those of two scales may; give "
+            f"--score-scale {_RTMW_SCALE:g} if RTMW wrote them, else --score-scale 1"
+        )
+    return _RTMW_SCALE

@@ -58,6 +58,14 @@ def constant_model(path: Path, input_shape, outputs: dict[str, np.ndarray], *, o
     return save(path, nodes, {"image": shape}, shapes, constants)
 
 
+def told(path: Path, **metadata: str) -> Path:
+    """Write metadata into a model's file."""
+    proto = onnx.load(path)
+    helper.set_model_props(proto, metadata)
+    onnx.save(proto, path)
+    return path
+
+
 def _colour_weights(n_keypoints, side, pixels):
     """Convolution that averages channel k % 3 for keypoint k and gives 0 for black, 1 for white."""
     mean, std = pixels
@@ -78,7 +86,7 @@ def colour_maps_model(path: Path, size_px, n_keypoints: int, batch=None, pixels=
         path,
         [node],
         {"image": [batch, 3, height, width]},
-        {"maps": [batch, n_keypoints, height // 4, width // 4]},
+        {"maps": [batch, n_keypoints, height and height // 4, width and width // 4]},
         _colour_weights(n_keypoints, 5, pixels),
     )
 

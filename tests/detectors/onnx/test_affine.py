@@ -36,6 +36,25 @@ def test_a_grid_position_returns_to_where_the_affine_transform_took_it_from(box,
         assert np.abs(got - truth).max() < 1e-3
 
 
+@given(box=BOX, size=SIZE, fraction=st.tuples(st.floats(0, 1), st.floats(0, 1)))
+def test_with_udp_first_and_last_pixels_of_region_input_and_grid_fall_on_each_other(box, size, fraction):
+    """An image point p lies at (p - corner) / extent x (size - 1) of the input, and of any grid likewise."""
+    regions = Regions.around(np.array([box]), size, udp=True)
+    classic = Regions.around(np.array([box]), size)
+    corner = classic.centres_px[0] - classic.sizes_px[0] / 2
+    truth = corner + np.array(fraction) * classic.sizes_px[0]
+    for grid in (np.array(size), np.array(size) // 4):
+        position = np.array(fraction) * (grid - 1)
+        assert np.abs(regions.to_image_px(position[None, None], grid)[0, 0] - truth).max() < 1e-3
+
+
+def test_a_crop_with_udp_shows_the_regions_corners_at_its_own():
+    image = np.random.default_rng(0).integers(1, 255, (60, 80, 3), dtype=np.uint8)
+    # 64 pixels of the crop over 63 of the image: pixel i is pixel 5 + i.
+    regions = Regions(np.array([[5 + 31.5, 3 + 23.5]]), np.array([[63.0, 47.0]]), udp=True)
+    np.testing.assert_array_equal(regions.crop(image, (64, 48))[0], image[3:51, 5:69])
+
+
 @given(box=BOX, size=SIZE)
 def test_regions_hold_their_box_and_have_the_inputs_shape(box, size):
     regions = Regions.around(np.array([box]), size)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.keypoints import COCO_17
+from hicp_lib.core.keypoints import COCO_17, TO_HALPE
 from hicp_lib.detectors.onnx.alphapose import AlphaPose
 from tests.detectors.onnx.onnx_models import (
     ALPHAPOSE_PIXELS,
@@ -81,6 +81,20 @@ def test_wrong_options_and_models_are_one_line(tmp_path):
             AlphaPose(body, **options)
     with pytest.raises(InputError, match="mmpose"):
         AlphaPose(colour_simcc_model(tmp_path / "simcc.onnx", (48, 64), 17))
+
+
+def test_hands_without_a_face_are_combined_too(tmp_path):
+    """Of Halpe's 68 points without the face, the last 42 are for integral regression."""
+    at = cells(68)
+    maps = np.concatenate([heat_maps(68, at, (48, 64))[:, :26], logits(68, at)[:, 26:]], axis=1)
+    model = constant_model(tmp_path / "m.onnx", (1, 3, 256, 192), {"maps": maps})
+    detector = AlphaPose(model, boxes="gt")
+    assert detector.decoding == "combined"
+    found = detector.detect(BLACK, [BOX])
+    points = found.keypoints_px[0, TO_HALPE["halpe68_noface"]]
+    np.testing.assert_allclose(points, back_to_image(at / (48, 64), BOX, (48, 64)), atol=2e-2)
+    np.testing.assert_allclose(found.scores[0, 94:], 0.9, atol=1e-4)
+    assert np.isnan(found.keypoints_px[0, 26:94]).all()
 
 
 def test_everything_assumed_is_told(tmp_path):

@@ -51,7 +51,7 @@ def test_detect_with_a_model_of_ones_own(capsys, model, tmp_path):
     found = np.array(row["keypoints"]).reshape(136, 3)
     assert np.abs(found[:17, :2] - positions[np.arange(17) % 3]).max() < 0.5
     assert (found[17:20] == 0).all()
-    capsys.readouterr()
+    assert capsys.readouterr().err.startswith("transform: classic, not UDP (ASSUMED")
     assert "--model FILE.onnx" in mistake(capsys, *arguments)
     assert "boxes 'gt'" in mistake(capsys, *arguments, "--model", model, "--boxes", "gt")
     assert "boxes 'all'" in mistake(capsys, *arguments, "--model", model, "--boxes", "all")
@@ -63,6 +63,46 @@ def test_detect_with_a_model_of_ones_own(capsys, model, tmp_path):
     )
 
 
+@pytest.mark.parametrize("name", ["mmpose", "alphapose", "openpose", "detectron2", "one-stage"])
+def test_show_use_and_detect_refuse_the_same_networks_in_the_same_words(capsys, tmp_path, name):
+    """What is wrong with a network is known before it sees an image: nothing is kept that would not run."""
+    model = constant_model(tmp_path / "m.onnx", (1, 3, 64, 48), {"out": np.zeros((1, 40, 9, 9), np.float32)})
+    write_png(tmp_path / "images" / "7.png", np.zeros((9, 9, 3), np.uint8))
+    detect = ["detect", "--images", str(tmp_path / "images"), "--out", str(tmp_path / "found.json")]
+    chosen = ["--detector", name, "--model", str(model)]
+    errors = {
+        mistake(capsys, *command, *chosen) for command in (["models", "show"], ["models", "use"], detect)
+    }
+    (error,) = errors
+    assert "takes image (1, 3, 64, 48) tensor(float) and gives out (1, 40, 9, 9)" in error
+    assert all(
+        f" {known} (" in error for known in ("mmpose", "alphapose", "openpose", "detectron2", "one-stage")
+    )
+
+
+def test_a_person_model_is_looked_at_before_an_image_is_shown(capsys, model, tmp_path):
+    person = constant_model(tmp_path / "p.onnx", (1, 3, 64, 64), {"out": np.zeros((1, 9, 7), np.float32)})
+    show = ["models", "show", "--detector", "mmpose", "--model", model]
+    assert "(1, 84, 5 + classes)" in mistake(capsys, *show, "--person-model", str(person))
+    assert "leave them out" in mistake(capsys, *show, "-o", "person_min_score", "0.5")
+    rows = constant_model(tmp_path / "q.onnx", (1, 3, 64, 64), {"dets": np.zeros((1, 0, 5), np.float32)})
+    chosen = ["--person-model", str(rows), "-o", "person_min_score", "0.5", "-o", "person_family", "yolox"]
+    assert cli.run([*show, *chosen]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "person detector  yolox  (given; option person_family)" in lines
+    assert any(line.startswith("person score     >= 0.5  ") for line in lines)
+
+
+def test_the_transform_is_printed_and_may_be_given(capsys, model):
+    show = ["models", "show", "--detector", "mmpose", "--model", model]
+    for options, expected in (
+        ([], "classic, not UDP  (ASSUMED"),
+        (["-o", "udp", "true"], "UDP: sizes less one"),
+    ):
+        assert cli.run([*show, *options]) == 0
+        assert f"transform        {expected}" in capsys.readouterr().out
+
+
 def test_a_model_named_once_is_taken_from_then_on(capsys, model, tmp_path):
     use = ["models", "use", "--detector", "mmpose"]
     before = weights_sha256()
@@ -70,7 +110,9 @@ def test_a_model_named_once_is_taken_from_then_on(capsys, model, tmp_path):
     assert "/no.onnx: cannot be read" in mistake(capsys, *use, "--model", "/no.onnx")
     assert weights_sha256() == before
     assert cli.run([*use, "--model", model, "-o", "flip_test", "true"]) == 0
-    assert "hicp report -p detectors mmpose" in capsys.readouterr().out
+    told = capsys.readouterr()
+    assert "hicp report -p detectors mmpose" in told.out
+    assert told.err.startswith("transform: classic, not UDP (ASSUMED") and told.err.count("\n") == 1
     assert make_detector("mmpose").settings == make_detector("mmpose", model=model, flip_test=True).settings
     # What is given at a call comes first; a model given there stands for itself.
     assert make_detector("mmpose", flip_test=False).settings["flip_test"] is False
@@ -94,6 +136,8 @@ def test_files_are_kept_by_their_whole_path_however_they_were_named(model, tmp_p
 
 def test_detectors_with_weights_of_their_own_take_no_others(capsys, model):
     assert "takes none of yours" in mistake(capsys, "models", "use", "--detector", "mediapipe")
+    combined = ["--detector", "combined:mmpose+mmpose", "--model", model]
+    assert "name the weights of each by itself" in mistake(capsys, "models", "use", *combined)
 
 
 def test_a_damaged_list_of_own_models_is_told_in_one_line(capsys, model):

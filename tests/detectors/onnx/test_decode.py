@@ -60,6 +60,21 @@ def plain_dark(heat, kernel):
     return x + step[0], y + step[1], heat[y, x]
 
 
+def plain_dark_udp(heat, kernel):
+    height, width = heat.shape
+    y, x = np.unravel_index(np.argmax(heat), heat.shape)
+    half = kernel // 2
+    blurred = cv2.GaussianBlur(np.pad(heat, half), (kernel, kernel), 0)[half:-half, half:-half]
+    log = np.pad(np.log(np.clip(blurred * heat.max() / blurred.max(), 1e-3, 50.0)), 1, mode="edge")
+    log = log[y : y + 3, x : x + 3].astype(float)
+    gradient = np.array([log[1, 2] - log[1, 0], log[2, 1] - log[0, 1]]) / 2
+    dxx, dyy = log[1, 2] - 2 * log[1, 1] + log[1, 0], log[2, 1] - 2 * log[1, 1] + log[0, 1]
+    dxy = (log[2, 2] - log[1, 2] - log[2, 1] + 2 * log[1, 1] - log[1, 0] - log[0, 1] + log[0, 0]) / 2
+    least = np.finfo(np.float32).eps
+    step = np.linalg.solve([[dxx + least, dxy], [dxy, dyy + least]], gradient)
+    return x - step[0], y - step[1], heat[y, x]
+
+
 def plain_integral(logits):
     heat = 1 / (1 + np.exp(-logits.astype(float)))
     total = sum(heat.ravel())
@@ -93,6 +108,38 @@ def test_quarter_offset(needs_both, seed):
 def test_dark(kernel, seed):
     maps, _ = gaussians(np.random.default_rng(seed), noise=0.003)
     agree(decode.decode_dark(maps, kernel), maps, lambda heat: plain_dark(heat, kernel))
+
+
+@given(seed=SEEDS)
+@settings(max_examples=20)
+def test_dark_of_udp(seed):
+    maps, _ = gaussians(np.random.default_rng(seed))
+    agree(decode.decode_dark_udp(maps), maps, lambda heat: plain_dark_udp(heat, 11))
+
+
+@pytest.mark.parametrize(
+    ("decoder", "expected"),
+    [
+        (decode.decode_dark, [(5.29996, 7.80009), (0, 15), (4.11388, 4.81933), (11, 1)]),
+        (decode.decode_dark_udp, [(5.30019, 7.79997), (-0.5, 15.5), (4.11477, 4.81221), (11.5, 1.38903)]),
+    ],
+)
+def test_what_mmposes_own_code_gives(decoder, expected):
+    """Peaks in the middle, at a corner, of two people, and at a border."""
+    y, x = np.mgrid[:16, :12]
+
+    def bump(cx, cy, sigma, top):
+        return top * np.exp(-((x - cx) ** 2 + (y - cy) ** 2) / (2 * sigma**2))
+
+    maps = np.stack(
+        [
+            bump(5.3, 7.8, 2, 1),
+            bump(0.2, 15.4, 2, 1),
+            bump(3.5, 3.5, 2, 0.4) + bump(6, 9, 3, 0.3),
+            bump(10.7, 1.1, 1.5, 1),
+        ]
+    )
+    np.testing.assert_allclose(decoder(maps[None].astype(np.float32))[0][0], expected, atol=1e-4)
 
 
 @given(seed=SEEDS)

@@ -27,11 +27,11 @@ def detectron2(path, masses, input_shape=(3, 80, 100), **more):
     return constant_model(path, input_shape, outputs | more)
 
 
-def torchvision(path, logits):
+def torchvision(path, logits, input_shape=(3, 80, 100)):
     points = np.concatenate([POINTS, np.ones((2, 17, 1))], axis=2).astype(np.float32)
     outputs = {"boxes": BOXES, "labels": CLASSES + 1, "scores": SCORES, "points": points,
                "points_scores": logits.astype(np.float32)}  # fmt: skip
-    return constant_model(path, (3, 80, 100), outputs)
+    return constant_model(path, input_shape, outputs)
 
 
 def test_detectron2_loses_half_a_pixel_and_keeps_its_masses(tmp_path):
@@ -130,12 +130,19 @@ def test_an_open_input_gets_detectron2s_size(tmp_path, shape, expected):
 
 
 def test_a_torchvision_open_input_gets_the_image_as_it_is(tmp_path):
-    detector = KeypointRcnn(colour_echo(tmp_path / "m.onnx", 3), family="torchvision")
+    logits = np.zeros((2, 17))
+    detector = KeypointRcnn(torchvision(tmp_path / "m.onnx", logits, input_shape=(3, None, None)))
     image = np.zeros((40, 30, 3), np.uint8)
     assert detector._fit(image).pixels is image
     assert detector._feed(np.full((4, 4, 3), 255, np.uint8)).max() == 1
-    with pytest.raises(InputError, match="keypoint scores"):
-        detector.detect(image)
+
+
+def test_a_network_without_the_familys_outputs_is_refused_before_it_runs(tmp_path):
+    with pytest.raises(InputError, match="keypoint scores") as caught:
+        KeypointRcnn(colour_echo(tmp_path / "m.onnx", 3), family="torchvision")
+    assert "image (3, ?, ?) tensor(float) and gives points (1, 17, 3)" in str(caught.value)
+    with pytest.raises(InputError, match="one-stage"):
+        KeypointRcnn(constant_model(tmp_path / "n.onnx", (3, 8, 8), {"out": np.zeros((2, 5), np.float32)}))
 
 
 @given(data=st.data())

@@ -1,14 +1,22 @@
 """MMPose on networks with known answers: peaks through the whole path, from colours to image pixels."""
 
 import numpy as np
+import onnx
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from onnx import helper
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import COCO_17, LEFT_HAND, RIGHT_HAND, TO_HALPE
 from hicp_lib.detectors.onnx.mmpose import MMPose
-from tests.detectors.onnx.onnx_models import colour_maps_model, colour_simcc_model, constant_model
+from tests.detectors.onnx.onnx_models import (
+    colour_maps_model,
+    colour_simcc_model,
+    constant_model,
+    save,
+    told,
+)
 
 SIZE = (48, 64)
 BOXES = [(20.0, 30.0, 60.0, 80.0), (10.5, 7.25, 200.0, 33.0), (-20, -10, 70.5, 90), (150.5, 100, 49.5, 60.0)]
@@ -116,13 +124,15 @@ def test_hand_networks_give_the_hand_they_are_shown(tmp_path):
         assert np.isnan(np.delete(found.keypoints_px[0], indices, axis=0)).all()
 
 
-@pytest.mark.parametrize("n_keypoints", [17, 26, 133, 136])
+@pytest.mark.parametrize("n_keypoints", [14, 17, 26, 133, 136])
 def test_every_layout_lands_on_its_halpe_points(tmp_path, n_keypoints):
     x = np.arange(n_keypoints) % 90
     outputs = {name: np.eye(bins, dtype=np.float32)[x][None] for name, bins in (("x", 96), ("y", 128))}
     model = constant_model(tmp_path / "m.onnx", (1, 3, 64, 48), outputs)
     found = MMPose(model).detect(np.zeros((64, 48, 3), np.uint8))
-    convention = {17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"}[n_keypoints]
+    convention = {14: "crowdpose14", 17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"}[
+        n_keypoints
+    ]
     at = back_to_image(np.stack([x / 2 / 48, x / 2 / 64], axis=1), (0, 0, 48, 64))
     np.testing.assert_allclose(found.keypoints_px[0, TO_HALPE[convention]], at, atol=1e-3)
     assert np.isfinite(found.keypoints_px[0]).all(axis=1).sum() == n_keypoints
@@ -159,6 +169,8 @@ def test_person_boxes_detected_given_and_missing(tmp_path):
     assert len(given_box.detect(image, np.zeros((0, 4)))) == 0
     for options in (
         {"boxes": "gt"},
+        {"boxes": "image", "person_min_score": 0.5},
+        {"boxes": "detected", "person_family": "yolox"},
         {"boxes": "some"},
         {"boxes": "gt", "person_model": person},
     ):
@@ -184,6 +196,139 @@ def test_everything_assumed_is_told(tmp_path):
     } <= facts.keys()
 
 
+UDP_BOX = np.array([[100.0, 100.0, 240.0, 480.0]])
+UDP_TRUTH = np.stack([np.linspace(110, 330, 17), np.linspace(120, 570, 17)], axis=1)
+
+
+def udp_model(path, udp):
+    """Heat maps as a network has for points of a person of 240 x 480 pixels, trained with UDP or without.
+
+    The box, padded and grown to 3 : 4, is 450 x 600 around (220, 340); the input is 192 x 256, the maps
+    are a quarter. With UDP all sizes are less one.
+    """
+    fraction = (UDP_TRUTH - (220 - 225, 340 - 300)) / (450, 600)
+    cells = fraction * (np.array([48, 64]) - udp)
+    return constant_model(path, (1, 3, 256, 192), {"maps": heat_maps(17, cells, (48, 64), sigma=2.0)})
+
+
+@pytest.mark.parametrize("udp", [False, True])
+def test_heat_maps_of_networks_trained_with_udp(tmp_path, udp):
+    """0 px with the option that is right for the network, several with the other: up to 6.2 px."""
+    image = np.zeros((700, 500, 3), np.uint8)
+    model = udp_model(tmp_path / "m.onnx", udp)
+    right, wrong = (MMPose(model, boxes="gt", udp=option) for option in (udp, not udp))
+    error_px = np.abs(right.detect(image, UDP_BOX).keypoints_px[0, COCO_17] - UDP_TRUTH)
+    assert error_px.max() < 0.05
+    assert np.abs(wrong.detect(image, UDP_BOX).keypoints_px[0, COCO_17] - UDP_TRUTH).max() > 5
+
+
+def test_udp_is_told_by_the_file_where_it_can_be_and_named_where_not(tmp_path):
+    def transform(model, **options):
+        (fact,) = (fact for fact in MMPose(model, **options).describe() if fact.what == "transform")
+        return fact.value[:3], fact.why
+
+    plain = udp_model(tmp_path / "plain.onnx", False)
+    assert transform(plain) == ("cla", "ASSUMED, the file does not tell; -o udp true for networks named udp")
+    assert transform(plain, udp=True) == ("UDP", "option udp")
+    assert transform(told(udp_model(tmp_path / "a.onnx", True), udp="true")) == (
+        "UDP",
+        "told by its metadata",
+    )
+    assert transform(tmp_path / "a.onnx", udp=False) == ("cla", "option udp")
+    patches = patch_model(tmp_path / "vit.onnx")
+    assert transform(patches)[0] == "UDP" and "patches of 16 pixels" in transform(patches)[1]
+    simcc = colour_simcc_model(tmp_path / "simcc.onnx", SIZE, 17)
+    assert transform(simcc) == ("cla", "told by the outputs")
+    for model, options in ((simcc, {"udp": True}), (plain, {"udp": True, "dark": False})):
+        with pytest.raises(InputError, match="UDP is for heat maps decoded by DARK"):
+            MMPose(model, **options)
+
+
+def patch_model(path):
+    """Begins as vision transformers do: one convolution over patches of 16 x 16 pixels."""
+    nodes = [
+        helper.make_node("Conv", ["image", "weights"], ["patches"], strides=[16, 16]),
+        helper.make_node("Resize", ["patches", "", "fourfold"], ["maps"]),
+    ]
+    constants = {
+        "weights": np.ones((17, 3, 16, 16), np.float32), "fourfold": np.array([1, 1, 4, 4], np.float32),
+    }  # fmt: skip
+    return save(path, nodes, {"image": [None, 3, 64, 48]}, {"maps": [None, 17, 16, 12]}, constants)
+
+
+def test_the_flip_test_with_udp_does_not_shift(tmp_path):
+    """Symmetric heat maps stay symmetric: the mirrored answer of UDP falls on the straight one."""
+    cells = np.tile([23.5, 30.0], (17, 1))
+    maps = heat_maps(17, cells, (48, 64))
+    model = constant_model(tmp_path / "m.onnx", (None, 3, 256, 192), {"maps": maps}, open_batch=True)
+    image = np.zeros((256, 192, 3), np.uint8)
+    straight, flipped = (MMPose(model, udp=True, flip_test=on).detect(image) for on in (False, True))
+    np.testing.assert_allclose(flipped.keypoints_px, straight.keypoints_px, atol=1e-3)
+
+
+def test_rtmw3d_gives_x_and_y_and_the_lower_of_their_maxima(tmp_path):
+    x, y = np.arange(133) % 96, np.arange(133) % 128
+    plain = {
+        "simcc_x": np.eye(96, dtype=np.float32)[x][None],
+        "simcc_y": np.eye(128, dtype=np.float32)[y][None],
+    }
+    deep = plain | {"simcc_z": 0.1 * np.eye(96, dtype=np.float32)[x[::-1]][None]}
+    found = [
+        MMPose(constant_model(tmp_path / f"{len(outputs)}.onnx", (1, 3, 64, 48), outputs)).detect(
+            np.zeros((64, 48, 3), np.uint8)
+        )
+        for outputs in (plain, deep)
+    ]
+    np.testing.assert_array_equal(found[0].keypoints_px, found[1].keypoints_px)
+    np.testing.assert_array_equal(found[0].scores, found[1].scores)
+
+
+def test_an_open_input_is_asked_for_or_told_by_metadata(tmp_path):
+    model = colour_maps_model(tmp_path / "m.onnx", (None, None), 17)
+    with pytest.raises(InputError, match="-o input_size_px"):
+        MMPose(model)
+    for wrong in ([], [96], [96, 0], ["96", 128], [96.0, 128.0]):
+        with pytest.raises(InputError, match="expected width and height in pixels"):
+            MMPose(model, input_size_px=wrong)
+    image = dots([[50.0, 70.0], [75.0, 60.0], [66.0, 88.0]])
+    fixed = MMPose(colour_maps_model(tmp_path / "fixed.onnx", (96, 128), 17)).detect(image)
+    opened = MMPose(model, input_size_px=[96, 128])
+    np.testing.assert_array_equal(opened.detect(image).keypoints_px, fixed.keypoints_px)
+    assert opened.settings["input_size_px"] == (96, 128)
+    proto = onnx.load(model)
+    proto.graph.input[0].type.tensor_type.shape.dim[1].dim_param = "channels"
+    onnx.save(proto, model)
+    np.testing.assert_array_equal(
+        MMPose(model, input_size_px=[96, 128]).detect(image).keypoints_px, fixed.keypoints_px
+    )
+    told(model, cigpose_meta='{"input_w": 96, "input_h": 128, "split_ratio": 2.0, "num_keypoints": 17}')
+    np.testing.assert_array_equal(MMPose(model).detect(image).keypoints_px, fixed.keypoints_px)
+    with pytest.raises(InputError, match=r"96 x 128 \(told by its metadata\), not 192 x 256"):
+        MMPose(model, input_size_px=[192, 256])
+    with pytest.raises(InputError, match="not 192 x 256"):
+        MMPose(tmp_path / "fixed.onnx", input_size_px=[192, 256])
+
+
+def test_a_contract_that_the_network_does_not_keep_is_refused(tmp_path):
+    model = colour_simcc_model(tmp_path / "m.onnx", SIZE, 133)
+    assert MMPose(told(model, cigpose_meta='{"input_w": 48, "input_h": 64, "split_ratio": 2.0}'))
+    told(model, cigpose_meta='{"input_w": 48, "input_h": 64, "split_ratio": 3.0}')
+    with pytest.raises(InputError, match="3.0 bins per pixel"):
+        MMPose(model)
+
+
+@pytest.mark.parametrize(
+    ("n_keypoints", "name"), [(106, "LaPa's face"), (16, "MPII's body"), (18, "18 keypoints")]
+)
+def test_sets_of_keypoints_without_a_place_are_refused_by_name(tmp_path, n_keypoints, name):
+    model = colour_simcc_model(tmp_path / "m.onnx", SIZE, n_keypoints)
+    with pytest.raises(InputError, match=name) as caught:
+        MMPose(model)
+    message = str(caught.value)
+    assert f"simcc_x (1, {n_keypoints}, 96), simcc_y (1, {n_keypoints}, 128)" in message
+    assert "Known are mmpose" in message and "one-stage" in message and "\n" not in message
+
+
 @given(data=st.data())
 @settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 def test_outputs_of_any_shape_are_used_or_refused_in_one_line(data, tmp_path):
@@ -205,10 +350,6 @@ def test_outputs_of_any_shape_are_used_or_refused_in_one_line(data, tmp_path):
 
 @pytest.mark.parametrize("shape", [(1, 3, None, 48), (1, 1, 64, 48), (3, 64, 48), (1, 64, 48, 3)])
 def test_inputs_that_are_not_crops_are_refused(tmp_path, shape):
-    from onnx import helper
-
-    from tests.detectors.onnx.onnx_models import save
-
     path = save(tmp_path / "m.onnx", [helper.make_node("Identity", ["image"], ["o"])], {"image": list(shape)},
                 {"o": list(shape)}, {})  # fmt: skip
     with pytest.raises(InputError, match="crops of a fixed size"):

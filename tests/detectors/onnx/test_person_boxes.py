@@ -54,6 +54,85 @@ def test_raw_rows_are_decoded_and_suppressed(tmp_path):
     np.testing.assert_allclose(boxes, truth[:2] / np.tile(SCALE, 2), rtol=1e-4)
 
 
+def decoded_rows(rows, size_px=64):
+    """The same as YOLOX gives it with the decoding inside: centre and size in pixels."""
+    cells = np.array(
+        [(s, x, y) for s in (8, 16, 32) for y in range(size_px // s) for x in range(size_px // s)]
+    )
+    decoded = rows.copy()
+    decoded[:, :2] = (rows[:, :2] + cells[:, 1:]) * cells[:, :1]
+    decoded[:, 2:4] = np.exp(rows[:, 2:4]) * cells[:, :1]
+    return decoded
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rows_that_are_decoded_already_are_not_decoded_again(tmp_path, seed):
+    """Of random networks as well, whose rows tell of no object."""
+    rng = np.random.default_rng(seed)
+    raw = raw_rows([(4, 4, 20, 30), (30, 2, 25, 34)], [0.9, 0.8])
+    raw[2:20, :4] = rng.normal(0, 1, (18, 4))
+    found = []
+    for name, rows in (("raw", raw), ("decoded", decoded_rows(raw))):
+        path = constant_model(tmp_path / f"{name}.onnx", (1, 3, 64, 64), {"o": rows[None].astype(np.float32)})
+        detector = PersonBoxes(path)
+        assert detector.settings["decoded"] == (name == "decoded")
+        found.append(detector.find(IMAGE))
+    assert len(found[0][0]) == 2
+    np.testing.assert_allclose(found[1][0], found[0][0], rtol=1e-5)
+
+
+def plain_demonstration(rows, scale, min_score, max_overlap):
+    """YOLOX's own: of every row its likeliest class; whatever overlaps a likelier box goes; people stay."""
+    boxes = []
+    for x, y, w, h, sure, *classes in rows:
+        label = int(np.argmax(classes))
+        corners = np.array([x - w / 2, y - h / 2, x + w / 2, y + h / 2]) / np.tile(scale, 2)
+        boxes.append((sure * classes[label], label, corners))
+    boxes = sorted((box for box in boxes if box[0] >= min_score), key=lambda box: -box[0])
+    kept = []
+    for score, label, a in boxes:
+        for _, _, b in kept:
+            sides = np.minimum(a[2:], b[2:]) - np.maximum(a[:2], b[:2]) + 1
+            common = max(sides[0], 0) * max(sides[1], 0)
+            union = np.prod(a[2:] - a[:2] + 1) + np.prod(b[2:] - b[:2] + 1) - common
+            if common / union > max_overlap:
+                break
+        else:
+            kept.append((score, label, a))
+    return [(score, corners) for score, label, corners in kept if label == 0]
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_boxes_are_those_of_yoloxs_own_demonstration(tmp_path, seed):
+    """Any class suppresses, overlaps are counted with a pixel more, no box is cut at the image's border."""
+    rng = np.random.default_rng(seed)
+    rows = rng.uniform(0, 1, (84, 8))
+    rows[:, 2:4] = rng.normal(0.5, 0.5, (84, 2))
+    rows[:, 4] = rng.uniform(0, 1.2, 84)
+    path = constant_model(tmp_path / "p.onnx", (1, 3, 64, 64), {"o": rows[None].astype(np.float32)})
+    options = {"min_score": 0.2, "max_overlap": float(rng.uniform(0.2, 0.8))}
+    boxes, scores = PersonBoxes(path, **options).find(IMAGE)
+    expected = plain_demonstration(
+        decoded_rows(rows.astype(np.float32).astype(float)), SCALE, *options.values()
+    )
+    np.testing.assert_allclose(scores, [score for score, _ in expected], rtol=1e-6)
+    corners = np.array([corners for _, corners in expected])
+    np.testing.assert_allclose(boxes[:, :2], corners[:, :2], atol=1e-3)
+    np.testing.assert_allclose(boxes[:, :2] + boxes[:, 2:], corners[:, 2:], atol=1e-3)
+    assert (corners < 0).any() and (corners[:, 2] > IMAGE.shape[1]).any()
+
+
+def test_family_and_thresholds_may_be_given(tmp_path):
+    path = echo_model(tmp_path / "p.onnx", 3)
+    image = np.full((64, 64, 3), (10, 20, 200), np.uint8)
+    assert PersonBoxes(path, family="yolox").find(image)[1] == [200]
+    assert len(PersonBoxes(path, family="yolox", min_score=201).find(image)[1]) == 0
+    with pytest.raises(InputError, match="expected one of yolox, rtmdet"):
+        PersonBoxes(path, family="ssd")
+    facts = {fact.what: fact for fact in PersonBoxes(path, family="yolox").describe()}
+    assert facts["person detector"].why == "given; option person_family"
+
+
 def test_an_empty_answer_and_broken_numbers(tmp_path):
     boxes, scores = PersonBoxes(with_suppression(tmp_path / "a.onnx", np.zeros((0, 5)))).find(IMAGE)
     assert boxes.shape == (0, 4) and scores.shape == (0,)
@@ -61,14 +140,28 @@ def test_an_empty_answer_and_broken_numbers(tmp_path):
     assert len(PersonBoxes(with_suppression(tmp_path / "b.onnx", rows)).find(IMAGE)[0]) == 0
 
 
+def test_boxes_apart_from_their_scores_are_refused(tmp_path):
+    """A table of class scores beside one of boxes has as many rows as YOLOX's, and is not it."""
+    outputs = {"scores": np.zeros((1, 84, 80), np.float32), "boxes": np.zeros((1, 84, 4), np.float32)}
+    with pytest.raises(InputError, match="gives scores .1, 84, 80., boxes .1, 84, 4.; expected"):
+        PersonBoxes(constant_model(tmp_path / "p.onnx", (1, 3, 64, 64), outputs))
+
+
 @pytest.mark.parametrize(
     "output",
-    [np.zeros((1, 84, 3)), np.zeros((2, 84, 7)), np.zeros((84, 7)), np.zeros((1, 83, 7)), np.zeros(3)],
+    [
+        np.zeros((1, 84, 3)),
+        np.zeros((2, 84, 7)),
+        np.zeros((84, 7)),
+        np.zeros((1, 84, 4)),
+        np.zeros((1, 83, 7)),
+        np.zeros(3),
+    ],
 )
 def test_other_outputs_are_refused_in_one_line(tmp_path, output):
     path = constant_model(tmp_path / "p.onnx", (1, 3, 64, 64), {"output": output.astype(np.float32)})
     with pytest.raises(InputError) as caught:
-        PersonBoxes(path).find(IMAGE)
+        PersonBoxes(path)
     assert str(path) in str(caught.value) and "\n" not in str(caught.value)
 
 

@@ -30,6 +30,8 @@ def plain_merge(positions, scores, boxes, rules):
     k = positions.shape[1]
     part = ["body"] * (k - 110) + ["face"] * 68 + ["hand"] * 42 if rules.is_whole_body else ["body"] * k
     factor = {"body": 1.0, "face": 1.9, "hand": 0.55}
+    # As released, coinciding points are counted by the groups of 136 points in whole bodies of 133, too.
+    group = ["body"] * 26 + ["face"] * 68 + ["hand"] * (k - 94) if rules.is_whole_body else part
     left, result = list(range(len(scores))), []
     while left:
         best = max(left, key=lambda i: scores[i].mean())
@@ -50,7 +52,7 @@ def plain_merge(positions, scores, boxes, rules):
                 else:
                     terms[part[j]].append(product if d <= 1 else 0.0)
                     near[part[j]].append(np.exp(-d / rules.delta2))
-                matches += d / min(reach, 7) <= factor[part[j]]
+                matches += d / min(reach, 7) <= factor[group[j]]
             if rules.is_whole_body:
                 score_weight = {"body": 1, "face": 1, "hand": 0.1}
                 near_weight = {"body": 1, "face": 1, "hand": 1.5}
@@ -83,6 +85,7 @@ def plain_merge(positions, scores, boxes, rules):
         (WHOLE_BODY_RULES, 136),
         (INTEGRAL_RULES, 136),
         (INTEGRAL_RULES, 133),
+        (WHOLE_BODY_RULES, 133),
     ],
 )
 @given(seed=st.integers(0, 1000))
@@ -96,6 +99,29 @@ def test_merging_follows_the_rules(rules, k, seed):
     for got, got_score, (_, pose, score) in zip(merged, merged_scores, expected, strict=True):
         np.testing.assert_allclose(got, pose, atol=1e-9)
         np.testing.assert_allclose(got_score, score, atol=1e-9)
+
+
+def test_the_first_points_of_a_face_of_133_count_as_body():
+    """Points 23 to 25 begin the face of 133 and end the body of 136, 91 to 93 are a hand's and a face's.
+
+    5 px are in reach for a face (1.9 x 7 px) and a body (7 px), not for a hand (0.55 x 7 px); 10 px for a
+    face alone. Of two poses the coinciding points count k / (8 x sure points) each.
+    """
+
+    def n_people(apart_px):
+        positions = np.stack([np.arange(133.0) * 50, np.zeros(133)], axis=1)[None].repeat(2, axis=0)
+        positions[1, :, 1] = apart_px
+        rules = dataclasses.replace(WHOLE_BODY_RULES, min_matches=133 / (8 * 133) * 3)
+        scores, boxes = np.full((2, 133), 0.9), np.tile([0.0, 0, 7000, 200], (2, 1))
+        return len(merge_poses(positions, scores - [[0], [0.1]], boxes, rules)[0])
+
+    away = np.full(133, 100.0)
+    for points, distance_px, expected in (
+        (range(91, 94), 5.0, 1), (range(94, 97), 5.0, 2), (range(23, 26), 10.0, 2), (range(26, 29), 10.0, 1),
+    ):  # fmt: skip
+        apart_px = away.copy()
+        apart_px[list(points)] = distance_px
+        assert n_people(apart_px) == expected
 
 
 def test_copies_of_two_people_become_two():

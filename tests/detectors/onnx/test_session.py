@@ -11,7 +11,7 @@ from onnx import TensorProto, helper
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_file
 from hicp_lib.detectors.onnx.session import available_providers, open_model
-from tests.detectors.onnx.onnx_models import colour_maps_model, constant_model, save
+from tests.detectors.onnx.onnx_models import colour_maps_model, constant_model, save, told
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def test_ports_hash_and_response(model):
     assert opened.inputs[0].shape == (1, 3, 8, 8)
     assert opened.settings["sha256"] == sha256_file(model)
     assert opened.settings["provider"] == "cpu"
-    np.testing.assert_array_equal(opened.response_to_zeros[0], np.ones((1, 2, 4, 4)))
+    np.testing.assert_array_equal(opened.response_to_zeros()[0], np.ones((1, 2, 4, 4)))
 
 
 def test_one_session_per_process_until_the_file_changes(model):
@@ -72,6 +72,67 @@ def test_weights_in_a_second_file_are_refused(tmp_path):
     proto = onnx.load(path)
     onnx.save(proto, path, save_as_external_data=True, location="weights.bin", size_threshold=0)
     refused(path, "in one file")
+
+
+def external(name="weights", location="weights.bin"):
+    tensor = TensorProto(name=name, dims=[1], data_type=TensorProto.FLOAT, data_location=TensorProto.EXTERNAL)
+    tensor.external_data.add(key="location", value=location)
+    return tensor
+
+
+@pytest.mark.parametrize(
+    "location", ["weights.bin", "../weights.bin", "{folder}/weights.bin", "link", "twin"]
+)
+def test_weights_in_a_second_file_are_refused_wherever_it_lies(tmp_path, monkeypatch, location):
+    """ONNX Runtime would take them from the folder one happens to be in, and no hash would know of them."""
+    (tmp_path / "in").mkdir()
+    monkeypatch.chdir(tmp_path / "in")
+    for folder in (tmp_path, tmp_path / "in"):
+        (folder / "weights.bin").write_bytes(np.ones(1, np.float32).tobytes())
+    (tmp_path / "in/link").symlink_to("weights.bin")
+    (tmp_path / "in/twin").hardlink_to("weights.bin")
+    path = save(tmp_path / "in/m.onnx", [helper.make_node("Add", ["a", "weights"], ["c"])], {"a": [1]},
+                {"c": [1]}, {"weights": np.ones(1, np.float32)})  # fmt: skip
+    assert open_model(path).run(np.ones(1)) == [[2]]
+    proto = onnx.load(path)
+    proto.graph.initializer[0].CopyFrom(external(location=location.format(folder=tmp_path)))
+    path.write_bytes(proto.SerializeToString())
+    refused(path, "external_data=False")
+
+
+def test_a_second_file_is_refused_in_attributes_branches_functions_and_sparse_weights_too(tmp_path):
+    path = constant_model(tmp_path / "m.onnx", (1, 3, 8, 8), {"maps": np.ones((1, 2, 4, 4), np.float32)})
+    constant = helper.make_node("Constant", [], ["hidden"], value=external())
+    branch = helper.make_graph([constant], "branch", [], [helper.make_tensor_value_info("hidden", 1, [1])])
+    sparse = onnx.SparseTensorProto(values=external(), dims=[4])
+    function = helper.make_function("own", "F", [], ["hidden"], [constant], [helper.make_opsetid("", 17)])
+    additions = {
+        "attribute": lambda proto: proto.graph.node.append(constant),
+        "branch": lambda proto: proto.graph.node.append(
+            helper.make_node("If", ["c"], ["d"], then_branch=branch, else_branch=branch)
+        ),
+        "sparse weights": lambda proto: proto.graph.sparse_initializer.append(sparse),
+        "function": lambda proto: proto.functions.append(function),
+    }
+    for name, add in additions.items():
+        proto = onnx.load(path)
+        add(proto)
+        changed = tmp_path / f"{name}.onnx"
+        changed.write_bytes(proto.SerializeToString())
+        refused(changed, "outside the file")
+
+
+def test_metadata_are_read_and_a_contract_in_them_comes_first(tmp_path, model):
+    assert open_model(model).told.metadata == {}
+    told(model, udp="true", source="a lab", input_w="1", cigpose_meta='{"input_w": 192, "split_ratio": 2.0}')
+    assert open_model(model).told.metadata == {
+        "udp": True,
+        "source": "a lab",
+        "input_w": 192,
+        "split_ratio": 2.0,
+    }
+    told(model, cigpose_meta="[1]")
+    refused(model, "expected a JSON object")
 
 
 def test_a_network_with_other_inputs_is_refused(tmp_path):

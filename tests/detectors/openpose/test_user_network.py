@@ -6,8 +6,10 @@ from onnx import helper
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND, TO_HALPE
+from hicp_lib.detectors.openpose.hands import hand_square
 from hicp_lib.detectors.openpose.mobilenet import COCO_18
-from hicp_lib.detectors.openpose.user_network import BODY_25, OpenPose, hand_square
+from hicp_lib.detectors.openpose.net_input import fit
+from hicp_lib.detectors.openpose.user_network import BODY_25, OpenPose
 from tests.detectors.onnx.onnx_models import constant_model, save
 from tests.detectors.openpose.test_paf import STANDING, draw
 
@@ -40,7 +42,7 @@ def test_a_drawn_person_is_found_where_it_stands(tmp_path, part_model, person, a
     model = body_model(tmp_path / "m.onnx", part_model, person)
     found = OpenPose(model, as_released=as_released).detect(IMAGE)
     assert len(found) == 1
-    truth = (person + 0.5) / 2 - 0.5
+    truth = person * 183 / 367
     points = found.keypoints_px[0, TO_HALPE[part_model.convention]]
     assert np.abs(points - truth).max() < 0.75
     assert np.isfinite(found.keypoints_px[0]).all(axis=1).sum() == part_model.n_parts
@@ -74,10 +76,46 @@ def test_an_image_of_another_shape_is_padded_not_bent(tmp_path):
     model = body_model(tmp_path / "m.onnx")
     tall = OpenPose(model).detect(np.zeros((736, 400, 3), np.uint8))
     points = tall.keypoints_px[0, TO_HALPE["openpose_coco18"]]
-    assert np.abs(points - ((STANDING + 0.5) * 2 - 0.5)).max() < 3
+    assert np.abs(points - STANDING * 735 / 367).max() < 3
     wide = OpenPose(model).detect(np.zeros((100, 864, 3), np.uint8))
     points = wide.keypoints_px[0, TO_HALPE["openpose_coco18"]]
-    assert np.abs(points - ((STANDING + 0.5) * 2 - 0.5)).max() < 3
+    assert np.abs(points - STANDING * 863 / 431).max() < 3
+
+
+@pytest.mark.parametrize(
+    ("image_size", "net_width"),
+    [((640, 480), 496), ((640, 429), 544), ((1280, 425), 656), ((1280, 720), 656), ((429, 640), 240)],
+)
+def test_the_input_is_as_large_as_openposes(image_size, net_width):
+    """Width in proportion, to a multiple of 16, at most 16 / 9 of 368; corner pixels' centres meet."""
+    width, height = image_size
+    image = np.zeros((height, width, 3), np.uint8)
+    image[: height // 2, : width // 2] = 255
+    fitted = fit(image, 368)
+    assert fitted.pixels.shape == (368, net_width, 3)
+    zoom = min((net_width - 1) / (width - 1), 367 / (height - 1))
+    # The white quarter's border, half a pixel beyond its last pixel's centre.
+    border = np.array([width // 2 - 0.5, height // 2 - 0.5]) * zoom
+    for axis, line in enumerate((fitted.pixels[0, :, 0], fitted.pixels[:, 0, 0])):
+        assert abs(np.flatnonzero(line > 127)[-1] + 0.5 - border[axis]) <= 1
+    covered = [int(zoom * side + 0.5) for side in image_size]
+    back = min((side - 1) / (n - 1) for side, n in zip(image_size, covered, strict=True))
+    np.testing.assert_allclose(fitted.to_image_px(np.array([10.0, 20.0])), [10 * back, 20 * back])
+
+
+def test_an_open_input_is_tried_before_an_image_is_shown(tmp_path):
+    """A network of convolutions gives its maps for any size; one of another number of maps is refused."""
+    for n_maps, match in ((57, None), (56, "57 .COCO. or 78 .BODY_25. maps of 46 x 46")):
+        constants = {"weights": np.zeros((n_maps, 3, 8, 8), np.float32)}
+        node = helper.make_node("Conv", ["image", "weights"], ["maps"], strides=[8, 8])
+        shapes = {"image": [1, 3, None, None]}, {"maps": [1, n_maps, None, None]}
+        model = save(tmp_path / f"{n_maps}.onnx", [node], *shapes, constants)
+        if match is None:
+            facts = {fact.what: fact.value for fact in OpenPose(model).describe()}
+            assert facts["keypoints"] == "openpose_coco18" and len(OpenPose(model).detect(IMAGE)) == 0
+        else:
+            with pytest.raises(InputError, match=match):
+                OpenPose(model)
 
 
 def hand_colours(path):
@@ -126,7 +164,7 @@ def test_the_square_of_a_hand_follows_the_arm():
 def test_other_outputs_are_refused_in_one_line(tmp_path, shape):
     model = constant_model(tmp_path / "m.onnx", (1, 3, 368, 432), {"maps": np.zeros(shape, np.float32)})
     with pytest.raises(InputError) as caught:
-        OpenPose(model).detect(IMAGE)
+        OpenPose(model)
     assert str(model) in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -145,4 +183,6 @@ def test_everything_assumed_is_told(tmp_path):
     with pytest.raises(InputError, match="multiple of 16"):
         OpenPose(tmp_path / "m.onnx", net_height_px=100)
     with pytest.raises(InputError, match="expected squares"):
-        OpenPose(hand, hand_model=tmp_path / "m.onnx")
+        OpenPose(tmp_path / "m.onnx", hand_model=tmp_path / "m.onnx")
+    with pytest.raises(InputError, match="expected 57"):
+        OpenPose(hand)

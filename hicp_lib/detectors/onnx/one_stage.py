@@ -1,0 +1,112 @@
+"""Networks that find people and their keypoints in one pass over the image, decoded in the file.
+
+RTMO (Lu et al., "RTMO", CVPR 2024) sees the image in the input's top-left corner, BGR 0-255, and gives boxes
+with scores and keypoints. YOLO-pose (Maji et al., CVPR workshops 2022, as Ultralytics exports it) sees it in
+the middle, RGB 0-1, and gives rows of box, score and keypoints, without suppression (centre and size, one
+column per row) or after it (corners, and the class behind the score). The rest is filled with 114.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.letterbox import letterbox, planes
+from hicp_lib.detectors.onnx.person_boxes import unsuppressed
+from hicp_lib.detectors.onnx.pose_net import CONVENTIONS, convention_of
+from hicp_lib.detectors.onnx.session import open_model
+
+_FILL = (114, 114, 114)
+_DEFAULT_SIDE_PX = 640
+# x, y, size and score
+_N_BOX = 5
+_N_COLUMNS = {_N_BOX + 3 * n_keypoints for n_keypoints in CONVENTIONS}
+
+
+class OneStage:
+    """RTMO or YOLO-pose on the user's own weights.
+
+    Parameters
+    ----------
+    model : str or Path
+        ONNX export with the decoding inside.
+    min_score : float
+        Least score of a person.
+    max_overlap : float
+        Part of their union that two people's boxes may share.
+    provider : str
+    threads : int
+        See `hicp_lib.detectors.onnx.session.open_model`.
+    """
+
+    name = "one-stage"
+
+    def __init__(
+        self,
+        model: str | Path,
+        min_score: float = 0.1,
+        max_overlap: float = 0.65,
+        provider: str = "cpu",
+        threads: int = 1,
+    ) -> None:
+        self._model = open_model(model, provider, threads)
+        self._min_score, self._max_overlap = min_score, max_overlap
+        height, width = self._model.image_size_px
+        match self._model.told.metadata.get("imgsz"):  # so Ultralytics calls what it exported for
+            case [int(open_height), int(open_width)]:
+                self._size_px = width or open_width, height or open_height
+            case _:
+                self._size_px = width or _DEFAULT_SIDE_PX, height or _DEFAULT_SIDE_PX
+        outputs = self._model.response_to_zeros(*self._size_px[::-1])
+        self._is_rtmo = len(outputs) > 1
+        self._convention = convention_of(self._model, self._read(outputs)[1].shape[1], outputs)
+        self.settings = {"model": self._model.settings, "min_score": min_score, "max_overlap": max_overlap}
+
+    def detect(self, image: np.ndarray) -> Detections:
+        """Find people in an RGB image, shape (height, width, 3), uint8."""
+        fitted = letterbox(image, self._size_px, _FILL, is_centred=not self._is_rtmo)
+        feed = np.empty((1, 3, self._size_px[1], self._size_px[0]), np.float32)
+        step, greatest = (-1, 1.0) if self._is_rtmo else (1, 255.0)
+        planes(fitted.pixels[..., ::step], (0.0,) * 3, (greatest,) * 3, feed[0])
+        boxes, keypoints = self._read(self._model.run(feed))
+        keep = np.flatnonzero(boxes[:, 4] >= self._min_score)
+        keep = keep[unsuppressed(boxes[keep, :4], boxes[keep, 4], self._max_overlap)]
+        # Both families count from the corners of the input and of the image, not from pixels' centres.
+        positions_px = fitted.to_image_px(keypoints[keep, :, :2] - 0.5) + 0.5
+        scores = np.clip(np.nan_to_num(keypoints[keep, :, 2]), 0, 1)
+        is_given = np.isfinite(positions_px).all(axis=-1) & (scores > 0)
+        positions_px = np.where(is_given[..., None], positions_px, np.nan)
+        return Detections.of_parts(
+            positions_px, np.where(is_given, scores, 0), boxes[keep, 4], self._convention
+        )
+
+    def describe(self) -> list[Fact]:
+        """What is taken for granted about the model."""
+        width, height = self._size_px
+        size = "read from the file, its metadata imgsz, or else 640"
+        where = "BGR 0-255, top-left" if self._is_rtmo else "RGB 0-1, in the middle"
+        return [
+            *self._model.describe(),
+            Fact("family", "RTMO" if self._is_rtmo else "YOLO-pose", "told by its outputs"),
+            Fact("input", f"{width} wide, {height} high", size),
+            Fact("pixels", f"{where}, filled with 114", "as the family exports"),
+            Fact("keypoints", self._convention, "told by their number"),
+            Fact("person score", f"box score, >= {self._min_score:g}",
+                 f"overlaps above {self._max_overlap:g} are suppressed; options min_score, max_overlap"),
+        ]  # fmt: skip
+
+    def _read(self, outputs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Corners and score (n, 5) and keypoints with scores (n, k, 3), in input pixels."""
+        match [output.shape for output in outputs]:
+            case [(1, n, 5), (1, m, _, 3)] if n == m:
+                return outputs[0][0].astype(float), outputs[1][0].astype(float)
+            case [(1, n_columns, _)] if n_columns in _N_COLUMNS:
+                rows = outputs[0][0].T.astype(float)
+                half = rows[:, 2:4] / 2
+                corners = np.concatenate([rows[:, :2] - half, rows[:, :2] + half, rows[:, 4:5]], axis=1)
+                return corners, rows[:, _N_BOX:].reshape(len(rows), -1, 3)
+            case [(1, _, n_columns)] if n_columns - 1 in _N_COLUMNS:
+                rows = outputs[0][0].astype(float)
+                return rows[:, :_N_BOX], rows[:, _N_BOX + 1 :].reshape(len(rows), -1, 3)
+        raise self._model.refusal("expected RTMO's or YOLO-pose's outputs, of one class", outputs)

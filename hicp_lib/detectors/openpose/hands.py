@@ -1,0 +1,121 @@
+"""OpenPose's hand network on the user's weights, at the arms of the people found.
+
+A hand is looked for in a square around the point a third of the forearm beyond the wrist (Simon et al.,
+"Hand keypoint detection in single images using multiview bootstrapping", CVPR 2017), the left one
+mirrored: the network knows right hands.
+"""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import INDEX, LEFT_HAND, RIGHT_HAND
+from hicp_lib.detectors.onnx.session import open_model
+from hicp_lib.detectors.openpose.mobilenet import STRIDE
+from hicp_lib.detectors.openpose.net_input import feed
+from hicp_lib.detectors.openpose.released import enlarge
+
+_HAND_SIDE_PX, _N_HAND, _MIN_ARM_SCORE = 368, 21, 0.03
+# Where a hand's square lies and how large it is, in lengths of the forearm; smaller ones are not looked at.
+_BEYOND_WRIST, _SQUARE_SIDE, _FOREARMS_PER_UPPER_ARM, _MIN_AREA_PX2 = 0.33, 1.5, 0.9, 10.0
+_HANDS = {"left": LEFT_HAND, "right": RIGHT_HAND}
+
+
+class OpenPoseHands:
+    """OpenPose's hand network: 21 points of a right hand in a square crop."""
+
+    def __init__(self, model: str | Path, provider: str, threads: int) -> None:
+        self._model = open_model(model, provider, threads)
+        height, width = self._model.image_size_px
+        if height != width:
+            raise self._model.refusal(f"takes images of {width} x {height}; expected squares, of hands")
+        self._side_px = height or _HAND_SIDE_PX
+        self.settings = self._model.settings
+        self._maps(self._model.response_to_zeros(self._side_px, self._side_px))
+
+    def complete(self, image: np.ndarray, people: Detections) -> Detections:
+        """The people with the hands found at their arms; none where shoulder, elbow or wrist is missing."""
+        keypoints_px, scores = people.keypoints_px.copy(), people.scores.copy()
+        for person in range(len(people)):
+            for side, indices in _HANDS.items():
+                square = hand_square(keypoints_px[person], scores[person], side)
+                if square is not None:
+                    found = self.find(image, *square, is_left=side == "left")
+                    keypoints_px[person, indices], scores[person, indices] = found
+        return Detections(keypoints_px, scores, people.person_scores)
+
+    def find(
+        self, image: np.ndarray, corner_px: np.ndarray, side_px: float, is_left: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The points of the hand in a square.
+
+        Parameters
+        ----------
+        image : array, shape (height, width, 3), dtype uint8
+            RGB.
+        corner_px : array, shape (2,)
+            Top left of the square.
+        side_px : float
+        is_left : bool
+            Show it mirrored.
+
+        Returns
+        -------
+        points_px : array, shape (21, 2)
+            In the image; NaN where not found.
+        scores : array, shape (21,)
+        """
+        zoom = side_px / self._side_px
+        x0, step = (corner_px[0] + side_px, -zoom) if is_left else (corner_px[0], zoom)
+        to_image = np.array([[step, 0, x0], [0, zoom, corner_px[1]]])
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        crop = cv2.warpAffine(image, to_image, (self._side_px, self._side_px), flags=flags)
+        maps = self._maps(self._model.run(feed(crop)))
+        large = enlarge(maps[:_N_HAND], STRIDE).reshape(_N_HAND, -1)
+        at = large.argmax(axis=1)
+        scores = np.clip(np.nan_to_num(large.max(axis=1).astype(float)), 0, 1)
+        points = (
+            np.stack([at % self._side_px, at // self._side_px], axis=1) @ to_image[:, :2].T + to_image[:, 2]
+        )
+        return np.where(scores[:, None] > 0, points, np.nan), scores
+
+    def _maps(self, outputs: list[np.ndarray]) -> np.ndarray:
+        cells, maps = self._side_px // STRIDE, outputs[0]
+        if maps.ndim != 4 or maps.shape[1] < _N_HAND or maps.shape[2:] != (cells, cells):
+            raise self._model.refusal(f"expected hands' (1, {_N_HAND + 1}, {cells}, {cells})", outputs)
+        return maps[0]
+
+
+def hand_square(keypoints_px: np.ndarray, scores: np.ndarray, side: str) -> tuple[np.ndarray, float] | None:
+    """The square in which OpenPose looks for a hand of a person, if it does.
+
+    Parameters
+    ----------
+    keypoints_px : array, shape (136, 2)
+    scores : array, shape (136,)
+    side : {"left", "right"}
+
+    Returns
+    -------
+    (array, float) or None
+        Its upper left corner, shape (2,), and its side in pixels.
+
+    Examples
+    --------
+    >>> keypoints_px = np.zeros((136, 2))
+    >>> joints = [INDEX[f"left_{joint}"] for joint in ("wrist", "elbow", "shoulder")]
+    >>> keypoints_px[joints] = (400, 200), (300, 200), (200, 200)
+    >>> corner_px, side_px = hand_square(keypoints_px, np.ones(136), "left")
+    >>> corner_px.tolist(), side_px
+    ([358.0, 125.0], 150.0)
+    """
+    joints = [INDEX[f"{side}_{joint}"] for joint in ("wrist", "elbow", "shoulder")]
+    if not (scores[joints] > _MIN_ARM_SCORE).all():
+        return None
+    wrist, elbow, shoulder = keypoints_px[joints]
+    upper_arm_px = np.linalg.norm(elbow - shoulder)
+    side_px = _SQUARE_SIDE * max(np.linalg.norm(wrist - elbow), _FOREARMS_PER_UPPER_ARM * upper_arm_px)
+    centre = wrist + _BEYOND_WRIST * (wrist - elbow)
+    return (centre - side_px / 2, float(side_px)) if side_px**2 > _MIN_AREA_PX2 else None
