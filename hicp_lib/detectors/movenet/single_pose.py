@@ -25,6 +25,8 @@ class MoveNetThunder:
     boxes : str, optional
     person_model : str or Path, optional
         See `hicp_lib.detectors.onnx.box_source.BoxSource`.
+    person_min_score, person_max_overlap : float, optional
+        Thresholds of the person finder.
     padding : float
         What boxes are grown by before they become squares. Of 1.0, 1.1, 1.25 and 1.5, 1.0 was best or within
         .01 AP of the best on rendered scenes of seed 11.
@@ -39,13 +41,17 @@ class MoveNetThunder:
         self,
         boxes: str | None = None,
         person_model: str | Path | None = None,
+        person_min_score: float | None = None,
+        person_max_overlap: float | None = None,
         padding: float = 1.0,
         provider: str = "cpu",
         threads: int = 1,
     ) -> None:
         self._model = open_committed(f"{self.name}.onnx", provider, threads)
-        (*_, self._side_px) = self._model.inputs[0].shape
-        self._boxes, self._padding = BoxSource(boxes, person_model, provider, threads), padding
+        self._side_px = self._model.inputs[0].shape[-1] or 0
+        thresholds = {"min_score": person_min_score, "max_overlap": person_max_overlap}
+        self._boxes = BoxSource(boxes, person_model, provider, threads, **thresholds)
+        self._padding = padding
         self.takes_boxes = self._boxes.kind == "gt"
         self.settings: dict[str, Any] = {"padding": padding, "model": self._model.settings}
         self.settings |= {"opencv": cv2.__version__} | self._boxes.settings

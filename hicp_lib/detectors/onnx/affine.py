@@ -67,6 +67,11 @@ class Regions:
         grown = np.stack([widths, widths / aspect], axis=1) * padding
         return cls(boxes_px[:, :2] + boxes_px[:, 2:] / 2, grown, udp)
 
+    @classmethod
+    def whole(cls, image: np.ndarray, input_size_px: tuple[int, int]) -> Regions:
+        """The one region that an image fits into exactly."""
+        return cls.around(np.array([[0, 0, image.shape[1], image.shape[0]]]), input_size_px, padding=1.0)
+
     def __len__(self) -> int:
         return len(self.centres_px)
 

@@ -46,7 +46,7 @@ class NanoDet:
     def find(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """People in an RGB image (height, width, 3): boxes (n, 4: x, y, width, height) and scores (n,)."""
         size_px = self._side_px, self._side_px
-        whole = Regions.around([[0, 0, image.shape[1], image.shape[0]]], size_px, padding=1.0)
+        whole = Regions.whole(image, size_px)
         feed = np.empty((1, 3, *size_px), np.float32)
         planes(whole.crop(image, size_px)[0][..., ::-1], _MEAN, _STD, out=feed[0])
         corners_px, scores = self._read(self._model.run(feed))

@@ -42,7 +42,7 @@ class PoseNetMobileNet:
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
         size_px = self._side_px, self._side_px
-        whole = Regions.around([[0, 0, image.shape[1], image.shape[0]]], size_px, padding=1.0)
+        whole = Regions.whole(image, size_px)
         (square,) = whole.crop(image, size_px)
         positions_px, scores, person_scores = decode(self.maps(square), self._rule)
         in_image_px = whole.to_image_px(positions_px.reshape(1, -1, 2), size_px).reshape(positions_px.shape)
