@@ -5,6 +5,8 @@ near it, and along each edge of the tree the displacement from a parent to its c
 cell that no person has yet is the root of the next one, whose other keypoints are walked to.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -57,15 +59,16 @@ class Maps:
     to_parent_px: np.ndarray
     stride_px: int
 
-    def cell(self, position_px: np.ndarray) -> tuple[int, int]:
-        """Row and column of the cell nearest to a position (2: x, y)."""
-        x, y = np.floor(position_px / self.stride_px + 0.5)
+    def cell(self, x_px: float, y_px: float) -> tuple[int, int]:
+        """Row and column of the cell nearest to a position."""
         height, width = self.heat.shape[1:]
-        return int(min(max(y, 0), height - 1)), int(min(max(x, 0), width - 1))
+        row, column = math.floor(y_px / self.stride_px + 0.5), math.floor(x_px / self.stride_px + 0.5)
+        return min(max(row, 0), height - 1), min(max(column, 0), width - 1)
 
-    def keypoint(self, part: int, cell: tuple[int, int]) -> np.ndarray:
-        """Position (2: x, y) of a keypoint near a cell."""
-        return np.array(cell[::-1]) * self.stride_px + self.offsets_px[part][cell]
+    def keypoint(self, part: int, cell: tuple[int, int]) -> tuple[float, float]:
+        """x and y of a keypoint near a cell."""
+        off_x, off_y = self.offsets_px[(part, *cell)].tolist()
+        return cell[1] * self.stride_px + off_x, cell[0] * self.stride_px + off_y
 
 
 def decode(maps: Maps, rule: DecodingRule) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -92,7 +95,7 @@ def decode(maps: Maps, rule: DecodingRule) -> tuple[np.ndarray, np.ndarray, np.n
         if _is_taken(people, part, maps.keypoint(part, (cell[0], cell[1])), rule):
             continue
         person = _walk(maps, part, (cell[0], cell[1]))
-        is_new = [not _is_taken(people, k, person[k, :2], rule) for k in range(_N_PARTS)]
+        is_new = [not _is_taken(people, k, person[k, :2].tolist(), rule) for k in range(_N_PARTS)]
         person_scores.append(person[is_new, 2].sum() / _N_PARTS)
         people.append(person)
     rows = np.array(people).reshape(-1, _N_PARTS, 3)
@@ -107,20 +110,24 @@ def _roots(heat: np.ndarray, least: float) -> np.ndarray:
     return rows[np.argsort(-heat[tuple(rows.T)], kind="stable")]
 
 
-def _is_taken(people: list[np.ndarray], part: int, position_px: np.ndarray, rule: DecodingRule) -> bool:
-    return any(((person[part, :2] - position_px) ** 2).sum() <= rule.same_part_px**2 for person in people)
+def _is_taken(people: list[np.ndarray], part: int, position_px: Sequence[float], rule: DecodingRule) -> bool:
+    return any(math.dist(person[part, :2], position_px) <= rule.same_part_px for person in people)
 
 
 def _walk(maps: Maps, root: int, cell: tuple[int, int]) -> np.ndarray:
-    """x, y, score (17, 3) of the person with this root: up the tree from it, then down to all others."""
-    person = np.full((_N_PARTS, 3), np.nan)
-    person[root] = *maps.keypoint(root, cell), maps.heat[root][cell]
+    """x, y, score (17, 3) of the person with this root: up the tree from it, then down to all others.
+
+    In plain numbers: arrays of two would take most of the decoding's time.
+    """
+    found = {root: (*maps.keypoint(root, cell), float(maps.heat[(root, *cell)]))}
     up = [(edge, child, parent, maps.to_parent_px) for edge, (parent, child) in enumerate(EDGES)]
     down = [(edge, parent, child, maps.to_child_px) for edge, (parent, child) in enumerate(EDGES)]
     for edge, source, target, steps_px in [*up[::-1], *down]:
-        if np.isfinite(person[source, 2]) and np.isnan(person[target, 2]):
-            at = person[source, :2] + steps_px[edge][maps.cell(person[source, :2])]
+        if source in found and target not in found:
+            x_px, y_px, _ = found[source]
+            step_x, step_y = steps_px[(edge, *maps.cell(x_px, y_px))].tolist()
+            at = x_px + step_x, y_px + step_y
             for _ in range(_N_REFINEMENTS):
-                at = maps.keypoint(target, maps.cell(at))
-            person[target] = *at, maps.heat[target][maps.cell(at)]
-    return person
+                at = maps.keypoint(target, maps.cell(*at))
+            found[target] = (*at, float(maps.heat[(target, *maps.cell(*at))]))
+    return np.array([found[part] for part in range(_N_PARTS)])

@@ -54,7 +54,7 @@ class PoseNetMobileNet:
         outputs = dict(zip((port.name for port in self._model.outputs), self._model.run(blob), strict=True))
         # Of each vector all y come first, then all x.
         to_child, to_parent, offsets = (
-            np.stack(np.split(outputs[name][0], 2)[::-1], axis=-1).astype(float)
+            np.moveaxis(outputs[name].reshape(2, -1, *outputs[name].shape[2:])[::-1], 0, -1)
             for name in ("displacement_fwd", "displacement_bwd", "offset")
         )
         heat = 1 / (1 + np.exp(-outputs["heatmap"][0]))

@@ -62,7 +62,7 @@ def test_a_person_is_walked_to_from_any_root():
     person = rng.uniform(20, 220, (17, 2))
     for root in range(17):
         maps = maps_of(person)
-        cell = maps.cell(person[root])
+        cell = maps.cell(*person[root])
         maps.heat[root][cell] = 0.95
         positions_px, scores, _ = decode(maps, DecodingRule())
         np.testing.assert_allclose(positions_px[0], person, atol=1e-9)
