@@ -10,6 +10,7 @@ import pytest
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.detectors.registry import DETECTORS, default_detector_names
+from hicp_lib.evaluation.ap.found_and_placed import found_and_placed
 from hicp_lib.study.plots import evaluation, people
 from hicp_lib.study.plots.palette import DETECTOR_STYLES, detector_colour
 from hicp_lib.study.plots.style import Figure, in_words
@@ -79,6 +80,33 @@ def test_comparison_figures_say_on_what_data_and_what_they_show(metrics, draw):
 def test_alt_text_names_the_best_detector(metrics):
     metrics.loc[(metrics["detector"] == "openpose-mobilenet") & (metrics["metric"] == "AP"), "value"] = 0.99
     assert "openpose-mobilenet with 0.99 on basic body" in evaluation.precision_recall(metrics, "x").alt
+
+
+def test_the_axes_of_a_group_begin_below_its_lowest_interval(metrics):
+    hands = metrics["group"] == "hand"
+    metrics.loc[hands, ["value", "low", "high"]] = [0.75, 0.65, 0.85]
+    metrics.loc[~hands, ["value", "low", "high"]] = np.nan  # nobody counts
+    axes = evaluation.precision_recall(metrics, "x").figure.axes
+    assert [axis.get_xlim()[0] for axis in axes] == pytest.approx([0, 0, 0.6, 0.6])
+
+
+@pytest.mark.parametrize("oks", [[0.0, 0.05], [0.0, 0.95], [0.5, 0.95]], ids=["nobody", "one", "both"])
+def test_found_and_placed_are_side_by_side_for_who_is_found(oks):
+    parts = [
+        pd.DataFrame(
+            {"subset": subset, "group": "body", "detector": "posenet", "oks": of, "source_image": [1, 2]}
+        )
+        for subset, of in (("basic", [0.9, 0.9]), ("headless", oks))
+    ]
+    table = found_and_placed(pd.concat(parts), 10)
+    figure = evaluation.found_and_placed(table, "made-up people")
+    found, placed = ([line.get_xdata()[0] for line in axis.get_lines() if line.get_marker() == "o"
+                      and len(line.get_xdata()) == 1] for axis in figure.figure.axes)  # fmt: skip
+    of_found = [value for value in oks if value >= 0.1]
+    share = len(of_found) / len(oks)
+    assert found == pytest.approx([1.0, share])
+    assert placed == pytest.approx([0.9, sum(of_found) / len(of_found)] if of_found else [0.9])
+    assert f"posenet {share:.2f} on headless" in figure.alt
 
 
 def test_the_share_of_people_falls_with_oks():
