@@ -21,13 +21,18 @@ Found = Mapping[tuple[str, str], Mapping[int, Detections]]
 def groups_of(found: Found, detector: str) -> tuple[str, ...]:
     """The keypoint groups a detector is scored on: its own, or those an imported one gives a keypoint of.
 
+    One run in several ways is labelled "NAME, how", and keeps its groups.
+
     Examples
     --------
     >>> groups_of({}, "mediapipe"), groups_of({("basic", "mine"): {1: Detections.none()}}, "mine")
     (('body', 'hand'), ())
+    >>> groups_of({}, "movenet-lightning, found boxes")
+    ('body',)
     """
-    if detector in DETECTORS:
-        return DETECTORS[detector].groups
+    known = DETECTORS.get(detector.partition(", ")[0])
+    if known:
+        return known.groups
     given = np.zeros(N_KEYPOINTS, dtype=bool)
     for (_, name), images in found.items():
         if name == detector:

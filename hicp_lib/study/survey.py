@@ -1,4 +1,4 @@
-"""The survey of data sets and detectors (the paper's Tables I and II, `data/survey.json`)."""
+"""The survey of data sets and detectors: the paper's Tables I (`data/survey.json`) and II (the registry)."""
 
 from collections.abc import Collection
 
@@ -8,21 +8,27 @@ from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.files import read_json
 from hicp_lib.detectors.registry import DETECTORS, command_to_run, command_to_use
 
-_SURVEY_FILE = DATA_DIR / "survey.json"
+PAPER_SYSTEMS = ("openpose", "mmpose", "alphapose", "detectron2", "mediapipe")
 
 
 def surveyed_data_sets() -> pd.DataFrame:
     """Data sets with annotated keypoints, one row each; numbers are points per person."""
-    return pd.DataFrame(read_json(_SURVEY_FILE)["data_sets"]).drop(columns="reference")
+    return pd.DataFrame(read_json(DATA_DIR / "survey.json")["data_sets"]).drop(columns="reference")
 
 
 def surveyed_detectors(run: Collection[str]) -> pd.DataFrame:
-    """Detectors (the paper's Table II), one row each, with a column `here`: "run", or what would run it.
+    """Detectors (the paper's Table II), one row each, the paper's five first.
 
     Parameters
     ----------
     run : sequence of str
         Names of the detectors that were run; one that was imported as NAME-imported counts.
+
+    Returns
+    -------
+    pd.DataFrame
+        Columns `system, detector, paradigm, keypoints, training data, input`, `parameters [M]`,
+        `operations [G]` (NaN where the user's weights decide) and `here`: "run", or what would run it.
 
     Examples
     --------
@@ -30,8 +36,19 @@ def surveyed_detectors(run: Collection[str]) -> pd.DataFrame:
     >>> table.at["mediapipe", "here"], table.at["mmpose", "here"]
     ('run', 'run')
     """
-    table = pd.DataFrame(read_json(_SURVEY_FILE)["detectors"]).drop(columns="reference")
-    return table.assign(here=[_status(name, run) for name in table["detector"]])
+    names = dict.fromkeys([*PAPER_SYSTEMS, *DETECTORS])
+    facts = {name: DETECTORS[name].facts for name in names}
+    rows = [
+        (DETECTORS[name].label, name, f.paradigm, f.keypoints, f.training_data, f.input,
+         _scaled(f.n_parameters, 1e6), _scaled(f.n_operations, 1e9), _status(name, run))
+        for name, f in facts.items()
+    ]  # fmt: skip
+    columns = ["system", "detector", "paradigm", "keypoints", "training data", "input"]
+    return pd.DataFrame(rows, columns=[*columns, "parameters [M]", "operations [G]", "here"])
+
+
+def _scaled(number: int | None, unit: float) -> float:
+    return float("nan") if number is None else number / unit
 
 
 def _status(name: str, run: Collection[str]) -> str:
@@ -39,7 +56,5 @@ def _status(name: str, run: Collection[str]) -> str:
         return "run"
     if name in ("mediapipe-pose", "mediapipe-hands") and "mediapipe" in run:
         return "run, within mediapipe"
-    if name in DETECTORS:
-        command = command_to_use if DETECTORS[name].needs_model else command_to_run
-        return f"not run; {command(name)}"
-    return f"not run; hicp import --format {name} --predictions DIR --annotations A.json --out D.json"
+    command = command_to_use if DETECTORS[name].needs_model else command_to_run
+    return f"not run; {command(name)}"

@@ -28,7 +28,7 @@ from hicp_lib.detectors.runtime.results import (
     image_bytes,
     result_path,
 )
-from hicp_lib.formats.annotations import read_annotations
+from hicp_lib.formats.annotations import Annotations, read_annotations
 
 
 def detect_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Detections]:
@@ -51,12 +51,34 @@ def detect_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, D
 def time_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Timed]:
     """People in every image of a dataset folder (`images/`, `annotations.json`), by image id.
 
+    Parameters
+    ----------
+    name : str
+    dataset_dir : path
+    **options : object
+        As of `detect_annotated`.
+
+    Returns
+    -------
+    dict of int to Timed
+    """
+    folder = Path(dataset_dir)
+    return detect_annotated(name, read_annotations(folder / "annotations.json"), folder / "images", **options)
+
+
+def detect_annotated(
+    name: str, annotations: Annotations, images_dir: str | Path, **options
+) -> dict[int, Timed]:
+    """People in every annotated image, by image id.
+
     The annotated boxes go to detectors that take them.
 
     Parameters
     ----------
     name : str
-    dataset_dir : path
+    annotations : Annotations
+    images_dir : path
+        Folder of the images.
     **options : object
         As of `detect_images`.
 
@@ -64,11 +86,7 @@ def time_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Tim
     -------
     dict of int to Timed
     """
-    annotations = read_annotations(Path(dataset_dir) / "annotations.json")
-    paths = {
-        image_id: Path(dataset_dir) / "images" / image.file_name
-        for image_id, image in annotations.images.items()
-    }
+    paths = {i: Path(images_dir) / image.file_name for i, image in annotations.images.items()}
     people = annotations.take(~annotations.is_crowd)
     boxes_px = {image_id: people.boxes_px[people.image_ids == image_id] for image_id in paths}
     return detect_images(name, paths, boxes_px=boxes_px, **options)

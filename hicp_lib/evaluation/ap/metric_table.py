@@ -8,13 +8,12 @@ from collections.abc import Mapping, Sequence
 
 import pandas as pd
 
-from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import GROUPS
 from hicp_lib.detectors.runtime.results import Timed
 from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
 from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate, person_oks
 from hicp_lib.evaluation.cases import Found, Truth, all_cases, labelled, per_case
-from hicp_lib.formats.annotations import source_images
+from hicp_lib.formats.annotations import Annotations, source_images
 
 # (subset, detector, group) -> its evaluation, and its figures on draws that all detectors share
 Drawn = Mapping[tuple[str, str, str], tuple[Evaluation, pd.DataFrame]]
@@ -132,27 +131,37 @@ def head_loss(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0
     DataFrame
         Columns `group, detector, basic, headless, change, low, high, n_people`; the interval is the change's.
     """
-    subsets = ("basic", "headless")
-    shared = truth["basic"].images.keys() & truth["headless"].images.keys()
-    same = {subset: truth[subset].of_images(shared) for subset in subsets}
-    clusters = source_images(same["basic"])
+    drawn = draw_cases(*same_people(truth, found), n_resamples, seed)
     rows = []
-    for subset, detector, group in all_cases(found):
-        if subset != "basic":
-            continue
-        on = {s: {i: found[s, detector].get(i, Detections.none()) for i in shared} for s in subsets}
-        basic, headless = (evaluate(same[s], on[s], group) for s in subsets)
-        drawn = resample([headless, basic], n_resamples, seed, clusters)
-        change = difference(headless, basic, *drawn).set_index("metric").loc["AP", ["value", "low", "high"]]
-        rows.append((group, detector, basic.AP, headless.AP, *change, basic.n_people))
+    for (subset, detector, group), (basic, of_basic) in drawn.items():
+        if subset == "basic":
+            headless, of_headless = drawn["headless", detector, group]
+            change = difference(headless, basic, of_headless, of_basic).set_index("metric").loc["AP"]
+            rows.append((group, detector, basic.AP, headless.AP, *change, basic.n_people))
     columns = ["group", "detector", "basic", "headless", "change", "low", "high", "n_people"]
     return pd.DataFrame(rows, columns=columns).sort_values("group", kind="stable", ignore_index=True)
 
 
+def same_people(truth: Truth, found: Found) -> tuple[dict[str, Annotations], Found]:
+    """Basic and Headless with the people who are in both; further subsets as they are.
+
+    Equal image ids are then of the same person, so that `draw_cases` draws the same people in both.
+    """
+    pair = ("basic", "headless")
+    shared = truth["basic"].images.keys() & truth["headless"].images.keys()
+    people = {s: of.of_images(shared) if s in pair else of for s, of in truth.items()}
+    seen = {case: {i: run[i] for i in run if i in people[case[0]].images} for case, run in found.items()}
+    return people, seen
+
+
 def people_oks(truth: Truth, found: Found) -> pd.DataFrame:
-    """OKS of each person's best detection: `subset, group, detector` and the columns of `person_oks`."""
+    """OKS of each person's best detection.
+
+    Columns `subset, group, detector, source_image` and those of `person_oks`.
+    """
     table = per_case(person_oks, truth, found)
-    return table[["subset", "group", "detector", "image_id", "annotation_id", "oks", "n_labelled"]]
+    first = ["subset", "group", "detector", "source_image"]
+    return table[[*first, "image_id", "annotation_id", "oks", "n_labelled"]]
 
 
 def detection_times(runs: Mapping[tuple[str, str], Mapping[int, Timed]]) -> pd.DataFrame:

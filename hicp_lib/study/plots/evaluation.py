@@ -1,4 +1,4 @@
-"""Figures of the 2D comparison: precision against recall, the loss without a head, OKS, time."""
+"""Figures of the 2D comparison: precision against recall, the loss without a head, who is found, time."""
 
 from pathlib import Path
 
@@ -7,13 +7,16 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
+from hicp_lib.evaluation.ap.found_and_placed import FOUND, OKS_OF_FOUND
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import THRESHOLD_MARKERS, detector_colour
 from hicp_lib.study.plots.people import detections_grid
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 GROUP_TITLES = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
+WIDTH_IN = 5.5  # what can be read on a telephone, and fills a page
 _THRESHOLDS = {".5": ("AP50", "AR50"), ".75": ("AP75", "AR75"), ".5:.95": ("AP", "AR")}
+_SUBSETS = {"basic": 0, "headless": 1}  # in a row: above filled, below open
 
 
 @in_style
@@ -28,17 +31,24 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
     data_note : str
         On what data, e.g. "rendered people"; becomes part of the caption.
     """
-    figure, axes = _panels(table, 4.0, "average recall", "average precision")
+    figure, axes = _panels(table, 2.7, "average recall", "average precision")
     for axis, rows, _, _ in marks.facets(axes, table, "group", "subset"):
         for detector, of_detector in rows.groupby("detector", sort=False):
             _scatter_detector(axis, of_detector, detector)
-        axis.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02), aspect="equal")
-    colours = marks.detector_lines(axes[0, 0], table["detector"].unique())
+        axis.set(aspect="equal")
+    for row, group in zip(axes, table["group"].unique(), strict=True):
+        least = table.loc[table["group"] == group, ["value", "low"]].min().min()
+        start = np.floor(5 * np.nan_to_num(least)) / 5
+        ticks = np.arange(start, 1.01, 0.2)
+        row[0].set(xlim=(start, 1.02), ylim=(start, 1.02), xticks=ticks, yticks=ticks)
+    detectors = table["detector"].unique()
+    colours = marks.detector_lines(axes[0, 0], detectors)
     names = [f"OKS {name}" for name in THRESHOLD_MARKERS]
     shapes = marks.legend_lines(
         axes[0, 0], names, ({"marker": m, "ls": ""} for m in THRESHOLD_MARKERS.values())
     )
-    figure.legend(handles=[*colours, *shapes], loc="outside lower center", ncols=4, fontsize=9)
+    places = {"loc": "outside lower center", "fontsize": 9}
+    figure.legend(handles=[*colours, *shapes], ncols=_legend_columns(detectors), **places)
     caption = (
         f"Average precision against average recall per detector, on {data_note}. The shape is the OKS "
         "threshold (square .5, circle .75, triangle the mean over .5:.05:.95), as in Fig. 4 of the paper; "
@@ -50,21 +60,35 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
 def _panels(table: pd.DataFrame, height_in: float, x_label: str, y_label: str):
     """A figure with a panel for each group of keypoints (down) and subset (across), and its axes."""
     shape = table["group"].nunique(), table["subset"].nunique()
-    size = 4.4 * shape[1], height_in * shape[0]
-    figure, axes = new_figure(*shape, *size, sharex=True, sharey=True, squeeze=False)
+    size = WIDTH_IN, height_in * shape[0] + 0.6
+    figure, axes = new_figure(*shape, *size, sharex="row", sharey="row", squeeze=False)
     for axis, _, group, subset in marks.facets(axes, table, "group", "subset"):
-        title = f"{subset.capitalize()} · {GROUP_TITLES.get(group, group)}"
-        axis.set(title=title, xlabel=x_label, ylabel=y_label)
-        axis.label_outer()
+        axis.set_title(f"{subset.capitalize()}, {_short_title(group)}")
+    for axis in axes[-1]:
+        axis.set_xlabel(x_label)
+    for axis in axes[:, 0]:
+        axis.set_ylabel(y_label)
     return figure, axes
+
+
+def _short_title(group: str) -> str:
+    return GROUP_TITLES.get(group, group).partition(" (")[0].lower()
+
+
+def _legend_columns(names) -> int:
+    """How many columns of these names a figure is wide enough for."""
+    return 2 if max(map(len, names)) < 30 else 1
 
 
 def _scatter_detector(axis, rows: pd.DataFrame, detector: str) -> None:
     by_metric = {metric: row for metric, row in rows.groupby("metric")}
+    colour = detector_colour(detector)
+    track = [[by_metric[pair[k]]["value"].iloc[0] for pair in _THRESHOLDS.values()] for k in (1, 0)]
+    axis.plot(*track, color=colour, lw=2, alpha=0.4)
     for threshold, (precision, recall) in _THRESHOLDS.items():
         y, x = by_metric[precision], by_metric[recall]
         reach = {"xerr": marks.whiskers(x), "yerr": marks.whiskers(y)}
-        pen = {"color": detector_colour(detector), "markersize": 7, "elinewidth": 0.9, "alpha": 0.9}
+        pen = {"color": colour, "markersize": 6, "mec": "white", "mew": 0.5, "elinewidth": 0.7}
         axis.errorbar(x["value"], y["value"], fmt=THRESHOLD_MARKERS[threshold], **reach, **pen)
 
 
@@ -84,26 +108,68 @@ def loss_without_head(table: pd.DataFrame, data_note: str) -> Figure:
     `table` as for `precision_recall`; only rows with metric "AP" are drawn.
     """
     rows = table[table["metric"] == "AP"]
-    names, groups = (rows[name].unique() for name in ("detector", "group"))
-    figure, axes = new_figure(1, len(groups), 4.4 * len(groups), 3.2, sharex=True, squeeze=False)
-    for axis, group in zip(axes[0], groups, strict=True):
-        part = rows[rows["group"] == group].pivot(index="detector", columns="subset", values="value")
-        part = part.reindex([name for name in names[::-1] if name in part.index])
-        for y, (detector, row) in enumerate(part.iterrows()):
-            colour = detector_colour(detector)
-            axis.plot([row["headless"], row["basic"]], [y, y], "-", color=colour, lw=3, alpha=0.45)
-            axis.plot(row["basic"], y, "o", color=colour, markersize=9)
-            axis.plot(row["headless"], y, "o", color=colour, mfc="white", mew=2, markersize=9)
-        axis.set(yticks=range(len(part)), yticklabels=list(part.index), xlabel="average precision (.5:.95)")
-        axis.set(xlim=(-0.02, 1.02), ylim=(-0.6, len(part) - 0.4), title=GROUP_TITLES.get(group, group))
-    drops = rows.pivot_table(index=["detector", "group"], columns="subset", values="value")
-    said = series_text((drops["headless"] - drops["basic"]).dropna(), "{} {} {:+.2f}")
+    figure = _with_and_without(rows, {"AP": "average precision (.5:.95)"}, "metric")
+    drops = rows.pivot_table(index=["detector", "group"], columns="subset", values="value", sort=False)
+    change = drops.get("headless", np.nan) - drops.get("basic", np.nan)
+    said = series_text(change.dropna(), "{} {} {:+.2f}")
     caption = (
         "What removing the head costs: average precision on Basic (filled) and Headless (open) for each "
-        f"detector, on {data_note}."
+        f"detector, with 95 % bootstrap intervals, on {data_note}."
     )
     alt = f"Average precision with and without the head. Change per detector: {said}."
     return Figure(figure, caption, alt, rows)
+
+
+@in_style
+def found_and_placed(table: pd.DataFrame, data_note: str) -> Figure:
+    """Share of people who are found at all, beside how well those who are found are placed.
+
+    `table` as from `hicp_lib.evaluation.ap.found_and_placed.found_and_placed`.
+    """
+    labels = {FOUND: "share of people found", OKS_OF_FOUND: "mean OKS of the found"}
+    rows = table[table["what"].isin(labels)]
+    figure = _with_and_without(rows, labels, "what")
+    shares = rows[(rows["what"] == FOUND) & (rows["group"] == rows["group"].iloc[0])]
+    said = series_text(shares.set_index(["detector", "subset"])["value"], "{0} {2:.2f} on {1}")
+    caption = (
+        "Found, apart from placed: the share of people of whom some detection has an OKS of at least .1, and "
+        "the mean OKS of those people's best detections; Basic filled, Headless open, with 95 % bootstrap "
+        f"intervals over source images, on {data_note}."
+    )
+    group = _short_title(rows["group"].iloc[0])
+    return Figure(figure, caption, f"Dots per detector. Share found, {group}: {said}.", table)
+
+
+def _with_and_without(rows: pd.DataFrame, labels: dict[str, str], across: str):
+    """Dots with whiskers of each detector in Basic (filled) and Headless (open), joined.
+
+    A row of panels per group of keypoints, in each one per value of the column `across`, named by `labels`.
+    """
+    groups = rows["group"].unique()
+    names = {group: list(rows.loc[rows["group"] == group, "detector"].unique()) for group in groups}
+    heights = [len(of_group) + 0.8 for of_group in names.values()]
+    figure, axes = new_figure(
+        len(groups), len(labels), WIDTH_IN, 0.5 * sum(heights) + 0.9, squeeze=False, height_ratios=heights,
+        sharex="col", sharey="row",
+    )  # fmt: skip
+    for axis, part, group, what in marks.facets(axes, rows, "group", across):
+        for detector, pair in part.dropna(subset="value").groupby("detector", sort=False):
+            y = names[group].index(detector) + 0.24 * (pair["subset"].map(_SUBSETS).fillna(0.5) - 0.5)
+            pen = {"color": detector_colour(detector), "markersize": 7}
+            axis.plot(pair["value"], y, "-", lw=3, alpha=0.45, **pen)
+            for (_, row), height in zip(pair.iterrows(), y, strict=True):
+                fill = "white" if row["subset"] == "headless" else pen["color"]
+                reach = marks.whiskers(row.to_frame().T)
+                axis.errorbar(row["value"], height, xerr=reach, fmt="o", mfc=fill, elinewidth=0.9, **pen)
+        marks.name_rows(axis, names[group])
+        axis.set(xlim=(-0.03, 1.03), xlabel=labels[what])
+        axis.label_outer()
+    for axis, group in zip(axes[:, 0], groups, strict=True):
+        axis.set_title(GROUP_TITLES.get(group, group))
+    styles = [{"marker": "o", "ls": "", "mfc": fill} for fill in (None, "white")]
+    handles = marks.legend_lines(axes[0, 0], ["Basic", "Headless"], styles)
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=9)
+    return figure
 
 
 @in_style
@@ -112,7 +178,7 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
 
     `table` has one row per person: columns `subset, group, detector, oks` (0 when nobody was found).
     """
-    figure, axes = _panels(table, 3.2, "OKS of the best detection", "share of people at least as good")
+    figure, axes = _panels(table, 2.2, "OKS of the best detection", "share at least as good")
     medians = []
     for axis, rows, group, subset in marks.facets(axes, table, "group", "subset"):
         for detector, people in rows.groupby("detector", sort=False):
@@ -122,7 +188,7 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
             axis.step(*steps, color=detector_colour(detector), where="pre", label=detector)
             medians.append(f"{detector} {np.median(oks):.2f} ({subset} {group})")
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
-    marks.legend_below(figure, axes)
+    marks.legend_below(figure, axes, ncols=_legend_columns(table["detector"].unique()))
     caption = (
         f"Share of annotated people whose best-fitting detection reaches a given OKS, on {data_note}; "
         "a person nobody found counts with OKS 0."
@@ -164,7 +230,7 @@ def time_per_image(table: pd.DataFrame, machine_note: str) -> Figure:
     """Distribution of the detection time per image; `table` has columns `detector, time_ms`."""
     detectors = table["detector"].unique()[::-1]
     samples = [table.loc[table["detector"] == name, "time_ms"].dropna() for name in detectors]
-    figure, axis = new_figure(1, 1, 7.5, 0.8 + 0.55 * len(detectors))
+    figure, axis = new_figure(1, 1, WIDTH_IN, 0.8 + 0.4 * len(detectors))
     marks.draw_boxes(axis, samples, map(detector_colour, detectors))
     axis.set(yticks=range(1, len(detectors) + 1), yticklabels=detectors)
     axis.set(xlabel="time per image [ms]", xlim=(0, None))

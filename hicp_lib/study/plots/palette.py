@@ -1,18 +1,24 @@
-"""Colours and markers: a fixed colour per detector, on every page."""
+"""Colours and markers: a fixed pair per detector, on every page."""
 
-# Okabe and Ito's colour-blind-safe palette; a detector keeps its colour on every page.
-DETECTOR_COLOURS: dict[str, str] = {
-    "mediapipe": "#0072B2",
-    "mediapipe-pose": "#56B4E9",
-    "mediapipe-hands": "#CC79A7",
-    "openpose-mobilenet": "#E69F00",
-    "openpose": "#D55E00",
-    "mmpose": "#009E73",
-    "alphapose": "#7F5FA8",
-    "detectron2": "#8C6D31",
-    "combined": "#882255",
+# Each detector's colour and marker, the same on every page. Those of the default study stay apart for readers
+# who are blind to red or green, too; the others do so by their markers.
+DETECTOR_STYLES: dict[str, tuple[str, str]] = {
+    "mediapipe": ("#0072B2", "o"),
+    "mediapipe-pose": ("#56B4E9", "p"),
+    "mediapipe-hands": ("#CC79A7", "h"),
+    "movenet-thunder": ("#22AA99", "s"),
+    "movenet-lightning": ("#2E4600", "v"),
+    "movenet-multipose": ("#C77CFF", "^"),
+    "posenet": ("#A0522D", "D"),
+    "openpose-mobilenet": ("#E69F00", "X"),
+    "openpose": ("#D55E00", "P"),
+    "mmpose": ("#009E73", "<"),
+    "alphapose": ("#7F5FA8", ">"),
+    "detectron2": ("#8C6D31", "d"),
+    "combined": ("#B0125F", "H"),
+    "combined:movenet-thunder": ("#4B0055", "*"),
 }
-OTHER_COLOUR = "#595959"
+OTHER_COLOUR, _OTHER_MARKER = "#595959", "8"
 TRUTH_COLOUR = "#111111"
 
 # The two subsets of HiCP, and the two boxes of the paper's figure of how they are made.
@@ -27,13 +33,29 @@ THRESHOLD_MARKERS = {".5": "s", ".75": "o", ".5:.95": "^"}
 def detector_colour(name: str) -> str:
     """The colour of a detector, also of variants such as "mmpose-imported"; others take the neutral grey.
 
-    All combinations ("combined:BODY+HANDS") share one.
+    Combinations ("combined:BODY+HANDS") share one, but for those on the bodies of MoveNet Thunder.
 
     Examples
     --------
     >>> detector_colour("mmpose-imported") == detector_colour("mmpose")
     True
     """
-    kind = name.partition(":")[0]
-    known = [detector for detector in DETECTOR_COLOURS if f"{kind}-".startswith(f"{detector}-")]
-    return DETECTOR_COLOURS[max(known, key=len)] if known else OTHER_COLOUR
+    return _style(name)[0]
+
+
+def detector_marker(name: str) -> str:
+    """The marker of a detector in Matplotlib's notation; found as `detector_colour` finds the colour.
+
+    Examples
+    --------
+    >>> detector_marker("movenet-thunder"), detector_marker("combined:movenet-thunder+mediapipe-hands")
+    ('s', '*')
+    """
+    return _style(name)[1]
+
+
+def _style(name: str) -> tuple[str, str]:
+    known = [
+        key for key in DETECTOR_STYLES if name.startswith(key) and name[len(key) : len(key) + 1] in "-:+"
+    ]
+    return DETECTOR_STYLES[max(known, key=len)] if known else (OTHER_COLOUR, _OTHER_MARKER)

@@ -14,6 +14,7 @@ from hicp_lib.evaluation.ap.metric_table import (
     metric_table,
     pairs,
     people_oks,
+    same_people,
 )
 from hicp_lib.formats.annotations import source_images
 from tests.evaluation.made_people import make_annotations, make_detections
@@ -59,6 +60,20 @@ def test_the_loss_is_taken_on_the_people_in_both(study):
     assert row["basic"] == pytest.approx(1.0) and row["headless"] == pytest.approx(0.5, abs=0.06)
     assert row["change"] == pytest.approx(row["headless"] - row["basic"])
     assert row["low"] < row["change"] < row["high"] < 0
+
+
+def test_the_same_people_are_drawn_with_and_without_the_head(study):
+    truth, found = study
+    people, seen = same_people(truth | {"whole images": truth["basic"]}, found)
+    assert {s: len(of.images) for s, of in people.items()} == {
+        "basic": 40,
+        "headless": 40,
+        "whole images": 60,
+    }
+    assert set(seen["basic", "mediapipe"]) == set(range(40))
+    drawn = draw_cases(people, {("basic", "a"): seen["basic", "mediapipe"],
+                                ("headless", "a"): seen["basic", "mediapipe"]}, 20)  # fmt: skip
+    assert drawn["basic", "a", "body"][1].equals(drawn["headless", "a", "body"][1])
 
 
 def test_crops_of_one_image_are_drawn_together(study, monkeypatch):

@@ -1,5 +1,7 @@
 """Figures: what they carry, and that what is drawn is where it belongs."""
 
+from itertools import combinations
+
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
@@ -7,8 +9,10 @@ import pytest
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import INDEX
+from hicp_lib.detectors.registry import DETECTORS, default_detector_names
+from hicp_lib.evaluation.ap.found_and_placed import found_and_placed
 from hicp_lib.study.plots import evaluation, people
-from hicp_lib.study.plots.palette import DETECTOR_COLOURS, detector_colour
+from hicp_lib.study.plots.palette import DETECTOR_STYLES, detector_colour
 from hicp_lib.study.plots.style import Figure, in_words
 
 METRICS = ("AP", "AP50", "AP75", "AR", "AR50", "AR75")
@@ -78,6 +82,33 @@ def test_alt_text_names_the_best_detector(metrics):
     assert "openpose-mobilenet with 0.99 on basic body" in evaluation.precision_recall(metrics, "x").alt
 
 
+def test_the_axes_of_a_group_begin_below_its_lowest_interval(metrics):
+    hands = metrics["group"] == "hand"
+    metrics.loc[hands, ["value", "low", "high"]] = [0.75, 0.65, 0.85]
+    metrics.loc[~hands, ["value", "low", "high"]] = np.nan  # nobody counts
+    axes = evaluation.precision_recall(metrics, "x").figure.axes
+    assert [axis.get_xlim()[0] for axis in axes] == pytest.approx([0, 0, 0.6, 0.6])
+
+
+@pytest.mark.parametrize("oks", [[0.0, 0.05], [0.0, 0.95], [0.5, 0.95]], ids=["nobody", "one", "both"])
+def test_found_and_placed_are_side_by_side_for_who_is_found(oks):
+    parts = [
+        pd.DataFrame(
+            {"subset": subset, "group": "body", "detector": "posenet", "oks": of, "source_image": [1, 2]}
+        )
+        for subset, of in (("basic", [0.9, 0.9]), ("headless", oks))
+    ]
+    table = found_and_placed(pd.concat(parts), 10)
+    figure = evaluation.found_and_placed(table, "made-up people")
+    found, placed = ([line.get_xdata()[0] for line in axis.get_lines() if line.get_marker() == "o"
+                      and len(line.get_xdata()) == 1] for axis in figure.figure.axes)  # fmt: skip
+    of_found = [value for value in oks if value >= 0.1]
+    share = len(of_found) / len(oks)
+    assert found == pytest.approx([1.0, share])
+    assert placed == pytest.approx([0.9, sum(of_found) / len(of_found)] if of_found else [0.9])
+    assert f"posenet {share:.2f} on headless" in figure.alt
+
+
 def test_the_share_of_people_falls_with_oks():
     table = pd.DataFrame(
         {"subset": "basic", "group": "body", "detector": "mediapipe", "oks": [0, 0.5, 0.9, 1.0]}
@@ -109,11 +140,36 @@ def test_drawing_leaves_matplotlib_as_it_was(metrics):
     assert dict(mpl.rcParams) == before
 
 
-def test_colours_are_fixed_and_distinct():
-    assert len(set(DETECTOR_COLOURS.values())) == len(DETECTOR_COLOURS)
-    assert detector_colour("mmpose-imported") == DETECTOR_COLOURS["mmpose"]
-    assert detector_colour("combined:mmpose+b") == DETECTOR_COLOURS["combined"]
-    assert detector_colour("something else") not in DETECTOR_COLOURS.values()
+# Linear RGB as eyes without red or green cones have it (Machado et al. 2009), and without a lack.
+_EYES = {
+    "all cones": np.eye(3),
+    "no red": [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]],
+    "no green": [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]],
+}
+_SHOWN_TOGETHER = (*default_detector_names()[2:], "combined:movenet-thunder+mediapipe-hands")
+
+
+def _as_seen(colour: str, eyes: str) -> np.ndarray:
+    """OKLab, in which equal distances look alike."""
+    linear = np.array([((c + 0.055) / 1.055) ** 2.4 for c in mpl.colors.to_rgb(colour)])
+    to_cones = [[0.4122, 0.5363, 0.0514], [0.2119, 0.6807, 0.1074], [0.0883, 0.2817, 0.63]]
+    to_lab = [[0.2105, 0.7936, -0.0041], [1.978, -2.4286, 0.4506], [0.0259, 0.7828, -0.8087]]
+    return np.array(to_lab) @ np.cbrt(np.array(to_cones) @ np.clip(np.array(_EYES[eyes]) @ linear, 0, 1))
+
+
+def test_every_detector_has_a_colour_and_a_marker_of_its_own():
+    assert DETECTORS.keys() < DETECTOR_STYLES.keys()
+    assert all(
+        len(set(column)) == len(DETECTOR_STYLES) for column in zip(*DETECTOR_STYLES.values(), strict=True)
+    )
+    assert detector_colour("mmpose-imported") == DETECTOR_STYLES["mmpose"][0]
+    assert detector_colour("something else") not in {colour for colour, _ in DETECTOR_STYLES.values()}
+
+
+@pytest.mark.parametrize("eyes", _EYES)
+def test_the_default_detectors_stay_apart_for_the_colour_blind(eyes):
+    seen = [_as_seen(detector_colour(name), eyes) for name in _SHOWN_TOGETHER]
+    assert min(np.linalg.norm(a - b) for a, b in combinations(seen, 2)) > 0.08
 
 
 @pytest.mark.parametrize(("items", "text"), [([], "nothing"), (["a"], "a"), (["a", "b", "c"], "a, b and c")])

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import DETECTOR_COLOURS, OTHER_COLOUR, detector_colour
+from hicp_lib.study.plots.palette import DETECTOR_STYLES, OTHER_COLOUR, detector_colour, detector_marker
 from hicp_lib.study.plots.style import in_words, new_figure, series_text
 
 
@@ -56,7 +56,7 @@ def test_a_legend_has_each_label_once():
 def test_lines_of_a_legend_have_the_detectors_colours_and_no_points():
     _, axis = new_figure()
     mediapipe, other = marks.detector_lines(axis, ["mediapipe", "unheard of"])
-    assert (mediapipe.get_color(), other.get_color()) == (DETECTOR_COLOURS["mediapipe"], OTHER_COLOUR)
+    assert (mediapipe.get_color(), other.get_color()) == (DETECTOR_STYLES["mediapipe"][0], OTHER_COLOUR)
     (square,) = marks.legend_lines(axis, ["OKS .5"], [{"marker": "s", "ls": ""}])
     assert (square.get_label(), square.get_marker(), len(square.get_xdata())) == ("OKS .5", "s", 0)
 
@@ -76,11 +76,12 @@ def test_a_box_is_of_quartiles_and_its_whiskers_of_the_5th_and_95th_percentile()
         ("mmpose-imported", "mmpose"),
         ("mediapipe-pose-imported", "mediapipe-pose"),
         ("combined:openpose+mediapipe", "combined"),
+        ("combined:movenet-thunder+mediapipe-hands", "combined:movenet-thunder"),
         ("openpose-mobilenet", "openpose-mobilenet"),
     ],
 )
 def test_variants_have_their_detectors_colour(name, like):
-    assert detector_colour(name) == DETECTOR_COLOURS[like]
+    assert (detector_colour(name), detector_marker(name)) == DETECTOR_STYLES[like]
 
 
 def test_a_name_that_begins_alike_is_another_detector():

@@ -7,7 +7,7 @@ import pytest
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.study.plots import relative3d, within_distance
-from hicp_lib.study.plots.palette import DETECTOR_COLOURS
+from hicp_lib.study.plots.palette import DETECTOR_STYLES
 
 VIEWS, DETECTORS = ("upper", "lower"), ("mediapipe", "openpose-mobilenet")
 PARTS = ("left wrist", "right wrist", "left hand", "right hand")
@@ -106,7 +106,7 @@ def test_spread_and_bias_are_in_centimetres_and_rare_parts_left_out():
     assert figure.table["part"].tolist() == ["left wrist"]
     marker = figure.figure.axes[0].get_lines()[0]
     assert marker.get_xydata()[0].tolist() == pytest.approx([1, 3])
-    assert marker.get_color() == DETECTOR_COLOURS["mediapipe"]
+    assert marker.get_color() == DETECTOR_STYLES["mediapipe"][0]
     assert "mediapipe 1 with more bias" in figure.alt
 
 

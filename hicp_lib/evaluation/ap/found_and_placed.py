@@ -1,0 +1,44 @@
+"""Found at all, apart from placed well: average precision mixes the two."""
+
+import pandas as pd
+
+from hicp_lib.evaluation.matching import MATCH_OKS
+from hicp_lib.evaluation.statistics.proportions import proportions
+
+FOUND, OKS_OF_FOUND, WELL_PLACED = "found", "mean OKS of those found", "OKS of .5 or more, of those found"
+_WELL_PLACED_OKS = 0.5
+
+
+def found_and_placed(people: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+    """Who is found at all, and how well those who are found are placed.
+
+    A person is found if the detection that fits best has an OKS of at least `matching.MATCH_OKS` (.1): of a
+    lesser one, Ronchi and Perona (2017) do not say whose it is.
+
+    Parameters
+    ----------
+    people : DataFrame
+        As from `metric_table.people_oks`.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
+
+    Returns
+    -------
+    DataFrame
+        Columns `subset, group, detector, what` (`FOUND`, `OKS_OF_FOUND`, `WELL_PLACED`), `value` (NaN where
+        nobody is found), `low, high` (95 %, over source images), `n` (people), `n_images`.
+    """
+    by = ["subset", "group", "detector"]
+    is_found = people["oks"] >= MATCH_OKS
+    measures = {
+        FOUND: is_found.astype(float),
+        OKS_OF_FOUND: people["oks"].where(is_found),
+        WELL_PLACED: (people["oks"] >= _WELL_PLACED_OKS).astype(float).where(is_found),
+    }
+    tables = [
+        proportions(people.assign(value=values), by, "value", n_resamples, seed).assign(what=what)
+        for what, values in measures.items()
+    ]
+    everyone = tables[0][by].merge(pd.DataFrame({"what": list(measures)}), how="cross")
+    table = everyone.merge(pd.concat(tables), how="left", on=[*by, "what"])
+    return table.fillna({"n": 0, "n_images": 0}).astype({"n": int, "n_images": int})

@@ -1,0 +1,58 @@
+"""Figures of where the box of a top-down detector comes from, and of whose fault a lost person is."""
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from hicp_lib.evaluation.ap.loss_shares import SHARES
+from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.evaluation import WIDTH_IN
+from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.style import Figure, in_style, new_figure, series_text
+
+
+@in_style
+def box_sources(table: pd.DataFrame, data_note: str) -> Figure:
+    """Average precision by where the box comes from; `table` as from `metric_table`, of `box_variants`."""
+    rows = table[table["metric"] == "AP"]
+    figure = _bars_by_case(rows, "subset", rows["subset"].unique(), "detector", "AP")
+    said = series_text(rows.set_index(["detector", "subset"])["value"], "{0} {2:.2f} on {1}")
+    caption = (
+        "A top-down detector on boxes of three sources, and a bottom-up one that needs none: average "
+        "precision of bodies on the whole images, and on the same people's crops with and without the head, "
+        f"with 95 % bootstrap intervals, on {data_note}."
+    )
+    return Figure(figure, caption, f"Bars of average precision: {said}.", rows)
+
+
+@in_style
+def loss_shares(table: pd.DataFrame, data_note: str) -> Figure:
+    """What keeps average precision from 1; `table` as from `hicp_lib.evaluation.ap.loss_shares`."""
+    table = table[~table["detector"].str.contains(" less ")]
+    cases = table["subset"].str.capitalize() + ": " + table["detector"]
+    figure = _bars_by_case(table.assign(case=cases), "share", SHARES, "case", "loss of AP")
+    last = table[table["subset"] == table["subset"].iloc[-1]]
+    said = series_text(last.set_index(["share", "detector", "subset"])["value"], "{0} of {1} {3:.2f} on {2}")
+    caption = (
+        "What keeps average precision of bodies from 1, share by share: the network's own (true boxes, and "
+        "the head in the picture), what the missing head adds, what boxes of a person finder add. With 95 % "
+        f"bootstrap intervals of these differences, on {data_note}."
+    )
+    return Figure(figure, caption, f"Bars of lost average precision: {said}.", table)
+
+
+def _bars_by_case(rows: pd.DataFrame, across: str, panels: Sequence[str], down: str, x_label: str):
+    """Lying bars with whiskers: panels by values of the column `across`, a bar per value of `down`."""
+    cases = list(rows[down].unique())
+    size = WIDTH_IN, 0.8 + 0.45 * len(cases)
+    figure, axes = new_figure(1, len(panels), *size, sharex=True, sharey=True, squeeze=False)
+    for axis, panel in zip(axes[0], panels, strict=True):
+        part = rows[rows[across] == panel]
+        colours = [detector_colour(name.partition(",")[0]) for name in part["detector"]]
+        y = part[down].map(cases.index)
+        axis.barh(y, part["value"], 0.6, color=colours, xerr=marks.whiskers(part), ecolor="#222222")
+        axis.set_title(panel.capitalize(), fontsize=9)
+        axis.set(xlabel=x_label)
+        axis.grid(axis="y", visible=False)
+    marks.name_rows(axes[0, 0], [case.replace(", ", ",\n").replace(": ", ":\n") for case in cases])
+    return figure

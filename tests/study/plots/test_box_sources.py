@@ -1,0 +1,47 @@
+"""Figures of boxes and shares: every case has its bar, with few people and none, too."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hicp_lib.evaluation.ap.loss_shares import SHARES, box_variants, loss_shares
+from hicp_lib.evaluation.ap.metric_table import draw_cases, metric_table
+from hicp_lib.study.plots import box_sources
+from tests.evaluation.made_people import make_annotations, make_detections
+
+PAIR = ("movenet-lightning", "movenet-multipose")
+PLACES = ("whole images", "basic", "headless")
+
+
+@pytest.fixture(params=[(0, 4), (2, 4), (9, 12)], ids=lambda request: f"{request[0]} of {request[1]} found")
+def drawn(request):
+    n_found, n_people = request.param
+    points = np.random.default_rng(3).uniform(50, 400, (n_people, 136, 2))
+    people = make_annotations(points, range(n_people))
+    run = {i: make_detections(points[i]) for i in range(n_found)}
+    found = {(place, label): run for place in PLACES for label in box_variants(*PAIR)}
+    return draw_cases(dict.fromkeys(PLACES, people), found, 20, groups=["body"])
+
+
+def lengths(axis) -> list[float]:
+    return [bar.get_width() for bar in axis.patches]
+
+
+def test_a_bar_for_each_source_of_the_box(drawn):
+    table = metric_table(drawn)
+    figure = box_sources.box_sources(table, "made-up people")
+    assert len(figure.figure.axes) == len(PLACES) and "made-up people" in figure.caption
+    for axis, place in zip(figure.figure.axes, PLACES, strict=True):
+        rows = table[(table["subset"] == place) & (table["metric"] == "AP")]
+        assert lengths(axis) == pytest.approx(rows["value"].tolist())
+    assert "movenet-lightning, true boxes" in figure.alt and len(figure.alt) < 800
+
+
+def test_a_panel_for_each_share_and_none_for_the_difference_of_two_detectors(drawn):
+    table = loss_shares(drawn, *PAIR)
+    figure = box_sources.loss_shares(table, "made-up people")
+    assert [axis.get_title(loc="left") for axis in figure.figure.axes] == [s.capitalize() for s in SHARES]
+    shown = table[~table["detector"].str.contains(" less ")]
+    for axis, share in zip(figure.figure.axes, SHARES, strict=True):
+        assert lengths(axis) == pytest.approx(shown.loc[shown["share"] == share, "value"].tolist())
+    assert isinstance(figure.table, pd.DataFrame) and " less " not in figure.alt

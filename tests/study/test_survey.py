@@ -1,0 +1,32 @@
+"""The paper's Tables I and II: who is in them, and what is said of them."""
+
+import math
+
+from hicp_lib.detectors.registry import DETECTORS
+from hicp_lib.study.survey import PAPER_SYSTEMS, surveyed_data_sets, surveyed_detectors
+
+
+def test_every_detector_is_told_and_the_papers_come_first():
+    table = surveyed_detectors([])
+    assert table["detector"].tolist()[: len(PAPER_SYSTEMS)] == list(PAPER_SYSTEMS)
+    assert sorted(table["detector"]) == sorted(DETECTORS)
+    for row in table.to_dict("records"):
+        facts = DETECTORS[row["detector"]].facts
+        assert (row["paradigm"], row["keypoints"]) == (facts.paradigm, facts.keypoints)
+        if facts.n_parameters is None:
+            assert math.isnan(row["parameters [M]"]) and math.isnan(row["operations [G]"])
+        else:
+            assert row["parameters [M]"] == facts.n_parameters / 1e6
+            assert row["operations [G]"] == facts.n_operations / 1e9
+
+
+def test_what_was_not_run_says_what_would_run_it():
+    here = surveyed_detectors(["mediapipe", "alphapose-imported"]).set_index("detector")["here"]
+    assert here[["mediapipe", "alphapose"]].tolist() == ["run", "run"]
+    assert here["mediapipe-hands"] == "run, within mediapipe"
+    assert here["mmpose"].startswith("not run; hicp models use --detector mmpose")
+    assert here["posenet"].startswith("not run; hicp detect --detector posenet")
+
+
+def test_our_own_data_sets_stand_beside_the_others():
+    assert surveyed_data_sets()["data set"].tolist()[-2:] == ["HiCP (paper)", "HiCP rendered (this study)"]
