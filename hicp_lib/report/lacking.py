@@ -36,7 +36,7 @@ def without_absent(
     Parameters
     ----------
     parameters : dict of str to object
-    asked_for : collection of str
+    asked_for : list of str
         Names of parameters that a user set, which stay as they are.
 
     Returns
