@@ -15,8 +15,8 @@ DETECTOR_STYLES: dict[str, tuple[str, str]] = {
     "mmpose": ("#009E73", "<"),
     "alphapose": ("#7F5FA8", ">"),
     "detectron2": ("#8C6D31", "d"),
-    "combined": ("#B0125F", "H"),
-    "combined:movenet-thunder": ("#4B0055", "*"),
+    "combined": ("#4B0055", "H"),
+    "combined:movenet-thunder": ("#A0105A", "*"),
 }
 OTHER_COLOUR, _OTHER_MARKER = "#595959", "8"
 TRUTH_COLOUR = "#111111"
