@@ -47,13 +47,13 @@ def class_examples(
         pictures.append(draw_truth(people, images_dir, image_id, people.ids == annotation_id, _TRUTH_COLOUR))
     columns = -(-len(names) // 2)
     rows = [pictures[start : start + columns] for start in range(0, len(pictures), columns)]
-    figure = picture_grid(
-        rows, caption=f"An example of each class, with its labelled keypoints: the first crop of it. {note}.",
-        alt=f"One picture for each class: {in_words(names)}.", cell_in=2.1,
-    )  # fmt: skip
-    for axis, name in zip(figure.figure.axes, names, strict=False):
-        axis.set_title(name, loc="center", fontsize=8)
-    return figure
+    return picture_grid(
+        rows,
+        titles=names,
+        caption=f"An example of each class, with its labelled keypoints: the first crop of it. {note}.",
+        alt=f"One picture for each class: {in_words(names)}.",
+        cell_in=2.1,
+    )
 
 
 @in_style

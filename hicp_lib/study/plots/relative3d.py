@@ -62,7 +62,7 @@ def camera_views(
     return picture_grid(
         rows,
         row_titles=[f"image {frame}" for frame in frames],
-        column_titles=[f"{view}\n{detector}" for view, detector in found],
+        titles=[f"{view}\n{detector}" for view, detector in found],
         caption=f"Some images of every view, with keypoints of a score of at least {min_score}: {note}.",
         alt=f"{len(frames)} images per view and detector; with somebody found: {in_words(seen)}.",
         cell_in=min(3.2, 11 / len(found)),
