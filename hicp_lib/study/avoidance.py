@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.keypoints import HEAD, mirror
-from hicp_lib.experiments.avoidance.reaching import LEAVES_S, PHASES_S
+from hicp_lib.experiments.avoidance.reaching import LEAVES_S, PHASES_S, SCRIPTS
 from hicp_lib.experiments.avoidance.runs import IDEAL, NO_AVOIDANCE, Run, keypoints_m
 from hicp_lib.robot.home import HOME_M
 from hicp_lib.robot.loop import AVOIDING
@@ -20,6 +20,7 @@ CROSSED_M = 0.2  # reactions count from here
 MOVED_M = 0.005  # the hand has begun to give way
 LOST_S = 0.5  # without a sighting for longer, the robot has forgotten
 AT_HEAD_M = 0.15  # a keypoint of the head this near a true one is on the head
+ENOUGH_SHARE = 0.5  # of the images; a head that is found in fewer is the reason
 BACK_M = 0.02  # the hand is back at its post
 SURE = 0.3  # the paper's threshold for scores
 
@@ -213,6 +214,8 @@ def _why(row) -> str:
         return "the controller is too slow"
     if row.seen_share == 0:
         return "the detector never finds the person while they are near"
+    if SCRIPTS[row.script].by_head and row.head_share < ENOUGH_SHARE:
+        return f"it is the head that comes, and that is found in {row.head_share:.0%} of the images"
     if row.blind_s > LOST_S:
         return f"the person is lost in {1 - row.seen_share:.0%} of the images, for up to {row.blind_s:.1f} s"
     return f"found in {row.seen_share:.0%} of the images, but the hand moves {row.reaction_s:.1f} s late"

@@ -123,6 +123,14 @@ def test_the_verdict_names_the_failure(runs):
     assert "too slow" in verdicts.loc["ground truth, published gains", "why"]
 
 
+def test_a_head_that_is_not_found_is_the_reason(runs):
+    table = metrics([runs[0], runs[1], runs[3]]).assign(script="sitting, head", min_distance_m=0.01)
+    of_heads = {share: table.assign(head_share=share, reaction_s=0.7) for share in (0.49, 0.5)}
+    why = {share: against_no_avoidance(rows)["why"].iloc[-1] for share, rows in of_heads.items()}
+    assert "the head that comes, and that is found in 49%" in why[0.49]
+    assert why[0.5] == "found in 100% of the images, but the hand moves 0.7 s late"
+
+
 def test_errors_do_not_mind_the_side_and_feed_the_separation(runs):
     errors = keypoint_errors(runs)
     np.testing.assert_allclose(errors["error_m"], 0.03, atol=1e-6)
