@@ -12,7 +12,7 @@ from hicp_lib.core.images import read_image
 from hicp_lib.core.keypoints import FACE, HANDS, LIMBS, N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
+from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure
 
 _SHIFT = 4  # fractional bits of OpenCV's drawing coordinates
 _MAX_PX = 1e5  # points farther off would overflow them
@@ -179,7 +179,7 @@ def picture_grid(
         if j < len(rows[i]) and rows[i][j] is not None:
             axis.imshow(rows[i][j], interpolation="lanczos")
     for axis, title in zip(axes.flat, titles, strict=False):
-        axis.set_title(title.replace("+", "\n+"), loc="center", fontsize=min(9, 4 * cell_in))
+        axis.set_title(in_lines(title), loc="center", fontsize=min(9, 4 * cell_in))
     for axis, title in zip(axes[:, 0], row_titles, strict=False):
         axis.set_ylabel(title, fontsize=9)
     return Figure(figure, caption, alt)

@@ -12,7 +12,7 @@ from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
 from hicp_lib.study.plots.people import draw_detections, picture_grid
 from hicp_lib.study.plots.skeleton import BODY_LIMBS, HAND_LIMBS, limb_lines
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
 
 _AXES = ("x_m", "y_m", "z_m")
 # Seen by the robot, which looks along -x; the axis that is not drawn is the one looked along.
@@ -194,7 +194,7 @@ def spread_causes(table: pd.DataFrame, note: str) -> Figure:
     for (case, rows), (upper, lower) in zip(cases, axes.T, strict=True):
         _draw_causes(upper, rows, parts, "spread_m")
         _draw_causes(lower, rows, parts, "bias_m")
-        upper.set(title="\n".join(case), xlabel=_SPREAD)
+        upper.set(title=in_lines("\n".join(case)), xlabel=_SPREAD)
         lower.set(xlabel=_BIAS)
     marks.name_rows(axes[0, 0], parts)
     marks.legend_below(figure, axes, ncols=3)
