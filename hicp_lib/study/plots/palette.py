@@ -15,10 +15,11 @@ DETECTOR_STYLES: dict[str, tuple[str, str]] = {
     "mmpose": ("#009E73", "<"),
     "alphapose": ("#7F5FA8", ">"),
     "detectron2": ("#8C6D31", "d"),
+    "one-stage": ("#B59B00", "8"),
     "combined": ("#4B0055", "H"),
     "combined:movenet-thunder": ("#A0105A", "P"),
 }
-OTHER_COLOUR, _OTHER_MARKER = "#595959", "8"
+OTHER_COLOUR, _OTHER_MARKER = "#595959", "."
 TRUTH_COLOUR = "#111111"
 
 # The two subsets of HiCP, and the two boxes of the paper's figure of how they are made.
