@@ -5,8 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.keypoints import mirror
-from hicp_lib.experiments.avoidance.reaching import LEAVES_S, PHASES_S
+from hicp_lib.core.keypoints import HEAD, mirror
+from hicp_lib.experiments.avoidance.reaching import LEAVES_S, PHASES_S, SCRIPTS
 from hicp_lib.experiments.avoidance.runs import IDEAL, NO_AVOIDANCE, Run, keypoints_m
 from hicp_lib.robot.home import HOME_M
 from hicp_lib.robot.loop import AVOIDING
@@ -19,6 +19,8 @@ REACH_M = 0.4  # keypoints this near the post can threaten the hand
 CROSSED_M = 0.2  # reactions count from here
 MOVED_M = 0.005  # the hand has begun to give way
 LOST_S = 0.5  # without a sighting for longer, the robot has forgotten
+AT_HEAD_M = 0.15  # a keypoint of the head this near a true one is on the head
+ENOUGH_SHARE = 0.5  # of the images; a head that is found in fewer is the reason
 BACK_M = 0.02  # the hand is back at its post
 SURE = 0.3  # the paper's threshold for scores
 
@@ -31,8 +33,8 @@ def metrics(runs: Iterable[Run]) -> pd.DataFrame:
     `retreat_m` (the hand's largest distance from its post), `false_retreats` (begun while the person was
     farther than `FIELD_M`), `idle_error_m` (the hand's mean error before the person moves), `back_s` (from
     the person's having left to the hand's being back), `seen_share` (of the images taken while the person
-    is near, those with any sure keypoint in space), `blind_s` (longest time the person was near with
-    nothing new seen of them).
+    is near, those with any sure keypoint in space), `head_share` (those with one of the head that is on the
+    head), `blind_s` (longest time the person was near with nothing new seen of them).
     """
     return pd.DataFrame([_metrics(run) for run in runs])
 
@@ -182,11 +184,18 @@ def _metrics(run: Run) -> dict:
 def _sightings(run: Run, near_s: np.ndarray) -> dict:
     """How well the person was seen while near, from the images of a run."""
     if not len(run.frames) or not len(near_s):
-        return {"seen_share": np.nan, "blind_s": np.nan}
+        return {"seen_share": np.nan, "head_share": np.nan, "blind_s": np.nan}
     frames = run.frames[run.frames["t_s"].between(near_s[0], near_s[-1])]
-    seen = np.array([sure_keypoints(frame)[1].any() for _, frame in frames.iterrows()], bool)
+    sights = [sure_keypoints(frame) for _, frame in frames.iterrows()]
+    seen = np.array([is_sure.any() for _, is_sure, _ in sights], bool)
     times = np.concatenate([[near_s[0]], frames["t_s"].to_numpy()[seen], [near_s[-1]]])
-    return {"seen_share": float(seen.mean()), "blind_s": float(np.diff(times).max())}
+    shares = {"seen_share": seen.mean(), "head_share": np.mean([_shows_head(*sight) for sight in sights])}
+    return {name: float(share) for name, share in shares.items()} | {"blind_s": float(np.diff(times).max())}
+
+
+def _shows_head(points_m: np.ndarray, is_sure: np.ndarray, truth_m: np.ndarray) -> bool:
+    off_m = np.linalg.norm(points_m[:, HEAD, None] - truth_m[HEAD], axis=-1).min(axis=-1)
+    return bool((is_sure[:, HEAD] & (off_m < AT_HEAD_M)).any())
 
 
 def _crossing_s(t: np.ndarray, distance_m: np.ndarray) -> float:
@@ -205,6 +214,8 @@ def _why(row) -> str:
         return "the controller is too slow"
     if row.seen_share == 0:
         return "the detector never finds the person while they are near"
+    if SCRIPTS[row.script].by_head and row.head_share < ENOUGH_SHARE:
+        return f"it is the head that comes, and that is found in {row.head_share:.0%} of the images"
     if row.blind_s > LOST_S:
         return f"the person is lost in {1 - row.seen_share:.0%} of the images, for up to {row.blind_s:.1f} s"
     return f"found in {row.seen_share:.0%} of the images, but the hand moves {row.reaction_s:.1f} s late"

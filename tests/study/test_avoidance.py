@@ -85,6 +85,26 @@ def test_metrics_of_runs_with_known_answers(runs):
     assert loses["blind_s"] == pytest.approx(near_until_s - 2.1, abs=0.05)
 
 
+@pytest.mark.parametrize(
+    ("keypoint", "off_m", "score", "share"),
+    [
+        ("nose", 0.14, 0.9, 1.0),
+        ("nose", 0.16, 0.9, 0.0),
+        ("nose", 0.14, 0.2, 0.0),
+        ("left_wrist", 0.0, 0.9, 0.0),
+    ],
+)
+def test_a_head_is_found_by_a_sure_keypoint_of_the_head_on_the_head(runs, keypoint, off_m, score, share):
+    points, scores, truth = np.full((1, 136, 3), np.nan), np.zeros((1, 136)), np.full((136, 3), 5.0)
+    truth[INDEX["left_ear"]] = 1.0  # on the head, if not the keypoint's own place
+    points[0, INDEX[keypoint]] = truth[INDEX["left_ear"]] + [off_m, 0, 0]
+    scores[0, INDEX[keypoint]] = score
+    seen = runs[3]
+    arrays = {"keypoints_m": points, "scores": scores, "truth_m": truth}
+    flat = {name: [array.ravel().tolist()] * len(seen.frames) for name, array in arrays.items()}
+    assert metrics([Run(seen.job, seen.cycles, seen.frames.assign(**flat))])["head_share"].item() == share
+
+
 def test_a_retreat_from_nobody_is_false():
     run = made_up(IDEAL[1], 0.06, True)
     cycles = run.cycles.assign(status=np.where((T > 0.2) & (T < 0.4), AVOIDING, run.cycles["status"]))
@@ -101,6 +121,14 @@ def test_the_verdict_names_the_failure(runs):
     }  # fmt: skip
     assert "never finds" in verdicts.loc["blind", "why"] and "lost in" in verdicts.loc["loses", "why"]
     assert "too slow" in verdicts.loc["ground truth, published gains", "why"]
+
+
+def test_a_head_that_is_not_found_is_the_reason(runs):
+    table = metrics([runs[0], runs[1], runs[3]]).assign(script="sitting, head", min_distance_m=0.01)
+    of_heads = {share: table.assign(head_share=share, reaction_s=0.7) for share in (0.49, 0.5)}
+    why = {share: against_no_avoidance(rows)["why"].iloc[-1] for share, rows in of_heads.items()}
+    assert "the head that comes, and that is found in 49%" in why[0.49]
+    assert why[0.5] == "found in 100% of the images, but the hand moves 0.7 s late"
 
 
 def test_errors_do_not_mind_the_side_and_feed_the_separation(runs):

@@ -13,7 +13,7 @@ from hicp_lib.robot.separation import Separation, separation_table
 from hicp_lib.study.avoidance import FIELD_M, WITHIN_M
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
+from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure
 
 _STYLES = {NO_AVOIDANCE: ":", PUBLISHED_GAINS: "--"}
 _ROWS = {"distance_m": "distance (cm)", "activation": "activation", "hand_error_m": "hand from post (cm)"}
@@ -108,7 +108,7 @@ def separation_terms(separations: Mapping[str, Separation], note: str) -> Figure
             axis.barh(place, 100 * value, left=100 * start, color=colour, label=term if place == 0 else None)
             start += value
         axis.text(100 * start + 1, place, f"{100 * start:.0f} cm", va="center")
-    axis.set_yticks(range(len(separations)), list(separations))
+    axis.set_yticks(range(len(separations)), list(map(in_lines, separations)))
     axis.set_xlabel("protective separation distance (cm)")
     axis.margins(x=0.12)
     if separations:

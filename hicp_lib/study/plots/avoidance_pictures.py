@@ -15,7 +15,7 @@ from PIL import Image
 
 from hicp_lib.core.keypoints import LIMBS
 from hicp_lib.experiments.avoidance.closed_loop import start_posture
-from hicp_lib.experiments.avoidance.reaching import script
+from hicp_lib.experiments.avoidance.reaching import LEAVES_S, NEAR_S, script
 from hicp_lib.experiments.avoidance.runs import Run, image
 from hicp_lib.experiments.laboratory import in_root
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
@@ -24,8 +24,8 @@ from hicp_lib.robot.segments import body_segments
 from hicp_lib.robot.skin import read_skin
 from hicp_lib.study.avoidance import SURE, sure_keypoints
 from hicp_lib.study.plots.avoidance import condition_colour
-from hicp_lib.study.plots.people import draw_people
-from hicp_lib.study.plots.style import Figure, in_style, new_figure
+from hicp_lib.study.plots.people import draw_people, picture_grid
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 
 _TURN_RAD, _TILT_RAD = np.radians(35.0), np.radians(18.0)  # of the view: to the side, from above
 _LIMITS_M = ((-1.2, 0.3), (-0.48, 0.7))
@@ -56,6 +56,33 @@ def filmstrip(run: Run, times_s: Sequence[float], note: str) -> Figure:
         f"it, and robot and person in space, threatened taxels red. Data: {note}.",
         f"{len(times_s)} moments: the person comes near and the robot's arm gives way; never nearer than "
         f"{nearest:.1f} cm.",
+    )
+
+
+def nearest_views(runs: Sequence[Run], note: str) -> Figure:
+    """The image each detector last took half-way through the time the person is near: a row per script.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Those without images are left out.
+    note : str
+        What the data are, for the caption.
+    """
+    shown: dict[str, dict[str, np.ndarray]] = {}
+    for run in runs:
+        past = run.frames[run.frames["t_s"] <= (NEAR_S + LEAVES_S[0]) / 2] if len(run.frames) else run.frames
+        if len(past):
+            shown.setdefault(run.job.trial.script, {})[run.job.condition] = _drawn(run, past.iloc[-1])
+    detectors = list(dict.fromkeys(name for pictures in shown.values() for name in pictures))
+    return picture_grid(
+        [[pictures.get(name) for name in detectors] for pictures in shown.values()],
+        row_titles=list(shown),
+        titles=detectors,
+        caption="Through the robot's eyes when the person is near: the last image each detector had taken by "
+        f"then, with keypoints of a score of at least {SURE}. Data: {note}.",
+        alt=f"Pictures from above of {in_words(shown)}, with what {in_words(detectors)} found.",
+        cell_in=min(3.2, 11 / max(len(detectors), 1)),
     )
 
 
@@ -107,9 +134,12 @@ def _draw_image(axis, run: Run, frame: pd.Series | None, time_s: float) -> None:
     axis.axis("off")
     axis.set_title(f"{time_s:.1f} s")
     if frame is not None:
-        rgb, found = image(frame)
-        colour = condition_colour(run.job.condition)
-        axis.imshow(draw_people(rgb, found.keypoints_px, found.scores, colour, SURE, 2.0))
+        axis.imshow(_drawn(run, frame))
+
+
+def _drawn(run: Run, frame: pd.Series) -> np.ndarray:
+    rgb, found = image(frame)
+    return draw_people(rgb, found.keypoints_px, found.scores, condition_colour(run.job.condition), SURE, 2.0)
 
 
 def _draw_space(axis, run: Run, cycle: pd.Series, frame: pd.Series | None) -> None:

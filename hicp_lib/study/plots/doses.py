@@ -8,9 +8,9 @@ import pandas as pd
 from hicp_lib.core.images import read_image
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.palette import detector_colour, detector_marker
 from hicp_lib.study.plots.people import picture_grid
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
 
 _LABELS = {
     "distance": "distance [m]",
@@ -116,7 +116,7 @@ def _dose_panels(table: pd.DataFrame, by: str, styles: dict, labels: dict, ylabe
         for (detector, value), part in lines:
             part, colour = part.sort_values("level"), detector_colour(detector)
             pen = {"color": colour, "ls": styles[value], "label": f"{detector}{labels[value]}"}
-            axis.plot(part["level"], part["value"], marker="o", ms=3.5, **pen)
+            axis.plot(part["level"], part["value"], marker=detector_marker(detector), ms=4, **pen)
             axis.fill_between(part["level"], part["low"], part["high"], color=colour, alpha=0.13, lw=0)
         axis.set(xlabel=_LABELS.get(dose, dose), ylim=(-0.02, 1.02))
     for axis in axes.flat[len(doses) :]:
@@ -138,10 +138,16 @@ def flicker_rates(table: pd.DataFrame, note: str) -> Figure:
             for y, detector in enumerate(detectors):
                 case, colour = cases[tracks, measure].loc[[detector]], detector_colour(detector)
                 fill = colour if tracks == "as detected" else "white"
-                pen = {"xerr": marks.whiskers(case), "fmt": "o", "color": colour, "mfc": fill, "capsize": 2}
+                pen = {
+                    "xerr": marks.whiskers(case),
+                    "fmt": detector_marker(detector),
+                    "color": colour,
+                    "mfc": fill,
+                    "capsize": 2,
+                }
                 axis.errorbar(case["value"], y + marks.offset(k, 2, 0.26), **pen)
         axis.set(xlabel=measure, xlim=(0, None), ylim=(-0.5, len(detectors) - 0.5))
-    axes[0].set(yticks=range(len(detectors)), yticklabels=detectors)
+    axes[0].set(yticks=range(len(detectors)), yticklabels=list(map(in_lines, detectors)))
     lag_ms = 1000 * cases["filtered", "latency [s]"]["value"]
     caption = (
         "Keypoints that come and go between consecutive frames, and how far they jump, as detected "

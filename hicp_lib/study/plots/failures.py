@@ -12,9 +12,9 @@ from hicp_lib.evaluation.failures.placed_keypoints import STATES
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.evaluation import GROUP_TITLES
-from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.palette import detector_colour, detector_marker
 from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
 
 _TRUTH_COLOUR = "#39D353"
 _ONE_CROP = ["subset", "image_id", "annotation_id"]
@@ -47,13 +47,13 @@ def class_examples(
         pictures.append(draw_truth(people, images_dir, image_id, people.ids == annotation_id, _TRUTH_COLOUR))
     columns = -(-len(names) // 2)
     rows = [pictures[start : start + columns] for start in range(0, len(pictures), columns)]
-    figure = picture_grid(
-        rows, caption=f"An example of each class, with its labelled keypoints: the first crop of it. {note}.",
-        alt=f"One picture for each class: {in_words(names)}.", cell_in=2.1,
-    )  # fmt: skip
-    for axis, name in zip(figure.figure.axes, names, strict=False):
-        axis.set_title(name, loc="center", fontsize=8)
-    return figure
+    return picture_grid(
+        rows,
+        titles=names,
+        caption=f"An example of each class, with its labelled keypoints: the first crop of it. {note}.",
+        alt=f"One picture for each class: {in_words(names)}.",
+        cell_in=2.1,
+    )
 
 
 @in_style
@@ -62,12 +62,15 @@ def class_precision(table: pd.DataFrame, note: str) -> Figure:
     rows = table[table["metric"].isin(["AP", "AR"])]
     groups, detectors = (list(rows[name].unique()) for name in ("group", "detector"))
     names = [name for name in CLASSES if name in set(rows["class"])]
-    size = 4.8 * len(groups) + 1, 1.3 + 0.42 * len(names)
+    size = 4.8 * len(groups) + 1, 1.3 + (0.1 + 0.16 * len(detectors)) * len(names)
+    step = 0.8 / len(detectors)
     figure, axes = new_figure(1, len(groups), *size, sharey=True, squeeze=False)
     for axis, group in zip(axes[0], groups, strict=True):
         of_group = rows[rows["group"] == group]
         for (detector, metric), part in of_group.groupby(["detector", "metric"], sort=False):
-            below = marks.offset(detectors.index(detector), len(detectors), 0.24) + 0.09 * (metric == "AR")
+            below = marks.offset(detectors.index(detector), len(detectors), step) + 0.4 * step * (
+                metric == "AR"
+            )
             y = part["class"].map(names.index) + below
             _dots(axis, part, y, detector, filled=metric == "AP", label=f"{detector}, {metric}")
         _say_too_few(axis, names, set(of_group.loc[of_group["value"].isna(), "class"]))
@@ -98,7 +101,7 @@ def _dots(axis, rows: pd.DataFrame, y, detector: str, filled: bool = True, label
     colour = detector_colour(detector)
     pen = {"color": colour, "mfc": colour if filled else "white", "label": label or detector}
     value = rows["value"].astype(float)
-    axis.errorbar(value, y, xerr=marks.whiskers(rows), fmt="o", capsize=2, ms=5, **pen)
+    axis.errorbar(value, y, xerr=marks.whiskers(rows), fmt=detector_marker(detector), capsize=2, ms=5, **pen)
 
 
 def _detector_panels(table: pd.DataFrame, width_in: float, height_in: float, **shared):
@@ -107,7 +110,7 @@ def _detector_panels(table: pd.DataFrame, width_in: float, height_in: float, **s
     size = width_in * len(by_detector) + 0.8, height_in
     figure, axes = new_figure(1, len(by_detector), *size, sharey=True, squeeze=False, **shared)
     for axis, detector in zip(axes[0], by_detector, strict=True):
-        axis.set_title(detector)
+        axis.set_title(in_lines(detector))
     return figure, axes[0], [(axis, *case) for axis, case in zip(axes[0], by_detector.items(), strict=True)]
 
 
@@ -146,14 +149,15 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
 def head_change(table: pd.DataFrame, note: str) -> Figure:
     """Change of the hit rate of each keypoint when the head is cut off; from `change_per_keypoint`."""
     names, detectors = (list(table[name].unique()) for name in ("keypoint", "detector"))
-    figure, axis = new_figure(1, 1, 7.5, 1.2 + 0.3 * len(names))
+    step = 0.8 / len(detectors)
+    figure, axis = new_figure(1, 1, 7.5, 1.2 + (0.1 + 0.1 * len(detectors)) * len(names))
     for k, detector in enumerate(detectors):
         part = table[table["detector"] == detector].rename(columns={"change": "value"})
-        _dots(axis, part, part["keypoint"].map(names.index) + marks.offset(k, len(detectors), 0.24), detector)
+        _dots(axis, part, part["keypoint"].map(names.index) + marks.offset(k, len(detectors), step), detector)
     axis.axvline(0, color="#444444", lw=1)
     marks.name_rows(axis, [name.replace("_", " ") for name in names])
     axis.set(xlabel="change of the share of keypoints hit, without the head")
-    marks.legend_below(figure, axis)
+    marks.legend_below(figure, axis, ncols=2)
     said = series_text(table.groupby("detector", sort=False)["change"].mean(), "{} {:+.2f}")
     caption = (
         "Without the head: change of the share of keypoints hit, on the same keypoints of the same people, "
@@ -170,7 +174,7 @@ def hallucinated_heads(table: pd.DataFrame, note: str) -> Figure:
         dots = axis.scatter(rows["along"], rows["below"], c=rows["score"], s=14, vmin=0, vmax=1, alpha=0.8)
         axis.plot([0, 1, 1, 0, 0], [0, 0, 1, 1, 0], color="#444444", lw=1)
         axis.plot([0, 1], [0, 0], color="#D5272D", lw=2.5, label="where the head was cut off")
-        axis.set(xlim=(-0.3, 1.3), ylim=(1.05, -0.6), title=f"{detector} ({len(rows)})")
+        axis.set(xlim=(-0.3, 1.3), ylim=(1.05, -0.6), title=f"{in_lines(detector)} ({len(rows)})")
         axis.set(xlabel="along the cut [of the picture]")
     axes[0].set(ylabel="below the cut [of the picture]")
     figure.colorbar(dots, ax=axes, label="score", shrink=0.8)
@@ -241,7 +245,7 @@ def gallery(
             found_in = found[subset, detector].get(image_id, Detections.none())
             pictures.append(draw_detections(image, found_in, detector))
         rows.append(pictures)
-        titles.append(f"{detector}\n{case}")
+        titles.append(f"{in_lines(detector)}\n{case}")
     return picture_grid(
         rows, row_titles=titles, cell_in=2.3,
         caption="The worst cases, by rule: the surest mistakes, and people whom no detection fits although "

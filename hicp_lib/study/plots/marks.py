@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.style import in_lines
 
 _NO_DETECTOR = "#444444"  # what stands in a legend for all detectors
 
@@ -26,7 +27,8 @@ def legend_below(figure, axes, ncols: int = 4, fontsize: float = 9) -> None:
     """
     found = {}
     for axis in np.ravel(axes):
-        found.update({label: handle for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)})
+        pairs = zip(*axis.get_legend_handles_labels(), strict=True)
+        found.update({in_lines(label): handle for handle, label in pairs})
     figure.legend(found.values(), found, loc="outside lower center", ncols=ncols, fontsize=fontsize)
 
 
@@ -51,7 +53,9 @@ def legend_lines(axis, names: Iterable[str], styles: Iterable[dict[str, Any]]) -
 
 def detector_lines(axis, detectors: Sequence[str]) -> list:
     """Broad lines in the detectors' colours, for a legend."""
-    return legend_lines(axis, detectors, ({"lw": 4, "color": detector_colour(name)} for name in detectors))
+    return legend_lines(
+        axis, map(in_lines, detectors), ({"lw": 4, "color": detector_colour(name)} for name in detectors)
+    )
 
 
 def facets(axes, table: pd.DataFrame, down: str, across: str) -> Iterator[tuple[Any, pd.DataFrame, Any, Any]]:
@@ -81,7 +85,9 @@ def facets(axes, table: pd.DataFrame, down: str, across: str) -> Iterator[tuple[
 
 def name_rows(axis, labels: Sequence[str]) -> None:
     """Name the rows of a chart, the first on top."""
-    axis.set(yticks=range(len(labels)), yticklabels=labels, ylim=(len(labels) - 0.5, -0.5))
+    axis.set(
+        yticks=range(len(labels)), yticklabels=list(map(in_lines, labels)), ylim=(len(labels) - 0.5, -0.5)
+    )
 
 
 def offset(k: int, n: int, step: float) -> float:

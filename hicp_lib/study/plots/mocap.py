@@ -8,7 +8,7 @@ import pandas as pd
 
 from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS, THRESHOLDS_M
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
+from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour, detector_marker
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _MIN_N = 5  # fewer say little of a median
@@ -212,9 +212,11 @@ def _draw_dependence(axis, rows: pd.DataFrame) -> None:
         pen = {"color": detector_colour(detector), "label": detector}
         median, lower, upper = (100 * part[name] for name in ("median_m", "lower_m", "upper_m"))
         if part["middle"].notna().all():
-            axis.plot(part["middle"], median, "o-", markersize=4, **pen)
+            axis.plot(part["middle"], median, marker=detector_marker(detector), markersize=4, **pen)
             axis.fill_between(part["middle"], lower, upper, color=pen["color"], alpha=0.18, lw=0)
         else:
             x = part["bin"].map(labels.index) + marks.offset(k, rows["detector"].nunique(), 0.16)
-            axis.errorbar(x, median, [median - lower, upper - median], fmt="o", capsize=3, **pen)
+            axis.errorbar(
+                x, median, [median - lower, upper - median], fmt=detector_marker(detector), capsize=3, **pen
+            )
             axis.set(xticks=range(len(labels)), xticklabels=labels, xlim=(-0.5, len(labels) - 0.5))

@@ -11,14 +11,15 @@ DETECTOR_STYLES: dict[str, tuple[str, str]] = {
     "movenet-multipose": ("#C77CFF", "^"),
     "posenet": ("#A0522D", "D"),
     "openpose-mobilenet": ("#E69F00", "X"),
-    "openpose": ("#D55E00", "P"),
+    "openpose": ("#D55E00", "*"),
     "mmpose": ("#009E73", "<"),
     "alphapose": ("#7F5FA8", ">"),
     "detectron2": ("#8C6D31", "d"),
-    "combined": ("#B0125F", "H"),
-    "combined:movenet-thunder": ("#4B0055", "*"),
+    "one-stage": ("#B59B00", "8"),
+    "combined": ("#4B0055", "H"),
+    "combined:movenet-thunder": ("#A0105A", "P"),
 }
-OTHER_COLOUR, _OTHER_MARKER = "#595959", "8"
+OTHER_COLOUR, _OTHER_MARKER = "#595959", "."
 TRUTH_COLOUR = "#111111"
 
 # The two subsets of HiCP, and the two boxes of the paper's figure of how they are made.
@@ -49,7 +50,7 @@ def detector_marker(name: str) -> str:
     Examples
     --------
     >>> detector_marker("movenet-thunder"), detector_marker("combined:movenet-thunder+mediapipe-hands")
-    ('s', '*')
+    ('s', 'P')
     """
     return _style(name)[1]
 

@@ -12,7 +12,7 @@ from hicp_lib.core.images import read_image
 from hicp_lib.core.keypoints import FACE, HANDS, LIMBS, N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
+from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure
 
 _SHIFT = 4  # fractional bits of OpenCV's drawing coordinates
 _MAX_PX = 1e5  # points farther off would overflow them
@@ -144,7 +144,7 @@ def picture_grid(
     rows: Sequence[Sequence[np.ndarray | None]],
     *,
     row_titles: Sequence[str] = (),
-    column_titles: Sequence[str] = (),
+    titles: Sequence[str] = (),
     caption: str,
     alt: str,
     cell_in: float = 2.2,
@@ -155,7 +155,9 @@ def picture_grid(
     ----------
     rows : sequence of sequence of array, shape (height, width, 3)
         RGB, uint8; None leaves a cell empty.
-    row_titles, column_titles : sequence of str
+    row_titles : sequence of str
+    titles : sequence of str
+        Of the cells, row by row; as many as there are columns name these.
     caption, alt : str
     cell_in : float
         Width of a cell in inches.
@@ -176,8 +178,8 @@ def picture_grid(
         axis.spines[:].set_visible(False)
         if j < len(rows[i]) and rows[i][j] is not None:
             axis.imshow(rows[i][j], interpolation="lanczos")
-    for axis, title in zip(axes[0], column_titles, strict=False):
-        axis.set_title(title, loc="center", fontsize=9)
+    for axis, title in zip(axes.flat, titles, strict=False):
+        axis.set_title(in_lines(title), loc="center", fontsize=min(9, 4 * cell_in))
     for axis, title in zip(axes[:, 0], row_titles, strict=False):
         axis.set_ylabel(title, fontsize=9)
     return Figure(figure, caption, alt)
@@ -186,7 +188,7 @@ def picture_grid(
 def detections_grid(
     pictures: Mapping[str, tuple[np.ndarray, Mapping[str, Detections]]], min_score: float, note: str = ""
 ) -> Figure:
-    """Pictures (rows) as seen by detectors (columns).
+    """Pictures (rows) as seen by detectors (columns); one picture alone, two abreast.
 
     Parameters
     ----------
@@ -202,18 +204,20 @@ def detections_grid(
     Figure
     """
     detectors = list(next(iter(pictures.values()))[1])
-    rows = [
-        [draw_detections(image, found[d], d, min_score) for d in detectors]
+    columns = len(detectors) if len(pictures) > 1 else min(len(detectors), 2)
+    drawn = [
+        draw_detections(image, found[d], d, min_score)
         for image, found in pictures.values()
+        for d in detectors
     ]
     seen = [f"{d} {sum(len(found[d]) > 0 for _, found in pictures.values())}" for d in detectors]
     return picture_grid(
-        rows,
-        row_titles=list(pictures),
-        column_titles=detectors,
+        [drawn[start : start + columns] for start in range(0, len(drawn), columns)],
+        row_titles=list(pictures) if len(pictures) > 1 else (),
+        titles=detectors,
         caption=f"Keypoints with a score of at least {min_score}, per detector.{' ' if note else ''}{note}",
-        alt=f"{len(rows)} pictures with drawn skeletons; with somebody found: {in_words(seen)}.",
-        cell_in=min(3.2, 11 / len(detectors)),
+        alt=f"Skeletons on {in_words(pictures)}; pictures with somebody found: {in_words(seen)}.",
+        cell_in=min(3.2, 11 / columns),
     )
 
 

@@ -12,7 +12,7 @@ from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
 from hicp_lib.study.plots.people import draw_detections, picture_grid
 from hicp_lib.study.plots.skeleton import BODY_LIMBS, HAND_LIMBS, limb_lines
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
 
 _AXES = ("x_m", "y_m", "z_m")
 # Seen by the robot, which looks along -x; the axis that is not drawn is the one looked along.
@@ -62,7 +62,7 @@ def camera_views(
     return picture_grid(
         rows,
         row_titles=[f"image {frame}" for frame in frames],
-        column_titles=[f"{view}\n{detector}" for view, detector in found],
+        titles=[f"{view}\n{detector}" for view, detector in found],
         caption=f"Some images of every view, with keypoints of a score of at least {min_score}: {note}.",
         alt=f"{len(frames)} images per view and detector; with somebody found: {in_words(seen)}.",
         cell_in=min(3.2, 11 / len(found)),
@@ -194,7 +194,7 @@ def spread_causes(table: pd.DataFrame, note: str) -> Figure:
     for (case, rows), (upper, lower) in zip(cases, axes.T, strict=True):
         _draw_causes(upper, rows, parts, "spread_m")
         _draw_causes(lower, rows, parts, "bias_m")
-        upper.set(title="\n".join(case), xlabel=_SPREAD)
+        upper.set(title=in_lines("\n".join(case)), xlabel=_SPREAD)
         lower.set(xlabel=_BIAS)
     marks.name_rows(axes[0, 0], parts)
     marks.legend_below(figure, axes, ncols=3)

@@ -92,6 +92,17 @@ def in_words(items: Iterable[str]) -> str:
     return f"{', '.join(others)} and {last}" if others else last
 
 
+def in_lines(name: str) -> str:
+    """What stands in a figure for a detector's long name: a combination takes two lines.
+
+    Examples
+    --------
+    >>> in_lines("combined:mmpose+mediapipe-hands")
+    'combined:mmpose\\n+mediapipe-hands'
+    """
+    return name.replace("+", "\n+")
+
+
 def series_text(values: pd.Series, pattern: str = "{} {:.2f}") -> str:
     """`in_words` of a series, each value put into a pattern after the labels of its index.
 

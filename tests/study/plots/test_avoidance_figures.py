@@ -15,7 +15,7 @@ from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.separation import Separation
 from hicp_lib.robot.skin import read_skin
 from hicp_lib.study.plots.avoidance import joint_motion, over_time, separation_terms
-from hicp_lib.study.plots.avoidance_pictures import animation, filmstrip
+from hicp_lib.study.plots.avoidance_pictures import animation, filmstrip, nearest_views
 
 
 @pytest.fixture(scope="module")
@@ -51,3 +51,17 @@ def test_pictures_stand_still_and_move(run):
     assert filmstrip(run, (0.1, 0.6), "made up").table is None
     movie = Image.open(io.BytesIO(animation(run, rate_hz=4.0)))
     assert movie.format == "WEBP" and movie.n_frames == 4
+
+
+def test_each_detector_shows_the_last_image_before_the_middle_of_the_near_phase(run):
+    grey = {t_s: cv2.imencode(".png", np.full((240, 320, 3), level, np.uint8))[1].tobytes()
+            for t_s, level in ((0.0, 10), (3.2, 90), (3.5, 200))}  # fmt: skip
+    frames = pd.concat([run.frames.assign(t_s=t_s, jpeg=content) for t_s, content in grey.items()])
+    other = Job(Trial("sitting, head"), "movenet-thunder", 0.0)
+    unseeing = Run(Job(run.job.trial, "ground truth"), run.cycles, pd.DataFrame())
+    runs = [unseeing, Run(run.job, run.cycles, frames), Run(other, run.cycles, run.frames)]
+    figure = nearest_views(runs, "made up")
+    axes = np.reshape(figure.figure.axes, (2, 2))
+    assert [[len(axis.images) for axis in row] for row in axes] == [[1, 0], [0, 1]]
+    assert axes[0, 0].images[0].get_array().max() == 90 and axes[1, 0].get_ylabel() == "sitting, head"
+    assert "sitting, hand and sitting, head" in figure.alt

@@ -130,6 +130,14 @@ def test_grids_have_a_picture_per_detector_and_room_for_missing_ones():
     found = {"mediapipe": Detections.none(), "openpose-mobilenet": Detections.none()}
     figure = people.detections_grid({"one": (image, found), "two": (image, found)}, 0.3)
     assert sum(len(axis.images) for axis in figure.figure.axes) == 4
+    alone = people.detections_grid({"one": (image, dict.fromkeys(("a", "b+c", "d"), Detections.none()))}, 0.3)
+    titles = [axis.get_title(loc="center") for axis in alone.figure.axes]
+    assert titles == ["a", "b\n+c", "d", ""] and [len(axis.images) for axis in alone.figure.axes] == [
+        1,
+        1,
+        1,
+        0,
+    ]
     sparse = people.picture_grid([[image, None]], caption="c", alt="a")
     assert [len(axis.images) for axis in sparse.figure.axes] == [1, 0]
 
