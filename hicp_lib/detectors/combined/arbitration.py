@@ -4,7 +4,7 @@ Several looks at an image show the same hand more than once, show other people's
 where there are none. Three rules, in this order:
 
 1. *Duplicates.* Sightings whose roots lie closer together than a share of the hand's size are one hand;
-   its points are the medians of theirs.
+   its points are the medians of theirs, its scores say how many they are and how well they agree.
 2. *Refusal.* A hand whose root is farther from a wrist than a share of the forearm is not that wrist's.
    An arm without a wrist takes hands within reach of its elbow, and failing that of its shoulder.
 3. *Assignment.* Hands go to arms so that the sum of distances, in forearms, is smallest. Left and right
@@ -20,7 +20,7 @@ import numpy as np
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.extras import needs
 from hicp_lib.core.keypoints import LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
-from hicp_lib.detectors.combined.hand_squares import Arms
+from hicp_lib.detectors.combined.hand_squares import SEED_11, Arms, threshold
 
 with needs("mediapipe"):
     from scipy.optimize import linear_sum_assignment
@@ -31,7 +31,7 @@ _REFUSED = 1e6  # a distance no hand is assigned at; finite, as the solver wants
 
 @dataclass(frozen=True)
 class ArbitrationRule:
-    """Thresholds of the rules above.
+    """Thresholds of the rules above; each field says in its metadata how it was chosen, and on what data.
 
     Attributes
     ----------
@@ -40,12 +40,16 @@ class ArbitrationRule:
         farthest point).
     wrist_reach, elbow_reach, shoulder_reach : float
         Farthest root from the arm's last given joint, in forearms.
+    alone, scatter : float
+        What sightings are worth, see `merge_duplicates`.
     """
 
-    same_hand: float = 0.5
-    wrist_reach: float = 1.0
-    elbow_reach: float = 1.5
-    shoulder_reach: float = 2.5
+    same_hand: float = threshold(0.5, f"{SEED_11}: 0.35 and 0.7 within .005")
+    wrist_reach: float = threshold(1.0, f"{SEED_11}: 0.7 and 1.4 within .01")
+    elbow_reach: float = threshold(1.5, f"{SEED_11}: 1 and 2 the same")
+    shoulder_reach: float = threshold(2.5, f"{SEED_11}: 1.8 and 3.5 within .005")
+    alone: float = threshold(0.85, f"{SEED_11}: of hands seen once, 0.15 is the mean OKS")
+    scatter: float = threshold(4.0, f"{SEED_11}: 2 and 8 within .005")
 
 
 @dataclass(frozen=True)
@@ -87,27 +91,34 @@ class Hands:
         return len(self.sides)
 
 
-def merge_duplicates(hands: Hands, same_hand: float) -> Hands:
-    """One hand for all sightings of it: medians of points and scores, the side most of them say."""
+def merge_duplicates(hands: Hands, rule: ArbitrationRule) -> Hands:
+    """One hand for all sightings of it: the medians of their points, the side most of them say.
+
+    A point's score is the median of the sightings', times what their agreement is worth: 1 - `alone` / n of n
+    sightings, times exp(-`scatter` d) for a mean distance d from the median, in sizes of the hand.
+    """
     roots = hands.keypoints_px[:, 0]
     sizes = np.nanmax(np.linalg.norm(hands.keypoints_px - roots[:, None], axis=-1), axis=1, initial=0)
     apart = np.linalg.norm(roots[:, None] - roots[None], axis=-1)
-    near = (apart < same_hand * np.minimum.outer(sizes, sizes)) | np.eye(len(hands), dtype=bool)
+    near = (apart < rule.same_hand * np.minimum.outer(sizes, sizes)) | np.eye(len(hands), dtype=bool)
     left = np.ones(len(hands), dtype=bool)
     merged = []
     while left.any():
         # First the hand with the most sightings around it; among equals the first seen.
         centre = np.where(left, (near & left).sum(axis=1), 0).argmax()
-        merged.append(_median(hands.take(near[centre] & left)))
+        merged.append(_median(hands.take(near[centre] & left), rule))
         left &= ~near[centre]
     return Hands.concatenate(merged)
 
 
-def _median(same: Hands) -> Hands:
+def _median(same: Hands, rule: ArbitrationRule) -> Hands:
     given = np.isfinite(same.keypoints_px).all(axis=(0, 2))  # points that every sighting gives
     points = np.where(given[:, None], np.median(same.keypoints_px, axis=0), same.keypoints_px[0])
     scores = np.where(given, np.median(same.scores, axis=0), same.scores[0])
-    return Hands(points[None], scores[None], np.array([round(same.sides.mean() + 1e-9)]))
+    size_px = np.nanmax(np.linalg.norm(points - points[0], axis=-1))
+    apart = np.linalg.norm(same.keypoints_px - points, axis=-1).mean(axis=0) / max(size_px, 1)
+    agreement = (1 - rule.alone / len(same)) * np.exp(-rule.scatter * np.where(given, apart, 0))
+    return Hands(points[None], (scores * agreement)[None], np.array([round(same.sides.mean() + 1e-9)]))
 
 
 def distances(arms: Arms, hands: Hands, rule: ArbitrationRule) -> np.ndarray:

@@ -3,7 +3,7 @@
 `combined:BODY+HANDS` looks for hands where the body says they are, and everywhere else:
 
 1. the body detector runs once;
-2. the hand model looks at squares around the forearms' ends (`hand_squares`), enlarged when small;
+2. the hand model looks at a square around each forearm's end (`hand_squares`), enlarged when small;
 3. it looks at the whole image and, when that is oblong, at overlapping squares along it: a hand model
    is shown a square, and a long image makes small hands in it. These looks find the hands of bodies
    that were not found or whose arms are wrong, and every further sighting steadies a hand's points;
@@ -44,11 +44,14 @@ class Combined:
     body, hands : Detector
         Ready detectors; `hands` gives hand points in the Halpe layout.
     looks : str
-        Where hands are looked for, joined by +: "wrists" (squares at the forearms' ends), "image" (the whole
-        of it), "along" (squares along an oblong image).
+        Where hands are looked for, joined by +: "wrists" (a square at each forearm's end), "image" (the
+        whole of it), "along" (squares along an oblong image).
     arbitrate : bool
         Apply the rules of `arbitration`; if not, a wrist takes the surest hand of its own squares, and
         further hands go to the nearest free wrist.
+    agreement : bool
+        Hands that are arbitrated are as sure as the sightings of them are many and agree; if not, as the hand
+        model says.
     min_side_px : int
         Smaller squares are enlarged to this.
     """
@@ -59,6 +62,7 @@ class Combined:
         hands: Detector,
         looks: str = "wrists+image+along",
         arbitrate: bool = True,
+        agreement: bool = True,
         min_side_px: int = 320,
     ) -> None:
         self._looks = looks.split("+")
@@ -67,7 +71,8 @@ class Combined:
         self.name = f"combined:{body.name}+{hands.name}"
         self.parts: dict[str, Any] = {"body": body, "hands": hands}
         self._arbitrate, self._min_side_px = arbitrate, min_side_px
-        self._squares, self._rule = SquareRule(), ArbitrationRule()
+        self._squares = SquareRule()
+        self._rule = ArbitrationRule() if agreement else ArbitrationRule(alone=0, scatter=0)
         self.takes_boxes = getattr(body, "takes_boxes", False)
         self.settings: dict[str, Any] = {
             kind: {"name": part.name, **part.settings} for kind, part in self.parts.items()
@@ -84,7 +89,7 @@ class Combined:
 
     def _arbitrated(self, image: np.ndarray, bodies: Detections, arms: Arms) -> Detections:
         seen = [hands for _, _, hands in self._at_wrists(image, arms)] + self._elsewhere(image)
-        hands = merge_duplicates(Hands.concatenate(seen), self._rule.same_hand)
+        hands = merge_duplicates(Hands.concatenate(seen), self._rule)
         chosen = assign(distances(arms, hands, self._rule))
         strangers = hands.take(~self._within_reach(arms, hands))
         return give_hands(bodies, hands, chosen).concatenate(without_body(strangers))
@@ -110,9 +115,7 @@ class Combined:
         return give_hands(bodies, hands, chosen).concatenate(without_body(hands.take(rest)))
 
     def _at_wrists(self, image: np.ndarray, arms: Arms) -> list[tuple[int, int, Hands]]:
-        if "wrists" not in self._looks:
-            return []
-        squares = hand_squares(arms, self._squares, image)
+        squares = hand_squares(arms, self._squares, image) if "wrists" in self._looks else []
         return [(person, side, self._look(image, square)) for person, side, square in squares]
 
     def _elsewhere(self, image: np.ndarray) -> list[Hands]:

@@ -11,7 +11,9 @@ COCO and COCO-WholeBody with Halpe's sigmas:
 - `absent`, detections without a keypoint of the group: "drop" (COCO-WholeBody) or "count" (the Halpe
   tool: each a false positive).
 - `others`, the other people in a HiCP crop: "ignore" (detections of them are forgiven) or "count" (wrong).
-- `score`, what detections are ranked by: "person", or "group": the mean score of the keypoints given.
+- `score`, what detections are ranked by: "person", or "group": the mean score of the group's keypoints, 0 for
+  one that is not given, as it adds 0 to OKS. Bodies go by the first; hands by the second, for the score of a
+  person is the body's (COCO-WholeBody ranks hands by it, too).
 
 A keypoint the detection does not give adds 0 to OKS. Crowds are ignored. The 20 best detections of an
 image take part.
@@ -143,7 +145,7 @@ def evaluate(
         For detections of unknown images or with scores or coordinates that are no numbers, for unknown
         groups and options, and for area "source" where people have none.
     """
-    chosen = Options(**options)
+    chosen = Options(**_defaults(group) | options)
     check_detections(detections, annotations)
     people = _people_seen(annotations, group, chosen)
     keypoints = GROUPS[group]
@@ -170,6 +172,10 @@ def evaluate(
         recall=recall,
         matches=matches,
     )
+
+
+def _defaults(group: str) -> dict[str, str]:
+    return {"score": "group"} if group == "hand" else {}
 
 
 def check_detections(detections: Mapping[int, Detections], annotations: Annotations) -> None:
@@ -237,11 +243,9 @@ def _detections_seen(
 ) -> Iterator[dict]:
     for image_id, found in detections.items():
         points = found.keypoints_px[:, keypoints]
-        given = np.isfinite(points).all(axis=-1)
-        scores = found.person_scores
-        if options.score == "group":
-            scores = found.scores[:, keypoints].sum(axis=-1) / np.maximum(given.sum(axis=-1), 1)
-        for person, any_given, score in zip(points, given.any(axis=-1), scores, strict=True):
+        given = np.isfinite(points).all(axis=-1).any(axis=-1)
+        scores = {"person": found.person_scores, "group": found.scores[:, keypoints].mean(axis=-1)}
+        for person, any_given, score in zip(points, given, scores[options.score], strict=True):
             if any_given or options.absent == "count":
                 yield cocoeval.found_row(image_id, person, score)
 
@@ -267,7 +271,7 @@ def person_oks(
     DataFrame
         Columns `image_id, annotation_id, oks, n_labelled`.
     """
-    chosen = Options(**options)
+    chosen = Options(**_defaults(group) | options)
     check_detections(detections, annotations)
     people = _people_seen(annotations, group, chosen)
     keypoints = GROUPS[group]
@@ -302,8 +306,9 @@ def sensitivity_table(
     counted = np.flatnonzero(~annotations.is_crowd)
     has_source = all("source_area" in annotations.extras[i] for i in counted)
     variants: dict[str, dict[str, str]] = {"default": {}}
+    default = asdict(Options(**_defaults(group)))
     for name, kind in get_type_hints(Options).items():
-        values = [value for value in get_args(kind)[1:] if value != "source" or has_source]
+        values = [v for v in get_args(kind) if v != default[name] and (v != "source" or has_source)]
         variants |= {f"{name}={value}": {name: value} for value in values}
     table = pd.DataFrame(
         {"changed": changed, **evaluate(annotations, detections, group, **variant).row()}

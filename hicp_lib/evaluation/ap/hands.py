@@ -4,7 +4,10 @@ A labelled hand counts as found when some detection places its points, on the ri
 of the hand alone (its labelled points, the person's area) above .5.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from itertools import accumulate
+from operator import or_
 from typing import Any
 
 import numpy as np
@@ -12,7 +15,9 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND, SIGMAS
-from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals
+from hicp_lib.detectors.combined.arbitration import ArbitrationRule
+from hicp_lib.detectors.combined.hand_squares import SEED_11_THUNDER, SquareRule
+from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
 from hicp_lib.evaluation.ap.evaluate import check_detections, evaluate
 from hicp_lib.evaluation.cases import Found, Truth
 from hicp_lib.evaluation.matching import best_oks
@@ -21,13 +26,39 @@ from hicp_lib.formats.annotations import Annotations, source_images
 
 FOUND_OKS = 0.5
 
-# Parts of a combination, as options of `combined.detector.Combined`; the last is its default.
-INGREDIENTS: dict[str, dict] = {
-    "whole image": {"looks": "image", "arbitrate": False},
-    "wrist squares": {"looks": "wrists", "arbitrate": False},
-    "all looks": {"arbitrate": False},
-    "all looks, arbitrated": {},
+# Options of `combined.detector.Combined` and its hand detector. Each step changes one thing of the one before
+# it; the last is the default. The thresholds come second, so that all further steps are at the same.
+_STEPS: dict[str, dict] = {
+    "image, nearest wrist": {
+        "looks": "image", "min_side_px": 1, "arbitrate": False, "agreement": False, "hands_num_hands": 2,
+        "hands_min_score": 0.5,
+    },
+    "+ low thresholds": {"hands_num_hands": 4, "hands_min_score": 0.2},
+    "+ square at each wrist": {"looks": "image+wrists"},
+    "+ upscaling": {"min_side_px": 320},
+    "+ several looks": {"looks": "image+wrists+along"},
+    "+ arbitration": {"arbitrate": True},
+    "+ scores by agreement": {"agreement": True},
+}  # fmt: skip
+# How the thresholds among these were chosen.
+_CHOSEN = {
+    "hands_num_hands": "two of one person and two of others in a square; no other was tried",
+    "hands_min_score": f"{SEED_11_THUNDER}: 0.1 within .005",
+    "min_side_px": f"{SEED_11_THUNDER}: without it .013 less on Basic",
 }
+INGREDIENTS: dict[str, dict] = dict(zip(_STEPS, accumulate(_STEPS.values(), or_), strict=True))
+
+
+def thresholds() -> pd.DataFrame:
+    """The thresholds of the combination and what each was chosen on: columns `threshold, value, chosen`.
+
+    "within .005" is the change of the AP of hands on Basic and Headless, "both bodies" are those of
+    `mediapipe-pose` and `movenet-thunder`; of seed 11, 100 scenes.
+    """
+    rules = [field for rule in (SquareRule, ArbitrationRule) for field in fields(rule)]
+    rows = [(field.name, field.default, field.metadata["chosen"]) for field in rules]
+    rows += [(name, list(INGREDIENTS.values())[-1][name], chosen) for name, chosen in _CHOSEN.items()]
+    return pd.DataFrame(rows, columns=["threshold", "value", "chosen"]).astype({"value": str})
 
 
 def hand_oks(
@@ -65,41 +96,59 @@ def hand_oks(
 
 
 def compare_hands(
-    truth: Truth, found: Found, baseline: str, n_resamples: int = 1000, seed: int = 0
+    truth: Truth, found: Found, baseline: Found, n_resamples: int = 1000, seed: int = 0
 ) -> pd.DataFrame:
-    """Average precision of hands and hands found, against a baseline.
+    """Average precision of hands and hands found, step by step and against a baseline.
 
     Parameters
     ----------
     truth : Truth
         By subset.
     found : Found
-        By image id, of every subset and detector or variant of one.
-    baseline : str
-        The variant that hands found are set in proportion to.
+        By image id, of every subset and variant, in the order in which the variants follow each other.
+    baseline : Found
+        By image id, of every subset and one detector, which hands found are set in proportion to.
     n_resamples, seed : int, optional
         Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
     DataFrame
-        Columns `subset, variant, AP, AP_low, AP_high, n_hands, n_found, share, share_low, share_high, ratio,
-        ratio_low, ratio_high`: 95 % bootstrap intervals over source images; `ratio` is the hands found per
+        Columns `subset, variant, AP, AP_low, AP_high, step, step_low, step_high, AR50, n_hands, n_found,
+        share, share_low, share_high, ratio, ratio_low, ratio_high`: 95 % bootstrap intervals over source
+        images; `step` is AP less that of the variant before (NaN for the first), `ratio` the hands found per
         hand the baseline finds, both on the same draws.
     """
+    bases = {subset: run for (subset, _), run in baseline.items()}
     rows = []
-    for subset, variant in found:
-        people, clusters = truth[subset], source_images(truth[subset])
-        evaluation = evaluate(people, found[subset, variant], "hand")
-        ap = bootstrap_intervals(evaluation, n_resamples, seed, clusters).set_index("metric").loc["AP"]
-        counts = _counts(people, found[subset, variant], found[subset, baseline], clusters)
+    for subset in dict.fromkeys(subset for subset, _ in found):
+        runs = {variant: run for (its, variant), run in found.items() if its == subset}
+        rows += [(subset, *row) for row in _rows(truth[subset], runs, bases[subset], n_resamples, seed)]
+    ends = ("", "_low", "_high")
+    ap, step, share, ratio = ([f"{name}{end}" for end in ends] for name in ("AP", "step", "share", "ratio"))
+    columns = ["subset", "variant", *ap, *step, "AR50", "n_hands", "n_found", *share, *ratio]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def _rows(
+    people: Annotations, runs: Found, baseline: Mapping, n_resamples: int, seed: int
+) -> Iterator[tuple]:
+    clusters = source_images(people)
+    evaluations = [evaluate(people, run, "hand") for run in runs.values()]
+    samples = resample(evaluations, n_resamples, seed, clusters)
+    step: Any = (np.nan,) * 3
+    for k, (variant, run) in enumerate(runs.items()):
+        ap = _of_ap(intervals(evaluations[k].metrics(), samples[k]))
+        if k:
+            step = _of_ap(difference(evaluations[k], evaluations[k - 1], samples[k], samples[k - 1]))
+        counts = _counts(people, run, baseline, clusters)
         n_hands, n_found, _ = (int(n) for n in counts.sum(axis=0))
         found_of, ratio = (_with_interval(counts, 1, per, n_resamples, seed) for per in (0, 2))
-        rows.append((subset, variant, *ap[["value", "low", "high"]], n_hands, n_found, *found_of, *ratio))
-    ends = ("", "_low", "_high")
-    columns = ["subset", "variant", *(f"AP{end}" for end in ends), "n_hands", "n_found"]
-    columns += [f"{name}{end}" for name in ("share", "ratio") for end in ends]
-    return pd.DataFrame(rows, columns=columns)
+        yield variant, *ap, *step, evaluations[k].AR50, n_hands, n_found, *found_of, *ratio
+
+
+def _of_ap(figures: pd.DataFrame) -> pd.Series:
+    return figures.set_index("metric").loc["AP", ["value", "low", "high"]]
 
 
 def _counts(people: Annotations, found: Mapping, baseline: Mapping, clusters: Mapping) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Figures of the combination: what its ingredients buy, and what scores are worth."""
+"""Figures of the combination: what each of its steps buys, and what scores are worth."""
 
 import pandas as pd
 
@@ -7,30 +7,57 @@ from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import SUBSET_COLOURS, detector_colour
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
-_MEASURES = {"AP": "average precision of hands", "share": "share of labelled hands found"}
+_MEASURES = {
+    "AP": "average precision of hands", "step": "gain over the row above", "share": "share of hands found"
+}  # fmt: skip
 _GROUPS = {"body": "body", "hand": "hands"}
 
 
 @in_style
 def ingredients(table: pd.DataFrame, note: str) -> Figure:
-    """Average precision and hands found per variant and subset; `table` from `compare_hands`."""
-    variants = list(table["variant"].unique())
-    figure, axes = new_figure(1, 2, 10.0, 1.2 + 0.5 * len(variants), sharey=True)
-    for axis, (measure, label) in zip(axes, _MEASURES.items(), strict=True):
-        for k, (subset, rows) in enumerate(table.groupby("subset", sort=False)):
-            reach = marks.whiskers(rows, measure, f"{measure}_low", f"{measure}_high")
-            pen = {"fmt": "o", "color": SUBSET_COLOURS.get(subset), "label": subset, "capsize": 3}
-            y = rows["variant"].map(variants.index) + marks.offset(k, 2, 0.2)
-            axis.errorbar(rows[measure], y, xerr=reach, **pen)
-        axis.set(xlabel=label, xlim=(0, None))
-    marks.name_rows(axes[0], variants)
-    _legend_above(figure, axes[0])
-    said = series_text(table.set_index(["variant", "subset"])["AP"], "{0} {2:.2f} on {1}")
-    caption = (
-        "What each ingredient buys: average precision of hands, and the share of labelled hands found, "
-        f"with 95 % bootstrap intervals over source images: {note}."
+    """Average precision, its gain step by step, and hands found, a row of panels for each body detector.
+
+    Parameters
+    ----------
+    table : pd.DataFrame
+        As from `compare_hands`, with a column `body`.
+    note : str
+        What the data are, for the caption.
+    """
+    variants, bodies = list(table["variant"].unique()), list(table["body"].unique())
+    height_in = 0.7 + (0.7 + 0.36 * len(variants)) * len(bodies)
+    figure, axes = new_figure(
+        len(bodies), len(_MEASURES), 10.5, height_in, sharey=True, sharex="col", squeeze=False
     )
-    return Figure(figure, caption, f"Dots with whiskers per variant. Average precision: {said}.", table)
+    for row, body in zip(axes, bodies, strict=True):
+        for axis, measure in zip(row, _MEASURES, strict=True):
+            _draw_steps(axis, table[table["body"] == body], measure, variants)
+        row[0].set_title(f"bodies by {body}", loc="left", fontsize=9)
+    for axis, label in zip(axes[-1], _MEASURES.values(), strict=True):
+        axis.set(xlabel=label)
+    for axis in axes[-1, ::2]:
+        axis.set(xlim=(0, None))
+    marks.name_rows(axes[0, 0], variants)
+    _legend_above(figure, axes[0, 0])
+    ends = table[table["variant"].isin([variants[0], variants[-1]])]
+    said = series_text(ends.set_index(["body", "variant", "subset"])["AP"], "{0}, {1}: {3:.2f} on {2}")
+    caption = (
+        "What each step buys: average precision of hands, how much of it the step adds on the same crops, "
+        "and the share of labelled hands found, with 95 % bootstrap intervals over source images; a row of "
+        f"panels for the bodies of each detector: {note}."
+    )
+    alt = f"Dots with whiskers per step, for the bodies of {in_words(bodies)}. Average precision, {said}."
+    return Figure(figure, caption, alt, table)
+
+
+def _draw_steps(axis, table: pd.DataFrame, measure: str, variants: list[str]) -> None:
+    if measure == "step":
+        axis.axvline(0, color="#888888", lw=1)
+    for k, (subset, rows) in enumerate(table.groupby("subset", sort=False)):
+        reach = marks.whiskers(rows, measure, f"{measure}_low", f"{measure}_high")
+        pen = {"fmt": "o", "color": SUBSET_COLOURS.get(subset), "label": subset, "capsize": 3}
+        y = rows["variant"].map(variants.index) + marks.offset(k, 2, 0.24)
+        axis.errorbar(rows[measure], y, xerr=reach, **pen)
 
 
 @in_style

@@ -20,6 +20,7 @@ from hicp_lib.detectors.combined.hand_squares import Arms
 SHAPE = np.random.default_rng(0).uniform(-20, 20, (21, 2))
 SHAPE[0] = 0
 SIZE = np.linalg.norm(SHAPE, axis=1).max()
+AS_SAID = ArbitrationRule(same_hand=0.5, alone=0, scatter=0)  # scores are the hand model's
 
 
 def hands(*offsets, sides=None, scores=None) -> Hands:
@@ -32,32 +33,42 @@ def hands(*offsets, sides=None, scores=None) -> Hands:
 
 
 def test_sightings_of_one_hand_become_their_median():
-    merged = merge_duplicates(hands((0, 0), (1, 0), (8, 6), scores=[0.5, 0.6, 0.9]), 0.5)
+    merged = merge_duplicates(hands((0, 0), (1, 0), (8, 6), scores=[0.5, 0.6, 0.9]), AS_SAID)
     assert len(merged) == 1
     np.testing.assert_allclose(merged.keypoints_px[0], SHAPE + (1, 0))
     assert merged.scores[0].tolist() == [0.6] * 21
 
 
+def test_a_hand_is_as_sure_as_its_sightings_are_many_and_agree():
+    seen = hands((0, 0), (0, 0), (0, 0), (0, 0))
+    seen.keypoints_px[3, 7] += (0, 0.4 * SIZE)
+    scores = merge_duplicates(seen, ArbitrationRule(alone=0.8, scatter=2.0)).scores[0]
+    np.testing.assert_allclose(np.delete(scores, 7), 0.9 * (1 - 0.8 / 4))
+    assert scores[7] == pytest.approx(0.9 * (1 - 0.8 / 4) * np.exp(-2.0 * 0.4 / 4))
+    alone = merge_duplicates(seen.take(np.array([0])), ArbitrationRule(alone=0.8)).scores[0]
+    np.testing.assert_allclose(alone, 0.9 * 0.2)
+
+
 @pytest.mark.parametrize("share, n", [(0.49, 1), (0.51, 2)])
 def test_hands_are_one_within_half_their_size(share, n):
-    assert len(merge_duplicates(hands((0, 0), (share * SIZE, 0)), 0.5)) == n
+    assert len(merge_duplicates(hands((0, 0), (share * SIZE, 0)), AS_SAID)) == n
 
 
 def test_the_smaller_hand_sets_the_distance():
     two = hands((0, 0), (0.4 * SIZE, 0))
     two.keypoints_px[1] = two.keypoints_px[1, :1] + (two.keypoints_px[1] - two.keypoints_px[1, :1]) / 2
-    assert len(merge_duplicates(two, 0.5)) == 2
+    assert len(merge_duplicates(two, AS_SAID)) == 2
 
 
 def test_the_side_is_the_majoritys():
-    assert merge_duplicates(hands((0, 0), (1, 0), (2, 0), sides=[1, 0, 1]), 0.5).sides.tolist() == [1]
-    assert merge_duplicates(hands((0, 0), (1, 0), (2, 0), sides=[0, 0, 1]), 0.5).sides.tolist() == [0]
+    assert merge_duplicates(hands((0, 0), (1, 0), (2, 0), sides=[1, 0, 1]), AS_SAID).sides.tolist() == [1]
+    assert merge_duplicates(hands((0, 0), (1, 0), (2, 0), sides=[0, 0, 1]), AS_SAID).sides.tolist() == [0]
 
 
 def test_points_some_sighting_lacks_come_from_the_first():
     two = hands((0, 0), (2, 0))
     two.keypoints_px[1, 5] = np.nan
-    merged = merge_duplicates(two, 0.5)
+    merged = merge_duplicates(two, AS_SAID)
     np.testing.assert_allclose(merged.keypoints_px[0, 5], SHAPE[5])
     np.testing.assert_allclose(merged.keypoints_px[0, 6], SHAPE[6] + (1, 0))
 

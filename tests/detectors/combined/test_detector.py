@@ -6,6 +6,7 @@ import pytest
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
+from hicp_lib.detectors.combined.arbitration import ArbitrationRule
 from hicp_lib.detectors.combined.detector import Combined
 from hicp_lib.detectors.registry import make_detector
 
@@ -167,7 +168,9 @@ def test_with_nobody_found_the_hand_models_sides_stand_but_nobody_has_two_left_h
     found = combine(Detections.none()).detect(image_with((100, 100), (300, 300), left=[0, 1]))
     assert len(found) == 1
     assert sorted(roots(found)) == [(100, 100), (300, 300)]
-    assert found.person_scores[0] == pytest.approx(0.9)
+    assert found.person_scores[0] == pytest.approx(0.9 * (1 - ArbitrationRule().alone))  # each seen once
+    plain = combine(Detections.none(), agreement=False).detect(image_with((100, 100), (300, 300)))
+    assert plain.person_scores[0] == pytest.approx(0.9)
 
 
 def test_no_body_and_no_hand_is_nobody():

@@ -21,7 +21,7 @@ def arms(**points) -> Arms:
 
 
 def test_the_square_lies_a_third_of_the_forearm_beyond_the_wrist():
-    rule = SquareRule(sides=(1.5,))
+    rule = SquareRule(side=1.5)
     ((person, side, square),) = hand_squares(arms(l_elbow=(100, 100), l_wrist=(160, 100)), rule, IMAGE)
     assert (person, side, square.side_px) == (0, 0, 90)
     middle = np.array([square.left_px, square.top_px]) + (square.side_px - 1) / 2
@@ -36,7 +36,7 @@ def test_a_forearm_that_points_at_the_camera_is_not_taken_for_short():
 
 
 def test_without_an_elbow_the_square_lies_around_the_wrist_and_without_a_scale_there_is_none():
-    rule = SquareRule(sides=(1.0,))
+    rule = SquareRule(side=1.0)
     shoulders = dict(l_shoulder=(250, 100), r_shoulder=(150, 100))
     ((_, side, square),) = hand_squares(arms(r_wrist=(100, 200), **shoulders), rule, IMAGE)
     assert side == 1
@@ -103,14 +103,12 @@ def test_squares_along_an_image_cover_it_and_overlap(height, width):
 
 def test_the_published_numbers():
     """A third of the forearm beyond the wrist, and 0.9 of the upper arm, are OpenPose's."""
-    rule = SquareRule()
-    assert (rule.beyond_wrist, rule.forearms_per_upper_arm, rule.min_score) == (0.33, 0.9, 0.03)
-    assert (rule.sides, rule.forearms_per_shoulders) == ((1.8, 2.7), 0.6)
+    assert (SquareRule().beyond_wrist, SquareRule().forearms_per_upper_arm) == (0.33, 0.9)
 
 
 def test_a_wrist_at_the_least_score_counts_and_one_below_does_not():
     keypoints, scores = np.zeros((1, N_KEYPOINTS, 2)), np.zeros((1, N_KEYPOINTS))
-    scores[0, [9, 10]] = 0.03, np.nextafter(0.03, 0)
+    scores[0, [9, 10]] = 0.1, np.nextafter(0.1, 0)
     found = Arms.of(Detections(keypoints, scores, np.ones(1)), SquareRule())
     assert np.isfinite(found.wrists_px).all(axis=-1).tolist() == [[True, False]]
 

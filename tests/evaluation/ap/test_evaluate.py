@@ -54,7 +54,7 @@ def by_pycocotools(annotations, detections, group) -> dict[str, float]:
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_is_what_pycocotools_gives_the_usual_way(scene, group, seed):
     annotations, detections = scene(seed)
-    ours = evaluate(annotations, detections, group)
+    ours = evaluate(annotations, detections, group, score="person")
     expected = by_pycocotools(annotations, detections, group)
     assert ours.metrics() == expected
     assert 0.05 < ours.AP < 0.95  # a case that says something
@@ -141,7 +141,7 @@ def test_detections_without_the_group_are_dropped_unless_counted(annotated, dete
     detections = {1: detected([PERSON], [0.5]), 2: detected([body_only], [0.9])}
     annotations = annotated([PERSON, PERSON], [1, 2])
     assert evaluate(annotations, detections, "hand").AP == pytest.approx(51 / 101)  # recall 1/2, all right
-    counted = evaluate(annotations, detections, "hand", absent="count")
+    counted = evaluate(annotations, detections, "hand", absent="count", score="person")
     assert counted.AP == pytest.approx(51 / 101 / 2) and counted.n_detections == 2  # behind a false positive
     assert evaluate(annotations, detections, "hand").n_detections == 1
     assert evaluate(annotations, detections, "body").AP == ONE
@@ -185,8 +185,9 @@ def test_ranking_by_the_groups_own_scores(annotated, detected):
     scores[0, HANDS], scores[1, HANDS] = 0.8, 0.1
     detections = {1: replace(found, scores=scores)}
     annotations = annotated([PERSON], [1])
-    assert evaluate(annotations, detections, "hand").AP == pytest.approx(0.5)
-    assert evaluate(annotations, detections, "hand", score="group").AP == ONE
+    assert evaluate(annotations, detections, "hand", score="person").AP == pytest.approx(0.5)
+    assert evaluate(annotations, detections, "hand").AP == ONE
+    assert evaluate(annotations, detections, "body").AP == pytest.approx(0.5)
 
 
 def test_wholebody_sigmas_are_kinder_to_hands(scene):
@@ -195,7 +196,7 @@ def test_wholebody_sigmas_are_kinder_to_hands(scene):
     assert table.loc["default", "AP"] == evaluate(annotations, detections, "hand").AP
     assert table.loc["sigmas=wholebody", "AP"] > table.loc["default", "AP"]
     assert table.loc["sigmas=wholebody", "AP_change"] > 0 == table.loc["default", "AP_change"]
-    changed = "sigmas=wholebody area=box area=box53 unlabelled=drop absent=count others=count score=group"
+    changed = "sigmas=wholebody area=box area=box53 unlabelled=drop absent=count others=count score=person"
     assert table.index.tolist() == ["default", *changed.split()]
     body = sensitivity_table(annotations, detections, "body").set_index("changed")
     assert body.loc["sigmas=wholebody", "AP_change"] == 0
@@ -246,15 +247,19 @@ def test_other_shapes_unknown_images_groups_and_options_are_refused(annotated, d
         evaluate(annotations, {1: good}, area="bbox")
 
 
-def test_the_groups_score_is_the_mean_of_what_was_given_be_it_one_keypoint(annotated, detected):
-    only_one = np.where(np.arange(136) == HANDS[0], 2.0, 0.0)[None]
+@pytest.mark.parametrize(("of_one", "expected"), [(0.3, ONE), (0.5, 0.5)])
+def test_the_groups_score_is_the_mean_over_all_its_keypoints_those_not_given_too(
+    annotated, detected, of_one, expected
+):
     points = np.array([PERSON, AWAY])
-    points[0, HANDS[1:]] = np.nan
+    points[1, HANDS[1:]] = np.nan
     found = detected(points)
     scores = found.scores.copy()
-    scores[0, HANDS[0]], scores[1, HANDS] = 0.8, 0.6
-    annotations = annotated([PERSON], [1], visibility=only_one)
-    assert evaluate(annotations, {1: replace(found, scores=scores)}, "hand", score="group").AP == ONE
+    scores[0, HANDS], scores[1, HANDS] = 0.01, 0.0
+    scores[1, HANDS[0]] = of_one  # over the 42 of the hands less or more than .01
+    annotations = annotated([PERSON], [1])
+    found = replace(found, scores=scores)
+    assert evaluate(annotations, {1: found}, "hand", score="group").AP == pytest.approx(expected)
 
 
 def test_the_smallest_person_counts(annotated, detected):

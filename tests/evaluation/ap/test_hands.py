@@ -1,13 +1,19 @@
 """Hands found, one by one, and set in proportion to a baseline."""
 
+import re
+from itertools import pairwise
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND
+from hicp_lib.detectors.registry import make_detector
 from hicp_lib.evaluation.ap import hands
 from hicp_lib.evaluation.ap.evaluate import evaluate
-from hicp_lib.evaluation.ap.hands import INGREDIENTS, compare_hands, hand_oks
+from hicp_lib.evaluation.ap.hands import INGREDIENTS, compare_hands, hand_oks, thresholds
+from hicp_lib.report.notebooks import read_notebooks
 from tests.evaluation.made_people import make_annotations, make_detections
 
 N = 12
@@ -50,25 +56,50 @@ def test_crowds_and_others_have_no_hands_to_find():
 def test_shares_and_ratios_with_intervals_around_them():
     people = make_annotations(POINTS, range(N))
     found = {("basic", "few"): detections(range(4)), ("basic", "many"): detections(range(8), range(2))}
-    table = compare_hands({"basic": people}, found, "few", n_resamples=200).set_index("variant")
+    few = {("basic", "few"): found["basic", "few"]}
+    table = compare_hands({"basic": people}, found, few, n_resamples=200).set_index("variant")
     assert table.loc["many", ["n_hands", "n_found"]].tolist() == [24, 10]
     assert table.loc["many", "share"] == pytest.approx(10 / 24)
     assert table.loc["many", "ratio"] == pytest.approx(2.5)
     assert table.loc["few", ["ratio", "ratio_low", "ratio_high"]].tolist() == [1, 1, 1]
     low, high = table.loc["many", ["ratio_low", "ratio_high"]]
     assert 1 < low < 2.5 < high
-    assert table.loc["many", "AP"] == evaluate(people, found["basic", "many"], "hand").AP
+    ap = [evaluate(people, found["basic", variant], "hand").AP for variant in ("few", "many")]
+    assert table["AP"].tolist() == ap
+    assert np.isnan(table.loc["few", "step"]) and table.loc["many", "step"] == pytest.approx(ap[1] - ap[0])
+    low, high = table.loc["many", ["step_low", "step_high"]]
+    assert low < ap[1] - ap[0] < high
 
 
 def test_against_a_baseline_that_finds_nothing_there_is_no_ratio():
     people = make_annotations(POINTS, range(N))
     found = {("basic", "none"): {}, ("basic", "many"): detections(range(8))}
-    table = compare_hands({"basic": people}, found, "none", n_resamples=20)
+    table = compare_hands({"basic": people}, found, {("basic", "none"): {}}, n_resamples=20)
     assert table["ratio"].isna().all() and table["share"].tolist() == [0, pytest.approx(8 / 24)]
 
 
-def test_the_last_ingredient_is_the_combination_as_it_is():
-    assert list(INGREDIENTS.values())[-1] == {}
+def test_steps_change_one_thing_at_a_time_and_end_at_the_default():
+    """The first is the plain form: MediaPipe's own thresholds, and nothing of the rules."""
+    steps = [made(options) for options in INGREDIENTS.values()]
+    assert steps[0]["looks"] == ["image"] and not steps[0]["arbitrate"]
+    assert steps[0]["hands"] == make_detector("mediapipe-hands").settings | {"name": "mediapipe-hands"}
+    for before, after in pairwise(steps):
+        changed = {key for key in before if before[key] != after[key]}
+        assert len(changed) == 1, changed
+    assert steps[-1] == made({})
+
+
+def test_no_threshold_was_chosen_on_what_a_notebook_evaluates():
+    table = thresholds().set_index("threshold")
+    rules = {*made({})["squares"], *made({})["rule"]}
+    assert set(table.index) == rules | {"hands_num_hands", "hands_min_score", "min_side_px"}
+    seeds = {int(seed) for chosen in table["chosen"] for seed in re.findall(r"seed (\d+)", chosen)}
+    evaluated = {notebook.defaults.get("seed") for notebook in read_notebooks(CHECKOUT / "notebooks")}
+    assert seeds and 0 in evaluated and not seeds & evaluated
+
+
+def made(options: dict) -> dict:
+    return make_detector("combined:mediapipe-pose+mediapipe-hands", **options).settings
 
 
 def test_a_hand_is_found_above_one_half(monkeypatch):
@@ -76,5 +107,6 @@ def test_a_hand_is_found_above_one_half(monkeypatch):
     halves = {"image_id": range(N), "annotation_id": range(1, N + 1), "side": "left"}
     for oks, found in ((0.5, 0), (np.nextafter(0.5, 1), N)):
         monkeypatch.setattr(hands, "hand_oks", lambda *_, oks=oks: pd.DataFrame(halves | {"oks": oks}))
-        table = compare_hands({"basic": people}, {("basic", "d"): detections(range(4))}, "d", n_resamples=5)
+        some = {("basic", "d"): detections(range(4))}
+        table = compare_hands({"basic": people}, some, some, n_resamples=5)
         assert table["n_found"].tolist() == [found] and table["n_hands"].tolist() == [N]

@@ -7,21 +7,23 @@ from hicp_lib.evaluation.calibration.curves import calibration_study
 from hicp_lib.study.plots import combination
 
 
-def test_ingredients_show_every_variant_on_every_subset():
+def test_steps_are_drawn_for_every_body_and_subset():
     rows = [
-        (subset, variant, 0.3, 0.2, 0.4, 0.5, 0.4, 0.6)
+        (body, subset, variant, 0.3 + 0.1 * (body == "mine"), 0.2, 0.4, step, -0.1, 0.2, 0.5, 0.4, 0.6)
+        for body in ("theirs", "mine")
         for subset in ("basic", "headless")
-        for variant in ("whole image", "wrist squares")
+        for variant, step in (("plain", np.nan), ("+ squares", 0.1))
     ]
     ends = ("", "_low", "_high")
-    columns = ["subset", "variant", *(f"{name}{end}" for name in ("AP", "share") for end in ends)]
+    columns = ["body", "subset", "variant", *(f"{m}{end}" for m in ("AP", "step", "share") for end in ends)]
     table = pd.DataFrame(rows, columns=columns)
     figure = combination.ingredients(table, "made up")
-    assert [label.get_text() for label in figure.figure.axes[0].get_yticklabels()] == [
-        "whole image",
-        "wrist squares",
-    ]
-    assert "wrist squares 0.30 on headless" in figure.alt and "made up" in figure.caption
+    axes = np.reshape(figure.figure.axes, (2, 3))
+    assert [label.get_text() for label in axes[0, 0].get_yticklabels()] == ["plain", "+ squares"]
+    assert [axis.get_title(loc="left") for axis in axes[:, 0]] == ["bodies by theirs", "bodies by mine"]
+    dots = [np.array(line.get_xdata(), float) for line in axes[1, 0].lines if line.get_marker() == "o"]
+    np.testing.assert_allclose(dots, np.full((2, 2), 0.4))
+    assert "mine, + squares: 0.40 on headless" in figure.alt and "made up" in figure.caption
     assert figure.table is table
 
 
