@@ -3,7 +3,8 @@
 `combined:BODY+HANDS` looks for hands where the body says they are, and everywhere else:
 
 1. the body detector runs once;
-2. the hand model looks at a square around each forearm's end (`hand_squares`), enlarged when small;
+2. the hand model looks at a square around each forearm's end (`hand_squares`), enlarged when small, and
+   at its mirror image: its errors there are others;
 3. it looks at the whole image and, when that is oblong, at overlapping squares along it: a hand model
    is shown a square, and a long image makes small hands in it. These looks find the hands of bodies
    that were not found or whose arms are wrong, and every further sighting steadies a hand's points;
@@ -33,7 +34,7 @@ from hicp_lib.detectors.combined.arbitration import (
 )
 from hicp_lib.detectors.combined.hand_squares import Arms, Square, SquareRule, hand_squares, squares_along
 
-LOOKS = ("wrists", "image", "along")
+LOOKS = ("wrists", "mirrored", "image", "along")
 
 
 class Combined:
@@ -44,8 +45,8 @@ class Combined:
     body, hands : Detector
         Ready detectors; `hands` gives hand points in the Halpe layout.
     looks : str
-        Where hands are looked for, joined by +: "wrists" (a square at each forearm's end), "image" (the
-        whole of it), "along" (squares along an oblong image).
+        Where hands are looked for, joined by +: "wrists" (a square at each forearm's end), "mirrored" (that
+        square mirrored), "image" (the whole of it), "along" (squares along an oblong image).
     arbitrate : bool
         Apply the rules of `arbitration`; if not, a wrist takes the surest hand of its own squares, and
         further hands go to the nearest free wrist.
@@ -60,7 +61,7 @@ class Combined:
         self,
         body: Detector,
         hands: Detector,
-        looks: str = "wrists+image+along",
+        looks: str = "wrists+mirrored+image+along",
         arbitrate: bool = True,
         agreement: bool = True,
         min_side_px: int = 320,
@@ -115,15 +116,23 @@ class Combined:
         return give_hands(bodies, hands, chosen).concatenate(without_body(hands.take(rest)))
 
     def _at_wrists(self, image: np.ndarray, arms: Arms) -> list[tuple[int, int, Hands]]:
-        squares = hand_squares(arms, self._squares, image) if "wrists" in self._looks else []
-        return [(person, side, self._look(image, square)) for person, side, square in squares]
+        ways = [way == "mirrored" for way in ("wrists", "mirrored") if way in self._looks]
+        return [
+            (person, side, self._look(image, square, mirrored))
+            for person, side, square in hand_squares(arms, self._squares, image)
+            for mirrored in ways
+        ]
 
     def _elsewhere(self, image: np.ndarray) -> list[Hands]:
         whole = [Hands.of(self.parts["hands"].detect(image))] if "image" in self._looks else []
         squares = squares_along(image) if "along" in self._looks else []
         return whole + [self._look(image, square) for square in squares]
 
-    def _look(self, image: np.ndarray, square: Square) -> Hands:
-        hands = Hands.of(self.parts["hands"].detect(square.cut(image, self._min_side_px)))
-        positions_px = square.to_image_px(hands.keypoints_px, self._min_side_px)
-        return Hands(positions_px, hands.scores, hands.sides)
+    def _look(self, image: np.ndarray, square: Square, mirrored: bool = False) -> Hands:
+        pixels = square.cut(image, self._min_side_px)
+        shown = np.ascontiguousarray(pixels[:, ::-1]) if mirrored else pixels
+        hands = Hands.of(self.parts["hands"].detect(shown))
+        positions_px, sides = hands.keypoints_px, hands.sides
+        if mirrored:
+            positions_px, sides = (len(pixels) - 1, 0) + positions_px * (-1, 1), 1 - sides
+        return Hands(square.to_image_px(positions_px, self._min_side_px), hands.scores, sides)

@@ -174,7 +174,7 @@ def evaluate(
     )
 
 
-def _defaults(group: str) -> dict[str, str]:
+def _defaults(group: str) -> dict[str, Any]:
     return {"score": "group"} if group == "hand" else {}
 
 

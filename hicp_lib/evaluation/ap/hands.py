@@ -36,7 +36,7 @@ _STEPS: dict[str, dict] = {
     "+ low thresholds": {"hands_num_hands": 4, "hands_min_score": 0.2},
     "+ square at each wrist": {"looks": "image+wrists"},
     "+ upscaling": {"min_side_px": 320},
-    "+ several looks": {"looks": "image+wrists+along"},
+    "+ several looks": {"looks": "image+wrists+mirrored+along"},
     "+ arbitration": {"arbitrate": True},
     "+ scores by agreement": {"agreement": True},
 }  # fmt: skip
@@ -131,7 +131,11 @@ def compare_hands(
 
 
 def _rows(
-    people: Annotations, runs: Found, baseline: Mapping, n_resamples: int, seed: int
+    people: Annotations,
+    runs: Mapping[str, Mapping[int, Detections]],
+    baseline: Mapping,
+    n_resamples: int,
+    seed: int,
 ) -> Iterator[tuple]:
     clusters = source_images(people)
     evaluations = [evaluate(people, run, "hand") for run in runs.values()]

@@ -8,6 +8,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 from hicp_lib.detectors.combined.arbitration import ArbitrationRule
 from hicp_lib.detectors.combined.detector import Combined
+from hicp_lib.detectors.combined.hand_squares import Square
 from hicp_lib.detectors.registry import make_detector
 
 SIDES = (LEFT_HAND, RIGHT_HAND)
@@ -92,10 +93,20 @@ def test_the_points_of_a_hand_are_back_in_the_image_to_a_millionth_of_a_pixel():
     np.testing.assert_allclose(found.keypoints_px[0, RIGHT_HAND], SHAPE + RIGHT_ROOT, atol=1e-6)
 
 
-@pytest.mark.parametrize("looks", ["wrists", "image", "wrists+image"])
+@pytest.mark.parametrize("looks", ["wrists", "mirrored", "image", "wrists+image"])
 def test_each_way_of_looking_finds_the_hands_of_a_good_body(looks):
     found = combine(body(ARMS), looks=looks).detect(image_with(LEFT_ROOT, RIGHT_ROOT))
     assert roots(found) == [LEFT_ROOT, RIGHT_ROOT]
+
+
+def test_a_mirrored_look_has_the_points_where_they_are_and_the_other_side():
+    detector, square = combine(body(ARMS)), Square(280, 200, 50)
+    plain, mirrored = (
+        detector._look(image_with(LEFT_ROOT, left=[0]), square, way) for way in (False, True)
+    )  # the fake calls the hand left, whichever way it is shown
+    np.testing.assert_allclose(mirrored.keypoints_px[0, 0], plain.keypoints_px[0, 0])
+    np.testing.assert_allclose(mirrored.keypoints_px[0, 0], LEFT_ROOT)
+    assert (plain.sides.tolist(), mirrored.sides.tolist()) == ([0], [1])
 
 
 def test_the_body_detector_runs_once():
