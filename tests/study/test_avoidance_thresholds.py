@@ -109,7 +109,7 @@ def test_a_keypoint_is_sure_above_the_threshold():
 def test_twice_the_distance_is_enough_and_the_reason_names_shares_and_times():
     table = pd.DataFrame(
         {
-            "script": "a",
+            "script": "sitting, hand",
             "detector": [NO_AVOIDANCE, "twice", "less", "lost"],
             "min_distance_m": [0.05, 0.1, 0.0999, 0.06],
             "seen_share": [np.nan, 1.0, 0.9, 0.25],

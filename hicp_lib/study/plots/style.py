@@ -1,6 +1,7 @@
 """One style for all figures, what a figure carries, and its numbers in words."""
 
 import functools
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -99,8 +100,10 @@ def in_lines(name: str) -> str:
     --------
     >>> in_lines("combined:mmpose+mediapipe-hands")
     'combined:mmpose\\n+mediapipe-hands'
+    >>> in_lines("+ squares")
+    '+ squares'
     """
-    return name.replace("+", "\n+")
+    return re.sub(r"(?<=\w)\+", "\n+", name)
 
 
 def series_text(values: pd.Series, pattern: str = "{} {:.2f}") -> str:

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.detectors.registry import DETECTORS, Entry
+from hicp_lib.detectors.registry import DETECTORS, Entry, Facts
 
 
 class Slow:
@@ -46,4 +46,6 @@ class Slow:
         )
 
 
-ENTRY = DETECTORS["slow"] = Entry("slow", "Slow", ("body",), __name__, "Slow")
+ENTRY = DETECTORS["slow"] = Entry(
+    "slow", "Slow", ("body",), __name__, "Slow", Facts("top-down", "one", "nothing", "any")
+)
