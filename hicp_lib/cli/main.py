@@ -145,7 +145,8 @@ def detect(
     if workers and dask:
         raise click.UsageError("Give either --workers N or --dask ADDRESS.", click.get_current_context())
     needs_model = detector in DETECTORS and DETECTORS[detector].needs_model
-    facts = describe(make_detector(detector, **given(**chosen))) if needs_model else []
+    # Held until the end: the runs share the network it has open.
+    made = make_detector(detector, **given(**chosen)) if needs_model else None
     if dataset_dir is not None:
         found = detect_dataset(detector, dataset_dir, workers=workers, dask=dask, **given(**chosen))
     elif images_dir is not None:
@@ -156,7 +157,8 @@ def detect(
         write_json(out.with_suffix(".images.json"), names, indent=1)
     write_detections(out, found)
     click.echo(f"{out}: {sum(len(people) for people in found.values())} people in {len(found)} images")
-    tell_assumed(facts)
+    if made is not None:
+        tell_assumed(describe(made))
 
 
 def _numbered_images(folder: Path) -> dict[int, Path]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import open3d
 
+from hicp_lib.core.detections import Detector
 from hicp_lib.simulation.body.model import REGIONS, load_body, pose_body
 from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at, pixel_rays, project_world
 
@@ -38,6 +39,17 @@ def render_person(seed: int, distance_m: float = 2.2) -> tuple[np.ndarray, np.nd
     eye = target + (distance_m, rng.uniform(-0.4, 0.4), rng.uniform(-0.2, 0.2))
     camera = PlacedCamera(480, 480, 600.0, 600.0, 239.5, 239.5, look_at(eye, target))
     return _shade(body, posed, camera), project_world(camera, posed.keypoints_m)[0]
+
+
+def errors_px(detector: Detector, n: int = 4) -> np.ndarray:
+    """How far off (n, 13) the upper bodies of n people are placed, by the surest person found of each."""
+    errors = []
+    for seed in range(n):
+        image, truth_px = render_person(seed)
+        found = detector.detect(image)
+        best = np.argmax(found.person_scores)
+        errors.append(np.linalg.norm(found.keypoints_px[best, :13] - truth_px[:13], axis=1))
+    return np.array(errors)
 
 
 def _shade(body, posed, camera: PlacedCamera) -> np.ndarray:

@@ -31,7 +31,7 @@ class MoveNetMultiPose:
 
     def __init__(self, min_person_score: float = 0.1, provider: str = "cpu", threads: int = 1) -> None:
         self._model = open_committed(f"{self.name}.onnx", provider, threads)
-        self._side_px, self._min_person_score = self._model.inputs[0].shape[-1] or 0, min_person_score
+        self._side_px, self._min_person_score = self._model.side_px, min_person_score
         self.settings = {"min_person_score": min_person_score, "opencv": cv2.__version__}
         self.settings["model"] = self._model.settings
 

@@ -48,7 +48,7 @@ class MoveNetThunder:
         threads: int = 1,
     ) -> None:
         self._model = open_committed(f"{self.name}.onnx", provider, threads)
-        self._side_px = self._model.inputs[0].shape[-1] or 0
+        self._side_px = self._model.side_px
         thresholds = {"min_score": person_min_score, "max_overlap": person_max_overlap}
         self._boxes = BoxSource(boxes, person_model, provider, threads, **thresholds)
         self._padding = padding

@@ -5,6 +5,11 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+IMAGENET_RGB = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)
+"""Mean and deviation of ImageNet's red, green and blue, 0-255."""
+IMAGENET_BGR = IMAGENET_RGB[0][::-1], IMAGENET_RGB[1][::-1]
+"""The same of blue, green and red."""
+
 
 @dataclass(frozen=True)
 class Letterbox:

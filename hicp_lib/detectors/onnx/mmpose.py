@@ -11,6 +11,7 @@ from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.box_source import BoxSource
 from hicp_lib.detectors.onnx.decode import decode_dark, decode_dark_udp, decode_quarter
 from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.letterbox import IMAGENET_RGB
 from hicp_lib.detectors.onnx.pose_net import PoseNet
 from hicp_lib.detectors.onnx.pose_nms import oks_nms
 from hicp_lib.detectors.onnx.session import OnnxModel, open_model
@@ -20,8 +21,6 @@ _RTMW_OPERATOR, _RTMW_SCALE = "DepthToSpace", 10.0
 # Vision transformers (ViTPose, Sapiens) first cut the crop into patches, and all were trained with UDP;
 # convolutional networks (HRNet, CSPNeXt) look the same with and without.
 _MIN_PATCH_PX = 14
-# Of ImageNet's R, G and B values.
-_MEAN, _STD = (123.675, 116.28, 103.53), (58.395, 57.12, 57.375)
 # Keypoints whose network score is above this count in a person's score.
 _MIN_COUNTED_SCORE = 0.2
 
@@ -77,7 +76,7 @@ class MMPose:
         threads: int = 1,
     ) -> None:
         opened, self._dark = open_model(model, provider, threads), dark
-        self._net = PoseNet(opened, _MEAN, _STD, flip_test, input_size_px)
+        self._net = PoseNet(opened, *IMAGENET_RGB, flip_test, input_size_px)
         self._udp, self._udp_from = _told_udp(opened, self._net.is_simcc, udp)
         if self._udp and (self._net.is_simcc or not dark):
             raise opened.refusal("UDP is for heat maps decoded by DARK; leave out udp, or dark false")

@@ -6,16 +6,15 @@ is 0, 1, ... or 10 strides away (Li et al., "Generalized focal loss", NeurIPS 20
 its file.
 """
 
-import cv2
 import numpy as np
 
 from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.letterbox import planes
+from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, planes
+from hicp_lib.detectors.onnx.person_boxes import unsuppressed
 from hicp_lib.detectors.onnx.session import open_committed
 
 FILE = "nanodet.onnx"
-_MEAN, _STD = (103.53, 116.28, 123.675), (57.375, 57.12, 58.395)
 _STRIDES_PX = (8, 16, 32)
 _PERSON, _N_BINS = 0, 11
 
@@ -39,7 +38,7 @@ class NanoDet:
         self, min_score: float = 0.3, max_overlap: float = 0.6, provider: str = "cpu", threads: int = 1
     ) -> None:
         self._model = open_committed(FILE, provider, threads)
-        self._side_px = self._model.inputs[0].shape[-1] or 0
+        self._side_px = self._model.side_px
         self._min_score, self._max_overlap = min_score, max_overlap
         self.settings = {"min_score": min_score, "max_overlap": max_overlap} | self._model.settings
 
@@ -48,14 +47,15 @@ class NanoDet:
         size_px = self._side_px, self._side_px
         whole = Regions.whole(image, size_px)
         feed = np.empty((1, 3, *size_px), np.float32)
-        planes(whole.crop(image, size_px)[0][..., ::-1], _MEAN, _STD, out=feed[0])
-        corners_px, scores = self._read(self._model.run(feed))
-        ends_px = whole.to_image_px(corners_px.reshape(1, -1, 2), size_px)[0].reshape(-1, 2, 2)
-        ends_px = ends_px.clip(0, image.shape[1::-1])
-        boxes_px = np.concatenate([ends_px[:, 0], ends_px[:, 1] - ends_px[:, 0]], axis=1)
-        kept = cv2.dnn.NMSBoxes(boxes_px.tolist(), scores.tolist(), self._min_score, self._max_overlap)
-        rows = [row for row in np.asarray(kept, int).reshape(-1).tolist() if (boxes_px[row, 2:] > 0).all()]
-        return boxes_px[rows], scores[rows]
+        planes(whole.crop(image, size_px)[0][..., ::-1], *IMAGENET_BGR, out=feed[0])
+        corners, scores = self._read(self._model.run_named(feed))
+        ends_px = whole.to_image_px(corners.reshape(1, -1, 2), size_px)[0].clip(0, image.shape[1::-1])
+        corners_px = ends_px.reshape(-1, 4)
+        is_box = (corners_px[:, 2:] > corners_px[:, :2]).all(axis=1)
+        corners_px, scores = corners_px[is_box], scores[is_box]
+        rest = unsuppressed(corners_px, scores, self._max_overlap)
+        corners_px, scores = corners_px[rest], scores[rest]
+        return np.concatenate([corners_px[:, :2], corners_px[:, 2:] - corners_px[:, :2]], axis=1), scores
 
     def describe(self) -> list[Fact]:
         """What it is, and what it keeps."""
@@ -66,14 +66,13 @@ class NanoDet:
             ),
         ]
 
-    def _read(self, outputs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def _read(self, outputs: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Corners (n, 2, 2: left-top, right-bottom; x, y) and scores (n,), in input pixels."""
-        by_name = dict(zip((port.name for port in self._model.outputs), outputs, strict=True))
         corners, scores = [], []
         for stride_px in _STRIDES_PX:
-            of_people = by_name[f"scores_{stride_px}"][0, :, _PERSON]
+            of_people = outputs[f"scores_{stride_px}"][0, :, _PERSON]
             cells = np.flatnonzero(of_people >= self._min_score)
-            bins = by_name[f"sides_{stride_px}"][0][cells].astype(float).reshape(-1, 4, _N_BINS)
+            bins = outputs[f"sides_{stride_px}"][0][cells].astype(float).reshape(-1, 4, _N_BINS)
             likely = np.exp(bins - bins.max(axis=-1, keepdims=True))
             sides_px = stride_px * (likely @ np.arange(_N_BINS)) / likely.sum(axis=-1)
             columns = self._side_px // stride_px

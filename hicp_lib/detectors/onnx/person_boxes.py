@@ -14,13 +14,13 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.letterbox import letterbox, planes
+from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, letterbox, planes
 from hicp_lib.detectors.onnx.session import open_model
 
 _FILL = (114, 114, 114)
 _NORMALISATIONS = {
     "yolox": ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),
-    "rtmdet": ((103.53, 116.28, 123.675), (57.375, 57.12, 58.395)),
+    "rtmdet": IMAGENET_BGR,
 }
 _STRIDES = (8, 16, 32)
 _PERSON = 0

@@ -91,6 +91,20 @@ class OnnxModel:
             raise self.refusal("expected an input of one image, (1, 3, h, w)")
         return shape[2], shape[3]
 
+    @property
+    def side_px(self) -> int:
+        """Side of the one image it takes, a square of a fixed size.
+
+        Raises
+        ------
+        InputError
+            If it takes something else.
+        """
+        height, width = self.image_size_px
+        if height is None or height != width:
+            raise self.refusal("expected an input of one square image of a fixed size")
+        return height
+
     def refusal(self, why: str, outputs: list[np.ndarray] | None = None) -> InputError:
         """What to raise for a network that is not the one wanted: what was found, why not, what is known.
 
@@ -133,6 +147,10 @@ class OnnxModel:
                 f"({one_line(error)}); export it again for this input"
             ) from None
         return [np.asarray(output) for output in outputs]
+
+    def run_named(self, pixels: np.ndarray) -> dict[str, np.ndarray]:
+        """As `run`, the outputs by their names."""
+        return dict(zip((port.name for port in self.outputs), self.run(pixels), strict=True))
 
     def response_to_zeros(self, *size_px: int) -> list[np.ndarray]:
         """The outputs for an input of zeros: their shapes, and what the network says of nobody.

@@ -35,7 +35,7 @@ class PoseNetMobileNet:
         self, max_people: int = 5, min_root_score: float = 0.5, provider: str = "cpu", threads: int = 1
     ) -> None:
         self._model = open_committed(f"{self.name}.onnx", provider, threads)
-        self._side_px = self._model.inputs[0].shape[-1] or 0
+        self._side_px = self._model.side_px
         self._rule = DecodingRule(max_people, min_root_score)
         self.settings = {**asdict(self._rule), "opencv": cv2.__version__, "model": self._model.settings}
 
@@ -51,7 +51,7 @@ class PoseNetMobileNet:
     def maps(self, square: np.ndarray) -> Maps:
         """Run the network on an RGB square of its input's side."""
         blob = cv2.dnn.blobFromImage(square, 1 / 127.5, mean=(127.5, 127.5, 127.5))
-        outputs = dict(zip((port.name for port in self._model.outputs), self._model.run(blob), strict=True))
+        outputs = self._model.run_named(blob)
         # Of each vector all y come first, then all x.
         to_child, to_parent, offsets = (
             np.moveaxis(outputs[name].reshape(2, -1, *outputs[name].shape[2:])[::-1], 0, -1)

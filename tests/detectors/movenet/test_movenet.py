@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hicp_lib.detectors.registry import make_detector
-from tests.detectors.plain_people import render_person
+from tests.detectors.plain_people import errors_px, render_person
 
 NAMES = ("movenet-thunder", "movenet-lightning", "movenet-multipose")
 
@@ -16,14 +16,9 @@ def box_around(points_px: np.ndarray) -> list[float]:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_rendered_people_are_found_to_a_few_pixels(name):
-    detector, errors = make_detector(name), []
-    for seed in range(4):
-        image, truth_px = render_person(seed)
-        found = detector.detect(image)
-        best = np.argmax(found.person_scores)
-        errors.append(np.linalg.norm(found.keypoints_px[best, :13] - truth_px[:13], axis=1))
+    errors = errors_px(make_detector(name))
     assert np.median(errors) < 8
-    assert np.max(np.array(errors)[:, [5, 6]]) < 40, "left and right shoulder are 90 px apart"
+    assert np.max(errors[:, [5, 6]]) < 40, "left and right shoulder are 90 px apart"
 
 
 @pytest.mark.parametrize("name", NAMES)

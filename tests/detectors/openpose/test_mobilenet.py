@@ -17,20 +17,14 @@ from hicp_lib.core.keypoints import COCO_17, INDEX
 from hicp_lib.detectors.openpose import mobilenet
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.weights import default
-from tests.detectors.plain_people import render_person
+from tests.detectors.plain_people import errors_px, render_person
 
 
 def test_rendered_people_are_found_to_a_few_pixels():
-    detector = make_detector("openpose-mobilenet")
-    errors = []
-    for seed in range(4):
-        image, truth_px = render_person(seed)
-        found = detector.detect(image)
-        best = np.argmax(found.person_scores)
-        errors.append(np.linalg.norm(found.keypoints_px[best, :13] - truth_px[:13], axis=1))
+    errors = errors_px(make_detector("openpose-mobilenet"))
     assert np.isfinite(errors).mean() > 0.8
     assert np.nanmedian(errors) < 8
-    shoulders = np.array(errors)[:, [5, 6]]
+    shoulders = errors[:, [5, 6]]
     assert np.nanmax(shoulders) < 40, "left and right shoulder are 90 px apart"
 
 

@@ -3,18 +3,13 @@
 import numpy as np
 
 from hicp_lib.detectors.registry import make_detector
-from tests.detectors.plain_people import render_person
+from tests.detectors.plain_people import errors_px, render_person
 
 
 def test_rendered_people_are_found_to_a_few_pixels():
-    detector, errors = make_detector("posenet"), []
-    for seed in range(4):
-        image, truth_px = render_person(seed)
-        found = detector.detect(image)
-        best = np.argmax(found.person_scores)
-        errors.append(np.linalg.norm(found.keypoints_px[best, :13] - truth_px[:13], axis=1))
+    errors = errors_px(make_detector("posenet"))
     assert np.median(errors) < 8
-    assert np.max(np.array(errors)[:, [5, 6]]) < 40, "left and right shoulder are 90 px apart"
+    assert np.max(errors[:, [5, 6]]) < 40, "left and right shoulder are 90 px apart"
 
 
 def test_two_people_are_two_people():
