@@ -153,7 +153,7 @@ def _with_class(verdict: Verdict, results: Path) -> Verdict:
     if not claim.class_tests:
         return verdict
     of_class = _judge_claim(replace(claim, tests=claim.class_tests), results)
-    said = of_class.ours or of_class.reason
+    said = ": ".join(text for text in (of_class.reason, of_class.ours) if text)
     return replace(verdict, of_class=f"{claim.class_statement} {of_class.verdict.capitalize()}: {said}")
 
 

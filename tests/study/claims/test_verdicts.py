@@ -132,6 +132,12 @@ def test_a_class_statement_has_its_own_verdict(write):
     results = write(rows(mmpose=(-0.4, -0.5, -0.3), mediapipe=(0.2, 0.1, 0.3)))
     found = verdict(claim(NAMED, class_tests=(CLASS,), class_statement="Every one."), results)
     assert found.verdict == v.REPRODUCED and found.of_class.startswith("Every one. Not reproduced: ")
+    left_open = verdict(
+        claim(NAMED, class_tests=(CLASS,), class_statement="Every one."),
+        write(rows(mediapipe=(0.0, -0.1, 0.1))),
+    )
+    assert left_open.of_class.startswith("Every one. Not testable here: the 95 % intervals leave it open")
+    assert left_open.of_class.endswith(": mediapipe 0 [-0.1, 0.1]")
     nobody = verdict(
         claim(NAMED, class_tests=(CLASS,), class_statement="Every one."), write(rows(posenet=(1, 1, 1)))
     )
