@@ -4,7 +4,7 @@
 
 1. the body detector runs once;
 2. the hand model looks at a square around each forearm's end (`hand_squares`), enlarged when small, and
-   at its mirror image: its errors there are others;
+   if asked to at its mirror image: its errors there are others;
 3. it looks at the whole image and, when that is oblong, at overlapping squares along it: a hand model
    is shown a square, and a long image makes small hands in it. These looks find the hands of bodies
    that were not found or whose arms are wrong, and every further sighting steadies a hand's points;
@@ -61,7 +61,7 @@ class Combined:
         self,
         body: Detector,
         hands: Detector,
-        looks: str = "wrists+mirrored+image+along",
+        looks: str = "wrists+image+along",
         arbitrate: bool = True,
         agreement: bool = True,
         min_side_px: int = 320,

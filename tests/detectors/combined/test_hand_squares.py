@@ -7,7 +7,14 @@ from hypothesis import strategies as st
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import N_KEYPOINTS
-from hicp_lib.detectors.combined.hand_squares import Arms, Square, SquareRule, hand_squares, squares_along
+from hicp_lib.detectors.combined.hand_squares import (
+    MIN_OBLONG,
+    Arms,
+    Square,
+    SquareRule,
+    hand_squares,
+    squares_along,
+)
 
 IMAGE = np.zeros((300, 400, 3), np.uint8)
 
@@ -88,10 +95,10 @@ def test_the_border_of_the_square_is_the_border_of_its_pixels():
     np.testing.assert_allclose(corners, [[9.5, 19.5], [59.5, 69.5]])
 
 
-@pytest.mark.parametrize("height, width", [(400, 100), (100, 400), (301, 250), (100, 110)])
+@pytest.mark.parametrize("height, width", [(400, 100), (100, 400), (302, 200), (100, 140)])
 def test_squares_along_an_image_cover_it_and_overlap(height, width):
     squares = squares_along(np.zeros((height, width, 3), np.uint8))
-    if max(height, width) < 1.15 * min(height, width):
+    if max(height, width) < MIN_OBLONG * min(height, width):
         assert squares == []
         return
     starts = [max(square.left_px, square.top_px) for square in squares]
@@ -113,9 +120,9 @@ def test_a_wrist_at_the_least_score_counts_and_one_below_does_not():
     assert np.isfinite(found.wrists_px).all(axis=-1).tolist() == [[True, False]]
 
 
-def test_an_image_is_oblong_from_115_to_100_on():
-    assert squares_along(np.zeros((100, 114, 3))) == []
-    assert [square.left_px for square in squares_along(np.zeros((100, 115, 3)))] == [0, 15]
+def test_an_image_is_oblong_from_three_to_two_on():
+    assert squares_along(np.zeros((100, 149, 3))) == []
+    assert [square.left_px for square in squares_along(np.zeros((100, 150, 3)))] == [0, 50]
     assert [(s.left_px, s.top_px) for s in squares_along(np.zeros((250, 100, 3)))] == [
         (0, 0), (0, 50), (0, 100), (0, 150)
     ]  # fmt: skip

@@ -92,7 +92,7 @@ def test_steps_change_one_thing_at_a_time_and_end_at_the_default():
 def test_no_threshold_was_chosen_on_what_a_notebook_evaluates():
     table = thresholds().set_index("threshold")
     rules = {*made({})["squares"], *made({})["rule"]}
-    assert set(table.index) == rules | {"hands_num_hands", "hands_min_score", "min_side_px"}
+    assert set(table.index) == rules | {"hands_num_hands", "hands_min_score", "min_side_px", "looks"}
     seeds = {int(seed) for chosen in table["chosen"] for seed in re.findall(r"seed (\d+)", chosen)}
     evaluated = {notebook.defaults.get("seed") for notebook in read_notebooks(CHECKOUT / "notebooks")}
     assert seeds and 0 in evaluated and not seeds & evaluated
