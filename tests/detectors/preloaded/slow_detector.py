@@ -47,5 +47,5 @@ class Slow:
 
 
 ENTRY = DETECTORS["slow"] = Entry(
-    "slow", "Slow", ("body",), __name__, "Slow", Facts("top-down", "one", "nothing", "any")
+    "slow", "Slow", ("body",), __name__, "Slow", Facts("top-down", "one", "nothing", "none", "any")
 )
