@@ -90,6 +90,16 @@ def draw_detections(
     return draw_people(image, found.keypoints_px, found.scores, detector_colour(detector), min_score)
 
 
+def draw_rings(image: np.ndarray, places_px: np.ndarray, radius_px: int) -> np.ndarray:
+    """A copy of an image (height, width, 3) with white rings about places (n, 2); NaN for none."""
+    canvas = np.ascontiguousarray(image).copy()
+    for place_px in places_px[(np.abs(places_px) < _MAX_PX).all(axis=1)]:
+        centre_px = place_px.round().astype(int).tolist()
+        for colour, width_px in ((_RIM_COLOUR, 5), ((255, 255, 255), 2)):
+            cv2.circle(canvas, centre_px, radius_px, colour, width_px, cv2.LINE_AA)
+    return canvas
+
+
 def draw_truth(
     annotations: Annotations,
     images_dir: str | Path,

@@ -1,5 +1,6 @@
 """Figures of the relative 3D test: what the robot saw, median skeletons, stability, accuracy, causes."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -10,7 +11,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
-from hicp_lib.study.plots.people import draw_detections, picture_grid
+from hicp_lib.study.plots.people import detections_grid, draw_rings
 from hicp_lib.study.plots.skeleton import BODY_LIMBS, HAND_LIMBS, limb_lines
 from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
 
@@ -35,6 +36,7 @@ def camera_views(
     frames: Sequence[int],
     min_score: float,
     note: str,
+    markers: pd.DataFrame | None = None,
 ) -> Figure:
     """Some frames of every view, as each detector sees them.
 
@@ -50,23 +52,17 @@ def camera_views(
         Keypoints below it are not drawn.
     note : str
         What the data are, for the caption.
+    markers : pd.DataFrame, optional
+        What is ringed, columns `frame, u_px, v_px`, as from
+        `hicp_lib.evaluation.space.registration_error.marker_pixels`.
     """
-    rows = []
-    for k in frames:
-        cells = [(read_rgb(recordings[view], k), of[k], name) for (view, name), of in found.items()]
-        rows.append([draw_detections(*cell, min_score) for cell in cells])
-    seen = [
-        f"{detector} {sum(len(detections[frame]) > 0 for frame in frames)} ({view})"
-        for (view, detector), detections in found.items()
-    ]
-    return picture_grid(
-        rows,
-        row_titles=[f"image {frame}" for frame in frames],
-        titles=[f"{view}\n{detector}" for view, detector in found],
-        caption=f"Some images of every view, with keypoints of a score of at least {min_score}: {note}.",
-        alt=f"{len(frames)} images per view and detector; with somebody found: {in_words(seen)}.",
-        cell_in=min(3.2, 11 / len(found)),
-    )
+    pictures = {}
+    for k, (view, recording) in itertools.product(frames, recordings.items()):
+        ringed_px = [] if markers is None else markers.loc[markers["frame"] == k, ["u_px", "v_px"]]
+        image = draw_rings(read_rgb(recording, k), np.reshape(ringed_px, (-1, 2)), 7)
+        people = {detector: of[k] for (seen_from, detector), of in found.items() if seen_from == view}
+        pictures[f"{view}, image {k}"] = image, people
+    return detections_grid(pictures, min_score, f"Data: {note}.")
 
 
 @in_style

@@ -124,7 +124,7 @@ def test_causes_are_dots_with_the_tail_as_a_line():
     assert "depth sensor 0.4 and 5.0 cm and 2D detection 1.6 and 5.0 cm" in figure.alt
 
 
-def test_camera_views_have_a_row_per_frame_and_a_column_per_view_and_detector(monkeypatch):
+def test_camera_views_have_a_row_per_frame_and_view_and_a_column_per_detector(monkeypatch):
     monkeypatch.setattr(
         relative3d, "read_rgb", lambda recording, frame: np.full((30, 40, 3), frame, np.uint8)
     )
@@ -132,8 +132,15 @@ def test_camera_views_have_a_row_per_frame_and_a_column_per_view_and_detector(mo
     pixels[0, INDEX["left_wrist"]], scores[0, INDEX["left_wrist"]] = (20, 10), 0.9
     found, nobody = Detections(pixels, scores, np.ones(1)), Detections.none()
     people = {("upper", "mediapipe"): [found] * 3, ("lower", "mediapipe"): [nobody, nobody, found]}
-    figure = relative3d.camera_views({"upper": None, "lower": None}, people, [0, 2], 0.1, "made up")
+    people |= {(view, "posenet"): [nobody] * 3 for view in ("upper", "lower")}
+    recordings = {"upper": None, "lower": None}
+    figure = relative3d.camera_views(recordings, people, [0, 2], 0.1, "made up")
     images = [axis.images[0].get_array() for axis in figure.figure.axes]
-    assert [int(image[0, 0, 0]) for image in images] == [0, 0, 2, 2]
-    assert [bool((image != image[0, 0]).any()) for image in images] == [True, False, True, True]
-    assert "mediapipe 2 (upper) and mediapipe 1 (lower)" in figure.alt and "made up" in figure.caption
+    assert [int(image[0, 0, 0]) for image in images] == [0, 0, 0, 0, 2, 2, 2, 2]
+    drawn = [bool((image != image[0, 0]).any()) for image in images]
+    assert drawn == [True, False, False, False, True, False, True, False]
+    assert "mediapipe 3 and posenet 0" in figure.alt and "made up" in figure.caption
+    markers = pd.DataFrame({"frame": [2, 2, 0], "u_px": [20.0, np.nan, 20.0], "v_px": [15.0, np.nan, 900.0]})
+    figure = relative3d.camera_views(recordings, people, [0, 2], 0.1, "made up", markers)
+    first, *_, last = (axis.images[0].get_array() for axis in figure.figure.axes[1::2])
+    assert (first == 0).all() and last[15, 27].min() > 200 and (last[15, 20] == 2).all()
