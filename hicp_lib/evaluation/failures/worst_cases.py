@@ -5,11 +5,16 @@
 - *Overlooked*: people with the most visible keypoints whom no detection fits (an OKS of .1 is asked for; a
   body found with left and right exchanged throughout may not reach it).
 
+- *Lost close by* (`lost_points`): the keypoint that a detector is surest of among those that it places well
+  on a person with a head and not on the same person without, though it finds the person in both.
+
 Equal cases follow in the order of their ids; of each source image only the worst case counts.
 """
 
 import numpy as np
 import pandas as pd
+
+from hicp_lib.core.keypoints import NAMES
 
 WRONG = ("inversion", "swap", "miss")
 KINDS_OF_CASE = ("surest mistakes", "overlooked")
@@ -44,3 +49,27 @@ def worst_cases(errors: pd.DataFrame, n: int = 4) -> pd.DataFrame:
     place = table["rank"], *(table[name].map(orders[name].index) for name in ("case", "detector"))
     columns = ["detector", "case", "rank", "subset", "image_id", "badness"]
     return table.iloc[np.lexsort(place)].query("rank <= @n")[columns].reset_index(drop=True)
+
+
+def lost_points(errors: pd.DataFrame) -> pd.DataFrame:
+    """The keypoint that each detector loses close by, bodies only: a row with and one without the head.
+
+    Parameters
+    ----------
+    errors : DataFrame
+        `error_kinds.all_errors` with the subsets "basic" and "headless".
+
+    Returns
+    -------
+    DataFrame
+        Columns `detector, case` (what is lost), `subset, image_id, annotation_id, keypoint` (Halpe index).
+    """
+    body = errors[errors["group"] == "body"]
+    basic, headless = (body[body["subset"] == subset] for subset in ("basic", "headless"))
+    both = basic.merge(headless, on=["detector", "annotation_id", "keypoint"], suffixes=("", "_headless"))
+    is_lost = (both["kind"] == "good") & ~both["hit_headless"] & (both["kind_headless"] != "not found")
+    lost = both[is_lost].sort_values("score", ascending=False, kind="stable").drop_duplicates("detector")
+    lost["case"] = [f"loses the {NAMES[keypoint].replace('_', ' ')}" for keypoint in lost["keypoint"]]
+    close = lost.assign(subset="headless", image_id=lost["image_id_headless"])
+    columns = ["detector", "case", "subset", "image_id", "annotation_id", "keypoint"]
+    return pd.concat([lost.assign(subset="basic"), close], ignore_index=True)[columns]

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
@@ -13,11 +14,15 @@ from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.evaluation import GROUP_TITLES
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
-from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
+from hicp_lib.study.plots.people import draw_detections, draw_rings, draw_truth, picture_grid
 from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
 
 _TRUTH_COLOUR = "#39D353"
 _ONE_CROP = ["subset", "image_id", "annotation_id"]
+_WORST = (
+    "The worst cases, by rule: the surest mistakes, and people whom no detection fits although much of them "
+    "is visible"
+)
 _KIND_COLOURS = ("#1B9E4B", "#9BD3A0", "#0072B2", "#CC79A7", "#D5272D", "#BDBDBD", "#5F5F5F")
 _KIND_STYLES = {kind: {"color": colour} for kind, colour in zip(KINDS, _KIND_COLOURS, strict=True)}
 _STATE_STYLES = dict(zip(STATES, (("-", "o"), ("--", "s"), (":", "^"), (":", "x")), strict=True))
@@ -219,13 +224,14 @@ def gallery(
     truth: Mapping[str, Annotations],
     found: Mapping[tuple[str, str], Mapping[int, Detections]],
     note: str,
+    what: str = _WORST,
 ) -> Figure:
-    """The worst cases, a row for each detector and kind of case.
+    """Single cases, a row for each detector and kind of case.
 
     Parameters
     ----------
     cases : pd.DataFrame
-        As from `worst_cases`.
+        As from `worst_cases` or `lost_points`; a keypoint that is named is ringed where it truly is.
     folders : mapping of str to Path
         The subsets' dataset folders.
     truth : mapping of str to Annotations
@@ -234,21 +240,25 @@ def gallery(
         By subset and detector, then by image id.
     note : str
         What the data are, for the caption.
+    what : str, optional
+        What the cases are, for the caption.
     """
     rows, titles = [], []
     for (detector, case), part in cases.groupby(["detector", "case"], sort=False):
         pictures = []
-        for subset, image_id in part[["subset", "image_id"]].itertuples(index=False):
+        columns = part.columns.intersection([*_ONE_CROP, "keypoint"])
+        for subset, image_id, *point in part[columns].itertuples(index=False):
             people, images_dir = truth[subset], Path(folders[subset]) / "images"
             of_image = (people.image_ids == image_id) & ~people.is_crowd
             image = draw_truth(people, images_dir, image_id, of_image, _TRUTH_COLOUR, n_keypoints=26)
             found_in = found[subset, detector].get(image_id, Detections.none())
-            pictures.append(draw_detections(image, found_in, detector))
+            ringed_px = people.keypoints_px[people.ids == point[0], point[1]] if point else np.zeros((0, 2))
+            pictures.append(draw_rings(draw_detections(image, found_in, detector), ringed_px, 20))
         rows.append(pictures)
         titles.append(f"{in_lines(detector)}\n{case}")
     return picture_grid(
         rows, row_titles=titles, cell_in=2.3,
-        caption="The worst cases, by rule: the surest mistakes, and people whom no detection fits although "
-        f"much of them is visible. Green: the truth (bodies); the detector's colour: what it found. {note}.",
-        alt=f"Pictures of {len(cases)} cases with skeletons of truth and detection.",
+        caption=f"{what}. Green: the truth (bodies); the detector's colour: what it found. {note}.",
+        alt=f"Pictures of {len(cases)} cases with skeletons of truth and detection, in rows: "
+        f"{in_words(' '.join(title.split()) for title in titles)}.",
     )  # fmt: skip

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import INDEX
 from hicp_lib.evaluation.failures.error_kinds import all_errors
-from hicp_lib.evaluation.failures.worst_cases import worst_cases
+from hicp_lib.evaluation.failures.worst_cases import lost_points, worst_cases
 from tests.evaluation.made_people import POINTS, make_annotations, make_detections
 
 
@@ -30,3 +32,23 @@ def test_only_visible_keypoints_are_overlooked_and_an_image_counts_once():
     table = worst_cases(errors, n=4)
     assert table[["rank", "image_id", "badness"]].to_numpy().tolist() == [[1, 0, 17], [2, 2, 17]]
     assert worst_cases(errors, n=1)["image_id"].tolist() == [0]
+
+
+def test_the_point_that_is_lost_is_the_one_the_detector_was_surest_of():
+    wrist, knee = INDEX["left_wrist"], INDEX["left_knee"]
+    truth = {"basic": make_annotations(POINTS[None], [3]), "headless": make_annotations(POINTS[None], [4])}
+    moved, scores = POINTS.copy(), np.full((1, 136), 0.5)
+    moved[[wrist, knee]] += 5_000
+    scores[0, wrist] = 0.9
+    where = {"basic": POINTS, "headless": moved}
+    found = {
+        (subset, detector): {i: Detections(points[None], scores, np.ones(1))}
+        for (subset, points), i in zip(where.items(), (3, 4), strict=True)
+        for detector in ("loses", "overlooks")
+    }
+    found["headless", "overlooks"] = {}  # somebody who is not found has lost no point
+    table = lost_points(all_errors(truth, found))
+    assert table[["detector", "case", "subset", "image_id", "keypoint"]].to_numpy().tolist() == [
+        ["loses", "loses the left wrist", "basic", 3, wrist],
+        ["loses", "loses the left wrist", "headless", 4, wrist],
+    ]

@@ -5,9 +5,12 @@ import pandas as pd
 import pytest
 
 from hicp_lib.core.detections import Detections
+from hicp_lib.core.images import write_png
+from hicp_lib.core.keypoints import INDEX
 from hicp_lib.evaluation.failures.error_kinds import KINDS
 from hicp_lib.evaluation.space.flicker import flicker
 from hicp_lib.study.plots import doses, failures
+from tests.evaluation.made_people import make_annotations, make_detections
 
 DETECTORS = ("mediapipe", "openpose-mobilenet")
 
@@ -103,3 +106,22 @@ def test_flicker_says_the_delay_of_the_filter():
     lag = table[(table["measure"] == "latency [s]") & (table["tracks"] == "filtered")]["value"].iloc[0]
     assert f"{1000 * lag:.0f} ms" in figure.caption and lag > 0
     assert "mediapipe 0.000" in figure.alt
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_a_keypoint_that_is_named_is_ringed_in_every_picture(named, tmp_path):
+    points = np.stack(np.meshgrid(np.arange(12), np.arange(12)), axis=-1).reshape(-1, 2)[:136] * 25.0 + 30
+    subsets, wrist = ("basic", "headless"), INDEX["left_wrist"]
+    truth = {subset: make_annotations(points[None], [1]) for subset in subsets}
+    for subset in subsets:
+        write_png(tmp_path / subset / "images" / "1.png", np.zeros((340, 340, 3), np.uint8))
+    found = {(subset, "mediapipe"): {1: make_detections(points[None])} for subset in subsets}
+    cases = pd.DataFrame({"detector": "mediapipe", "case": "loses it", "subset": subsets, "image_id": 1})
+    if named:
+        cases = cases.assign(annotation_id=1, keypoint=wrist)
+    folders = {subset: tmp_path / subset for subset in subsets}
+    figure = failures.gallery(cases, folders, truth, found, "made up", "What is lost")
+    u, v = points[wrist].astype(int)
+    for axis in figure.figure.axes:
+        assert (axis.images[0].get_array()[v, u + 20].min() > 200) == named
+    assert "mediapipe loses it" in figure.alt and figure.caption.startswith("What is lost. Green")
