@@ -62,14 +62,16 @@ def lost_points(errors: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns `detector, case` (what is lost), `subset, image_id, annotation_id, keypoint` (Halpe index).
+        Columns `detector, case` (what is lost, and how), `subset, image_id, annotation_id, keypoint` (Halpe
+        index).
     """
     body = errors[errors["group"] == "body"]
     basic, headless = (body[body["subset"] == subset] for subset in ("basic", "headless"))
     both = basic.merge(headless, on=["detector", "annotation_id", "keypoint"], suffixes=("", "_headless"))
     is_lost = (both["kind"] == "good") & ~both["hit_headless"] & (both["kind_headless"] != "not found")
     lost = both[is_lost].sort_values("score", ascending=False, kind="stable").drop_duplicates("detector")
-    lost["case"] = [f"loses the {NAMES[keypoint].replace('_', ' ')}" for keypoint in lost["keypoint"]]
+    points = [NAMES[keypoint].replace("_", " ") for keypoint in lost["keypoint"]]
+    lost["case"] = [f"{point}: {kind}" for point, kind in zip(points, lost["kind_headless"], strict=True)]
     close = lost.assign(subset="headless", image_id=lost["image_id_headless"])
     columns = ["detector", "case", "subset", "image_id", "annotation_id", "keypoint"]
     return pd.concat([lost.assign(subset="basic"), close], ignore_index=True)[columns]
