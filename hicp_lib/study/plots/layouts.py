@@ -3,21 +3,14 @@
 import numpy as np
 import pandas as pd
 
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import read_json
 from hicp_lib.core.keypoints import BODY, COCO_17, FACE, HANDS, LEFT_HAND, LIMBS, TO_HALPE
 from hicp_lib.simulation.body.joints import pose_from_joints, radians
 from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.study.plots.marks import legend_below
 from hicp_lib.study.plots.style import Figure, in_style, new_figure, series_text
 
-_BOTH_HANDS = ("left_hand21", "right_hand21")
-# By who gives it, the conventions of `hicp_lib.core.keypoints.TO_HALPE` that it is made of.
-LAYOUTS = {
-    "Detectron2, MoveNet:\nCOCO": ("coco17",),
-    "OpenPose:\nBODY_25, hands, face": ("openpose_body25", *_BOTH_HANDS, "openpose_face70"),
-    "MMPose:\nCOCO-WholeBody": ("wholebody133",),
-    "AlphaPose:\nHalpe": ("halpe136",),
-    "MediaPipe:\nPose, Hands": ("mediapipe_pose33", *_BOTH_HANDS),
-}
 _PARTS = {
     "COCO's body": (COCO_17, "#0072B2", "o", 4.5),
     "more of the body, feet": (np.setdiff1d(BODY, COCO_17), "#D55E00", "s", 4),
@@ -33,8 +26,8 @@ def layouts() -> Figure:
     pose = pose_from_joints(radians(_ARMS_DEG, "left_") | radians(_ARMS_DEG, "right_"))
     points_m = pose_body(load_body(), "man_35_average", pose).keypoints_m[:, 1:]
     figure, axes = new_figure(2, 3, 6.4, 7.2)
-    rows = []
-    for axis, (name, conventions) in zip(axes.flat, LAYOUTS.items(), strict=False):
+    rows, made_of = [], read_json(DATA_DIR / "survey.json")["layouts"]
+    for axis, (name, conventions) in zip(axes.flat, made_of.items(), strict=False):
         given = np.concatenate([TO_HALPE[convention] for convention in conventions])
         rows.append((name.replace("\n", " "), len(given), int((given >= 0).sum())))
         _draw(axis, points_m, given, f"{name}, {len(given)}")

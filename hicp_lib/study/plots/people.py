@@ -91,7 +91,20 @@ def draw_detections(
 
 
 def draw_rings(image: np.ndarray, places_px: np.ndarray, radius_px: int) -> np.ndarray:
-    """A copy of an image (height, width, 3) with white rings about places (n, 2); NaN for none."""
+    """Draw white rings onto a copy of an image.
+
+    Parameters
+    ----------
+    image : array, shape (height, width, 3)
+        RGB, uint8.
+    places_px : array, shape (n, 2)
+        Their centres; NaN for none.
+    radius_px : int
+
+    Returns
+    -------
+    array, shape (height, width, 3)
+    """
     canvas = np.ascontiguousarray(image).copy()
     for place_px in places_px[(np.abs(places_px) < _MAX_PX).all(axis=1)]:
         centre_px = place_px.round().astype(int).tolist()
@@ -129,8 +142,8 @@ def draw_truth(
         RGB, uint8.
     """
     image = read_image(Path(images_dir) / annotations.images[image_id].file_name)
-    scores = visible_scores(annotations.visibility[rows]) * (np.arange(N_KEYPOINTS) < n_keypoints)
-    return draw_people(image, annotations.keypoints_px[rows], scores, colour)
+    shown = (annotations.visibility[rows] > 0) & (np.arange(N_KEYPOINTS) < n_keypoints)
+    return draw_people(image, annotations.keypoints_px[rows], shown.astype(float), colour)
 
 
 def _draw_person(canvas, points, shown, pen, width_px: float, rim_px: float) -> None:
@@ -229,19 +242,3 @@ def detections_grid(
         alt=f"Skeletons on {in_words(pictures)}; pictures with somebody found: {in_words(seen)}.",
         cell_in=min(3.2, 11 / columns),
     )
-
-
-def visible_scores(visibility: np.ndarray) -> np.ndarray:
-    """Annotated visibility flags as drawing scores: visible 1, occluded 0.5, not labelled 0.
-
-    Parameters
-    ----------
-    visibility : array, shape (n_persons, 136)
-        COCO's flags: 0, 1 or 2.
-
-    Returns
-    -------
-    array, shape (n_persons, 136)
-    """
-    flags = np.asarray(visibility, dtype=float).reshape(-1, N_KEYPOINTS)
-    return np.where(flags >= 2, 1.0, np.where(flags > 0, 0.5, 0.0))

@@ -8,12 +8,14 @@ import pandas as pd
 import pytest
 
 from hicp_lib.core.detections import Detections
+from hicp_lib.core.images import write_png
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.detectors.registry import DETECTORS, default_detector_names
 from hicp_lib.evaluation.ap.found_and_placed import found_and_placed
 from hicp_lib.study.plots import evaluation, people
 from hicp_lib.study.plots.palette import DETECTOR_STYLES, detector_colour
 from hicp_lib.study.plots.style import Figure, in_words
+from tests.evaluation.made_people import make_annotations
 
 METRICS = ("AP", "AP50", "AP75", "AR", "AR50", "AR75")
 
@@ -61,10 +63,15 @@ def test_drawing_leaves_the_image_and_survives_wild_points():
     assert not image.any()
 
 
-def test_flags_become_scores():
-    flags = np.zeros(136)
-    flags[:3] = [2, 1, 0.4]
-    assert people.visible_scores(flags)[0, :4].tolist() == [1.0, 0.5, 0.5, 0.0]
+@pytest.mark.parametrize(("flag", "is_drawn"), [(2, True), (1, True), (0.4, True), (0, False)])
+def test_what_is_labelled_is_drawn_hidden_or_not(flag, is_drawn, tmp_path):
+    write_png(tmp_path / "1.png", np.zeros((60, 60, 3), np.uint8))
+    points, flags = np.full((1, 136, 2), 30.0), np.zeros((1, 136))
+    flags[0, 5] = flag
+    truth = make_annotations(points, [1], visibility=flags)
+    drawn = people.draw_truth(truth, tmp_path, 1, truth.ids == 1, "white")
+    assert drawn.any() == is_drawn
+    assert not people.draw_truth(truth, tmp_path, 1, truth.ids == 1, "white", n_keypoints=5).any()
 
 
 @pytest.mark.parametrize("draw", [evaluation.precision_recall, evaluation.loss_without_head])
