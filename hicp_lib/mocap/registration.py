@@ -1,10 +1,12 @@
 """Where the motion capture's frame lies in the robot's base frame, from markers clicked in images.
 
-Three ways, from the same kind of clicks (`reprojection` has a fourth, without depth):
+From the same kind of clicks (`reprojection` has one more way, without depth):
 
 - `register_by_camera_marker`: eight markers in two images give the rotation by Arun's method; the
   translation is the one that puts the marker on the camera at the camera's optical centre (paper section
-  IV-C). It is as wrong as that marker is far from the centre.
+  IV-C). Where the rotation is found about the middle of the eight, an error of it swings the person around
+  the camera, a metre and more away. Where it is found about the camera, errors of depth, which lie along
+  the lines of sight, turn nothing. Either is as wrong as the camera's marker is far from the centre.
 - `register_selected`: rotation and translation by Arun's method from the same eight markers.
 - `register_robustly`: the same from the markers of all clicked images, those left out that do not agree
   with the others.
@@ -20,16 +22,16 @@ from hicp_lib.core.alignment import RigidFit, arun
 from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
-from hicp_lib.core.keypoints import N_KEYPOINTS
-from hicp_lib.lifting.paper import lift
+from hicp_lib.lifting.paper import BODY_RADIUS_M
+from hicp_lib.lifting.table import lift_pixels
 from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.qualisys import MotionCapture
-from hicp_lib.recordings.recording import Recording, read_depth_m
+from hicp_lib.recordings.recording import Recording
 
 CAMERA_MARKER = "camera"
 REGISTRATION_FILE = "registration.json"
 N_PAPER_MARKERS, N_PAPER_IMAGES = 8, 2
-_SEEN, _MEASURED = ["x_m", "y_m", "z_m"], ["mocap_x_m", "mocap_y_m", "mocap_z_m"]
+SEEN, MEASURED = ["x_m", "y_m", "z_m"], ["mocap_x_m", "mocap_y_m", "mocap_z_m"]
 _OUTLIER_MEDIANS = 3 * 1.4826  # three standard deviations, as multiples of the median residual, ...
 _MIN_OUTLIER_M = 0.02  # ... and this are what residuals left out are beyond
 _MAX_ROUNDS = 20
@@ -66,11 +68,15 @@ class Registration:
 
 
 def lift_clicks(
-    recording: Recording, clicks: pd.DataFrame, mocap: MotionCapture, offset_s: float = 0.0
+    recording: Recording,
+    clicks: pd.DataFrame,
+    mocap: MotionCapture,
+    offset_s: float = 0.0,
+    radius_m: float = BODY_RADIUS_M,
 ) -> pd.DataFrame:
     """Clicked markers in the robot's base frame and in the motion capture's; others are left out.
 
-    They are lifted like keypoints of the body, by the paper's method.
+    They are lifted by the paper's method, like keypoints of the body unless another radius is given.
 
     Parameters
     ----------
@@ -80,6 +86,8 @@ def lift_clicks(
     mocap : MotionCapture
     offset_s : float, optional
         To add to the motion capture's stamps to have them on the camera's clock.
+    radius_m : float, optional
+        Half the side of the neighbourhood that the depth is taken from.
 
     Returns
     -------
@@ -87,14 +95,9 @@ def lift_clicks(
         Columns `frame, marker, x_m, y_m, z_m, mocap_x_m, mocap_y_m, mocap_z_m`.
     """
     clicks = clicks.sort_values("frame", kind="stable", ignore_index=True)
-    seen_m = np.full((len(clicks), 3), np.nan)
-    for frame, rows in clicks.groupby("frame"):
-        pixels_px = np.full((len(rows), N_KEYPOINTS, 2), np.nan)
-        pixels_px[:, 0] = rows[["u_px", "v_px"]]
-        points_m = lift(pixels_px, read_depth_m(recording, frame), recording.intrinsics).points_m[:, 0]
-        seen_m[rows.index] = transform(recording.T_base_cam[frame], points_m)
+    (seen_m,) = lift_pixels(recording, clicks, [radius_m])
     table = clicks[["frame", "marker"]].copy()
-    table[_SEEN], table[_MEASURED] = seen_m, measured_markers(recording, clicks, mocap, offset_s)
+    table[SEEN], table[MEASURED] = seen_m, measured_markers(recording, clicks, mocap, offset_s)
     return table.dropna(ignore_index=True)
 
 
@@ -138,10 +141,10 @@ def select_paper_markers(matched: pd.DataFrame) -> pd.DataFrame:
     pd.DataFrame
         At most eight rows of it.
     """
-    matched = matched[_keeps_distances(matched)]
+    matched = matched[keeps_distances(matched)]
     frames = matched["frame"].value_counts(sort=True).sort_index(kind="stable").nlargest(N_PAPER_IMAGES).index
     table = matched[matched["frame"].isin(frames)].reset_index(drop=True)
-    points = table[_MEASURED].to_numpy()
+    points = table[MEASURED].to_numpy()
     chosen = [int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmax())]
     while len(chosen) < min(N_PAPER_MARKERS, len(points)):
         nearest = np.linalg.norm(points[:, None] - points[chosen], axis=2).min(axis=1)
@@ -149,17 +152,61 @@ def select_paper_markers(matched: pd.DataFrame) -> pd.DataFrame:
     return table.loc[sorted(chosen)].reset_index(drop=True)
 
 
-def _keeps_distances(matched: pd.DataFrame) -> np.ndarray:
-    """Which points (n,) are as far from most others in the one frame as in the other, to a decimetre."""
+def keeps_distances(matched: pd.DataFrame) -> np.ndarray:
+    """Which clicks are as far from most others in the one frame as in the other, to a decimetre.
+
+    Parameters
+    ----------
+    matched : pd.DataFrame
+        As from `lift_clicks`, n rows.
+
+    Returns
+    -------
+    array of bool, shape (n,)
+    """
     seen_m, measured_m = (
         np.linalg.norm(points_m[:, None] - points_m, axis=2)
-        for points_m in (matched[names].to_numpy() for names in (_SEEN, _MEASURED))
+        for points_m in (matched[names].to_numpy() for names in (SEEN, MEASURED))
     )
     return np.median(np.abs(seen_m - measured_m), axis=1) < _MAX_STRETCH_M
 
 
+def camera_places(
+    recording: Recording, mocap: MotionCapture, offset_s: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where the marker on the camera was measured in every frame, and where the camera was.
+
+    Parameters
+    ----------
+    recording : Recording
+    mocap : MotionCapture
+    offset_s : float, optional
+        To add to the motion capture's stamps to have them on the camera's clock.
+
+    Returns
+    -------
+    marker_m : array, shape (n_frames, 3)
+        In the motion capture's frame; NaN where not measured.
+    centre_m : array, shape (n_frames, 3)
+        The camera's optical centre in the base frame.
+
+    Raises
+    ------
+    InputError
+        If the marker `camera` is missing.
+    """
+    if CAMERA_MARKER not in mocap.names:
+        hint = "name the one on the camera so, or click markers in more images and use all of them"
+        raise InputError(f"motion capture has no marker {CAMERA_MARKER!r}; {hint}")
+    camera = pd.DataFrame({"frame": range(len(recording)), "marker": CAMERA_MARKER})
+    marker_m = measured_markers(recording, camera, mocap, offset_s)
+    if np.isnan(marker_m).all():
+        raise InputError(f"marker {CAMERA_MARKER!r} was measured in no frame of the recording")
+    return marker_m, recording.T_base_cam[:, :3, 3]
+
+
 def register_by_camera_marker(
-    matched: pd.DataFrame, recording: Recording, mocap: MotionCapture, offset_s: float = 0.0
+    matched: pd.DataFrame, marker_m: np.ndarray, centre_m: np.ndarray, about_camera: bool = False
 ) -> Registration:
     """Rotation by Arun's method; translation from the marker on the camera, its median over the frames.
 
@@ -169,10 +216,10 @@ def register_by_camera_marker(
     ----------
     matched : pd.DataFrame
         As from `select_paper_markers`.
-    recording : Recording
-    mocap : MotionCapture
-    offset_s : float, optional
-        To add to the motion capture's stamps to have them on the camera's clock.
+    marker_m, centre_m : array, shape (n_frames, 3)
+        As from `camera_places`.
+    about_camera : bool, optional
+        Whether the rotation is found about the camera, or about the middle of the points.
 
     Returns
     -------
@@ -181,19 +228,20 @@ def register_by_camera_marker(
     Raises
     ------
     InputError
-        If `hicp_lib.core.alignment.arun` refuses the points, or the marker `camera` is missing.
+        If `hicp_lib.core.alignment.arun` refuses the points.
     """
-    if CAMERA_MARKER not in mocap.names:
-        hint = "name the one on the camera so, or click markers in more images and use all of them"
-        raise InputError(f"motion capture has no marker {CAMERA_MARKER!r}; {hint}")
-    fit = _fit(matched)
-    camera = pd.DataFrame({"frame": range(len(recording)), "marker": CAMERA_MARKER})
-    marker_m = measured_markers(recording, camera, mocap, offset_s)
-    if np.isnan(marker_m).all():
-        raise InputError(f"marker {CAMERA_MARKER!r} was measured in no frame of the recording")
+    if about_camera:
+        frames = matched["frame"]
+        from_marker_m = matched[MEASURED].to_numpy() - marker_m[frames]
+        measured = np.isfinite(from_marker_m).all(axis=1)
+        from_centre_m = matched[SEEN].to_numpy() - centre_m[frames]
+        fit = arun(from_marker_m[measured], from_centre_m[measured], about_origin=True)
+    else:
+        fit = _fit(matched)
     T = fit.T_b_a.copy()
-    T[:3, 3] = np.nanmedian(recording.T_base_cam[:, :3, 3] - marker_m @ T[:3, :3].T, axis=0)
-    return _registration("paper: eight clicks, camera marker", fit, T)
+    T[:3, 3] = np.nanmedian(centre_m - marker_m @ T[:3, :3].T, axis=0)
+    how = "turned about the camera" if about_camera else "camera marker"
+    return _registration(f"paper: eight clicks, {how}", fit, T)
 
 
 def register_selected(matched: pd.DataFrame) -> Registration:
@@ -216,7 +264,7 @@ def register_selected(matched: pd.DataFrame) -> Registration:
     Examples
     --------
     >>> corners_m = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
-    >>> matched = pd.DataFrame(np.c_[corners_m + [0, 0, 2], corners_m], columns=[*_SEEN, *_MEASURED])
+    >>> matched = pd.DataFrame(np.c_[corners_m + [0, 0, 2], corners_m], columns=[*SEEN, *MEASURED])
     >>> registration = register_selected(matched)
     >>> registration.n_points, round(registration.T_base_mocap[2, 3], 6)
     (4, np.float64(2.0))
@@ -245,8 +293,8 @@ def register_robustly(matched: pd.DataFrame) -> Registration:
     InputError
         If `hicp_lib.core.alignment.arun` refuses the points.
     """
-    seen_m, measured_m = matched[_SEEN].to_numpy(), matched[_MEASURED].to_numpy()
-    kept = _keeps_distances(matched)
+    seen_m, measured_m = matched[SEEN].to_numpy(), matched[MEASURED].to_numpy()
+    kept = keeps_distances(matched)
     for _ in range(_MAX_ROUNDS):
         fit = arun(measured_m[kept], seen_m[kept])
         residuals_m = np.linalg.norm(transform(fit.T_b_a, measured_m) - seen_m, axis=1)
@@ -289,7 +337,7 @@ def read_registration(path: str | Path) -> Registration:
 
 
 def _fit(matched: pd.DataFrame) -> RigidFit:
-    return arun(matched[_MEASURED].to_numpy(), matched[_SEEN].to_numpy())
+    return arun(matched[MEASURED].to_numpy(), matched[SEEN].to_numpy())
 
 
 def _registration(method: str, fit: RigidFit, T_base_mocap: np.ndarray | None = None) -> Registration:

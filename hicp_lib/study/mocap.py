@@ -16,8 +16,15 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.runtime.results import detections_of
 from hicp_lib.detectors.runtime.run import detect_images
+from hicp_lib.evaluation.cases import labelled
 from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_ablation
-from hicp_lib.evaluation.space.mocap_error import MIN_SCORES, TABLE_JOINTS, marker_means, mocap_errors
+from hicp_lib.evaluation.space.mocap_error import (
+    MIN_SCORES,
+    TABLE_JOINTS,
+    marker_means,
+    median_errors,
+    mocap_errors,
+)
 from hicp_lib.evaluation.space.occlusion import joint_occlusion
 from hicp_lib.evaluation.space.stability import POSITION, position_array
 from hicp_lib.lifting.robust import METHODS
@@ -167,25 +174,50 @@ def register(
     InputError
         If the recording has neither clicks nor a registration, or they are malformed.
     """
-    simulation, clicks_path = read_simulation(recording), recording.folder / CLICKS_FILE
-    if simulation:
-        from hicp_lib.simulation.sensors.clicks import simulate_clicks
-
-        exact, true_offset_s = np.array(simulation["T_base_mocap"]), simulation["mocap_offset_s"]
-        clicks = simulate_clicks(recording, mocap, exact, n_images, noise_px, true_offset_s, seed)
-    elif clicks_path.is_file():
-        exact = None
+    clicks, exact = simulated_clicks(recording, mocap, n_images, noise_px, seed)
+    clicks_path = recording.folder / CLICKS_FILE
+    if exact is None and not clicks_path.is_file():
+        return Registered([_given(recording)], None, pd.DataFrame())
+    if exact is None:
         clicks = read_clicks(clicks_path, open_recording(recording.folder), mocap.names)
         clicks = clicks[clicks["frame"] < len(recording)]
-    else:
-        return Registered([_given(recording)], None, pd.DataFrame())
     matched = registration.lift_clicks(recording, clicks, mocap, offset_s)
     eight = registration.select_paper_markers(matched)
     fits = [registration.register_selected(eight), registration.register_robustly(matched)]
     fits.append(register_by_reprojection(recording, clicks, mocap, fits[-1], offset_s))
     if registration.CAMERA_MARKER in mocap.names:
-        fits.insert(0, registration.register_by_camera_marker(eight, recording, mocap, offset_s))
+        places = registration.camera_places(recording, mocap, offset_s)
+        ways = (False, True)
+        fits = [registration.register_by_camera_marker(eight, *places, way) for way in ways] + fits
     return Registered(fits, exact, clicks.merge(eight[["frame", "marker"]]))
+
+
+def simulated_clicks(
+    recording: Recording, mocap: MotionCapture, n_images: int, noise_px: float, seed: int
+) -> tuple[pd.DataFrame, np.ndarray | None]:
+    """Clicks in a simulated recording, and its true transform.
+
+    Parameters
+    ----------
+    recording : Recording
+    mocap : MotionCapture
+    n_images, noise_px, seed : int, float, int
+        As of `register`.
+
+    Returns
+    -------
+    pd.DataFrame
+        As from `hicp_lib.simulation.sensors.clicks.simulate_clicks`; empty where it is not simulated.
+    array or None, shape (4, 4)
+        T_base_mocap; None where it is not simulated.
+    """
+    simulation = read_simulation(recording)
+    if not simulation:
+        return pd.DataFrame(), None
+    from hicp_lib.simulation.sensors.clicks import simulate_clicks
+
+    exact, offset_s = np.array(simulation["T_base_mocap"]), simulation["mocap_offset_s"]
+    return simulate_clicks(recording, mocap, exact, n_images, noise_px, offset_s, seed), exact
 
 
 def _given(recording: Recording) -> registration.Registration:
@@ -199,7 +231,13 @@ def _given(recording: Recording) -> registration.Registration:
 
 
 def medians_under(
-    registered: Registered, points: pd.DataFrame, recording: Recording, mocap: MotionCapture, offset_s: float
+    registered: Registered,
+    points: pd.DataFrame,
+    recording: Recording,
+    mocap: MotionCapture,
+    offset_s: float,
+    n_resamples: int = 1000,
+    seed: int = 0,
 ) -> pd.DataFrame:
     """What the choice of the registration does to the median errors of elbows and wrists.
 
@@ -212,24 +250,23 @@ def medians_under(
     mocap : MotionCapture
     offset_s : float
         Of the motion capture's clock.
+    n_resamples, seed : int
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
     pd.DataFrame
-        Columns `registration, detector, method, part, median_m` (both sides together; score above 0.1); the
-        exact transform, where it is known, comes last.
+        Column `registration`, then as from `median_errors`, score above 0.1; the exact transform, where it is
+        known, comes last.
     """
     fits = {fit.method: fit.T_base_mocap for fit in registered.fits}
     fits |= {} if registered.exact is None else {"exact": registered.exact}
     tables = []
     for name, T_base_mocap in fits.items():
         reference = marker_means(mocap, recording.times_s - offset_s, T_base_mocap, TABLE_JOINTS)
-        errors = mocap_errors(points, reference)
-        errors = errors[errors["score"] > MIN_SCORES[-1]]
-        part = errors["keypoint"].str.split("_").str[1].rename("part")
-        medians = errors.groupby(["detector", "method", part], sort=False)["error_m"].median()
-        tables.append(medians.rename("median_m").reset_index().assign(registration=name))
-    return pd.concat(tables, ignore_index=True)[["registration", "detector", "method", "part", "median_m"]]
+        medians = median_errors(mocap_errors(points, reference), MIN_SCORES[-1:], n_resamples, seed)
+        tables.append(labelled(medians, registration=name))
+    return pd.concat(tables, ignore_index=True)
 
 
 def errors_at_joints(

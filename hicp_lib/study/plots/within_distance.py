@@ -8,11 +8,10 @@ from collections.abc import Sequence
 import pandas as pd
 
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.palette import METHOD_LINES, detector_colour
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _REFERENCES = {"median": "its median position", "truth": "its true position"}
-_METHOD_LINES = {"robust": "-", "paper": ":"}
 # Darker is closer.
 _FADES = (1.0, 0.62, 0.34)
 
@@ -39,7 +38,7 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
         for (detector, method), curve in curves.groupby(level=[0, 1], sort=False):
             pen = {"color": detector_colour(detector), "lw": 1.8, "label": f"{detector}, {method}"}
             distance_cm = 100 * curve.index.get_level_values("threshold_m")
-            axis.plot(distance_cm, curve, _METHOD_LINES.get(method, "--"), **pen)
+            axis.plot(distance_cm, curve, METHOD_LINES[method], **pen)
         axis.vlines([100 * distance for distance in marked_m], 0, 1, color="#AAAAAA", lw=0.8)
         axis.set(title=f"{view} · {kind}s", ylim=(0, 1.02), xlim=(0, None))
         axis.set(xlabel="distance [cm]", ylabel="share of images")

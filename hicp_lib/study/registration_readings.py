@@ -1,0 +1,108 @@
+"""Which assumption of the paper's registration costs what: one changed at a time, over many draws of clicks.
+
+The paper clicks eight markers in two images (section IV-C). Which ones, and how rotation and translation
+were put together, it leaves open.
+"""
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.camera import transform
+from hicp_lib.core.errors import InputError
+from hicp_lib.evaluation.space.registration_error import compare_registrations
+from hicp_lib.evaluation.statistics.resampling import PERCENTILES
+from hicp_lib.mocap import registration as r
+from hicp_lib.recordings.qualisys import MotionCapture
+from hicp_lib.recordings.recording import Recording
+from hicp_lib.study.mocap import simulated_clicks
+
+_NEAR_M = 0.003  # the radius of the paper's other neighbourhood
+_EVERY = 50  # measurements of the markers that are judged
+_CLICK = ["frame", "marker"]
+
+
+def registration_readings(
+    recording: Recording,
+    mocap: MotionCapture,
+    offset_s: float,
+    n_images: int = 12,
+    noise_px: float = 1.0,
+    n_draws: int = 100,
+    seed: int = 0,
+) -> pd.DataFrame | None:
+    """Error of `hicp_lib.mocap.registration.register_by_camera_marker` under each reading of the paper.
+
+    Parameters
+    ----------
+    recording : Recording
+    mocap : MotionCapture
+        With a marker on the camera.
+    offset_s : float
+        Of the motion capture's clock.
+    n_images, noise_px : int, float
+        Of the simulated clicks, as of `hicp_lib.study.mocap.register`.
+    n_draws : int
+        How often two of the images, and eight markers clicked in them, are drawn; the same for every reading.
+    seed : int
+        Of clicks and draws.
+
+    Returns
+    -------
+    pd.DataFrame or None
+        Columns `reading, turned_rad` (median angle to the true rotation), `added_m, low_m, high_m` (median
+        displacement of the person's markers: median and 95 % range of the draws), `n_draws`; None where the
+        recording is not simulated.
+
+    Raises
+    ------
+    InputError
+        If no two images have enough clicks with a depth, or the camera has no marker.
+    """
+    clicks, exact = simulated_clicks(recording, mocap, n_images, noise_px, seed)
+    if exact is None:
+        return None
+    base = r.lift_clicks(recording, clicks, mocap, offset_s)
+    sharp, _ = simulated_clicks(recording, mocap, n_images, 0.0, seed)
+    sharp = r.lift_clicks(recording, sharp, mocap, offset_s)
+    near = r.lift_clicks(recording, clicks, mocap, offset_s, _NEAR_M)
+    true = base.assign(**dict(zip(r.SEEN, transform(exact, base[r.MEASURED].to_numpy()).T, strict=True)))
+    marker_m, centre_m = r.camera_places(recording, mocap, offset_s)
+    centred_m = transform(np.linalg.inv(exact), centre_m)
+    readings = {
+        "as written": (base, marker_m, False),
+        "camera marker at the optical centre": (base, centred_m, False),
+        "clicks without error": (sharp, marker_m, False),
+        "depth from 3 mm around a click": (near, marker_m, False),
+        "depth of the marker itself": (true, marker_m, False),
+        "turned about the camera": (base, marker_m, True),
+        "turned about the camera, its marker at the optical centre": (base, centred_m, True),
+    }
+    found = []
+    for clicked in _draw_clicks([table for table, _, _ in readings.values()], n_draws, seed):
+        for name, (table, at_m, about_camera) in readings.items():
+            eight = table.merge(clicked, on=_CLICK)
+            fit = r.register_by_camera_marker(eight, at_m, centre_m, about_camera)
+            found.append(replace(fit, method=name))
+    some = replace(mocap, times_s=mocap.times_s[::_EVERY], points_m=mocap.points_m[::_EVERY])
+    table = compare_registrations(found, some, exact).rename(columns={"method": "reading"})
+    of_reading = table.groupby("reading", sort=False)
+    low_m, high_m = (of_reading["added_m"].quantile(percent / 100) for percent in PERCENTILES)
+    medians = of_reading[["turned_rad", "added_m"]].median()
+    return medians.assign(low_m=low_m, high_m=high_m, n_draws=n_draws).reset_index()
+
+
+def _draw_clicks(tables: list[pd.DataFrame], n_draws: int, seed: int) -> list[pd.DataFrame]:
+    """Draws of two images and eight markers that all tables have, with a depth of the person."""
+    common = tables[0][_CLICK]
+    for table in tables:
+        common = common.merge(table.loc[r.keeps_distances(table), _CLICK])
+    counts = common["frame"].value_counts(sort=False)
+    pairs = [pair for pair in combinations(counts.index, 2) if counts[list(pair)].sum() >= r.N_PAPER_MARKERS]
+    if not pairs:
+        raise InputError("no two images have eight clicks with a depth; give more in n_click_images")
+    rng = np.random.default_rng(seed)
+    chosen = (common[common["frame"].isin(pairs[k])] for k in rng.integers(len(pairs), size=n_draws))
+    return [rows.iloc[rng.permutation(len(rows))[: r.N_PAPER_MARKERS]] for rows in chosen]
