@@ -55,12 +55,10 @@ def above_floor(
     pd.DataFrame
         Columns `detector` and one per joint, in cm, here with the 95 % interval.
     """
-    floor_m = medians[(medians["detector"] == PERFECT) & (medians["method"] == "paper")]
-    floor_m = floor_m.drop_duplicates("keypoint").set_index("keypoint")["median_m"]
-    theirs_m = paper["median_m"] - paper["keypoint"].map(floor_m)
-    theirs = paper.assign(detector=paper["detector"] + " (paper)", value_m=theirs_m)
-    ours = differences[(differences["other"] == PERFECT) & (differences["method"] == "paper")]
-    rows = pd.concat([ours, theirs])
+    of_floor = (medians["detector"] == PERFECT) & (medians["method"] == "paper")
+    floor_m = medians[of_floor].drop_duplicates("keypoint").set_index("keypoint")["median_m"]
+    theirs = paper.assign(detector=paper["detector"] + " (paper)", method="paper", other=PERFECT)
+    theirs["value_m"] = theirs["median_m"] - theirs["keypoint"].map(floor_m)
+    rows = pd.concat([differences, theirs]).query("other == @PERFECT and method == 'paper'")
     rows = rows[(rows["min_score"] == min_score) & rows["keypoint"].isin(TABLE_JOINTS)]
-    text = bounds_of(rows, ("value_m", "low_m", "high_m"), 100, 1)
-    return wide(rows, ["detector"], "keypoint", text)
+    return wide(rows, ["detector"], "keypoint", bounds_of(rows, ("value_m", "low_m", "high_m"), 100, 1))

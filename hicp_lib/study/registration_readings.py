@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.camera import transform
-from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.space.registration_error import compare_registrations
 from hicp_lib.evaluation.statistics.resampling import PERCENTILES
 from hicp_lib.mocap import registration as r
@@ -59,7 +58,7 @@ def registration_readings(
     Raises
     ------
     InputError
-        If no two images have enough clicks with a depth, or the camera has no marker.
+        If fewer than three clicks have a depth, or the camera has no marker.
     """
     clicks, exact = simulated_clicks(recording, mocap, n_images, noise_px, seed)
     if exact is None:
@@ -80,11 +79,10 @@ def registration_readings(
         "turned about the camera": (base, marker_m, True),
         "turned about the camera, its marker at the optical centre": (base, centred_m, True),
     }
-    found = []
-    for clicked in _draw_clicks([table for table, _, _ in readings.values()], n_draws, seed):
-        for name, (table, at_m, about_camera) in readings.items():
-            eight = table.merge(clicked, on=_CLICK)
-            fit = r.register_by_camera_marker(eight, at_m, centre_m, about_camera)
+    tables, found = _in_common([table for table, _, _ in readings.values()]), []
+    for eight in _draw_eights(tables[0]["frame"].to_numpy(), n_draws, seed):
+        for table, (name, (_, at_m, about_camera)) in zip(tables, readings.items(), strict=True):
+            fit = r.register_by_camera_marker(table.iloc[eight], at_m, centre_m, about_camera)
             found.append(replace(fit, method=name))
     some = replace(mocap, times_s=mocap.times_s[::_EVERY], points_m=mocap.points_m[::_EVERY])
     table = compare_registrations(found, some, exact).rename(columns={"method": "reading"})
@@ -94,15 +92,17 @@ def registration_readings(
     return medians.assign(low_m=low_m, high_m=high_m, n_draws=n_draws).reset_index()
 
 
-def _draw_clicks(tables: list[pd.DataFrame], n_draws: int, seed: int) -> list[pd.DataFrame]:
-    """Draws of two images and eight markers that all tables have, with a depth of the person."""
+def _in_common(tables: list[pd.DataFrame]) -> list[pd.DataFrame]:
+    """The clicks that all tables have with a depth of the person, in one order."""
     common = tables[0][_CLICK]
     for table in tables:
         common = common.merge(table.loc[r.keeps_distances(table), _CLICK])
-    counts = common["frame"].value_counts(sort=False)
-    pairs = [pair for pair in combinations(counts.index, 2) if counts[list(pair)].sum() >= r.N_PAPER_MARKERS]
-    if not pairs:
-        raise InputError("no two images have eight clicks with a depth; give more in n_click_images")
-    rng = np.random.default_rng(seed)
-    chosen = (common[common["frame"].isin(pairs[k])] for k in rng.integers(len(pairs), size=n_draws))
-    return [rows.iloc[rng.permutation(len(rows))[: r.N_PAPER_MARKERS]] for rows in chosen]
+    return [common.merge(table) for table in tables]
+
+
+def _draw_eights(frames: np.ndarray, n_draws: int, seed: int) -> list[np.ndarray]:
+    """Rows of eight clicks in two images, for each draw; of fewer, where no two images have so many."""
+    in_two = [np.flatnonzero(np.isin(frames, two)) for two in combinations(np.unique(frames), 2)]
+    n = min(r.N_PAPER_MARKERS, max(map(len, in_two)))
+    enough, rng = [rows for rows in in_two if len(rows) >= n], np.random.default_rng(seed)
+    return [rng.permutation(enough[k])[:n] for k in rng.integers(len(enough), size=n_draws)]

@@ -12,6 +12,8 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import write_json
 from hicp_lib.mocap.registration import (
     REGISTRATION_FILE,
+    SEEN,
+    camera_places,
     lift_clicks,
     measured_markers,
     read_registration,
@@ -113,10 +115,27 @@ def test_arun_alone_finds_what_the_markers_say(laboratory, clicks):
 def test_the_papers_translation_is_off_by_where_the_camera_marker_sits(laboratory, clicks):
     recording, mocap = laboratory
     matched = select_paper_markers(lift_clicks(recording, clicks, mocap))
-    registration = register_by_camera_marker(matched, recording, mocap)
+    registration = register_by_camera_marker(matched, *camera_places(recording, mocap))
     assert np.allclose(registration.T_base_mocap[:3, :3], register_selected(matched).T_base_mocap[:3, :3])
     _, displacement = errors_of(registration)
     assert displacement == pytest.approx(np.linalg.norm(CAMERA_MARKER_CAM), abs=0.01)
+
+
+def test_turned_about_the_camera_errors_along_the_line_of_sight_turn_nothing(laboratory, clicks):
+    """Markers that are lifted too near by up to 5 cm, each along its own line of sight."""
+    recording, mocap = laboratory
+    matched = select_paper_markers(lift_clicks(recording, clicks, mocap))
+    marker_m, centre_m = camera_places(recording, mocap)
+    centred_m = transform(np.linalg.inv(T_BASE_MOCAP), centre_m)
+    sight_m = matched[SEEN].to_numpy() - centre_m[matched["frame"]]
+    nearer = np.linspace(0, 0.05, len(matched))[:, None] / np.linalg.norm(sight_m, axis=1, keepdims=True)
+    wrong = matched.assign(**dict(zip(SEEN, (matched[SEEN].to_numpy() - nearer * sight_m).T, strict=True)))
+    (turned, moved), (turned_less, moved_less) = (
+        errors_of(register_by_camera_marker(wrong, centred_m, centre_m, about)) for about in (False, True)
+    )
+    assert turned > 0.01 and turned_less < 0.005 and moved > 2 * moved_less
+    _, moved = errors_of(register_by_camera_marker(matched, marker_m, centre_m, about_camera=True))
+    assert moved < np.linalg.norm(CAMERA_MARKER_CAM)
 
 
 def test_wrong_clicks_do_not_spoil_the_fit_to_many(laboratory, clicks):
@@ -153,15 +172,14 @@ def test_what_cannot_be_matched_is_left_out(laboratory, clicks):
     assert set(NAMES[:9]) - set(matched["marker"]) == {"m2", "m5"}
 
 
-def test_a_missing_camera_marker_is_refused(laboratory, clicks):
+def test_a_missing_camera_marker_is_refused(laboratory):
     recording, mocap = laboratory
-    matched = lift_clicks(recording, clicks, mocap)
     without = replace(mocap, names=NAMES[:9], points_m=mocap.points_m[:, :9])
     with pytest.raises(InputError, match="no marker 'camera'"):
-        register_by_camera_marker(matched, recording, without)
+        camera_places(recording, without)
     mocap = replace(mocap, points_m=np.full_like(mocap.points_m, np.nan))
     with pytest.raises(InputError, match="measured in no frame"):
-        register_by_camera_marker(matched, recording, mocap)
+        camera_places(recording, mocap)
 
 
 def test_a_given_transform_is_read(tmp_path):
@@ -218,7 +236,7 @@ def test_the_offset_is_taken_from_the_cameras_clock(laboratory, clicks):
     eight = select_paper_markers(lift_clicks(recording, clicks, mocap))
     late = replace(mocap, times_s=mocap.times_s - 0.37)
     found, given = (
-        register_by_camera_marker(eight, recording, capture, offset_s).T_base_mocap
+        register_by_camera_marker(eight, *camera_places(recording, capture, offset_s)).T_base_mocap
         for capture, offset_s in ((mocap, 0.0), (late, 0.37))
     )
     np.testing.assert_allclose(found, given, atol=1e-9)

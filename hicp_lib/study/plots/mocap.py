@@ -1,4 +1,4 @@
-"""Figures of the test against motion capture: fractions, distributions, trajectories, what errors depend on.
+"""Figures of the test against motion capture: distributions, trajectories, what errors depend on.
 
 Tables are those of `hicp_lib.evaluation.space.mocap_error`. A detector called `palette.PERFECT` among them
 is the floor: what the true keypoints in the image come to.
@@ -7,63 +7,17 @@ is the floor: what the true keypoints in the image come to.
 import numpy as np
 import pandas as pd
 
-from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS, THRESHOLDS_M
+from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import (
-    METHOD_LINES,
-    PERFECT,
-    TRUTH_COLOUR,
-    detector_colour,
-    detector_marker,
-)
+from hicp_lib.study.plots.palette import PERFECT, TRUTH_COLOUR, detector_colour, detector_marker
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _MIN_N = 5  # fewer say little of a median
-_LIMITS_M = np.arange(0, 0.2001, 0.0025)  # of the curves of fractions
 _OUT_OF_RANGE_M = 0.15  # beyond the reference's range by more is not drawn
 _BOX_CM, _ERROR_CM = (1, 3, 10, 30, 100), (1, 2, 5, 10, 20, 50)  # ticks of logarithmic axes
 _LINE = ["detector", "method", "keypoint"]
 _AXES = {"x_m": "x (backward) [m]", "y_m": "y (right) [m]", "z_m": "z (up) [m]"}
 _BY = {"distance_m": "distance from the camera [m]", "score": "score", "sight": "line of sight"}
-
-
-@in_style
-def fraction_curves(errors: pd.DataFrame, min_score: float, note: str) -> Figure:
-    """Fraction of the frames with motion capture in which a joint was found within a distance of it.
-
-    Parameters
-    ----------
-    errors : pd.DataFrame
-        As from `hicp_lib.evaluation.space.mocap_error.mocap_errors`.
-    min_score : float
-        A keypoint counts as found above it.
-    note : str
-        What the data are, for the caption.
-    """
-    errors = errors[errors["reference_x_m"].notna()].reset_index(drop=True)
-    found_m = errors["error_m"].where(errors["score"] > min_score).to_numpy()
-    within = pd.DataFrame(found_m[:, None] <= _LIMITS_M, columns=_LIMITS_M).rename_axis("distance_m", axis=1)
-    shares = within.groupby([errors[name] for name in _LINE], sort=False).mean()
-    table = shares.stack().rename("share").reset_index()
-    figure, axes = _joint_axes(list(table["keypoint"].unique()), 3.2, 2.4)
-    for (detector, method, keypoint), part in table.groupby(_LINE, sort=False):
-        pen = {"color": detector_colour(detector), "ls": METHOD_LINES[method], "lw": 1.8}
-        label = f"{detector}, {method}"
-        axes[keypoint].plot(100 * part["distance_m"], part["share"], label=label, **pen)
-    for axis in axes.values():
-        axis.vlines([100 * limit for limit in THRESHOLDS_M], 0, 1, color="#AAAAAA", lw=0.8)
-        axis.set(ylim=(0, 1.02), xlim=(0, 20), xlabel="distance [cm]", ylabel="share of frames")
-        axis.label_outer()
-    marks.legend_below(figure, list(axes.values()), ncols=4)
-    caption = (
-        f"Share of frames with motion capture in which a joint was found (score above {min_score:g}) within "
-        f"a distance of the mean of its two markers (dotted: the paper's lifting, solid: robust; grey: 2.5, "
-        f"5 and 10 cm, as in the paper{_floor(errors)}): {note}."
-    )
-    at_5_cm = table[np.isclose(table["distance_m"], 0.05)]
-    said = series_text(at_5_cm.groupby(_LINE[:2], sort=False)["share"].mean(), "{} {} {:.2f}")
-    alt = f"Rising curves per joint and detector. Mean share within 5 cm: {said}."
-    return Figure(figure, caption, alt, table)
 
 
 @in_style
@@ -85,15 +39,15 @@ def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: fl
     found = errors[(errors["score"] > min_score) & errors["error_m"].notna()]
     joints = [joint for joint in TABLE_JOINTS if joint in set(errors["keypoint"])]
     cases = errors[_LINE[:2]].drop_duplicates().sort_values("method", kind="stable")  # the paper's first
-    names = [f"{detector}, {method}" for detector, method in cases.itertuples(index=False)]
+    names = [f"{detector}, {method} lifting" for detector, method in cases.itertuples(index=False)]
+    named, n_like = list(paper["detector"].unique()), (cases["method"] == "paper").sum()
     paper = paper[paper["min_score"] == min_score].set_index(["detector", "keypoint"]).sort_index()
-    named, n_like = list(dict.fromkeys(paper.index.get_level_values(0))), (cases["method"] == "paper").sum()
     labels = [*names[:n_like], *(f"{name} (paper)" for name in named), *names[n_like:]]
     figure, axes = _joint_axes(joints, 4.6, 0.9 + 0.24 * len(labels))
     for joint, axis in axes.items():
         part = found[found["keypoint"] == joint].groupby(_LINE[:2])["error_m"]
         for (detector, method), errors_m in part:
-            y = labels.index(f"{detector}, {method}")
+            y = labels.index(f"{detector}, {method} lifting")
             place = {"positions": [y], "widths": 0.6, "manage_ticks": False}
             marks.draw_boxes(axis, [100 * errors_m], [detector_colour(detector)], **place)
             if (detector, method) == (PERFECT, "paper"):
@@ -101,8 +55,8 @@ def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: fl
         for y, detector in enumerate(named, start=n_like):
             median_m = paper.at[(detector, joint), "median_m"]
             axis.plot(100 * median_m, y, "D", color=detector_colour(detector), markersize=7)
-        axis.hlines([n_like - 0.5, n_like + len(named) - 0.5], 0.5, 100, color="#AAAAAA", lw=0.8)
-        axis.set(xscale="log", xlim=(0.5, 100), xlabel="distance [cm]")
+        axis.hlines([n_like - 0.5, n_like + len(named) - 0.5], 0.3, 100, color="#AAAAAA", lw=0.8)
+        axis.set(xscale="log", xlim=(0.3, 100), xlabel="distance [cm]")
         axis.set(xticks=_BOX_CM, xticklabels=map(str, _BOX_CM))
         marks.name_rows(axis, labels)
         axis.label_outer()

@@ -23,7 +23,6 @@ DETECTOR_STYLES: dict[str, tuple[str, str]] = {
     "combined:movenet-thunder": ("#A0105A", "P"),
     PERFECT: (TRUTH_COLOUR, "|"),
 }
-METHOD_LINES = {"robust": "-", "paper": ":"}  # ways of lifting
 OTHER_COLOUR, _OTHER_MARKER = "#595959", "."
 
 # The two subsets of HiCP, and the two boxes of the paper's figure of how they are made.
