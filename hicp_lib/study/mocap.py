@@ -201,8 +201,10 @@ def simulated_clicks(
     ----------
     recording : Recording
     mocap : MotionCapture
-    n_images, noise_px, seed : int, float, int
-        As of `register`.
+    n_images : int
+    noise_px : float
+    seed : int
+        These three as of `register`.
 
     Returns
     -------

@@ -1,7 +1,8 @@
-"""How much of the distance from motion capture no detector can avoid, and what the choice of lifting adds.
+"""How much of the distance from motion capture is not the detector's, and what the neighbourhood's size adds.
 
 Markers lie on the skin and joints below it, and depth sees the skin. So a detector without an error in the
-image is still some centimetres off: the floor that detectors are compared with.
+image is still some centimetres off: the floor that detectors are compared with. It is no bound: errors in the
+image that lean towards the skin in sight may bring a detector below it.
 """
 
 from collections.abc import Sequence

@@ -41,7 +41,8 @@ def registration_readings(
         With a marker on the camera.
     offset_s : float
         Of the motion capture's clock.
-    n_images, noise_px : int, float
+    n_images : int
+    noise_px : float
         Of the simulated clicks, as of `hicp_lib.study.mocap.register`.
     n_draws : int
         How often two of the images, and eight markers clicked in them, are drawn; the same for every reading.

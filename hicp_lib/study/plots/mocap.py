@@ -14,7 +14,7 @@ from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, s
 
 _MIN_N = 5  # fewer say little of a median
 _OUT_OF_RANGE_M = 0.15  # beyond the reference's range by more is not drawn
-_BOX_CM, _ERROR_CM = (1, 3, 10, 30, 100), (1, 2, 5, 10, 20, 50)  # ticks of logarithmic axes
+_BOX_CM, _ERROR_CM = (1, 3, 10, 30, 100), (0.5, 1, 2, 5, 10, 20, 50)  # ticks of logarithmic axes
 _LINE = ["detector", "method", "keypoint"]
 _AXES = {"x_m": "x (backward) [m]", "y_m": "y (right) [m]", "z_m": "z (up) [m]"}
 _BY = {"distance_m": "distance from the camera [m]", "score": "score", "sight": "line of sight"}
@@ -60,21 +60,22 @@ def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: fl
         axis.set(xticks=_BOX_CM, xticklabels=map(str, _BOX_CM))
         marks.name_rows(axis, labels)
         axis.label_outer()
-    medians_cm = 100 * found[found["keypoint"].isin(joints)].groupby(_LINE, sort=False)["error_m"].median()
-    said = series_text(medians_cm.rename(index=_spaced, level="keypoint"), "{} {} {} {:.1f} cm")
+    medians_cm = (
+        100 * found[found["keypoint"].isin(joints)].groupby(_LINE[:2], sort=False)["error_m"].median()
+    )
+    said = series_text(medians_cm, "{}, {} lifting, {:.1f} cm")
     caption = (
         f"Distance of lifted joints (score above {min_score:g}) from the mean of their two markers: box "
         f"25–75 %, whiskers 5–95 %, line the median: {note}. On top by the paper's lifting, as are the "
         "diamonds: the paper's medians, of its own detectors on its own recording. Below by ours, which "
-        f"knows how deep joints lie in people{_floor(errors)}."
+        f"knows how deep joints lie in simulated people{_floor(errors)}."
     )
     table = found[[*_LINE, "frame", "score", "error_m"]]
-    return Figure(figure, caption, f"Box plots per joint. Medians: {said}.", table)
+    return Figure(figure, caption, f"Box plots per joint. Medians of all joints: {said}.", table)
 
 
 def _floor(table: pd.DataFrame) -> str:
-    known = PERFECT in set(table["detector"])
-    return f"; {PERFECT}: the true keypoints in the image, which no detector can better" if known else ""
+    return f"; {PERFECT}: the true keypoints in the image" if PERFECT in set(table["detector"]) else ""
 
 
 def _joint_axes(joints: list[str], width_in: float, height_in: float):
@@ -125,7 +126,7 @@ def trajectories(
         line = first[f"reference_{column}"].to_numpy()
         elapsed_s = times_s[first["frame"]] - times_s[0]
         axis.plot(elapsed_s, line, color=TRUTH_COLOUR, lw=1.6, label="motion capture")
-        for detector in errors["detector"].unique():
+        for detector in sorted(errors["detector"].unique(), key=PERFECT.__ne__):  # beneath the others
             dots = found[found["detector"] == detector]
             pen = {"color": detector_colour(detector), "markersize": 4, "alpha": 0.8, "label": detector}
             axis.plot(times_s[dots["frame"]] - times_s[0], dots[column], ".", **pen)
@@ -152,7 +153,7 @@ def trajectories(
 def error_dependence(table: pd.DataFrame, note: str) -> Figure:
     """Median error of elbows and wrists by distance, score and line of sight.
 
-    `table` from `hicp_lib.evaluation.space.mocap_error.errors_by`, one after the other for every column.
+    `table` from `hicp_lib.evaluation.space.error_dependence.errors_by`, one after the other for every column.
     """
     table = table[table["part"].isin(["elbow", "wrist"]) & (table["n"] >= _MIN_N)]
     shape = table["part"].nunique(), table["by"].nunique()
@@ -161,7 +162,7 @@ def error_dependence(table: pd.DataFrame, note: str) -> Figure:
     for axis, rows, part, by in marks.facets(axes, table, "part", "by"):
         _draw_dependence(axis, rows)
         axis.set(yscale="log", title=f"{part}s", xlabel=_BY.get(by, by))
-        axis.set(yticks=_ERROR_CM, yticklabels=map(str, _ERROR_CM), ylim=(0.7, 80))
+        axis.set(yticks=_ERROR_CM, yticklabels=map(str, _ERROR_CM), ylim=(0.3, 80))
         axis.minorticks_off()
     for axis in axes[:, 0]:
         axis.set(ylabel="distance from the markers [cm]")

@@ -21,7 +21,7 @@ DETECTOR_STYLES: dict[str, tuple[str, str]] = {
     "one-stage": ("#B59B00", "8"),
     "combined": ("#4B0055", "H"),
     "combined:movenet-thunder": ("#A0105A", "P"),
-    PERFECT: (TRUTH_COLOUR, "|"),
+    PERFECT: (TRUTH_COLOUR, "x"),
 }
 OTHER_COLOUR, _OTHER_MARKER = "#595959", "."
 

@@ -67,6 +67,9 @@ def test_both_markers_of_a_shoulder_are_on_its_outer_side(shape):
     ]  # the right one mirrored; axis 1: towards the front, towards the back
     assert (from_joint[:, :, 1] > 0.025).all() and (np.abs(from_joint[:, :, 2]) < 0.02).all()
     assert (from_joint[:, 0, 0] > 0.015).all() and (from_joint[:, 1, 0] < -0.015).all()
+    is_adult = not shape.startswith(("girl", "boy"))
+    mean_m = np.linalg.norm(from_joint.mean(axis=1), axis=1)  # as the page on simulated sensors says
+    assert not is_adult or ((mean_m > 0.035) & (mean_m < 0.065)).all()
 
 
 def test_markers_lie_off_the_skin_and_follow_the_limb():

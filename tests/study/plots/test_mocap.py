@@ -65,8 +65,8 @@ def test_distributions_compare_like_with_like_first(errors):
     assert len(axis.patches) == 5
     (floor,) = [line for line in axis.lines if line.get_linestyle() == ":"]
     assert floor.get_xdata() == pytest.approx([3.0, 3.0])
-    assert "no detector can better" in figure.caption
-    assert "better" not in draw.error_distributions(errors, paper_medians(), 0.1, "made up").caption
+    assert "true keypoints" in figure.caption
+    assert "true keypoints" not in draw.error_distributions(errors, paper_medians(), 0.1, "made up").caption
 
 
 def test_a_detector_that_found_nothing_has_no_box(errors):
