@@ -1,16 +1,10 @@
 """Where the motion capture's frame lies in the robot's base frame, from markers clicked in images.
 
-From the same kind of clicks (`reprojection` has one more way, without depth):
-
-- `register_by_camera_marker`: eight markers in two images give the rotation by Arun's method; the
-  translation is the one that puts the marker on the camera at the camera's optical centre (paper section
-  IV-C). Where the rotation is found about the middle of the eight, an error of it swings the person around
-  the camera, a metre and more away. Where it is found about the camera, errors of depth, which lie along
-  the lines of sight, turn nothing. Either is as wrong as the camera's marker is far from the centre.
-- `register_selected`: rotation and translation by Arun's method from the same eight markers.
-- `register_robustly`: the same from the markers of all clicked images, those left out that do not agree
-  with the others.
+From the markers of all clicked images, those left out that do not agree with the others. The paper's way is
+in `eight_clicks`; `reprojection` has one without depth.
 """
+
+from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +24,6 @@ from hicp_lib.recordings.recording import Recording
 
 CAMERA_MARKER = "camera"
 REGISTRATION_FILE = "registration.json"
-N_PAPER_MARKERS, N_PAPER_IMAGES = 8, 2
 SEEN, MEASURED = ["x_m", "y_m", "z_m"], ["mocap_x_m", "mocap_y_m", "mocap_z_m"]
 _OUTLIER_MEDIANS = 3 * 1.4826  # three standard deviations, as multiples of the median residual, ...
 _MIN_OUTLIER_M = 0.02  # ... and this are what residuals left out are beyond
@@ -65,6 +58,14 @@ class Registration:
     n_points: int = 0
     rms_m: float = np.nan
     leave_one_out_m: float = np.nan
+
+    @classmethod
+    def of_fit(cls, method: str, fit: RigidFit, T_base_mocap: np.ndarray | None = None) -> Registration:
+        """What was found from a fit; its transform unless another is given."""
+        left_out_m = fit.leave_one_out_m[np.isfinite(fit.leave_one_out_m)]
+        typical_m = float(np.median(left_out_m)) if len(left_out_m) else np.nan
+        T = fit.T_b_a if T_base_mocap is None else T_base_mocap
+        return cls(method, T, len(fit.residuals_m), fit.rms_m, typical_m)
 
 
 def lift_clicks(
@@ -125,33 +126,6 @@ def measured_markers(
     return interpolate_mocap(mocap.times_s, mocap.points_m, stamps_s)[np.arange(len(clicks)), columns]
 
 
-def select_paper_markers(matched: pd.DataFrame) -> pd.DataFrame:
-    """Eight markers in two images, as in the paper: of the two images that show most markers, the eight
-    that lie furthest from each other.
-
-    Clicks whose depth is that of something else, a wall behind for one, are not chosen.
-
-    Parameters
-    ----------
-    matched : pd.DataFrame
-        As from `lift_clicks`.
-
-    Returns
-    -------
-    pd.DataFrame
-        At most eight rows of it.
-    """
-    matched = matched[keeps_distances(matched)]
-    frames = matched["frame"].value_counts(sort=True).sort_index(kind="stable").nlargest(N_PAPER_IMAGES).index
-    table = matched[matched["frame"].isin(frames)].reset_index(drop=True)
-    points = table[MEASURED].to_numpy()
-    chosen = [int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmax())]
-    while len(chosen) < min(N_PAPER_MARKERS, len(points)):
-        nearest = np.linalg.norm(points[:, None] - points[chosen], axis=2).min(axis=1)
-        chosen.append(int(nearest.argmax()))
-    return table.loc[sorted(chosen)].reset_index(drop=True)
-
-
 def keeps_distances(matched: pd.DataFrame) -> np.ndarray:
     """Which clicks are as far from most others in the one frame as in the other, to a decimetre.
 
@@ -171,111 +145,10 @@ def keeps_distances(matched: pd.DataFrame) -> np.ndarray:
     return np.median(np.abs(seen_m - measured_m), axis=1) < _MAX_STRETCH_M
 
 
-def camera_places(
-    recording: Recording, mocap: MotionCapture, offset_s: float = 0.0
-) -> tuple[np.ndarray, np.ndarray]:
-    """Where the marker on the camera was measured in every frame, and where the camera was.
-
-    Parameters
-    ----------
-    recording : Recording
-    mocap : MotionCapture
-    offset_s : float, optional
-        To add to the motion capture's stamps to have them on the camera's clock.
-
-    Returns
-    -------
-    marker_m : array, shape (n_frames, 3)
-        In the motion capture's frame; NaN where not measured.
-    centre_m : array, shape (n_frames, 3)
-        The camera's optical centre in the base frame.
-
-    Raises
-    ------
-    InputError
-        If the marker `camera` is missing.
-    """
-    if CAMERA_MARKER not in mocap.names:
-        hint = "name the one on the camera so, or click markers in more images and use all of them"
-        raise InputError(f"motion capture has no marker {CAMERA_MARKER!r}; {hint}")
-    camera = pd.DataFrame({"frame": range(len(recording)), "marker": CAMERA_MARKER})
-    marker_m = measured_markers(recording, camera, mocap, offset_s)
-    if np.isnan(marker_m).all():
-        raise InputError(f"marker {CAMERA_MARKER!r} was measured in no frame of the recording")
-    return marker_m, recording.T_base_cam[:, :3, 3]
-
-
-def register_by_camera_marker(
-    matched: pd.DataFrame, marker_m: np.ndarray, centre_m: np.ndarray, about_camera: bool = False
-) -> Registration:
-    """Rotation by Arun's method; translation from the marker on the camera, its median over the frames.
-
-    The paper's section IV-C.
-
-    Parameters
-    ----------
-    matched : pd.DataFrame
-        As from `select_paper_markers`.
-    marker_m, centre_m : array, shape (n_frames, 3)
-        As from `camera_places`.
-    about_camera : bool, optional
-        Whether the rotation is found about the camera, or about the middle of the points.
-
-    Returns
-    -------
-    Registration
-
-    Raises
-    ------
-    InputError
-        If `hicp_lib.core.alignment.arun` refuses the points.
-    """
-    if about_camera:
-        frames = matched["frame"]
-        from_marker_m = matched[MEASURED].to_numpy() - marker_m[frames]
-        measured = np.isfinite(from_marker_m).all(axis=1)
-        from_centre_m = matched[SEEN].to_numpy() - centre_m[frames]
-        fit = arun(from_marker_m[measured], from_centre_m[measured], about_origin=True)
-    else:
-        fit = _fit(matched)
-    T = fit.T_b_a.copy()
-    T[:3, 3] = np.nanmedian(centre_m - marker_m @ T[:3, :3].T, axis=0)
-    how = "turned about the camera" if about_camera else "camera marker"
-    return _registration(f"paper: eight clicks, {how}", fit, T)
-
-
-def register_selected(matched: pd.DataFrame) -> Registration:
-    """Arun's method alone, from all of some markers.
-
-    Parameters
-    ----------
-    matched : pd.DataFrame
-        As from `select_paper_markers`.
-
-    Returns
-    -------
-    Registration
-
-    Raises
-    ------
-    InputError
-        If `hicp_lib.core.alignment.arun` refuses the points.
-
-    Examples
-    --------
-    >>> corners_m = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
-    >>> matched = pd.DataFrame(np.c_[corners_m + [0, 0, 2], corners_m], columns=[*SEEN, *MEASURED])
-    >>> registration = register_selected(matched)
-    >>> registration.n_points, round(registration.T_base_mocap[2, 3], 6)
-    (4, np.float64(2.0))
-    """
-    return _registration("Arun: the same eight clicks", _fit(matched))
-
-
 def register_robustly(matched: pd.DataFrame) -> Registration:
     """Arun's method from all markers that agree.
 
-    The start is from points that keep their distances to most others, as for `select_paper_markers`. Then
+    The start is from points that keep their distances to most others, as for `eight_clicks.select_markers`. Then
     points whose residual is beyond three robust standard deviations (and 2 cm) are left out, and the fit is
     made anew, until it stays.
 
@@ -302,7 +175,7 @@ def register_robustly(matched: pd.DataFrame) -> Registration:
         if (agrees == kept).all() or agrees.sum() < 3:
             break
         kept = agrees
-    return _registration("all clicks", fit)
+    return Registration.of_fit("all clicks", fit)
 
 
 def read_registration(path: str | Path) -> Registration:
@@ -334,15 +207,3 @@ def read_registration(path: str | Path) -> Registration:
         wrong = "its first three columns are not a rotation"
         raise InputError(f"{path}: T_base_mocap: {wrong}; give R, then t in m")
     return Registration("given", T)
-
-
-def _fit(matched: pd.DataFrame) -> RigidFit:
-    return arun(matched[MEASURED].to_numpy(), matched[SEEN].to_numpy())
-
-
-def _registration(method: str, fit: RigidFit, T_base_mocap: np.ndarray | None = None) -> Registration:
-    """What was found from a fit; its transform unless another is given."""
-    left_out_m = fit.leave_one_out_m[np.isfinite(fit.leave_one_out_m)]
-    typical_m = float(np.median(left_out_m)) if len(left_out_m) else np.nan
-    T = fit.T_b_a if T_base_mocap is None else T_base_mocap
-    return Registration(method, T, len(fit.residuals_m), fit.rms_m, typical_m)

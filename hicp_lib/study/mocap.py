@@ -1,12 +1,6 @@
-"""The data of the motion capture test: one recording, its clock offset, and its registration.
-
-A simulated recording knows its exact transform and clock; clicks are simulated there. A laboratory's own
-holds `clicks.csv` (markers clicked in images, see `hicp_lib.mocap.clicking`), or `registration.json` when
-the transform is known from elsewhere.
-"""
+"""The data of the motion capture test: what was detected and lifted, the clock's offset, and errors."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -29,31 +23,11 @@ from hicp_lib.evaluation.space.occlusion import joint_occlusion
 from hicp_lib.evaluation.space.stability import POSITION, position_array
 from hicp_lib.lifting.robust import METHODS
 from hicp_lib.lifting.table import lift_found
-from hicp_lib.mocap import registration
-from hicp_lib.mocap.clicking import CLICKS_FILE, read_clicks
-from hicp_lib.mocap.reprojection import register_by_reprojection
+from hicp_lib.mocap.registration import Registration
 from hicp_lib.mocap.synchronisation import ClockOffset, clock_offset
 from hicp_lib.recordings.qualisys import MotionCapture, read_mocap
-from hicp_lib.recordings.recording import MOCAP_FILE, Recording, open_recording, read_simulation, read_truth
-
-
-@dataclass(frozen=True)
-class Registered:
-    """The registrations of a recording.
-
-    Attributes
-    ----------
-    fits : list of registration.Registration
-        In the order of the module `hicp_lib.mocap.registration`, then by reprojection: the one to use.
-    exact : array or None, shape (4, 4)
-        The true transform T_base_mocap; None where it is not known.
-    clicks : pd.DataFrame
-        The clicks of the images the paper's registration rests on; empty where the transform was given.
-    """
-
-    fits: list[registration.Registration]
-    exact: np.ndarray | None
-    clicks: pd.DataFrame
+from hicp_lib.recordings.recording import MOCAP_FILE, Recording, read_truth
+from hicp_lib.study.registration import Registered
 
 
 def open_mocap(recording: Recording) -> MotionCapture:
@@ -142,104 +116,8 @@ def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame)
     )
 
 
-def register(
-    recording: Recording,
-    mocap: MotionCapture,
-    offset_s: float,
-    n_images: int = 12,
-    noise_px: float = 1.0,
-    seed: int = 0,
-) -> Registered:
-    """Every registration a recording allows; of one cut short, clicks beyond its end are not used.
-
-    Parameters
-    ----------
-    recording : Recording
-    mocap : MotionCapture
-    offset_s : float
-        Of the motion capture's clock, as from `find_clock`.
-    n_images : int
-        Images with simulated clicks; like the two below, not used on a laboratory's own recording.
-    noise_px : float
-        Standard deviation of a simulated click in each direction.
-    seed : int
-        Of the simulated clicks.
-
-    Returns
-    -------
-    Registered
-
-    Raises
-    ------
-    InputError
-        If the recording has neither clicks nor a registration, or they are malformed.
-    """
-    clicks, exact = simulated_clicks(recording, mocap, n_images, noise_px, seed)
-    clicks_path = recording.folder / CLICKS_FILE
-    if exact is None and not clicks_path.is_file():
-        return Registered([_given(recording)], None, pd.DataFrame())
-    if exact is None:
-        clicks = read_clicks(clicks_path, open_recording(recording.folder), mocap.names)
-        clicks = clicks[clicks["frame"] < len(recording)]
-    matched = registration.lift_clicks(recording, clicks, mocap, offset_s)
-    eight = registration.select_paper_markers(matched)
-    fits = [registration.register_selected(eight), registration.register_robustly(matched)]
-    fits.append(register_by_reprojection(recording, clicks, mocap, fits[-1], offset_s))
-    if registration.CAMERA_MARKER in mocap.names:
-        places = registration.camera_places(recording, mocap, offset_s)
-        ways = (False, True)
-        fits = [registration.register_by_camera_marker(eight, *places, way) for way in ways] + fits
-    return Registered(fits, exact, clicks.merge(eight[["frame", "marker"]]))
-
-
-def simulated_clicks(
-    recording: Recording, mocap: MotionCapture, n_images: int, noise_px: float, seed: int
-) -> tuple[pd.DataFrame, np.ndarray | None]:
-    """Clicks in a simulated recording, and its true transform.
-
-    Parameters
-    ----------
-    recording : Recording
-    mocap : MotionCapture
-    n_images : int
-    noise_px : float
-    seed : int
-        These three as of `register`.
-
-    Returns
-    -------
-    pd.DataFrame
-        As from `hicp_lib.simulation.sensors.clicks.simulate_clicks`; empty where it is not simulated.
-    array or None, shape (4, 4)
-        T_base_mocap; None where it is not simulated.
-    """
-    simulation = read_simulation(recording)
-    if not simulation:
-        return pd.DataFrame(), None
-    from hicp_lib.simulation.sensors.clicks import simulate_clicks
-
-    exact, offset_s = np.array(simulation["T_base_mocap"]), simulation["mocap_offset_s"]
-    return simulate_clicks(recording, mocap, exact, n_images, noise_px, offset_s, seed), exact
-
-
-def _given(recording: Recording) -> registration.Registration:
-    file, n_clicks = registration.REGISTRATION_FILE, registration.N_PAPER_MARKERS
-    if (recording.folder / file).is_file():
-        return registration.read_registration(recording.folder / file)
-    raise InputError(
-        f"{recording.folder}: has neither {CLICKS_FILE} (frame,marker,u_px,v_px) nor {file}; click {n_clicks}"
-        " or more markers with hicp_lib.mocap.clicking, or give T_base_mocap"
-    )
-
-
 def medians_under(
-    registered: Registered,
-    points: pd.DataFrame,
-    recording: Recording,
-    mocap: MotionCapture,
-    offset_s: float,
-    n_resamples: int = 1000,
-    seed: int = 0,
+    registered: Registered, points: pd.DataFrame, n_resamples: int = 1000, seed: int = 0
 ) -> pd.DataFrame:
     """What the choice of the registration does to the median errors of elbows and wrists.
 
@@ -248,10 +126,6 @@ def medians_under(
     registered : Registered
     points : pd.DataFrame
         The first of `lift_frames`.
-    recording : Recording
-    mocap : MotionCapture
-    offset_s : float
-        Of the motion capture's clock.
     n_resamples, seed : int
         Number of bootstrap draws, and what they are drawn with.
 
@@ -261,37 +135,30 @@ def medians_under(
         Column `registration`, then as from `median_errors`, score above 0.1; the exact transform, where it is
         known, comes last.
     """
-    fits = {fit.method: fit.T_base_mocap for fit in registered.fits}
-    fits |= {} if registered.exact is None else {"exact": registered.exact}
+    fits = list(registered.fits)
+    fits += [] if registered.exact is None else [Registration("exact", registered.exact)]
     tables = []
-    for name, T_base_mocap in fits.items():
-        reference = marker_means(mocap, recording.times_s - offset_s, T_base_mocap, TABLE_JOINTS)
-        medians = median_errors(mocap_errors(points, reference), MIN_SCORES[-1:], n_resamples, seed)
-        tables.append(labelled(medians, registration=name))
+    for fit in fits:
+        errors = mocap_errors(points, registered.reference(fit, TABLE_JOINTS))
+        medians = median_errors(errors, MIN_SCORES[-1:], n_resamples, seed)
+        tables.append(labelled(medians, registration=fit.method))
     return pd.concat(tables, ignore_index=True)
 
 
-def errors_at_joints(
-    points: pd.DataFrame, registered: Registered, recording: Recording, mocap: MotionCapture, offset_s: float
-) -> pd.DataFrame:
+def errors_at_joints(registered: Registered, points: pd.DataFrame) -> pd.DataFrame:
     """`mocap_errors` under the best registration, with the lines of sight: columns `distance_m, sight`.
 
     Parameters
     ----------
+    registered : Registered
     points : pd.DataFrame
         The first of `lift_frames`.
-    registered : Registered
-    recording : Recording
-    mocap : MotionCapture
-    offset_s : float
-        Of the motion capture's clock.
 
     Returns
     -------
     pd.DataFrame
     """
-    stamps_s, T_base_mocap = recording.times_s - offset_s, registered.fits[-1].T_base_mocap
-    reference = marker_means(mocap, stamps_s, T_base_mocap)
+    reference, recording = registered.reference(), registered.recording
     errors = mocap_errors(points, reference, read_truth(recording))
     return errors.merge(joint_occlusion(recording, reference), on=["frame", "keypoint"])
 

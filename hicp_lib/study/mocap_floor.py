@@ -18,6 +18,7 @@ from hicp_lib.evaluation.space.stability import POSITION, position_array
 from hicp_lib.lifting.table import lift_pixels
 from hicp_lib.recordings.recording import Recording, read_truth
 from hicp_lib.study.plots.palette import PERFECT
+from hicp_lib.study.registration import Registered
 
 
 def perfect_detections(recording: Recording) -> dict[str, list[Detections]]:
@@ -43,25 +44,18 @@ def perfect_detections(recording: Recording) -> dict[str, list[Detections]]:
 
 
 def medians_by_radius(
-    recording: Recording,
-    points: pd.DataFrame,
-    reference: pd.DataFrame,
-    radii_m: Sequence[float],
-    n_resamples: int = 1000,
-    seed: int = 0,
+    registered: Registered, points: pd.DataFrame, radii_m: Sequence[float], n_resamples: int, seed: int
 ) -> pd.DataFrame:
     """Median errors of the paper's lifting by the size of the neighbourhood that it takes depth from.
 
     Parameters
     ----------
-    recording : Recording
+    registered : Registered
     points : pd.DataFrame
-        As from `hicp_lib.lifting.table.lift_found`.
-    reference : pd.DataFrame
-        As from `hicp_lib.evaluation.space.mocap_error.marker_means`.
+        As from `hicp_lib.lifting.table.lift_found`; of some frames, to save time.
     radii_m : sequence of float
         Half the sides of the neighbourhood.
-    n_resamples, seed : int, optional
+    n_resamples, seed : int
         Number of bootstrap draws, and what they are drawn with.
 
     Returns
@@ -71,9 +65,9 @@ def medians_by_radius(
     """
     rows = points[(points["person"] == 0) & (points["method"] == "paper")]
     rows = rows[rows["keypoint"].isin(TABLE_JOINTS)]
-    reference = reference[reference["keypoint"].isin(TABLE_JOINTS)]
-    tables = []
-    for radius_m, lifted_m in zip(radii_m, lift_pixels(recording, rows, radii_m), strict=True):
+    reference = registered.reference(joints=TABLE_JOINTS)
+    reference, tables = reference[reference["frame"].isin(points["frame"])], []
+    for radius_m, lifted_m in zip(radii_m, lift_pixels(registered.recording, rows, radii_m), strict=True):
         lifted = rows.assign(**dict(zip(POSITION, lifted_m.T, strict=True)))
         medians = median_errors(mocap_errors(lifted, reference), MIN_SCORES[-1:], n_resamples, seed)
         tables.append(labelled(medians, radius_m=radius_m))

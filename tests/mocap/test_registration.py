@@ -10,17 +10,19 @@ from scipy.spatial.transform import Rotation
 from hicp_lib.core.camera import Camera, project, transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import write_json
+from hicp_lib.mocap.eight_clicks import (
+    camera_places,
+    register_by_camera_marker,
+    register_selected,
+    select_markers,
+)
 from hicp_lib.mocap.registration import (
     REGISTRATION_FILE,
     SEEN,
-    camera_places,
     lift_clicks,
     measured_markers,
     read_registration,
-    register_by_camera_marker,
     register_robustly,
-    register_selected,
-    select_paper_markers,
 )
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import open_recording
@@ -103,7 +105,7 @@ def test_clicks_are_lifted_to_where_the_markers_are(laboratory, clicks):
 
 
 def test_arun_alone_finds_what_the_markers_say(laboratory, clicks):
-    matched = select_paper_markers(lift_clicks(laboratory[0], clicks, laboratory[1]))
+    matched = select_markers(lift_clicks(laboratory[0], clicks, laboratory[1]))
     assert len(matched) == 8 and matched["frame"].nunique() <= 2
     registration = register_selected(matched)
     angle, displacement = errors_of(registration)
@@ -114,7 +116,7 @@ def test_arun_alone_finds_what_the_markers_say(laboratory, clicks):
 
 def test_the_papers_translation_is_off_by_where_the_camera_marker_sits(laboratory, clicks):
     recording, mocap = laboratory
-    matched = select_paper_markers(lift_clicks(recording, clicks, mocap))
+    matched = select_markers(lift_clicks(recording, clicks, mocap))
     registration = register_by_camera_marker(matched, *camera_places(recording, mocap))
     assert np.allclose(registration.T_base_mocap[:3, :3], register_selected(matched).T_base_mocap[:3, :3])
     _, displacement = errors_of(registration)
@@ -124,7 +126,7 @@ def test_the_papers_translation_is_off_by_where_the_camera_marker_sits(laborator
 def test_turned_about_the_camera_errors_along_the_line_of_sight_turn_nothing(laboratory, clicks):
     """Markers that are lifted too near by up to 5 cm, each along its own line of sight."""
     recording, mocap = laboratory
-    matched = select_paper_markers(lift_clicks(recording, clicks, mocap))
+    matched = select_markers(lift_clicks(recording, clicks, mocap))
     marker_m, centre_m = camera_places(recording, mocap)
     centred_m = transform(np.linalg.inv(T_BASE_MOCAP), centre_m)
     sight_m = matched[SEEN].to_numpy() - centre_m[matched["frame"]]
@@ -150,7 +152,7 @@ def test_wrong_clicks_do_not_spoil_the_fit_to_many(laboratory, clicks):
 def test_clicks_on_the_wall_behind_are_not_among_the_eight(laboratory, clicks):
     matched = lift_clicks(laboratory[0], clicks, laboratory[1])
     matched.loc[::4, ["x_m", "y_m", "z_m"]] += [-0.4, 0.9, 1.2]
-    eight = select_paper_markers(matched)
+    eight = select_markers(matched)
     assert len(eight) == 8 and register_selected(eight).rms_m < 0.005
 
 
@@ -233,7 +235,7 @@ def test_the_offset_is_taken_from_the_cameras_clock(laboratory, clicks):
     assert np.ptp(expected_m[clicks["marker"] == "m0", 0]) == pytest.approx(0.06)  # 0.6 s at 0.1 m/s
     matched = lift_clicks(recording, clicks, behind, 0.37)
     np.testing.assert_allclose(matched[["mocap_x_m", "mocap_y_m", "mocap_z_m"]], expected_m, atol=1e-12)
-    eight = select_paper_markers(lift_clicks(recording, clicks, mocap))
+    eight = select_markers(lift_clicks(recording, clicks, mocap))
     late = replace(mocap, times_s=mocap.times_s - 0.37)
     found, given = (
         register_by_camera_marker(eight, *camera_places(recording, capture, offset_s)).T_base_mocap
@@ -246,7 +248,7 @@ def test_the_eight_are_of_the_two_images_with_most_markers_and_far_apart(laborat
     matched = lift_clicks(laboratory[0], clicks, laboratory[1])
     matched = matched[~((matched["frame"] == 1) & (matched["marker"] == "m0"))]
     matched = matched[~((matched["frame"] == 3) & matched["marker"].isin(["m1", "m2"]))]
-    eight = select_paper_markers(matched)
+    eight = select_markers(matched)
     assert eight["frame"].isin([0, 2]).all() and len(eight) == 8
     points_m = eight[["mocap_x_m", "mocap_y_m", "mocap_z_m"]].to_numpy()
     apart_m = np.linalg.norm(points_m[:, None] - points_m, axis=2)[np.triu_indices(8, 1)]
@@ -262,7 +264,7 @@ def test_points_that_keep_their_distances_to_a_decimetre_are_chosen(off_m, is_ch
     matched[["mocap_x_m", "mocap_y_m", "mocap_z_m"]] = places_m
     places_m[0, 0] -= off_m
     matched[["x_m", "y_m", "z_m"]] = places_m
-    assert ("m0" in set(select_paper_markers(matched)["marker"])) == is_chosen
+    assert ("m0" in set(select_markers(matched)["marker"])) == is_chosen
 
 
 @pytest.mark.parametrize(("skew", "fits"), [(0.8e-4, True), (1.2e-4, False)])

@@ -6,11 +6,14 @@ import pytest
 
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.keypoints import BODY, INDEX
-from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS
+from hicp_lib.evaluation.space.mocap_error import MARKERS, TABLE_JOINTS
+from hicp_lib.mocap.registration import Registration
+from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import TRUTH_FILE, Recording, open_recording
 from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.study.mocap_floor import medians_by_radius, perfect_detections
 from hicp_lib.study.plots.palette import PERFECT
+from hicp_lib.study.registration import Registered
 
 CAMERA = Camera(160, 120, 300.0, 300.0, 79.5, 59.5)
 
@@ -47,8 +50,12 @@ def test_a_neighbourhood_wider_than_the_limb_takes_the_wall(recording):
     rows = pd.DataFrame({"frame": [0, 1], "keypoint": "left_wrist", "u_px": 79.0, "v_px": 60.0})
     points = rows.assign(detector="a", person=0, score=0.9, x_m=0.0, y_m=0.0, z_m=0.0)
     points = pd.concat([points.assign(method=name) for name in ("paper", "robust")])
-    reference = rows[["frame", "keypoint"]].assign(x_m=0.0, y_m=0.0, z_m=1.0)
-    table = medians_by_radius(recording, points, reference, (0.010, 0.040), n_resamples=10)
+    names = tuple(name for joint in TABLE_JOINTS for name in MARKERS[joint])
+    times_s, markers_m = np.arange(-0.1, 0.3, 0.01), np.array([0.0, 0.0, 1.0])
+    mocap = MotionCapture(times_s, names, np.broadcast_to(markers_m, (len(times_s), 8, 3)), 100.0)
+    registered = Registered(recording, mocap, 0.0, [Registration("given", np.eye(4))], None, pd.DataFrame())
+    table = medians_by_radius(registered, points, (0.010, 0.040), n_resamples=10, seed=0)
+    table = table[table["keypoint"] == "left_wrist"]
     assert table["radius_m"].tolist() == [0.010, 0.040] and set(table["method"]) == {"paper"}
     assert table["median_m"].tolist() == pytest.approx([0.0, 1.0], abs=0.01)
-    assert table["keypoint"].isin(TABLE_JOINTS).all() and (table["count"] == 2).all()
+    assert (table["count"] == 2).all() and (table["n_frames"] == 2).all()
