@@ -57,10 +57,7 @@ class Lifted:
 
 
 def lift(
-    keypoints_px: np.ndarray,
-    depth_m: np.ndarray,
-    intrinsics: Camera,
-    radius_m: float | np.ndarray = RADIUS_M,
+    keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera, radius_m: np.ndarray | float = RADIUS_M
 ) -> Lifted:
     """Lift the keypoints of everyone in an image by the paper's method; this module's head defines it.
 

@@ -11,14 +11,8 @@ import pandas as pd
 
 from hicp_lib.core.alignment import arun
 from hicp_lib.core.errors import InputError
-from hicp_lib.mocap.registration import (
-    CAMERA_MARKER,
-    MEASURED,
-    SEEN,
-    Registration,
-    keeps_distances,
-    measured_markers,
-)
+from hicp_lib.mocap import registration as r
+from hicp_lib.mocap.registration import MEASURED, SEEN, Registration
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import Recording
 
@@ -41,7 +35,7 @@ def select_markers(matched: pd.DataFrame) -> pd.DataFrame:
     pd.DataFrame
         At most eight rows of it.
     """
-    matched = matched[keeps_distances(matched)]
+    matched = matched[r.keeps_distances(matched)]
     frames = matched["frame"].value_counts(sort=True).sort_index(kind="stable").nlargest(N_IMAGES).index
     table = matched[matched["frame"].isin(frames)].reset_index(drop=True)
     points = table[MEASURED].to_numpy()
@@ -76,13 +70,13 @@ def camera_places(
     InputError
         If the marker `camera` is missing.
     """
-    if CAMERA_MARKER not in mocap.names:
+    if r.CAMERA_MARKER not in mocap.names:
         hint = "name the one on the camera so, or click markers in more images and use all of them"
-        raise InputError(f"motion capture has no marker {CAMERA_MARKER!r}; {hint}")
-    camera = pd.DataFrame({"frame": range(len(recording)), "marker": CAMERA_MARKER})
-    marker_m = measured_markers(recording, camera, mocap, offset_s)
+        raise InputError(f"motion capture has no marker {r.CAMERA_MARKER!r}; {hint}")
+    camera = pd.DataFrame({"frame": range(len(recording)), "marker": r.CAMERA_MARKER})
+    marker_m = r.measured_markers(recording, camera, mocap, offset_s)
     if np.isnan(marker_m).all():
-        raise InputError(f"marker {CAMERA_MARKER!r} was measured in no frame of the recording")
+        raise InputError(f"marker {r.CAMERA_MARKER!r} was measured in no frame of the recording")
     return marker_m, recording.T_base_cam[:, :3, 3]
 
 

@@ -148,9 +148,8 @@ def keeps_distances(matched: pd.DataFrame) -> np.ndarray:
 def register_robustly(matched: pd.DataFrame) -> Registration:
     """Arun's method from all markers that agree.
 
-    The start is from points that keep their distances to most others, as for `eight_clicks.select_markers`. Then
-    points whose residual is beyond three robust standard deviations (and 2 cm) are left out, and the fit is
-    made anew, until it stays.
+    The start is from points that keep their distances to most others. Then points whose residual is beyond
+    three robust standard deviations (and 2 cm) are left out, and the fit is made anew, until it stays.
 
     Parameters
     ----------

@@ -11,14 +11,8 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.runtime.results import detections_of
 from hicp_lib.detectors.runtime.run import detect_images
 from hicp_lib.evaluation.cases import labelled
+from hicp_lib.evaluation.space import mocap_error
 from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_ablation
-from hicp_lib.evaluation.space.mocap_error import (
-    MIN_SCORES,
-    TABLE_JOINTS,
-    marker_means,
-    median_errors,
-    mocap_errors,
-)
 from hicp_lib.evaluation.space.occlusion import joint_occlusion
 from hicp_lib.evaluation.space.stability import POSITION, position_array
 from hicp_lib.lifting.robust import METHODS
@@ -107,10 +101,10 @@ def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame)
     """
     best = points[points["person"] == 0]
     cases = [rows for _, rows in best.groupby(["detector", "method"], sort=False)]
-    seen_m = [position_array(rows, TABLE_JOINTS, len(recording)) for rows in cases]
+    seen_m = [position_array(rows, mocap_error.TABLE_JOINTS, len(recording)) for rows in cases]
     # Speeds are the same in any frame: no registration is needed yet.
-    means = marker_means(mocap, mocap.times_s, np.eye(4), TABLE_JOINTS)
-    means_m = means[POSITION].to_numpy(float).reshape(len(mocap.times_s), len(TABLE_JOINTS), 3)
+    means = mocap_error.marker_means(mocap, mocap.times_s, np.eye(4), mocap_error.TABLE_JOINTS)
+    means_m = means[POSITION].to_numpy(float).reshape(len(mocap.times_s), len(mocap_error.TABLE_JOINTS), 3)
     return clock_offset(
         recording.times_s, np.concatenate(seen_m, axis=1), mocap.times_s, np.tile(means_m, (1, len(cases), 1))
     )
@@ -139,8 +133,8 @@ def medians_under(
     fits += [] if registered.exact is None else [Registration("exact", registered.exact)]
     tables = []
     for fit in fits:
-        errors = mocap_errors(points, registered.reference(fit, TABLE_JOINTS))
-        medians = median_errors(errors, MIN_SCORES[-1:], n_resamples, seed)
+        errors = mocap_error.mocap_errors(points, registered.reference(fit, mocap_error.TABLE_JOINTS))
+        medians = mocap_error.median_errors(errors, mocap_error.MIN_SCORES[-1:], n_resamples, seed)
         tables.append(labelled(medians, registration=fit.method))
     return pd.concat(tables, ignore_index=True)
 
@@ -159,7 +153,7 @@ def errors_at_joints(registered: Registered, points: pd.DataFrame) -> pd.DataFra
     pd.DataFrame
     """
     reference, recording = registered.reference(), registered.recording
-    errors = mocap_errors(points, reference, read_truth(recording))
+    errors = mocap_error.mocap_errors(points, reference, read_truth(recording))
     return errors.merge(joint_occlusion(recording, reference), on=["frame", "keypoint"])
 
 
