@@ -61,7 +61,20 @@ class Registration:
 
     @classmethod
     def of_fit(cls, method: str, fit: RigidFit, T_base_mocap: np.ndarray | None = None) -> Registration:
-        """What was found from a fit; its transform unless another is given."""
+        """What was found from a fit.
+
+        Parameters
+        ----------
+        method : str
+            How, in words.
+        fit : RigidFit
+        T_base_mocap : array, shape (4, 4), optional
+            The transform, where it is not the fit's own.
+
+        Returns
+        -------
+        Registration
+        """
         left_out_m = fit.leave_one_out_m[np.isfinite(fit.leave_one_out_m)]
         typical_m = float(np.median(left_out_m)) if len(left_out_m) else np.nan
         T = fit.T_b_a if T_base_mocap is None else T_base_mocap

@@ -40,7 +40,7 @@ class Registered:
     mocap : MotionCapture
     offset_s : float
         To add to the motion capture's stamps to have them on the camera's clock.
-    fits : list of Registration
+    fits : list of r.Registration
         By eight clicks, by all, then by reprojection: the one to use.
     exact : array or None, shape (4, 4)
         The true transform T_base_mocap; None where it is not known.
