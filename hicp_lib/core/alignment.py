@@ -40,7 +40,7 @@ class RigidFit:
         return float(np.sqrt(np.mean(self.residuals_m**2)))
 
 
-def arun(points_a_m: np.ndarray, points_b_m: np.ndarray) -> RigidFit:
+def arun(points_a_m: np.ndarray, points_b_m: np.ndarray, about_origin: bool = False) -> RigidFit:
     """The rigid transform that takes `points_a_m` nearest to `points_b_m` in the least-squares sense.
 
     Arun, Huang and Blostein (PAMI 1987), with the sign of Umeyama (PAMI 1991): the best proper rotation
@@ -50,6 +50,8 @@ def arun(points_a_m: np.ndarray, points_b_m: np.ndarray) -> RigidFit:
     ----------
     points_a_m, points_b_m : array, shape (n, 3)
         Row i of one is row i of the other; n >= 3.
+    about_origin : bool, optional
+        Take a's origin to b's exactly, and only turn about it.
 
     Returns
     -------
@@ -79,8 +81,8 @@ def arun(points_a_m: np.ndarray, points_b_m: np.ndarray) -> RigidFit:
             f"the {len(a)} matched points lie on a line or in one place (singular-value ratio {ratio:.1e}, "
             f"at least {MIN_SPREAD_RATIO:.0e} is needed); add points off that line"
         )
-    T_b_a = _solve(a, b)
-    return RigidFit(T_b_a, _distances(T_b_a, a, b), _leave_one_out(a, b), ratio)
+    T_b_a = _solve(a, b, about_origin)
+    return RigidFit(T_b_a, _distances(T_b_a, a, b), _leave_one_out(a, b, about_origin), ratio)
 
 
 def _spread_ratio(points: np.ndarray) -> float:
@@ -88,8 +90,8 @@ def _spread_ratio(points: np.ndarray) -> float:
     return float(values[1] / values[0]) if values[0] > 0 else 0.0
 
 
-def _solve(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    mean_a, mean_b = a.mean(axis=0), b.mean(axis=0)
+def _solve(a: np.ndarray, b: np.ndarray, about_origin: bool) -> np.ndarray:
+    mean_a, mean_b = (np.zeros(3) if about_origin else points.mean(axis=0) for points in (a, b))
     U, _, Vt = np.linalg.svd((a - mean_a).T @ (b - mean_b))
     sign = np.sign(np.linalg.det(U) * np.linalg.det(Vt))
     T = np.eye(4)
@@ -102,10 +104,10 @@ def _distances(T_b_a: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.linalg.norm(a @ T_b_a[:3, :3].T + T_b_a[:3, 3] - b, axis=-1)
 
 
-def _leave_one_out(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _leave_one_out(a: np.ndarray, b: np.ndarray, about_origin: bool) -> np.ndarray:
     errors = np.full(len(a), np.nan)
     for i in range(len(a)):
         others = np.arange(len(a)) != i
         if others.sum() >= 3 and min(_spread_ratio(a[others]), _spread_ratio(b[others])) >= MIN_SPREAD_RATIO:
-            errors[i] = _distances(_solve(a[others], b[others]), a[i], b[i])
+            errors[i] = _distances(_solve(a[others], b[others], about_origin), a[i], b[i])
     return errors

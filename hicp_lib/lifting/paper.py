@@ -7,6 +7,7 @@ and the point is the median of each coordinate.
 
 What the paper leaves open is defined here:
 
+- r is half the side of the square, where its words allow the whole.
 - Where the keypoint's own pixel has no depth, the nearest pixel whose own depth sets a neighbourhood
   that reaches the keypoint decides the size; without any the keypoint is not lifted.
 - At the image's border the neighbourhood is what lies inside. A keypoint outside the image, beyond the
@@ -25,8 +26,9 @@ from hicp_lib.core.camera import Camera
 from hicp_lib.core.keypoints import BODY, N_KEYPOINTS
 from hicp_lib.core.memo import memoised
 
+BODY_RADIUS_M = 0.020
 RADIUS_M = np.full(N_KEYPOINTS, 0.003)
-RADIUS_M[BODY] = 0.020
+RADIUS_M[BODY] = BODY_RADIUS_M
 
 REASONS = ("lifted", "not_detected", "outside_image", "no_depth")
 """What `Lifted.reason` counts: lifted, or why not."""
@@ -54,7 +56,9 @@ class Lifted:
     reason: np.ndarray
 
 
-def lift(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera) -> Lifted:
+def lift(
+    keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera, radius_m: np.ndarray | float = RADIUS_M
+) -> Lifted:
     """Lift the keypoints of everyone in an image by the paper's method; this module's head defines it.
 
     Parameters
@@ -66,6 +70,8 @@ def lift(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera) -> L
         infinite: no depth.
     intrinsics : Camera
         Of that image.
+    radius_m : float or array, shape (136,), optional
+        r, of all keypoints or of each.
 
     Returns
     -------
@@ -94,7 +100,8 @@ def lift(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera) -> L
         depth_m = depth_m.astype(float)
     is_inside = intrinsics.contains(keypoints_px)
     at = np.floor(keypoints_px[is_inside, ::-1] + 0.5).astype(int).T
-    half_px = _half_widths(depth_m, at, intrinsics.fx_px * RADIUS_M[np.nonzero(is_inside)[1]])
+    radius_m = np.broadcast_to(radius_m, N_KEYPOINTS)[np.nonzero(is_inside)[1]]
+    half_px = _half_widths(depth_m, at, intrinsics.fx_px * radius_m)
     lifted = np.full((len(half_px), 3), np.nan)
     for some in _of_like_size(half_px):
         lifted[some] = _medians(depth_m, at[:, some], half_px[some], intrinsics)

@@ -8,8 +8,8 @@ import pandas as pd
 from hicp_lib.core.camera import transform
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.keypoints import NAMES
-from hicp_lib.lifting.paper import REASONS
+from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES
+from hicp_lib.lifting.paper import BODY_RADIUS_M, REASONS, lift
 from hicp_lib.lifting.robust import METHODS, lift_in_steps
 from hicp_lib.recordings.recording import Recording, read_depth_m
 
@@ -87,6 +87,35 @@ def lift_found(
         for i, method in enumerate(n_steps)
     }
     return pd.concat(tables, names=["detector", "method"]).droplevel(2).reset_index()
+
+
+def lift_pixels(
+    recording: Recording, pixels: pd.DataFrame, radii_m: Sequence[float] = (BODY_RADIUS_M,)
+) -> np.ndarray:
+    """Put pixels of a recording's images in space by the paper's method.
+
+    Parameters
+    ----------
+    recording : Recording
+    pixels : pd.DataFrame
+        Columns `frame, u_px, v_px`, n rows.
+    radii_m : sequence of float, optional
+        Half the side of the neighbourhood that the depth is taken from; every depth image is read once.
+
+    Returns
+    -------
+    array, shape (n_radii, n, 3)
+        In the robot's base frame; NaN where not lifted.
+    """
+    pixels, seen_m = pixels.reset_index(drop=True), np.full((len(radii_m), len(pixels), 3), np.nan)
+    for frame, rows in pixels.groupby("frame"):
+        depth_m = read_depth_m(recording, frame)
+        keypoints_px = np.full((len(rows), N_KEYPOINTS, 2), np.nan)
+        keypoints_px[:, 0] = rows[["u_px", "v_px"]]
+        for of_radius_m, radius_m in zip(seen_m, radii_m, strict=True):
+            lifted = lift(keypoints_px, depth_m, recording.intrinsics, radius_m)
+            of_radius_m[rows.index] = transform(recording.T_base_cam[frame], lifted.points_m[:, 0])
+    return seen_m
 
 
 def steps_of(method: str) -> int:

@@ -1,14 +1,10 @@
 """Where the motion capture's frame lies in the robot's base frame, from markers clicked in images.
 
-Three ways, from the same kind of clicks (`reprojection` has a fourth, without depth):
-
-- `register_by_camera_marker`: eight markers in two images give the rotation by Arun's method; the
-  translation is the one that puts the marker on the camera at the camera's optical centre (paper section
-  IV-C). It is as wrong as that marker is far from the centre.
-- `register_selected`: rotation and translation by Arun's method from the same eight markers.
-- `register_robustly`: the same from the markers of all clicked images, those left out that do not agree
-  with the others.
+From the markers of all clicked images, those left out that do not agree with the others. The paper's way is
+in `eight_clicks`; `reprojection` has one without depth.
 """
+
+from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,16 +16,15 @@ from hicp_lib.core.alignment import RigidFit, arun
 from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
-from hicp_lib.core.keypoints import N_KEYPOINTS
-from hicp_lib.lifting.paper import lift
+from hicp_lib.lifting.paper import BODY_RADIUS_M
+from hicp_lib.lifting.table import lift_pixels
 from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.qualisys import MotionCapture
-from hicp_lib.recordings.recording import Recording, read_depth_m
+from hicp_lib.recordings.recording import Recording
 
 CAMERA_MARKER = "camera"
 REGISTRATION_FILE = "registration.json"
-N_PAPER_MARKERS, N_PAPER_IMAGES = 8, 2
-_SEEN, _MEASURED = ["x_m", "y_m", "z_m"], ["mocap_x_m", "mocap_y_m", "mocap_z_m"]
+SEEN, MEASURED = ["x_m", "y_m", "z_m"], ["mocap_x_m", "mocap_y_m", "mocap_z_m"]
 _OUTLIER_MEDIANS = 3 * 1.4826  # three standard deviations, as multiples of the median residual, ...
 _MIN_OUTLIER_M = 0.02  # ... and this are what residuals left out are beyond
 _MAX_ROUNDS = 20
@@ -64,13 +59,38 @@ class Registration:
     rms_m: float = np.nan
     leave_one_out_m: float = np.nan
 
+    @classmethod
+    def of_fit(cls, method: str, fit: RigidFit, T_base_mocap: np.ndarray | None = None) -> Registration:
+        """What was found from a fit.
+
+        Parameters
+        ----------
+        method : str
+            How, in words.
+        fit : RigidFit
+        T_base_mocap : array, shape (4, 4), optional
+            The transform, where it is not the fit's own.
+
+        Returns
+        -------
+        Registration
+        """
+        left_out_m = fit.leave_one_out_m[np.isfinite(fit.leave_one_out_m)]
+        typical_m = float(np.median(left_out_m)) if len(left_out_m) else np.nan
+        T = fit.T_b_a if T_base_mocap is None else T_base_mocap
+        return cls(method, T, len(fit.residuals_m), fit.rms_m, typical_m)
+
 
 def lift_clicks(
-    recording: Recording, clicks: pd.DataFrame, mocap: MotionCapture, offset_s: float = 0.0
+    recording: Recording,
+    clicks: pd.DataFrame,
+    mocap: MotionCapture,
+    offset_s: float = 0.0,
+    radius_m: float = BODY_RADIUS_M,
 ) -> pd.DataFrame:
     """Clicked markers in the robot's base frame and in the motion capture's; others are left out.
 
-    They are lifted like keypoints of the body, by the paper's method.
+    They are lifted by the paper's method, like keypoints of the body unless another radius is given.
 
     Parameters
     ----------
@@ -80,6 +100,8 @@ def lift_clicks(
     mocap : MotionCapture
     offset_s : float, optional
         To add to the motion capture's stamps to have them on the camera's clock.
+    radius_m : float, optional
+        Half the side of the neighbourhood that the depth is taken from.
 
     Returns
     -------
@@ -87,14 +109,9 @@ def lift_clicks(
         Columns `frame, marker, x_m, y_m, z_m, mocap_x_m, mocap_y_m, mocap_z_m`.
     """
     clicks = clicks.sort_values("frame", kind="stable", ignore_index=True)
-    seen_m = np.full((len(clicks), 3), np.nan)
-    for frame, rows in clicks.groupby("frame"):
-        pixels_px = np.full((len(rows), N_KEYPOINTS, 2), np.nan)
-        pixels_px[:, 0] = rows[["u_px", "v_px"]]
-        points_m = lift(pixels_px, read_depth_m(recording, frame), recording.intrinsics).points_m[:, 0]
-        seen_m[rows.index] = transform(recording.T_base_cam[frame], points_m)
+    (seen_m,) = lift_pixels(recording, clicks, [radius_m])
     table = clicks[["frame", "marker"]].copy()
-    table[_SEEN], table[_MEASURED] = seen_m, measured_markers(recording, clicks, mocap, offset_s)
+    table[SEEN], table[MEASURED] = seen_m, measured_markers(recording, clicks, mocap, offset_s)
     return table.dropna(ignore_index=True)
 
 
@@ -122,114 +139,30 @@ def measured_markers(
     return interpolate_mocap(mocap.times_s, mocap.points_m, stamps_s)[np.arange(len(clicks)), columns]
 
 
-def select_paper_markers(matched: pd.DataFrame) -> pd.DataFrame:
-    """Eight markers in two images, as in the paper: of the two images that show most markers, the eight
-    that lie furthest from each other.
-
-    Clicks whose depth is that of something else, a wall behind for one, are not chosen.
+def keeps_distances(matched: pd.DataFrame) -> np.ndarray:
+    """Which clicks are as far from most others in the one frame as in the other, to a decimetre.
 
     Parameters
     ----------
     matched : pd.DataFrame
-        As from `lift_clicks`.
+        As from `lift_clicks`, n rows.
 
     Returns
     -------
-    pd.DataFrame
-        At most eight rows of it.
+    array of bool, shape (n,)
     """
-    matched = matched[_keeps_distances(matched)]
-    frames = matched["frame"].value_counts(sort=True).sort_index(kind="stable").nlargest(N_PAPER_IMAGES).index
-    table = matched[matched["frame"].isin(frames)].reset_index(drop=True)
-    points = table[_MEASURED].to_numpy()
-    chosen = [int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmax())]
-    while len(chosen) < min(N_PAPER_MARKERS, len(points)):
-        nearest = np.linalg.norm(points[:, None] - points[chosen], axis=2).min(axis=1)
-        chosen.append(int(nearest.argmax()))
-    return table.loc[sorted(chosen)].reset_index(drop=True)
-
-
-def _keeps_distances(matched: pd.DataFrame) -> np.ndarray:
-    """Which points (n,) are as far from most others in the one frame as in the other, to a decimetre."""
     seen_m, measured_m = (
         np.linalg.norm(points_m[:, None] - points_m, axis=2)
-        for points_m in (matched[names].to_numpy() for names in (_SEEN, _MEASURED))
+        for points_m in (matched[names].to_numpy() for names in (SEEN, MEASURED))
     )
     return np.median(np.abs(seen_m - measured_m), axis=1) < _MAX_STRETCH_M
-
-
-def register_by_camera_marker(
-    matched: pd.DataFrame, recording: Recording, mocap: MotionCapture, offset_s: float = 0.0
-) -> Registration:
-    """Rotation by Arun's method; translation from the marker on the camera, its median over the frames.
-
-    The paper's section IV-C.
-
-    Parameters
-    ----------
-    matched : pd.DataFrame
-        As from `select_paper_markers`.
-    recording : Recording
-    mocap : MotionCapture
-    offset_s : float, optional
-        To add to the motion capture's stamps to have them on the camera's clock.
-
-    Returns
-    -------
-    Registration
-
-    Raises
-    ------
-    InputError
-        If `hicp_lib.core.alignment.arun` refuses the points, or the marker `camera` is missing.
-    """
-    if CAMERA_MARKER not in mocap.names:
-        hint = "name the one on the camera so, or click markers in more images and use all of them"
-        raise InputError(f"motion capture has no marker {CAMERA_MARKER!r}; {hint}")
-    fit = _fit(matched)
-    camera = pd.DataFrame({"frame": range(len(recording)), "marker": CAMERA_MARKER})
-    marker_m = measured_markers(recording, camera, mocap, offset_s)
-    if np.isnan(marker_m).all():
-        raise InputError(f"marker {CAMERA_MARKER!r} was measured in no frame of the recording")
-    T = fit.T_b_a.copy()
-    T[:3, 3] = np.nanmedian(recording.T_base_cam[:, :3, 3] - marker_m @ T[:3, :3].T, axis=0)
-    return _registration("paper: eight clicks, camera marker", fit, T)
-
-
-def register_selected(matched: pd.DataFrame) -> Registration:
-    """Arun's method alone, from all of some markers.
-
-    Parameters
-    ----------
-    matched : pd.DataFrame
-        As from `select_paper_markers`.
-
-    Returns
-    -------
-    Registration
-
-    Raises
-    ------
-    InputError
-        If `hicp_lib.core.alignment.arun` refuses the points.
-
-    Examples
-    --------
-    >>> corners_m = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
-    >>> matched = pd.DataFrame(np.c_[corners_m + [0, 0, 2], corners_m], columns=[*_SEEN, *_MEASURED])
-    >>> registration = register_selected(matched)
-    >>> registration.n_points, round(registration.T_base_mocap[2, 3], 6)
-    (4, np.float64(2.0))
-    """
-    return _registration("Arun: the same eight clicks", _fit(matched))
 
 
 def register_robustly(matched: pd.DataFrame) -> Registration:
     """Arun's method from all markers that agree.
 
-    The start is from points that keep their distances to most others, as for `select_paper_markers`. Then
-    points whose residual is beyond three robust standard deviations (and 2 cm) are left out, and the fit is
-    made anew, until it stays.
+    The start is from points that keep their distances to most others. Then points whose residual is beyond
+    three robust standard deviations (and 2 cm) are left out, and the fit is made anew, until it stays.
 
     Parameters
     ----------
@@ -245,8 +178,8 @@ def register_robustly(matched: pd.DataFrame) -> Registration:
     InputError
         If `hicp_lib.core.alignment.arun` refuses the points.
     """
-    seen_m, measured_m = matched[_SEEN].to_numpy(), matched[_MEASURED].to_numpy()
-    kept = _keeps_distances(matched)
+    seen_m, measured_m = matched[SEEN].to_numpy(), matched[MEASURED].to_numpy()
+    kept = keeps_distances(matched)
     for _ in range(_MAX_ROUNDS):
         fit = arun(measured_m[kept], seen_m[kept])
         residuals_m = np.linalg.norm(transform(fit.T_b_a, measured_m) - seen_m, axis=1)
@@ -254,7 +187,7 @@ def register_robustly(matched: pd.DataFrame) -> Registration:
         if (agrees == kept).all() or agrees.sum() < 3:
             break
         kept = agrees
-    return _registration("all clicks", fit)
+    return Registration.of_fit("all clicks", fit)
 
 
 def read_registration(path: str | Path) -> Registration:
@@ -286,15 +219,3 @@ def read_registration(path: str | Path) -> Registration:
         wrong = "its first three columns are not a rotation"
         raise InputError(f"{path}: T_base_mocap: {wrong}; give R, then t in m")
     return Registration("given", T)
-
-
-def _fit(matched: pd.DataFrame) -> RigidFit:
-    return arun(matched[_MEASURED].to_numpy(), matched[_SEEN].to_numpy())
-
-
-def _registration(method: str, fit: RigidFit, T_base_mocap: np.ndarray | None = None) -> Registration:
-    """What was found from a fit; its transform unless another is given."""
-    left_out_m = fit.leave_one_out_m[np.isfinite(fit.leave_one_out_m)]
-    typical_m = float(np.median(left_out_m)) if len(left_out_m) else np.nan
-    T = fit.T_b_a if T_base_mocap is None else T_base_mocap
-    return Registration(method, T, len(fit.residuals_m), fit.rms_m, typical_m)

@@ -29,6 +29,18 @@ def test_random_transforms_are_recovered_exactly(seed, n, quaternion, shift):
     assert fit.rms_m < 1e-12 and fit.residuals_m.max() < 1e-12
 
 
+@given(seeds, quaternions)
+def test_turned_about_the_origin_noise_moves_it_nowhere(seed, quaternion):
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-1, 1, (8, 3)) + [0, 0, 3]
+    turn = Rotation.from_quat(quaternion)
+    exact, noisy = turn.apply(points), turn.apply(points * rng.uniform(0.9, 1, (8, 1)))
+    assert np.abs(arun(points, exact, about_origin=True).T_b_a[:3, :3] - turn.as_matrix()).max() < 1e-12
+    fit = arun(points, noisy, about_origin=True)  # each too near, on its own line of sight
+    assert np.array_equal(fit.T_b_a[:3, 3], np.zeros(3))
+    assert np.abs(fit.T_b_a[:3, :3] - turn.as_matrix()).max() < 1e-12
+
+
 @given(seeds, quaternions, shifts)
 def test_points_in_a_plane_give_a_rotation_not_its_mirror_image(seed, quaternion, shift):
     points = np.random.default_rng(seed).uniform(-1, 1, (6, 3)) * [1, 1, 0]

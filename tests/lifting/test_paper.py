@@ -43,6 +43,18 @@ def by_definition(pixel_px: np.ndarray, keypoint: int, depth_m: np.ndarray) -> n
     return np.median([deproject(CAMERA, [u, v], depth_m[v, u]) for v, u in around], axis=0)
 
 
+def test_a_radius_given_is_that_of_every_keypoint_or_of_each():
+    """A wrist and a finger on a limb 16 mm wide before a wall: a small neighbourhood stays on it."""
+    depth_m = np.full((120, 160), 2.0)
+    depth_m[:, 76:85] = 0.5  # 4 pixels to each side: 7 mm
+    points = keypoints(left_wrist=(80, 60), left_index_4=(80, 60))
+    own, small, large = (
+        lift(points, depth_m, CAMERA, *radius).points_m[0, [WRIST, FINGER], 2]
+        for radius in ((), (0.003,), (np.full(136, 0.020),))
+    )
+    assert own.tolist() == [2.0, 0.5] and small.tolist() == [0.5, 0.5] and large.tolist() == [2.0, 2.0]
+
+
 @settings(deadline=None, max_examples=15)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.2, 0.97]))
 def test_every_point_as_the_definition_says(seed, hole_share):

@@ -4,7 +4,8 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.evaluation.space.mocap_error import JOINTS, MIN_SCORES, TABLE_JOINTS
-from hicp_lib.study.paper_tables import beside_paper, paper_medians
+from hicp_lib.study.paper_tables import above_floor, beside_paper, paper_medians
+from hicp_lib.study.plots.palette import PERFECT
 
 
 def medians() -> pd.DataFrame:
@@ -27,6 +28,16 @@ def test_what_was_measured_stands_above_the_papers_rows():
     assert list(table.columns[2:]) == [joint.replace("_", " ") for joint in TABLE_JOINTS]
     assert table["left wrist"].tolist()[:2] == ["62 / 4.0 [3.8, 4.2]", "62 / 5.0 [3.8, 4.2]"]
     assert table.loc[3, "left elbow"] == "419 / 3.4"
+
+
+def test_what_stands_above_the_floor_is_by_the_papers_lifting_here_and_there():
+    rows = pd.concat([medians(), medians().assign(detector=PERFECT, median_m=0.03)])
+    differences = medians().assign(other=PERFECT, value_m=0.01, low_m=0.008, high_m=0.0121)
+    others = differences.assign(other="b", value_m=0.2)
+    table = above_floor(rows, pd.concat([differences, others]), paper_medians(), 0.1).set_index("detector")
+    assert table.index.tolist() == ["a", *(f"{n} (paper)" for n in paper_medians()["detector"].unique())]
+    assert table.loc["a", "left wrist"] == "1.0 [0.8, 1.2]"
+    assert table.loc["openpose (paper)", "left wrist"] == "2.6" and table.shape == (5, len(TABLE_JOINTS))
 
 
 def test_a_joint_that_was_never_found_is_a_plain_zero():

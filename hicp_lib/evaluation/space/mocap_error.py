@@ -7,7 +7,7 @@ Throughout, `errors` is the table of `mocap_errors`: one row per detector, metho
 where nothing was found, so that what is missing counts.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pandas as pd
@@ -29,11 +29,6 @@ MARKERS: dict[str, tuple[str, str]] = {
 }
 MIN_SCORES = (0.3, 0.1)
 _CASE = ["detector", "method", "keypoint"]
-_BINS: dict[str, list[float] | None] = {
-    "distance_m": [0.4, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.5, 3.0, 4.0],
-    "score": [0.1, 0.3, 0.5, 0.7, 0.9, 1.001],
-    "sight": None,
-}
 
 
 def marker_means(
@@ -133,113 +128,113 @@ def median_errors(
     DataFrame
         Columns `detector, method, keypoint, min_score, count` (frames with the keypoint above the score,
         lifted, and motion capture), `n_frames` (with motion capture), `median_m, low_m, high_m` (95 % moving
-        block bootstrap), `centre_median_m` (against the joint's centre), `block_frames`.
+        block bootstrap), `found, found_low, found_high` (count as a share of `n_frames`), `centre_median_m`
+        (against the joint's centre), `block_frames`.
     """
-    rows = []
-    length = _block_length(errors)
-    for case, part in errors.groupby(_CASE, sort=False):
-        weights = draw_blocks(len(part), length, n_resamples, seed)
-        for min_score in min_scores:
-            found = part.where(part["score"] > min_score)
-            numbers = with_interval(weighted_median(found["error_m"].to_numpy(), weights))
-            counts = (found["error_m"].count(), part["reference_x_m"].count())
-            rows.append((*case, min_score, *counts, *numbers, found["centre_error_m"].median(), length))
-    columns = [*_CASE, "min_score", "count", "n_frames", "median_m", "low_m", "high_m"]
-    return pd.DataFrame(rows, columns=[*columns, "centre_median_m", "block_frames"])
+    rows, block_frames = [], _block_length(errors)
+    for case, part, found_m, weights in _cases(errors, min_scores, n_resamples, seed):
+        found, known = np.isfinite(found_m), part["reference_x_m"].notna().to_numpy()
+        medians = with_interval(weighted_median(found_m, weights))
+        shares = with_interval(_shares(weights, found, known))
+        centre_m = part["centre_error_m"].where(part["score"] > case[-1]).median()
+        rows.append((*case, found.sum(), known.sum(), *medians, *shares, centre_m, block_frames))
+    numbers = ["count", "n_frames", "median_m", "low_m", "high_m", "found", "found_low", "found_high"]
+    return pd.DataFrame(rows, columns=[*_CASE, "min_score", *numbers, "centre_median_m", "block_frames"])
 
 
-def fractions_within(
+def median_differences(
     errors: pd.DataFrame,
-    min_score: float = 0.1,
-    thresholds_m: Sequence[float] = THRESHOLDS_M,
+    between: str = "detector",
+    min_scores: Sequence[float] = MIN_SCORES,
     n_resamples: int = 1000,
     seed: int = 0,
 ) -> pd.DataFrame:
-    """Fraction of the frames with motion capture in which a joint was found within a distance of it.
+    """Medians of cases that differ in one label only, one less the other's on the same draws of frames.
 
     Parameters
     ----------
     errors : DataFrame
         `mocap_errors`.
-    min_score : float, optional
-        Keypoints above it count as found.
-    thresholds_m : sequence of float, optional
-        The distances.
+    between : str, optional
+        The label: "detector", "method", or "min_score".
+    min_scores : sequence of float, optional
+        Keypoints above each count.
     n_resamples, seed : int, optional
         Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
     DataFrame
-        Columns `detector, method, keypoint, threshold_m, value, low, high` (95 % moving block bootstrap).
+        Columns `detector, method, keypoint, min_score, other` (the label of the one that is taken away),
+        `value_m, low_m, high_m` (95 % moving block bootstrap); both directions are there.
+    """
+    labels = [*_CASE, "min_score"]
+    k, rows = labels.index(between), []
+    drawn = {
+        case: weighted_median(found_m, weights)
+        for case, _, found_m, weights in _cases(errors, min_scores, n_resamples, seed)
+    }
+    for case, medians_m in drawn.items():
+        for other in dict.fromkeys(one[k] for one in drawn if one[k] != case[k]):
+            its_m = drawn[*case[:k], other, *case[k + 1 :]]
+            rows.append((*case, other, *with_interval(medians_m - its_m)))
+    return pd.DataFrame(rows, columns=[*labels, "other", "value_m", "low_m", "high_m"])
+
+
+def distance_shares(
+    errors: pd.DataFrame,
+    min_scores: Sequence[float] = MIN_SCORES,
+    thresholds_m: Sequence[float] = THRESHOLDS_M,
+    beyond: bool = False,
+    n_resamples: int = 1000,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """Share of the frames with motion capture in which a joint was found within a distance of it.
+
+    Parameters
+    ----------
+    errors : DataFrame
+        `mocap_errors`.
+    min_scores : sequence of float, optional
+        Keypoints above each count as found.
+    thresholds_m : sequence of float, optional
+        The distances.
+    beyond : bool, optional
+        Whether to give the share beyond the distance instead, of the frames in which the joint was found.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
+
+    Returns
+    -------
+    DataFrame
+        Columns `detector, method, keypoint, min_score, threshold_m, value, low, high` (95 % moving block
+        bootstrap); NaN where none was found.
     """
     rows = []
-    length = _block_length(errors)
-    for case, part in errors.groupby(_CASE, sort=False):
-        weights = draw_blocks(len(part), length, n_resamples, seed) * part["reference_x_m"].notna().to_numpy()
-        total = np.maximum(weights.sum(axis=1), 1)
-        found_m = np.where(part["score"] > min_score, part["error_m"], np.nan)
+    for case, part, found_m, weights in _cases(errors, min_scores, n_resamples, seed):
+        of = np.isfinite(found_m) if beyond else part["reference_x_m"].notna().to_numpy()
         for threshold_m in thresholds_m:
-            fractions = (weights * (found_m <= threshold_m)).sum(axis=1) / total
-            rows.append((*case, threshold_m, *with_interval(fractions)))
-    return pd.DataFrame(rows, columns=[*_CASE, "threshold_m", "value", "low", "high"])
+            hits = found_m > threshold_m if beyond else found_m <= threshold_m
+            rows.append((*case, threshold_m, *with_interval(_shares(weights, hits, of))))
+    return pd.DataFrame(rows, columns=[*_CASE, "min_score", "threshold_m", "value", "low", "high"])
 
 
-def errors_by(
-    errors: pd.DataFrame, column: str, edges: Sequence[float] | None = None, min_score: float = 0.1
-) -> pd.DataFrame:
-    """Median and quartiles of the error by another column: distance, score, occlusion.
-
-    Parameters
-    ----------
-    errors : DataFrame
-        `mocap_errors`, with the column.
-    column : str
-        What the error is grouped by.
-    edges : sequence of float, optional
-        Bins of a number, each closed on the left; None where the column holds labels.
-    min_score : float, optional
-        Keypoints above it count as found.
-
-    Returns
-    -------
-    DataFrame
-        Columns `detector, method, part` ("elbow", both sides together), `by` (the column), `bin` (as text),
-        `middle` (of the bin; NaN for labels), `n, median_m, lower_m, upper_m`; no rows where nothing was
-        found.
-    """
-    columns = ["detector", "method", "part", "by", "bin", "middle", "n", "median_m", "lower_m", "upper_m"]
-    found = errors[(errors["score"] > min_score) & errors["error_m"].notna()]
-    if found.empty:
-        return pd.DataFrame(columns=columns)
-    part = found["keypoint"].str.split("_").str[1].rename("part")
-    bins = found[column] if edges is None else pd.cut(found[column], list(edges), right=False)
-    keys = [found["detector"], found["method"], part, bins.rename("bin")]
-    grouped = found["error_m"].groupby(keys, sort=False, observed=True)
-    table = grouped.quantile([0.25, 0.5, 0.75]).unstack().set_axis(["lower_m", "median_m", "upper_m"], axis=1)
-    table = table.assign(n=grouped.size(), by=column).reset_index().sort_values("bin", kind="stable")
-    table["middle"] = np.nan if edges is None else np.array([b.mid for b in table["bin"]], dtype=float)
-    table["bin"] = [str(b) if edges is None else f"{b.left:g} to {b.right:g}" for b in table["bin"]]
-    return table[columns].sort_values(["detector", "method", "part"], kind="stable", ignore_index=True)
+def _cases(
+    errors: pd.DataFrame, min_scores: Sequence[float], n_resamples: int, seed: int
+) -> Iterator[tuple[tuple, pd.DataFrame, np.ndarray, np.ndarray]]:
+    """Labels, rows, errors of what was found (n_frames,) and weights of frames, the same for all cases."""
+    weights = draw_blocks(errors["frame"].nunique(), _block_length(errors), n_resamples, seed)
+    for case, part in errors.groupby(_CASE, sort=False):
+        part = part.sort_values("frame")
+        for min_score in min_scores:
+            found_m = part["error_m"].where(part["score"] > min_score).to_numpy()
+            yield (*case, min_score), part, found_m, weights
 
 
-def error_dependence(errors: pd.DataFrame, min_score: float = 0.1) -> pd.DataFrame:
-    """`errors_by` distance, score and occlusion, one after the other.
-
-    Parameters
-    ----------
-    errors : DataFrame
-        `mocap_errors`, with the columns `distance_m, sight` of
-        `hicp_lib.evaluation.space.occlusion.joint_occlusion`.
-    min_score : float, optional
-        Keypoints above it count as found.
-
-    Returns
-    -------
-    DataFrame
-        As of `errors_by`.
-    """
-    return pd.concat([errors_by(errors, column, edges, min_score) for column, edges in _BINS.items()])
+def _shares(weights: np.ndarray, hits: np.ndarray, of: np.ndarray) -> np.ndarray:
+    """Share of some frames that are hits, in every draw; NaN where none of them was drawn."""
+    total = weights @ of
+    return np.where(total > 0, (weights @ (hits & of)) / np.maximum(total, 1), np.nan)
 
 
 def _block_length(errors: pd.DataFrame) -> int:

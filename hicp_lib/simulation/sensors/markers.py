@@ -1,7 +1,8 @@
 """Reflective markers of motion capture: where a lab tapes them, and where they are in a pose.
 
-Two on each shoulder, elbow and wrist, on opposite sides, so that their mean is near the joint
-(the paper's section IV-C takes that mean for the joint); one on the depth camera.
+Two on each shoulder, elbow and wrist: on opposite sides of elbow and wrist, so that their mean is near
+the joint (the paper's section IV-C takes that mean for the joint), and both on the outer side of the
+shoulder, as there, where their mean lies beside it; one on the depth camera.
 """
 
 import numpy as np
@@ -14,12 +15,12 @@ from hicp_lib.simulation.rendering.raycast import RayScene
 from hicp_lib.simulation.rendering.surfaces import Hits, Look, Surface
 
 SIDES = {
-    "shoulder": ((1, 0, 0), (-1, 0, 0)),  # front and back, through the head of the upper arm
+    "shoulder": ((0.6, 0.8, 0), (-0.6, 0.8, 0)),  # outer side, one towards the front, one the back
     "elbow": ((0, 1, 0), (0, -1, 0)),  # outer and inner epicondyle, the ends of the hinge's axis
     "wrist": ((1, 0, 0), (-1, 0, 0)),  # styloid processes: thumb's side, little finger's side
 }
 """Directions from each joint to its two markers when the left arm hangs and its palm faces the thigh,
-in body axes; mirrored for the right."""
+in body axes, of length 1; mirrored for the right."""
 
 JOINT_MARKERS: tuple[str, ...] = tuple(
     f"{joint}_{side}_{number}" for joint in SIDES for side in ("left", "right") for number in (1, 2)

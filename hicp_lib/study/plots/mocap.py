@@ -1,67 +1,29 @@
-"""Figures of the test against motion capture: fractions, distributions, trajectories, what errors depend on.
+"""Figures of the test against motion capture: distributions, trajectories, what errors depend on.
 
-Tables are those of `hicp_lib.evaluation.space.mocap_error`, with one lifting method.
+Tables are those of `hicp_lib.evaluation.space.mocap_error`. A detector called `palette.PERFECT` among them
+is the floor: what the true keypoints in the image come to.
 """
 
 import numpy as np
 import pandas as pd
 
-from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS, THRESHOLDS_M
+from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour, detector_marker
+from hicp_lib.study.plots.palette import PERFECT, TRUTH_COLOUR, detector_colour, detector_marker
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _MIN_N = 5  # fewer say little of a median
-_LIMITS_M = np.arange(0, 0.2001, 0.0025)  # of the curves of fractions
 _OUT_OF_RANGE_M = 0.15  # beyond the reference's range by more is not drawn
-_BOX_CM, _ERROR_CM = (1, 3, 10, 30, 100), (1, 2, 5, 10, 20, 50)  # ticks of logarithmic axes
-_CASE = ["detector", "keypoint"]
+_BOX_CM, _ERROR_CM = (1, 3, 10, 30, 100), (0.5, 1, 2, 5, 10, 20, 50)  # ticks of logarithmic axes
+_LINE = ["detector", "method", "keypoint"]
 _AXES = {"x_m": "x (backward) [m]", "y_m": "y (right) [m]", "z_m": "z (up) [m]"}
 _BY = {"distance_m": "distance from the camera [m]", "score": "score", "sight": "line of sight"}
 
 
 @in_style
-def fraction_curves(errors: pd.DataFrame, min_score: float, note: str) -> Figure:
-    """Fraction of the frames with motion capture in which a joint was found within a distance of it.
-
-    Parameters
-    ----------
-    errors : pd.DataFrame
-        As from `hicp_lib.evaluation.space.mocap_error.mocap_errors`.
-    min_score : float
-        A keypoint counts as found above it.
-    note : str
-        What the data are, for the caption.
-    """
-    errors = errors[errors["reference_x_m"].notna()]
-    found_m = errors["error_m"].where(errors["score"] > min_score).to_numpy()
-    within = pd.DataFrame(found_m[:, None] <= _LIMITS_M, columns=_LIMITS_M)
-    shares = within.groupby([errors["detector"].to_numpy(), errors["keypoint"].to_numpy()], sort=False).mean()
-    table = shares.rename_axis(["detector", "keypoint"]).rename_axis("distance_m", axis=1)
-    table = table.stack().rename("share").reset_index()
-    figure, axes = _joint_axes(list(table["keypoint"].unique()), 3.2, 2.4)
-    for (detector, keypoint), part in table.groupby(["detector", "keypoint"], sort=False):
-        pen = {"color": detector_colour(detector), "lw": 2, "label": detector}
-        axes[keypoint].plot(100 * part["distance_m"], part["share"], **pen)
-    for axis in axes.values():
-        axis.vlines([100 * limit for limit in THRESHOLDS_M], 0, 1, color="#AAAAAA", lw=0.8)
-        axis.set(ylim=(0, 1.02), xlim=(0, 20), xlabel="distance [cm]", ylabel="share of frames")
-        axis.label_outer()
-    marks.legend_below(figure, list(axes.values()), ncols=5)
-    caption = (
-        f"Share of frames with motion capture in which a joint was found (score above {min_score:g}) within "
-        f"a distance of the mean of its two markers; grey: 2.5, 5 and 10 cm, as in the paper: "
-        f"{_lifting(errors)}, {note}."
-    )
-    at_5_cm = table[np.isclose(table["distance_m"], 0.05)]
-    said = series_text(at_5_cm.groupby("detector", sort=False)["share"].mean())
-    alt = f"Rising curves per joint and detector. Mean share within 5 cm: {said}."
-    return Figure(figure, caption, alt, table)
-
-
-@in_style
 def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: float, note: str) -> Figure:
-    """Distances from the markers per joint and detector, beside the medians the paper reports.
+    """Distances from the markers per joint and detector, like with like: first by the paper's lifting, beside
+    the medians the paper reports, then by the others.
 
     Parameters
     ----------
@@ -76,35 +38,44 @@ def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: fl
     """
     found = errors[(errors["score"] > min_score) & errors["error_m"].notna()]
     joints = [joint for joint in TABLE_JOINTS if joint in set(errors["keypoint"])]
-    detectors, named = (list(table["detector"].unique()) for table in (errors, paper))
+    cases = errors[_LINE[:2]].drop_duplicates().sort_values("method", kind="stable")  # the paper's first
+    names = [f"{detector}, {method} lifting" for detector, method in cases.itertuples(index=False)]
+    named, n_like = list(paper["detector"].unique()), (cases["method"] == "paper").sum()
     paper = paper[paper["min_score"] == min_score].set_index(["detector", "keypoint"]).sort_index()
-    figure, axes = _joint_axes(joints, 4.6, 0.9 + 0.26 * (len(detectors) + len(named)))
-    labels = [*detectors, *(f"{name} (paper)" for name in named)]
+    labels = [*names[:n_like], *(f"{name} (paper)" for name in named), *names[n_like:]]
+    figure, axes = _joint_axes(joints, 4.6, 0.9 + 0.24 * len(labels))
     for joint, axis in axes.items():
-        part = found[found["keypoint"] == joint]
-        for y, detector in enumerate(detectors):
-            errors_m = part.loc[part["detector"] == detector, "error_m"]
-            if errors_m.empty:
-                continue
+        part = found[found["keypoint"] == joint].groupby(_LINE[:2])["error_m"]
+        for (detector, method), errors_m in part:
+            y = labels.index(f"{detector}, {method} lifting")
             place = {"positions": [y], "widths": 0.6, "manage_ticks": False}
             marks.draw_boxes(axis, [100 * errors_m], [detector_colour(detector)], **place)
-        for y, detector in enumerate(named, start=len(detectors)):
+            if (detector, method) == (PERFECT, "paper"):
+                axis.axvline(100 * errors_m.median(), color=TRUTH_COLOUR, lw=0.8, ls=":")
+        for y, detector in enumerate(named, start=n_like):
             median_m = paper.at[(detector, joint), "median_m"]
             axis.plot(100 * median_m, y, "D", color=detector_colour(detector), markersize=7)
-        axis.axhline(len(detectors) - 0.5, color="#AAAAAA", lw=0.8)
-        axis.set(xscale="log", xlim=(0.5, 100), xlabel="distance [cm]")
+        axis.hlines([n_like - 0.5, n_like + len(named) - 0.5], 0.3, 100, color="#AAAAAA", lw=0.8)
+        axis.set(xscale="log", xlim=(0.3, 100), xlabel="distance [cm]")
         axis.set(xticks=_BOX_CM, xticklabels=map(str, _BOX_CM))
         marks.name_rows(axis, labels)
         axis.label_outer()
-    medians_cm = 100 * found[found["keypoint"].isin(joints)].groupby(_CASE, sort=False)["error_m"].median()
-    said = series_text(medians_cm.rename(index=_spaced, level="keypoint"), "{} {} {:.1f} cm")
+    medians_cm = (
+        100 * found[found["keypoint"].isin(joints)].groupby(_LINE[:2], sort=False)["error_m"].median()
+    )
+    said = series_text(medians_cm, "{}, {} lifting, {:.1f} cm")
     caption = (
         f"Distance of lifted joints (score above {min_score:g}) from the mean of their two markers: box "
-        f"25–75 %, whiskers 5–95 %, line the median: {_lifting(errors)}, {note}. Diamonds: the "
-        "paper's medians, of its own detectors and lifting on its own recording."
+        f"25–75 %, whiskers 5–95 %, line the median: {note}. On top by the paper's lifting, as are the "
+        "diamonds: the paper's medians, of its own detectors on its own recording. Below by ours, which "
+        f"knows how deep joints lie in simulated people{_floor(errors)}."
     )
-    table = found[["detector", "keypoint", "frame", "score", "error_m"]]
-    return Figure(figure, caption, f"Box plots per joint. Medians: {said}.", table)
+    table = found[[*_LINE, "frame", "score", "error_m"]]
+    return Figure(figure, caption, f"Box plots per joint. Medians of all joints: {said}.", table)
+
+
+def _floor(table: pd.DataFrame) -> str:
+    return f"; {PERFECT}: the true keypoints in the image" if PERFECT in set(table["detector"]) else ""
 
 
 def _joint_axes(joints: list[str], width_in: float, height_in: float):
@@ -155,7 +126,7 @@ def trajectories(
         line = first[f"reference_{column}"].to_numpy()
         elapsed_s = times_s[first["frame"]] - times_s[0]
         axis.plot(elapsed_s, line, color=TRUTH_COLOUR, lw=1.6, label="motion capture")
-        for detector in errors["detector"].unique():
+        for detector in sorted(errors["detector"].unique(), key=PERFECT.__ne__):  # beneath the others
             dots = found[found["detector"] == detector]
             pen = {"color": detector_colour(detector), "markersize": 4, "alpha": 0.8, "label": detector}
             axis.plot(times_s[dots["frame"]] - times_s[0], dots[column], ".", **pen)
@@ -169,7 +140,8 @@ def trajectories(
     caption = (
         f"The {name} over time in the robot's base frame: motion capture (line, interrupted where a marker "
         f"was missing) and lifted keypoints with a score above {min_score:g}; points more than "
-        f"{100 * _OUT_OF_RANGE_M:.0f} cm beyond the line's range are not shown: {_lifting(errors)}, {note}."
+        f"{100 * _OUT_OF_RANGE_M:.0f} cm beyond the line's range are not shown{_floor(errors)}: "
+        f"{_lifting(errors)}, {note}."
     )
     counts = found[found["error_m"].notna()].groupby("detector", sort=False).size()
     alt = f"Three curves over time. The {name} was found by {series_text(counts, '{} in {} frames')}."
@@ -181,7 +153,7 @@ def trajectories(
 def error_dependence(table: pd.DataFrame, note: str) -> Figure:
     """Median error of elbows and wrists by distance, score and line of sight.
 
-    `table` from `hicp_lib.evaluation.space.mocap_error.errors_by`, one after the other for every column.
+    `table` from `hicp_lib.evaluation.space.error_dependence.errors_by`, one after the other for every column.
     """
     table = table[table["part"].isin(["elbow", "wrist"]) & (table["n"] >= _MIN_N)]
     shape = table["part"].nunique(), table["by"].nunique()
@@ -190,7 +162,7 @@ def error_dependence(table: pd.DataFrame, note: str) -> Figure:
     for axis, rows, part, by in marks.facets(axes, table, "part", "by"):
         _draw_dependence(axis, rows)
         axis.set(yscale="log", title=f"{part}s", xlabel=_BY.get(by, by))
-        axis.set(yticks=_ERROR_CM, yticklabels=map(str, _ERROR_CM), ylim=(0.7, 80))
+        axis.set(yticks=_ERROR_CM, yticklabels=map(str, _ERROR_CM), ylim=(0.3, 80))
         axis.minorticks_off()
     for axis in axes[:, 0]:
         axis.set(ylabel="distance from the markers [cm]")
@@ -198,7 +170,7 @@ def error_dependence(table: pd.DataFrame, note: str) -> Figure:
     caption = (
         "Distance from the markers by distance from the camera, by score, and by whether something is in "
         "front of the joint (lines and dots the median, bands and whiskers the quartiles; bins of at least "
-        f"{_MIN_N}): {_lifting(table)}, {note}."
+        f"{_MIN_N}{_floor(table)}): {_lifting(table)}, {note}."
     )
     wrists = table[(table["by"] == "sight") & (table["part"] == "wrist")]
     said = series_text(100 * wrists.set_index(["detector", "bin"])["median_m"], "{0} {2:.1f} cm when {1}")

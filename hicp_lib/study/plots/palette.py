@@ -1,5 +1,8 @@
 """Colours and markers: a fixed pair per detector, on every page."""
 
+TRUTH_COLOUR = "#111111"
+PERFECT = "perfect detector"  # what finds the true keypoints, where they are known
+
 # Each detector's colour and marker, the same on every page. Those of the default study stay apart for readers
 # who are blind to red or green, too; the others do so by their markers.
 DETECTOR_STYLES: dict[str, tuple[str, str]] = {
@@ -18,9 +21,9 @@ DETECTOR_STYLES: dict[str, tuple[str, str]] = {
     "one-stage": ("#B59B00", "8"),
     "combined": ("#4B0055", "H"),
     "combined:movenet-thunder": ("#A0105A", "P"),
+    PERFECT: (TRUTH_COLOUR, "x"),
 }
 OTHER_COLOUR, _OTHER_MARKER = "#595959", "."
-TRUTH_COLOUR = "#111111"
 
 # The two subsets of HiCP, and the two boxes of the paper's figure of how they are made.
 SUBSET_COLOURS = {"basic": "#0072B2", "headless": "#D55E00"}

@@ -9,7 +9,7 @@ from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.style import Figure, in_style, new_figure, series_text
 
 # Solutions in the order they are given; not detectors' colours.
-_STYLES = (("#D5272D", "x"), ("#F0A202", "+"), ("#19B5FE", "1"), ("#2ECC40", "2"))
+_STYLES = (("#D5272D", "x"), ("#FF69B4", "3"), ("#F0A202", "+"), ("#19B5FE", "1"), ("#2ECC40", "2"))
 _MARGIN_PX = 45
 _ADDED, _LEAVE_ONE_OUT = ("added_m", "added error [mm]"), ("leave_one_out_m", "leave-one-out error [mm]")
 # White on a picture, and to be seen on the page as well.

@@ -1,6 +1,6 @@
 """Figures of the share of images in which keypoints were found within a distance: curves and bars.
 
-Tables are those of `hicp_lib.evaluation.space.stability.within_distance`, with one reference.
+Tables are those of `hicp_lib.evaluation.space.stability.within_distance`, with one reference; or like them.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,11 @@ from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
-_REFERENCES = {"median": "its median position", "truth": "its true position"}
+_REFERENCES = {
+    "median": "its median position",
+    "truth": "its true position",
+    "markers": "the mean of its two markers",
+}
 _METHOD_LINES = {"robust": "-", "paper": ":"}
 # Darker is closer.
 _FADES = (1.0, 0.62, 0.34)
@@ -48,7 +52,7 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
     caption = (
         "Share of images in which a keypoint was found within a distance of "
         f"{_REFERENCES[table['reference'].iloc[0]]}, left and right together (solid: robust lifting, dotted: "
-        f"the paper's; grey: the distances of the bars): {note}."
+        f"the paper's; grey: {_in_cm(marked_m)}): {note}."
     )
     return Figure(figure, caption, f"Rising curves per detector. {_shares_text(table, marked_m)}", table)
 

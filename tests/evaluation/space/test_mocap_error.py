@@ -107,62 +107,61 @@ def test_fractions_are_of_the_frames_with_motion_capture(reference):
     reference.loc[reference["frame"] >= 40, me.POSITION] = np.nan
     points = lifted(reference, 0.03)
     points.loc[points["frame"] < 10, "score"] = 0.0
-    fractions = me.fractions_within(me.mocap_errors(points, reference), n_resamples=50)
+    errors = me.mocap_errors(points, reference)
+    fractions = me.distance_shares(errors, n_resamples=50)
     shares = fractions.groupby("threshold_m")["value"].unique()
-    assert (
-        shares[0.025] == [0]
-        and shares[0.05] == pytest.approx([0.75])
-        and shares[0.1] == pytest.approx([0.75])
-    )
+    assert shares[0.025] == [0]
+    assert shares[0.05] == pytest.approx([0.75]) and shares[0.1] == pytest.approx([0.75])
+    beyond = me.distance_shares(errors, beyond=True, n_resamples=50)
+    assert beyond.groupby("threshold_m")["value"].unique().to_dict() == {0.025: [1], 0.05: [0], 0.1: [0]}
 
 
-def test_errors_are_binned_by_another_column_sides_together(reference):
-    errors = me.mocap_errors(lifted(reference, 0.01 + reference["frame"] / 1000), reference)
-    table = me.errors_by(errors, "frame", [0, 20, 40, 100]).query("part == 'wrist'")
-    assert table["bin"].tolist() == ["0 to 20", "20 to 40", "40 to 100"]
-    assert table["middle"].tolist() == [10, 30, 70] and table["n"].tolist() == [40, 40, 40]
-    assert table["median_m"].to_numpy() == pytest.approx([0.0195, 0.0395, 0.0595])
-    assert (table["lower_m"] < table["median_m"]).all() and (table["median_m"] < table["upper_m"]).all()
+def test_shares_beyond_are_of_the_frames_in_which_the_joint_was_found(reference):
+    points = lifted(reference, np.where(reference["frame"] % 4 == 0, 0.2, 0.01))
+    points.loc[points["frame"] % 2 == 1, "score"] = 0.2
+    points.loc[points["keypoint"] == "left_wrist", "score"] = 0.0
+    beyond = me.distance_shares(me.mocap_errors(points, reference), beyond=True, n_resamples=50)
+    beyond = beyond[beyond["threshold_m"] == 0.1].set_index(["min_score", "keypoint"])
+    assert beyond.loc[(0.3, "left_elbow"), "value"] == pytest.approx(1 / 2)
+    assert beyond.loc[(0.1, "left_elbow"), "value"] == pytest.approx(1 / 4)
+    assert beyond.loc[(0.1, "left_elbow"), "low"] < 1 / 4 < beyond.loc[(0.1, "left_elbow"), "high"]
+    assert beyond.loc[(0.1, "left_wrist"), ["value", "low", "high"]].isna().all()
 
 
-def test_errors_are_grouped_by_labels(reference):
-    errors = me.mocap_errors(lifted(reference, 0.01 + (reference["frame"] >= 50) * 0.1), reference)
-    errors["sight"] = np.where(errors["frame"] >= 50, "hidden", "clear")
-    table = me.errors_by(errors, "sight").query("part == 'elbow'").set_index("bin")
-    assert table.loc["clear", ["n", "median_m"]].tolist() == pytest.approx([100, 0.01])
-    assert table.loc["hidden", ["n", "median_m"]].tolist() == pytest.approx([20, 0.11])
+def test_medians_of_two_detectors_are_compared_on_the_same_draws(reference):
+    """Errors that vary by 10 cm over time, and one detector always 1 cm worse."""
+    error_m = 0.05 + 0.05 * np.sin(reference["frame"] * 2.0)
+    tables = [
+        lifted(reference, error_m, detector="one"), lifted(reference, error_m + 0.01, detector="other"),
+    ]  # fmt: skip
+    errors = me.mocap_errors(pd.concat(tables), reference)
+    table = me.median_differences(errors, n_resamples=50).set_index(["detector", "other"])
+    worse = table.loc[("other", "one")]
+    assert len(worse) == 2 * len(me.JOINTS)
+    assert worse[["value_m", "low_m", "high_m"]].to_numpy() == pytest.approx(0.01)
+    assert table.loc[("one", "other"), "value_m"].to_numpy() == pytest.approx(-0.01)
+    medians = me.median_errors(errors, n_resamples=50)
+    assert (medians["high_m"] - medians["low_m"] > 0.01).all()
+
+
+def test_what_a_higher_threshold_changes_has_an_interval(reference):
+    points = lifted(reference, np.where(reference["frame"] % 3 == 0, 0.01, 0.05))
+    points["score"] = np.where(reference["frame"] % 3 == 0, 0.9, 0.2)
+    errors = me.mocap_errors(points, reference)
+    table = me.median_differences(errors, "min_score", n_resamples=50).set_index(["min_score", "other"])
+    assert table.loc[(0.3, 0.1), "value_m"].to_numpy() == pytest.approx(-0.04)
+    assert table.loc[(0.1, 0.3), "value_m"].to_numpy() == pytest.approx(0.04)
+    found = me.median_errors(errors, n_resamples=50).set_index("min_score")[
+        ["found_low", "found", "found_high"]
+    ]
+    assert found.loc[0.3, "found"].to_numpy() == pytest.approx(1 / 3) and (found.loc[0.1] == 1).all(axis=None)
+    assert (found.loc[0.3, "found_low"] < 1 / 3).all() and (found.loc[0.3, "found_high"] > 1 / 3).all()
 
 
 def test_scores_must_be_above_and_distances_at_most_the_limit(reference):
     errors = me.mocap_errors(lifted(reference, score=0.3), reference).assign(error_m=0.05)
     medians = me.median_errors(errors, n_resamples=5).set_index("min_score")["count"]
     assert set(medians[0.3]) == {0} and set(medians[0.1]) == {N}
-    within = me.fractions_within(errors, 0.1, (np.nextafter(0.05, 0), 0.05), n_resamples=5)
+    within = me.distance_shares(errors, (0.1,), (np.nextafter(0.05, 0), 0.05), n_resamples=5)
     assert within.groupby("threshold_m")["value"].max().tolist() == [0, 1]
-    assert me.fractions_within(errors, 0.3, (0.05,), n_resamples=5)["value"].eq(0).all()
-
-
-def test_bins_are_closed_on_the_left_and_a_score_of_one_has_its_own(reference):
-    errors = me.mocap_errors(lifted(reference, 0.01), reference).query("keypoint == 'left_wrist'")
-    scores = np.resize([0.3, 0.5, 0.7, 0.9, 1.0], len(errors))
-    errors = errors.assign(score=scores, distance_m=np.resize([0.4, 0.79, 0.8, 1.0, 3.99], N), sight="clear")
-    table = me.error_dependence(errors, 0.1)
-    of_score = table[table["by"] == "score"].set_index("bin")["n"]
-    assert of_score.to_dict() == {"0.3 to 0.5": 12, "0.5 to 0.7": 12, "0.7 to 0.9": 12, "0.9 to 1.001": 24}
-    of_distance = table[table["by"] == "distance_m"].set_index("bin")["n"]
-    assert of_distance.to_dict() == {
-        "0.4 to 0.6": 12, "0.6 to 0.8": 12, "0.8 to 1": 12, "1 to 1.2": 12, "3 to 4": 12,
-    }  # fmt: skip
-    assert table.loc[table["by"] == "sight", ["bin", "n"]].to_numpy().tolist() == [["clear", N]]
-
-
-def test_quartiles_of_the_error(reference):
-    errors = me.mocap_errors(lifted(reference, 0.001 * reference["frame"]), reference).assign(sight="clear")
-    row = me.errors_by(errors.query("keypoint == 'left_wrist'"), "sight").iloc[0]
-    quartiles = np.quantile(0.001 * np.arange(N), [0.25, 0.5, 0.75])
-    assert row[["lower_m", "median_m", "upper_m"]].tolist() == pytest.approx(quartiles.tolist())
-
-
-def test_where_nothing_was_found_the_error_depends_on_nothing(reference):
-    errors = me.mocap_errors(lifted(reference, score=0.05), reference).assign(distance_m=1.0, sight="clear")
-    assert me.error_dependence(errors).empty and "median_m" in me.error_dependence(errors)
+    assert me.distance_shares(errors, (0.3,), (0.05,), n_resamples=5)["value"].eq(0).all()

@@ -46,16 +46,30 @@ def test_there_are_two_markers_for_each_of_six_joints():
 
 
 @pytest.mark.parametrize("shape", BODY.shape_names)
-def test_two_markers_have_their_joint_between_them(shape):
+def test_elbow_and_wrist_are_between_their_two_markers(shape):
     person, markers = _markers(shape)
-    first, second = markers[::2], markers[1::2]
-    joints = person.keypoints_m[JOINTS]
+    first, second = markers[4::2], markers[5::2]
+    joints = person.keypoints_m[JOINTS[2:]]
     assert np.linalg.norm((first + second) / 2 - joints, axis=1).max() < 0.02
     towards = [(first - joints), (second - joints)]
     cosine = np.sum(towards[0] * towards[1], axis=1) / np.prod(np.linalg.norm(towards, axis=2), axis=0)
     assert cosine.max() < -0.9  # on opposite sides
     apart_m = np.linalg.norm(first - second, axis=1)
     assert apart_m.min() > 0.05 and apart_m.max() < 0.2
+
+
+@pytest.mark.parametrize("shape", BODY.shape_names)
+def test_both_markers_of_a_shoulder_are_on_its_outer_side(shape):
+    person, markers = _markers(shape)
+    from_joint = (markers[:4].reshape(2, 2, 3) - person.keypoints_m[JOINTS[:2], None]) * [
+        [[1, 1, 1]],
+        [[1, -1, 1]],
+    ]  # the right one mirrored; axis 1: towards the front, towards the back
+    assert (from_joint[:, :, 1] > 0.025).all() and (np.abs(from_joint[:, :, 2]) < 0.02).all()
+    assert (from_joint[:, 0, 0] > 0.015).all() and (from_joint[:, 1, 0] < -0.015).all()
+    is_adult = not shape.startswith(("girl", "boy"))
+    mean_m = np.linalg.norm(from_joint.mean(axis=1), axis=1)  # as the page on simulated sensors says
+    assert not is_adult or ((mean_m > 0.035) & (mean_m < 0.065)).all()
 
 
 def test_markers_lie_off_the_skin_and_follow_the_limb():
@@ -91,10 +105,10 @@ def test_cameras_around_a_standing_person_see_every_marker_and_from_one_side_onl
     person, markers = _markers(SHAPE)
     around = count_seeing(body_scene(person), markers, room_cameras_m(QUALISYS, person.heads_m[0]))
     assert around.min() >= 2 and around.max() <= QUALISYS.n_cameras
-    front = count_seeing(body_scene(person), markers, np.array([[4.0, 0.3, 1.5], [4.0, -0.3, 1.5]]))
-    seen = {name for name, n in zip(JOINT_MARKERS, front, strict=True) if n == 2}
-    assert {"shoulder_left_1", "shoulder_right_1"} <= seen
-    assert not {"shoulder_left_2", "shoulder_right_2"} & seen
+    left = count_seeing(body_scene(person), markers, np.array([[0.3, 4.0, 1.5], [-0.3, 4.0, 1.5]]))
+    seen = {name for name, n in zip(JOINT_MARKERS, left, strict=True) if n == 2}
+    assert {"shoulder_left_1", "shoulder_left_2"} <= seen
+    assert not {"shoulder_right_1", "shoulder_right_2"} & seen
 
 
 def test_a_thinned_skin_hides_markers_as_all_of_it_does():

@@ -4,10 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.evaluation.space.mocap_error import JOINTS, TABLE_JOINTS, error_dependence
+from hicp_lib.evaluation.space.error_dependence import error_dependence
+from hicp_lib.evaluation.space.mocap_error import JOINTS, TABLE_JOINTS
 from hicp_lib.study.paper_tables import paper_medians
 from hicp_lib.study.plots import mocap as draw
-from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.palette import PERFECT
 
 N = 90
 TIMES_S = 100 + np.arange(N) / 15
@@ -46,38 +47,26 @@ def errors() -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def colours(axis) -> set[str]:
-    return {line.get_color() for line in axis.lines}
-
-
-def test_fraction_curves_rise_to_the_share_that_was_found(errors):
-    figure = draw.fraction_curves(errors, 0.1, "made up")
-    assert [axis.get_title("left") for axis in figure.figure.axes] == [
-        "left elbow", "left wrist", "left shoulder", "right elbow", "right wrist", "right shoulder",
-    ]  # fmt: skip
-    assert all(colours(axis) == set(map(detector_colour, DETECTORS)) for axis in figure.figure.axes)
-    shares = figure.table.groupby(["detector", "keypoint"])["share"]
-    assert (shares.first() == 0).all() and all(part.is_monotonic_increasing for _, part in shares)
-    seen = errors[~errors["frame"].between(40, 49)]
-    for (detector, joint), end in shares.last().items():
-        part = seen[(seen["detector"] == detector) & (seen["keypoint"] == joint)]
-        assert end == pytest.approx((part["error_m"] <= 0.2).mean())
-    assert "made up" in figure.caption and "mediapipe 0.9" in figure.alt
-
-
-def test_distributions_stand_beside_the_papers_medians(errors):
-    figure = draw.error_distributions(errors, paper_medians(), 0.1, "made up")
+def test_distributions_compare_like_with_like_first(errors):
+    perfect = errors.assign(detector=PERFECT, error_m=0.03)[errors["detector"] == DETECTORS[0]]
+    both = pd.concat([errors.assign(method="robust"), errors, perfect])
+    figure = draw.error_distributions(both, paper_medians(), 0.1, "made up")
     assert len(figure.figure.axes) == len(TABLE_JOINTS)
     axis = figure.figure.axes[0]
     labels = [label.get_text() for label in axis.get_yticklabels()]
     assert labels == [
-        *DETECTORS,
+        *(f"{name}, paper lifting" for name in (*DETECTORS, PERFECT)),
         *(f"{name} (paper)" for name in ("alphapose", "mmpose", "detectron2", "openpose")),
+        *(f"{name}, robust lifting" for name in DETECTORS),
     ]
     diamonds = [line for line in axis.lines if line.get_marker() == "D"]
     assert [float(line.get_xdata()[0]) for line in diamonds] == pytest.approx([4.0, 3.5, 16.7, 15.4])
-    assert [float(line.get_ydata()[0]) for line in diamonds] == [2, 3, 4, 5]
-    assert len(axis.patches) == len(DETECTORS)
+    assert [float(line.get_ydata()[0]) for line in diamonds] == [3, 4, 5, 6]
+    assert len(axis.patches) == 5
+    (floor,) = [line for line in axis.lines if line.get_linestyle() == ":"]
+    assert floor.get_xdata() == pytest.approx([3.0, 3.0])
+    assert "true keypoints" in figure.caption
+    assert "true keypoints" not in draw.error_distributions(errors, paper_medians(), 0.1, "made up").caption
 
 
 def test_a_detector_that_found_nothing_has_no_box(errors):

@@ -1,0 +1,74 @@
+"""How much of the distance from motion capture is not the detector's, and what the neighbourhood's size adds.
+
+Markers lie on the skin and joints below it, and depth sees the skin. So a detector without an error in the
+image is still some centimetres off: the floor that detectors are compared with. It is no bound: errors in the
+image that lean towards the skin in sight may bring a detector below it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import BODY, N_KEYPOINTS, NAMES
+from hicp_lib.evaluation.cases import labelled
+from hicp_lib.evaluation.space.mocap_error import MIN_SCORES, TABLE_JOINTS, median_errors, mocap_errors
+from hicp_lib.evaluation.space.stability import POSITION, position_array
+from hicp_lib.lifting.table import lift_pixels
+from hicp_lib.recordings.recording import Recording, read_truth
+from hicp_lib.study.plots.palette import PERFECT
+from hicp_lib.study.registration import Registered
+
+
+def perfect_detections(recording: Recording) -> dict[str, list[Detections]]:
+    """The body's true keypoints in every frame, hidden ones too, with scores of 1.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    dict of str to list of Detections
+        Under `PERFECT`, in the order of the frames; empty where the truth is not known.
+    """
+    truth = read_truth(recording)
+    if truth is None:
+        return {}
+    keypoints_px = np.full((len(recording), 1, N_KEYPOINTS, 2), np.nan)
+    names, columns = [NAMES[k] for k in BODY], ["u_px", "v_px", "u_px"]
+    keypoints_px[:, 0, BODY] = position_array(truth, names, len(recording), columns)[..., :2]
+    scores = np.isfinite(keypoints_px[..., 0]).astype(float)
+    return {PERFECT: [Detections(*person, np.ones(1)) for person in zip(keypoints_px, scores, strict=True)]}
+
+
+def medians_by_radius(
+    registered: Registered, points: pd.DataFrame, radii_m: Sequence[float], n_resamples: int, seed: int
+) -> pd.DataFrame:
+    """Median errors of the paper's lifting by the size of the neighbourhood that it takes depth from.
+
+    Parameters
+    ----------
+    registered : Registered
+    points : pd.DataFrame
+        As from `hicp_lib.lifting.table.lift_found`; of some frames, to save time.
+    radii_m : sequence of float
+        Half the sides of the neighbourhood.
+    n_resamples, seed : int
+        Number of bootstrap draws, and what they are drawn with.
+
+    Returns
+    -------
+    pd.DataFrame
+        Column `radius_m`, then as from `median_errors`, score above 0.1.
+    """
+    rows = points[(points["person"] == 0) & (points["method"] == "paper")]
+    rows = rows[rows["keypoint"].isin(TABLE_JOINTS)]
+    reference = registered.reference(joints=TABLE_JOINTS)
+    reference, tables = reference[reference["frame"].isin(points["frame"])], []
+    for radius_m, lifted_m in zip(radii_m, lift_pixels(registered.recording, rows, radii_m), strict=True):
+        lifted = rows.assign(**dict(zip(POSITION, lifted_m.T, strict=True)))
+        medians = median_errors(mocap_errors(lifted, reference), MIN_SCORES[-1:], n_resamples, seed)
+        tables.append(labelled(medians, radius_m=radius_m))
+    return pd.concat(tables, ignore_index=True)
