@@ -177,10 +177,17 @@ class Study:
         """
         self._values[name] = _plain(value)
 
-    def finish(self) -> None:
-        """Write the values and the provenance stamp, and show the stamp. The last line of every notebook."""
+    def finish(self, **more: Any) -> None:
+        """Write the values and the provenance stamp, and show the stamp. The last line of every notebook.
+
+        Parameters
+        ----------
+        **more : any
+            What else the stamp is to say.
+        """
         stamp = {"notebook": self.name, "schema": SCHEMA_VERSION} | provenance(self.parameters)
-        stamp |= {"wall_s": round(time.perf_counter() - self._start_s, 2), "peak_memory_mb": peak_memory_mb()}
+        wall_s = round(time.perf_counter() - self._start_s, 2)
+        stamp |= more | {"wall_s": wall_s, "peak_memory_mb": peak_memory_mb()}
         write_json(self.folder / "values.json", self._values, indent=2)
         write_json(self.folder / "captions.json", self._captions, indent=2)
         write_json(self.folder / "provenance.json", stamp, indent=2)

@@ -7,7 +7,9 @@ from hicp_lib.study.claims.verdicts import (
     NOT_REPRODUCED,
     NOT_TESTABLE,
     ON_RENDERED_DATA,
+    PARTLY,
     REPRODUCED,
+    UNDECIDED,
     VERDICTS,
 )
 from hicp_lib.study.plots import marks
@@ -18,6 +20,8 @@ _FILLS = {
     REPRODUCED: {"color": "#009E73", "hatch": "", "edgecolor": "white"},
     ON_RENDERED_DATA: {"color": "#56B4E9", "hatch": "//", "edgecolor": "white"},
     NOT_REPRODUCED: {"color": "#D55E00", "hatch": "xx", "edgecolor": "white"},
+    UNDECIDED: {"color": "#F0E442", "hatch": "oo", "edgecolor": "white"},
+    PARTLY: {"color": "#CC79A7", "hatch": "--", "edgecolor": "white"},
     NOT_TESTABLE: {"color": "#D9D9D9", "hatch": "..", "edgecolor": "white"},
 }
 
@@ -41,7 +45,7 @@ def verdicts(table: pd.DataFrame) -> Figure:
     axis.set(yticks=range(len(sections)), yticklabels=sections)
     axis.invert_yaxis()
     axis.set(xlabel="claims", ylabel="section of the paper", xticks=range(int(counts.sum(axis=1).max()) + 1))
-    figure.legend(loc="outside upper center", ncols=2)
+    figure.legend(loc="outside upper center", ncols=3)
     said = [f"{counts[verdict].sum()} {verdict}" for verdict in VERDICTS]
     caption = f"The paper's claims by section and verdict: {in_words(said)}."
     numbers = counts.reset_index().melt("section", var_name="verdict", value_name="claims")

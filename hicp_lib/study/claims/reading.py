@@ -1,0 +1,89 @@
+"""Verdicts as tables: one row per claim, what a page shows of them, and what of the paper they cover."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import pandas as pd
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json
+from hicp_lib.study.claims.statements import CLAIMS_FILE
+from hicp_lib.study.claims.verdicts import NOT_TESTABLE, VERDICTS, Verdict
+
+BEYOND = "beyond the paper's systems"
+
+
+def verdict_table(verdicts: Iterable[Verdict]) -> pd.DataFrame:
+    """One row per claim.
+
+    Columns `id, section, claim, tested, paper, ours, verdict, why_not, command, n_comparisons`; of the
+    statement beside it `class_tested, class_ours, class_verdict, class_why_not`, "" where there is none.
+    """
+    rows = []
+    for said in verdicts:
+        claim, beside = said.claim, said.of_class
+        row = {"id": claim.id, "section": claim.section, "claim": claim.text, "tested": claim.statement}
+        row |= {"paper": claim.paper, "ours": said.ours, "verdict": said.verdict, "why_not": said.reason}
+        row |= {"command": said.command, "n_comparisons": said.n_comparisons}
+        of_class = (beside.ours, beside.verdict, beside.reason) if beside else ("", "", "")
+        row |= zip(("class_ours", "class_verdict", "class_why_not"), of_class, strict=True)
+        rows.append(row | {"class_tested": claim.class_statement})
+    return pd.DataFrame(rows)
+
+
+def for_reading(table: pd.DataFrame, verdict: str) -> pd.DataFrame:
+    """The claims with one verdict, for a page.
+
+    `table` from `verdict_table`; columns `section, claim` (with what was tested, and the paper's value),
+    `ours` (with what leaves it open; for what could not be tested, why not, and what would), and, where some
+    claim has a statement beside it, `BEYOND`.
+    """
+    rows = table[table["verdict"] == verdict]
+    paper = (" Paper: " + rows["paper"] + ".").where(rows["paper"] != "", "")
+    shown = rows[["section"]].assign(claim=rows["claim"] + " Tested: " + rows["tested"] + paper)
+    why = rows["why_not"] + (": " + rows["command"]).where(rows["command"] != "", "")
+    if verdict == NOT_TESTABLE:
+        shown["why not, and what would test it"] = why
+    else:
+        shown["ours"] = rows["ours"] + (" (" + why + ")").where(why != "", "")
+    if (rows["class_tested"] != "").any():
+        open_at = rows[["class_why_not", "class_ours"]].agg(lambda two: ": ".join(filter(None, two)), axis=1)
+        of_class = rows["class_tested"] + " " + rows["class_verdict"].str.capitalize() + ": " + open_at
+        shown[BEYOND] = of_class.where(rows["class_tested"] != "", "–")
+    return shown
+
+
+def verdict_counts(table: pd.DataFrame, column: str = "verdict") -> dict[str, int]:
+    """How many claims got each verdict, by `VERDICTS`; `table` from `verdict_table`."""
+    return {verdict: int((table[column] == verdict).sum()) for verdict in VERDICTS}
+
+
+def coverage(table: pd.DataFrame, path: Path = CLAIMS_FILE) -> pd.DataFrame:
+    """The paper's numbers and orderings, each with the claims that test it or the reason why none does.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From `verdict_table`.
+    path : Path, optional
+        In the layout of `data/claims.json`.
+
+    Returns
+    -------
+    DataFrame
+        Columns `section, the paper's, claims`.
+
+    Raises
+    ------
+    InputError
+        If a sentence has neither a claim nor a reason, or names a claim that is not there.
+    """
+    rows, known = [], set(table["id"])
+    for sentence in read_json(path)["sentences"]:
+        claims, reason = sentence.get("claims", []), sentence.get("reason", "")
+        if bool(claims) == bool(reason) or set(claims) - known:
+            raise InputError(
+                f"{path}: sentence {sentence['says']!r}: expected ids of claims, or a reason for having none"
+            )
+        rows.append((sentence["section"], sentence["says"], ", ".join(claims) or f"not covered: {reason}"))
+    return pd.DataFrame(rows, columns=["section", "the paper's", "claims"])
