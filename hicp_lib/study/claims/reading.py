@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pandas as pd
 
-from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
 from hicp_lib.study.claims.statements import CLAIMS_FILE
 from hicp_lib.study.claims.verdicts import NOT_TESTABLE, VERDICTS, Verdict
@@ -21,13 +20,12 @@ def verdict_table(verdicts: Iterable[Verdict]) -> pd.DataFrame:
     """
     rows = []
     for said in verdicts:
-        claim, beside = said.claim, said.of_class
+        claim, beside = said.claim, said.of_class or Verdict(said.claim, "")
         row = {"id": claim.id, "section": claim.section, "claim": claim.text, "tested": claim.statement}
         row |= {"paper": claim.paper, "ours": said.ours, "verdict": said.verdict, "why_not": said.reason}
         row |= {"command": said.command, "n_comparisons": said.n_comparisons}
-        of_class = (beside.ours, beside.verdict, beside.reason) if beside else ("", "", "")
-        row |= zip(("class_ours", "class_verdict", "class_why_not"), of_class, strict=True)
-        rows.append(row | {"class_tested": claim.class_statement})
+        row |= {"class_tested": claim.class_statement, "class_ours": beside.ours}
+        rows.append(row | {"class_verdict": beside.verdict, "class_why_not": beside.reason})
     return pd.DataFrame(rows)
 
 
@@ -58,13 +56,11 @@ def verdict_counts(table: pd.DataFrame, column: str = "verdict") -> dict[str, in
     return {verdict: int((table[column] == verdict).sum()) for verdict in VERDICTS}
 
 
-def coverage(table: pd.DataFrame, path: Path = CLAIMS_FILE) -> pd.DataFrame:
+def coverage(path: Path = CLAIMS_FILE) -> pd.DataFrame:
     """The paper's numbers and orderings, each with the claims that test it or the reason why none does.
 
     Parameters
     ----------
-    table : DataFrame
-        From `verdict_table`.
     path : Path, optional
         In the layout of `data/claims.json`.
 
@@ -72,18 +68,8 @@ def coverage(table: pd.DataFrame, path: Path = CLAIMS_FILE) -> pd.DataFrame:
     -------
     DataFrame
         Columns `section, the paper's, claims`.
-
-    Raises
-    ------
-    InputError
-        If a sentence has neither a claim nor a reason, or names a claim that is not there.
     """
-    rows, known = [], set(table["id"])
-    for sentence in read_json(path)["sentences"]:
-        claims, reason = sentence.get("claims", []), sentence.get("reason", "")
-        if bool(claims) == bool(reason) or set(claims) - known:
-            raise InputError(
-                f"{path}: sentence {sentence['says']!r}: expected ids of claims, or a reason for having none"
-            )
-        rows.append((sentence["section"], sentence["says"], ", ".join(claims) or f"not covered: {reason}"))
-    return pd.DataFrame(rows, columns=["section", "the paper's", "claims"])
+    sentences = read_json(path)["sentences"]
+    covered = [", ".join(s.get("claims", [])) or f"not covered: {s['reason']}" for s in sentences]
+    table = pd.DataFrame(sentences)[["section", "says"]].rename(columns={"says": "the paper's"})
+    return table.assign(claims=covered)

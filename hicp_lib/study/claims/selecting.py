@@ -1,6 +1,5 @@
 """The quantities that a claim rests on, read from a run's result tables, and what is missing there."""
 
-import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -8,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from pandas.api.types import is_numeric_dtype
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
@@ -25,7 +25,7 @@ class Quantity:
     Attributes
     ----------
     value : float
-        NaN where a detector found nothing to take it of.
+        NaN where there is nothing to take it of, as the distance of what was never found.
     low, high : float
         Its 95 % interval; the number itself where it has none.
     row : dict of str to object
@@ -83,8 +83,7 @@ def select(side: Selection | float, results: Path) -> tuple[list[Quantity], list
     if isinstance(side, float):
         return [Quantity(side, side, side, {}, "")], []
     table = _read(side, results)
-    columns = [column for column in SYSTEMS if column in table]
-    run = {name for column in columns for name in table[column]}
+    columns = _systems(table)
     for column, wanted in side.where.items():
         if column not in SYSTEMS:
             table = table[table[column].isin(_listed(wanted))]
@@ -93,9 +92,6 @@ def select(side: Selection | float, results: Path) -> tuple[list[Quantity], list
         table = table[table[column].isin(_members(side.where.get(column), table[column]))]
     quantities = [_quantity(side, row) for row in table.to_dict("records")]
     absent = [name for column in SYSTEMS for name in side.named(column) if name not in present]
-    if side.nothing is not None:
-        quantities += [nothing for name in absent if name in run for nothing in _found_nothing(side, name)]
-        absent = [name for name in absent if name not in run]
     if not quantities and not absent:
         asked = ", ".join(f"{column} {value}" for column, value in side.where.items())
         raise MissingError(f"{side.notebook}/{side.table} has no result for {asked.replace(CLASS, 'any ')}")
@@ -149,8 +145,12 @@ def _read(selection: Selection, results: Path) -> pd.DataFrame:
     if unknown := asked - set(table.columns):
         there = ", ".join(table.columns)
         raise InputError(f"{path}: a claim asks for column {min(unknown)!r}; there are {there}")
-    named = {column: table[column].str.removesuffix(_IMPORTED) for column in SYSTEMS if column in table}
-    return table.assign(**named)
+    return table.assign(**{name: table[name].str.removesuffix(_IMPORTED) for name in _systems(table)})
+
+
+def _systems(table: pd.DataFrame) -> list[str]:
+    """The columns that name detectors; a number may be compared with an `other` one."""
+    return [name for name in SYSTEMS if name in table and not is_numeric_dtype(table[name])]
 
 
 def _listed(value: Any) -> list:
@@ -167,18 +167,10 @@ def _members(wanted: Any, present: Iterable[str]) -> list[str]:
     return [name for value in _listed(wanted) for name in classes.get(value, [value])]
 
 
-def _found_nothing(selection: Selection, detector: str) -> list[Quantity]:
-    """What counts for the rows of a detector that was run and has none there."""
-    given = {selection.value: math.nan, **selection.where, "detector": detector}
-    rows = itertools.product(*(_listed(value) for value in given.values()))
-    return [_quantity(selection, dict(zip(given, row, strict=True))) for row in rows]
-
-
 def _quantity(selection: Selection, row: dict[str, Any]) -> Quantity:
-    name = " ".join(_plain(row[column]) for column in selection.name if column in row)
+    name = " ".join(_plain(row[column]) for column in selection.name)
     if pd.isna(row[selection.value]) or math.isinf(row[selection.value]):
-        nothing = math.nan if selection.nothing is None else selection.nothing
-        return Quantity(nothing, nothing, nothing, row, name)
+        return Quantity(math.nan, math.nan, math.nan, row, name)
     columns = [column or selection.value for column in (selection.value, selection.low, selection.high)]
     value, *bounds = (float(row[column]) * selection.scale for column in columns)
     return Quantity(value, *sorted(bounds), row, name)

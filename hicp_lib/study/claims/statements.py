@@ -6,7 +6,7 @@ paper's numbers and orderings, each with the claims that cover it or the reason 
 (each a number or a selection of rows in a result table) by a `relation`:
 
     >, <       the difference left - right lies above `margin`, or below -`margin`
-    similar    left and right differ by at most `margin`
+    similar    left and right differ by less than `margin`
 
 A claim that names systems is tested on these only. A selection that names no detector speaks of *every* one
 that was run by itself (a combination has the body of another), and asks for `EVERY_NEEDS` of them. Beside a
@@ -14,6 +14,7 @@ claim may stand a statement about the class that its systems belong to, or under
 (`class_statement`, `class_tests`): it says how far a claim carries, and never decides its verdict.
 """
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -49,9 +50,6 @@ class Selection:
         Columns of the quantity's interval; the number counts as exact when they are "".
     scale : float
         Multiplies the quantity, to bring it to the claim's unit.
-    nothing : float or None
-        What a row without a number counts as, and the missing row of a named detector that was run: 0 where
-        it is the share of one who finds nothing; None where it cannot be said, as of a distance.
     name : tuple of str
         Columns that name a row in the evidence.
     """
@@ -64,7 +62,6 @@ class Selection:
     low: str = ""
     high: str = ""
     scale: float = 1.0
-    nothing: float | None = None
     name: tuple[str, ...] = ("detector",)
 
     def named(self, column: str) -> list[str]:
@@ -89,7 +86,7 @@ class Comparison:
     left : Selection
     right : Selection or float
     margin : float
-        Of `>` and `<`: the difference must be larger than this; of `similar`: it may be as large as this.
+        Of `>` and `<`: the difference must be larger than this; of `similar`: smaller.
     match : tuple of str
         Columns that must agree between the two rows compared.
     """
@@ -99,6 +96,12 @@ class Comparison:
     right: Selection | float
     margin: float = 0.0
     match: tuple[str, ...] = ()
+
+    @property
+    def claimed(self) -> tuple[float, float]:
+        """Between which bounds the difference left - right is claimed to lie."""
+        above, below = (self.margin, math.inf), (-math.inf, -self.margin)
+        return {">": above, "<": below, "similar": (-self.margin, self.margin)}[self.relation]
 
     @property
     def selections(self) -> list[Selection]:

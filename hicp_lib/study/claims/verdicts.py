@@ -9,7 +9,6 @@ paired comparison would, never for less. A claim that makes k comparisons takes 
 95 % intervals grow as those of a normal distribution do.
 """
 
-import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -88,13 +87,8 @@ class Pair:
 
     def slack(self, n_comparisons: int = 1) -> tuple[float, float]:
         """How far the interval's worse and better end are within what is claimed; below 0 outside."""
-        low, high = self.interval(n_comparisons)
-        if self.test.relation == "<":
-            low, high = -high, -low
-        if self.test.relation != "similar":
-            return low - self.test.margin, high - self.test.margin
-        nearest = max(low, -high, 0.0)
-        return self.test.margin - max(abs(low), abs(high)), self.test.margin - nearest
+        (low, high), (above, below) = self.interval(n_comparisons), self.test.claimed
+        return float(np.minimum(low - above, below - high)), float(np.minimum(high - above, below - low))
 
     def outcome(self, n_comparisons: int = 1) -> bool | None:
         """Whether it holds; None when that is open.
@@ -110,8 +104,6 @@ class Pair:
         True
         """
         worse, better = self.slack(n_comparisons)
-        if self.test.relation == "similar":
-            return True if worse >= 0 else False if better < 0 else None
         return True if worse > 0 else False if better <= 0 else None
 
 
@@ -153,8 +145,10 @@ def _judge(claim: Claim, results: Path) -> Verdict:
     if not pairs:
         return Verdict(claim, NOT_TESTABLE, reason=limits[0], command=command)
     said = _decide(claim, pairs, rendered)
-    for names in _every(pairs):
-        limits += [f"of at least {EVERY_NEEDS} only {', '.join(names)}"] * (len(names) < EVERY_NEEDS)
+    too_few = [", ".join(names) for names in _every(pairs) if len(names) < EVERY_NEEDS]
+    limits += [f"of at least {EVERY_NEEDS} only {names}" for names in too_few]
+    if said.verdict == NOT_REPRODUCED and not absent:  # one that contradicts "every" is enough
+        return replace(said, reason="; ".join(limits))
     if not limits:
         return said
     part = ", ".join(filter(None, [f"what was tested is {said.verdict}", said.reason]))
@@ -175,17 +169,13 @@ def _compared(claim: Claim, results: Path) -> tuple[list[Pair], list[str]]:
     pairs, absent = [], {}
     for test in claim.tests:
         (left, absent_left), (right, absent_right) = select(test.left, results), select(test.right, results)
-        both = itertools.product(left, right)
-        matching = [Pair(test, *two) for two in both if len({_keys(side, test) for side in two}) == 1]
+        agree = [(a, b) for a in left for b in right if all(a.row[c] == b.row[c] for c in test.match)]
+        matching = [Pair(test, *two) for two in agree]
         if not matching + absent_left + absent_right:
             raise MissingError(f"no two rows of {test.left.table} agree in {', '.join(test.match)}")
         pairs += matching
         absent |= dict.fromkeys(absent_left + absent_right)
     return pairs, list(absent)
-
-
-def _keys(side: Quantity, test: Comparison) -> tuple:
-    return tuple(side.row.get(column) for column in test.match)
 
 
 def _decide(claim: Claim, pairs: list[Pair], rendered: bool) -> Verdict:
@@ -211,7 +201,7 @@ def _every(pairs: Iterable[Pair]) -> list[list[str]]:
     for pair in pairs:
         for selection, quantity in zip(pair.test.selections, (pair.left, pair.right), strict=False):
             for column in SYSTEMS:
-                if selection.every(column) and column in quantity.row:
+                if selection.every(column) and isinstance(quantity.row.get(column), str):
                     key = column, str(selection.where.get(column))
                     run.setdefault(key, set()).add(quantity.row[column])
     return [sorted(names) for names in run.values()]
@@ -219,11 +209,11 @@ def _every(pairs: Iterable[Pair]) -> list[list[str]]:
 
 def _evidence(claim: Claim, pairs: list[Pair], decisive: list[Pair]) -> str:
     """The numbers that decide, closest calls first, and whom a claim on every detector was tested on."""
-    texts, of_all = (
-        list(dict.fromkeys(str(side) for pair in some for side in (pair.left, pair.right) if side.row))
-        for some in (decisive, pairs)
-    )
+    sides = [side for pair in decisive for side in (pair.left, pair.right) if side.row]
+    texts = list(dict.fromkeys(str(side) for side in sides))
     parts = [f"{'; '.join(texts[:SHOWN])} {claim.unit}".strip()]
-    parts += [f"{len(of_all) - SHOWN} numbers more"] * (len(texts) > SHOWN)
-    tested_on = sorted({name for names in _every(pairs) for name in names})
-    return "; ".join([*parts, *([f"tested on {', '.join(tested_on)}"] if tested_on else [])])
+    if len(texts) > SHOWN:
+        parts.append(f"{len(texts) - SHOWN} numbers more")
+    if tested_on := {name for names in _every(pairs) for name in names}:
+        parts.append(f"tested on {', '.join(sorted(tested_on))}")
+    return "; ".join(parts)

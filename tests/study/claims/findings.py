@@ -18,10 +18,12 @@ from hicp_lib.core.files import read_json
 
 MORE, LESS, SIMILAR = 0.2, -0.2, 0.0
 WITH_HANDS = ("mmpose", "alphapose", "openpose")
-SHOULDERS = ("left_shoulder", "right_shoulder")
 BODY = ("mmpose", "alphapose", "detectron2", "openpose")
 OTHERS = ("mmpose", "alphapose", "detectron2")  # than OpenPose
 BOTH, VIEWS, SIDES = ("basic", "headless"), ("upper", "lower"), ("left", "right")
+WRISTS, ELBOWS, SHOULDERS = (
+    tuple(f"{side}_{joint}" for side in SIDES) for joint in ("wrist", "elbow", "shoulder")
+)
 HANDS, HIPS = ("left hand", "right hand"), ("left hip", "right hip")
 ARMS = tuple(f"{side} {joint}" for joint in ("elbow", "wrist") for side in SIDES)
 PARTS = (*ARMS, *HANDS, *(f"{side} shoulder" for side in SIDES))
@@ -45,12 +47,19 @@ IN_3D, MOCAP = "03_relative_3d/pairs", "04_mocap_3d/medians"
 ODD, REMARKS = "03_relative_3d/implausible", "05_failure_analysis/paper_remarks"
 STEADY, FOUND = "03_relative_3d/stability", "03_relative_3d/found"
 ALIKE, BY_PARTS = "03_relative_3d/similar_views", "05_failure_analysis/order_by_parts"
+SEEN, MEDIAN_PAIRS, BETWEEN = f"{MOCAP}:seen", "04_mocap_3d/pairs", "04_mocap_3d/between_scores"
+BEYOND, ARM = "04_mocap_3d/beyond", "04_mocap_3d/sides"
+IN_METRES = ("value_m", "low_m", "high_m")
 VALUES = {  # columns of the number and of its interval, "" for none
     "01_dataset/counts": ("people", "", ""),
     LOSS: ("change", "low", "high"),
     MOCAP: ("median_m", "low_m", "high_m"),
+    SEEN: ("found", "found_low", "found_high"),  # in the same table
+    MEDIAN_PAIRS: IN_METRES,
+    BETWEEN: IN_METRES,
     "06_hri_avoidance/against_no_avoidance": ("min_distance_m", "", ""),
 }
+N_FRAMES = 480  # of the paper's recording, about
 
 Row = tuple[
     str, dict[str, Any], float, float
@@ -78,6 +87,10 @@ def in_view(view: str, part: Any, detector: Any, **more) -> dict[str, Any]:
     return {"view": view, "part": part, "detector": detector, "method": "paper"} | more
 
 
+def joint(keypoint: Any, score: Any, detector: Any) -> dict[str, Any]:
+    return {"detector": detector, "keypoint": keypoint, "min_score": score, "method": "paper"}
+
+
 def remark(measure: str, detector: str) -> dict[str, Any]:
     return {"measure": measure, "detector": detector, "status": "run"}
 
@@ -87,8 +100,8 @@ def size(level: int) -> dict[str, Any]:
             "measure": "visible keypoints hit"}  # fmt: skip
 
 
-FLICKERS = {"measure": "appears or vanishes"}
-BENT, HIPS_IN, TILT = "fingers bent beyond human limits", "hips in the abdomen", "shoulder line tilted"
+FLICKERS = {"measure": "flicker rate"}
+BENT, HIPS_IN, TILT = "broken fingers", "hips in the abdomen", "shoulder line tilt [rad]"
 COUNTS = "01_dataset/counts"
 CLEARANCE = "06_hri_avoidance/against_no_avoidance"
 SCRIPTS = ("sitting, hand", "standing, hand", "head")
@@ -117,7 +130,7 @@ WORLD: list[Row] = [
     ("05b_dose_curves/doses", size(640), 0.6, 0.03),
     # In space.
     (IN_3D, in_space("upper", "mediapipe", ("mmpose", "alphapose", "openpose")), SIMILAR, 0.01),
-    (FOUND, in_view("lower", HANDS, "mediapipe"), 1.0, 0),
+    (FOUND, in_view("lower", HANDS, "mediapipe", measure="found"), 1.0, 0),
     (STEADY, in_view("lower", PARTS, "openpose", **AT_10_CM), 0.45, 0.03),
     (ODD, odd(TILT, "shoulders", "mmpose", "lower"), 0.3, 0.03),
     (ODD, odd(TILT, "shoulders", "mmpose", "upper"), 0.1, 0.03),
@@ -126,10 +139,11 @@ WORLD: list[Row] = [
     (IN_3D, in_space("lower", COMBINATIONS, ("mmpose", "alphapose")), MORE, 0.03),
     (IN_3D, in_space("upper", COMBINATIONS, ("mmpose", "alphapose")), SIMILAR, 0.01),
     # Beside motion capture, with Tables III and IV below.
-    (ANY_JOINT, {"part": "any arm joint", "min_score": 0.1, "detector": "openpose", "method": "paper"},
-     0.4, 0.03),
-    (MOCAP, {"keypoint": SHOULDERS, "min_score": 0.1, "detector": BODY, "method": "paper", "count": 400},
-     0.25, 0.001),
+    (ANY_JOINT, in_view("mocap", "any arm joint", "openpose", measure="found"), 0.4, 0.03),
+    (ARM, in_view("mocap", "right arm", "openpose", measure="found", other="left arm"), MORE, 0.03),
+    (MOCAP, joint(SHOULDERS, 0.1, BODY), 0.25, 0.001),
+    (SEEN, joint(SHOULDERS, 0.1, BODY), 0.8, 0.01),
+    (BEYOND, joint(ELBOWS, (0.3, 0.1), "detectron2") | {"threshold_m": 0.1}, 0.6, 0.02),
     # Failures.
     (LOSS, {"group": "body", "detector": "mmpose"}, -0.1, 0.03),
     (LOSS, {"group": "body", "detector": ("alphapose", "detectron2")}, -0.3, 0.03),
@@ -162,12 +176,7 @@ def times(factor: float) -> Callable[[float], float]:
     return lambda value: factor * value
 
 
-WRISTS, ELBOWS = tuple(f"{side}_wrist" for side in SIDES), tuple(f"{side}_elbow" for side in SIDES)
 SURE_PAIR = {"detector": ("mmpose", "alphapose"), "min_score": 0.3}
-
-
-def count(detector: Any, **labels) -> tuple[str, dict[str, Any]]:
-    return f"{MOCAP}:count", {"detector": detector} | labels
 
 
 OPPOSITES: dict[str, list[Turn]] = {
@@ -210,21 +219,20 @@ OPPOSITES: dict[str, list[Turn]] = {
     "openpose-unstable": [(ALIKE, in_view("lower", "left elbow", "openpose"), is_now(0.02))],
     "wrists-best": [(MOCAP, SURE_PAIR | {"keypoint": WRISTS}, times(3))],
     "elbows-best": [(MOCAP, SURE_PAIR | {"keypoint": ELBOWS}, times(0.5))],
-    "alike-mocap": [(MOCAP, {"detector": "mmpose", "min_score": 0.3, "keypoint": "left_wrist"}, times(2))],
-    "wrists-any": [(MOCAP, {"detector": "openpose", "min_score": 0.3, "keypoint": "left_wrist"}, times(2))],
-    "elbows-worse": [(MOCAP, {"detector": "alphapose", "keypoint": "left_elbow"}, times(0.5))],
+    "alike-mocap": [
+        (MEDIAN_PAIRS, joint("left_wrist", 0.3, "alphapose") | {"other": "mmpose"}, is_now(value))
+        for value in (-0.03, 0.03)
+    ],
+    "wrists-any": [(MOCAP, joint("left_wrist", 0.3, "openpose"), times(2))],
+    "elbows-worse": [(MOCAP, joint("left_elbow", 0.3, "alphapose"), times(0.5))],
     "detectron2-elbows": [
-        (MOCAP, {"detector": "detectron2", "min_score": score, "keypoint": "right_elbow"}, times(0.5))
-        for score in (0.3, 0.1)
+        (BEYOND, joint("right_elbow", score, "detectron2"), is_now(0.2)) for score in (0.3, 0.1)
     ],
-    "openpose-few": [(*count("openpose", min_score=0.3, keypoint="right_elbow"), is_now(450))],
+    "openpose-few": [(SEEN, joint("right_elbow", 0.3, "openpose"), is_now(0.9))],
     "openpose-arm": [(ANY_JOINT, {"part": "any arm joint"}, is_now(value)) for value in (0.1, 0.8)],
-    "openpose-right": [
-        (*count("openpose", min_score=score, keypoint=keypoint), is_now(5))
-        for score in (0.3, 0.1) for keypoint in ("right_elbow", "right_wrist")
-    ],
-    "threshold": [(MOCAP, {"detector": "mmpose", "min_score": 0.1, "keypoint": "left_elbow"}, times(1.5))],
-    "detectron2-scale": [(*count("detectron2", min_score=0.3, keypoint="left_wrist"), is_now(300))],
+    "openpose-right": [(ARM, {"part": "right arm"}, is_now(LESS))],
+    "threshold": [(BETWEEN, joint("left_elbow", 0.3, "mmpose"), is_now(value)) for value in (-0.02, 0.02)],
+    "detectron2-scale": [(SEEN, joint("left_wrist", 0.3, "detectron2"), is_now(0.6))],
     "shoulders-worst": [(MOCAP, {"keypoint": "right_shoulder", "detector": "mmpose"}, is_now(0.03))],
     "headless-body": [(LOSS, {"detector": "alphapose"}, is_now(0.2))],
     "loses-least": [(LOSS, {"detector": "mmpose"}, is_now(-0.45))],
@@ -251,8 +259,8 @@ OPPOSITES: dict[str, list[Turn]] = {
     "clearance-5cm": [(CLEARANCE, {"script": "head"}, is_now(0.03))],
     "clearance-10cm": [(CLEARANCE, {"script": "head"}, is_now(0.07))],
     "best-whole-body": [
-        (*count("detectron2", min_score=0.3, keypoint="left_wrist"), is_now(470)),
-        (MOCAP, {"detector": "openpose", "min_score": 0.3, "keypoint": "right_elbow"}, times(0.5)),
+        (SEEN, joint("left_wrist", 0.3, "detectron2"), is_now(0.98)),
+        (MEDIAN_PAIRS, joint("right_elbow", 0.3, "mmpose") | {"other": "openpose"}, is_now(0.02)),
     ],
     "combination": [
         (IN_3D, in_space("lower", COMBINATIONS[0], "mmpose"), is_now(LESS)),
@@ -268,10 +276,19 @@ def _expanded(labels: dict[str, Any]) -> Iterable[dict[str, Any]]:
 
 def _rows() -> Iterable[Row]:
     yield from WORLD
-    paper = read_json(DATA_DIR / "paper.json")["mocap"]
-    for row in paper["rows"]:
-        labels = dict(zip(paper["columns"], row, strict=True)) | {"method": "paper"}
-        yield MOCAP, labels, labels.pop("median_cm") / 100, 0.001
+    tables = read_json(DATA_DIR / "paper.json")["mocap"]
+    rows = [dict(zip(tables["columns"], row, strict=True)) for row in tables["rows"]]
+    for row in rows:
+        labels, median_m = joint(row["keypoint"], row["min_score"], row["detector"]), row["median_cm"] / 100
+        yield MOCAP, labels, median_m, 0.001
+        yield SEEN, labels, row["count"] / N_FRAMES, 0.01
+        for other in rows:
+            same = {name for name in ("keypoint", "min_score", "detector") if row[name] == other[name]}
+            difference_m = median_m - other["median_cm"] / 100
+            if same == {"keypoint", "min_score"}:
+                yield MEDIAN_PAIRS, labels | {"other": other["detector"]}, difference_m, 0.001
+            if same == {"keypoint", "detector"} and row["min_score"] == 0.3:
+                yield BETWEEN, labels | {"other": other["min_score"]}, difference_m, 0.001
 
 
 def world() -> dict[str, pd.DataFrame]:
@@ -285,39 +302,48 @@ def world() -> dict[str, pd.DataFrame]:
     found: dict[str, dict[str, dict]] = {}
     for table, labels, value, half in _rows():
         for one in _expanded(labels):
-            both_ways = [(one, value)]
-            if "other" in one:
-                both_ways.append((one | {"detector": one["other"], "other": one["detector"]}, -value))
-            for row, signed in both_ways:
-                names = VALUES.get(table, ("value", "low", "high"))
-                numbers = zip(names, (signed, signed - half, signed + half), strict=True)
+            for row, signed in _both_ways(one, value):
+                numbers = zip(_values(table), (signed, signed - half, signed + half), strict=True)
                 full = row | {name: number for name, number in numbers if name}
-                key = json.dumps(row, sort_keys=True)
-                if found.setdefault(table, {}).setdefault(key, full) != full:
-                    raise ValueError(f"two findings on {table} {key}: {found[table][key]} and {full}")
-    return {table: _tidy(pd.DataFrame(rows.values())) for table, rows in found.items()}
+                key, rows = json.dumps(row, sort_keys=True), found.setdefault(table, {})
+                if any(
+                    abs(rows.setdefault(key, full)[name] - full[name]) > 1e-9
+                    for name in full
+                    if name not in row
+                ):
+                    raise ValueError(f"two findings on {table} {key}: {rows[key]} and {full}")
+    tables = {table: pd.DataFrame(rows.values()) for table, rows in found.items()}
+    tables[MOCAP] = tables[MOCAP].merge(tables.pop(SEEN), validate="one_to_one")
+    return tables
 
 
-def _tidy(table: pd.DataFrame) -> pd.DataFrame:
-    if "other" in table:
-        table = table.assign(pair=table["detector"] + " less " + table["other"])
-    return table
+def _values(table: str) -> tuple[str, str, str]:
+    return VALUES.get(table, ("value", "low", "high"))
+
+
+def _both_ways(row: dict[str, Any], value: float) -> list[tuple[dict[str, Any], float]]:
+    """A difference is there in both directions, and its name with it."""
+    if not isinstance(row.get("other"), str):
+        return [(row, value)]
+    one = "part" if row["other"].endswith("arm") else "detector"
+    turned_row = row | {one: row["other"], "other": row[one]}
+    return [(r | {"pair": f"{r[one]} less {r['other']}"}, v) for r, v in ((row, value), (turned_row, -value))]
 
 
 def turned(tables: dict[str, pd.DataFrame], turn: Turn) -> dict[str, pd.DataFrame]:
     """The tables with one finding the other way round, its interval with it."""
     target, labels, change = turn
-    name, _, column = target.partition(":")
+    name = target.partition(":")[0]
     table = tables[name].copy()
     rows = pd.Series(True, index=table.index)
     for label, value in labels.items():
         rows &= table[label].isin(value if isinstance(value, tuple) else (value,))
     assert rows.any(), f"no row of {name} has {labels}"
-    columns = [column] if column else [c for c in VALUES.get(name, ("value", "low", "high")) if c]
-    before = table.loc[rows, columns[0]]
-    for c in columns:
-        table[c] = table[c].astype(float)
-        table.loc[rows, c] += before.map(change) - before
+    columns = [column for column in _values(target) if column]
+    moved = table.loc[rows, columns[0]].map(change) - table.loc[rows, columns[0]]
+    for column in columns:
+        table[column] = table[column].astype(float)
+        table.loc[rows, column] += moved
     return tables | {name: table}
 
 

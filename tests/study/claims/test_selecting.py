@@ -27,16 +27,16 @@ def test_a_system_that_was_not_run_is_told(write):
     assert len(found) == 1 and absent == ["mmpose"]
 
 
-def test_a_row_that_is_missing_or_has_no_number_counts_as_nothing_found(write):
-    """Zero where that is a share, no number where it is a distance; never as if it had not been run."""
-    table = [row | {"part": "hand"} for row in rows(a=(math.nan, math.nan, math.nan), b=(0.5, 0.4, 0.6))]
-    table += [row | {"part": "elbow"} for row in rows(c=(0.5, 0.4, 0.6))]
-    hands = {"detector": ["a", "b", "c", "d"], "part": ["hand"]}
-    found, absent = select(Selection("02", "loss", hands, "change", nothing=0.0), write(table))
-    assert {q.row["detector"]: q.value for q in found} == {"a": 0.0, "b": 0.5, "c": 0.0}
-    assert absent == ["d"] and {q.row["part"] for q in found} == {"hand"}
-    found, absent = select(Selection("02", "loss", hands, "change"), write(table))
-    assert [str(q) for q in found] == ["a nothing found", "b 0.5"]
+def test_a_detector_that_has_no_number_does_not_leave_the_claim(write):
+    found, absent = select(of("a", "b"), write(rows(a=(math.nan, math.nan, math.nan), b=(0.5, 0.4, 0.6))))
+    assert [str(quantity) for quantity in found] == ["a nothing found", "b 0.5 [0.4, 0.6]"] and absent == []
+
+
+def test_a_number_may_be_compared_with_another(write):
+    """The column `other` names a detector, or a threshold."""
+    results = write([row | {"other": 0.1} for row in rows(mmpose=(0.5, 0.4, 0.6))])
+    (found,), absent = select(of("mmpose"), results)
+    assert (found.value, absent) == (0.5, [])
 
 
 def test_infinite_and_empty_numbers_are_no_numbers(write):

@@ -69,7 +69,7 @@ def test_a_selection_takes_each_row_and_names_its_detector_unless_told_otherwise
     (found,) = read(tmp_path, [SOUND | {"tests": tests}])
     first, second = found.tests
     assert first == Comparison(">", Selection("02", "loss", {}, "change", greatest=False, scale=1.0), 1.0)
-    assert first.left.name == ("detector",) and first.margin == 0.0 and first.left.nothing is None
+    assert first.left.name == ("detector",) and first.margin == 0.0
     assert (second.left.greatest, second.right, second.margin) == (True, 2.5, 0.01)
 
 

@@ -55,6 +55,11 @@ def test_every_detector_is_at_least_three_and_is_named(write):
     assert (two.verdict, two.reason) == (v.PARTLY, "of at least 3 only a, b; what was tested is reproduced")
 
 
+def test_one_that_contradicts_what_is_said_of_every_detector_is_enough(write):
+    found = verdict(claim(LOSES), write(rows(a=LOST, b=KEPT)))
+    assert (found.verdict, found.reason) == (v.NOT_REPRODUCED, "of at least 3 only a, b")
+
+
 def test_a_combination_does_not_count_as_one_more_detector(write):
     results = write(rows(a=LOST, b=LOST) + rows(**{"combined:a+hands": KEPT}))
     assert verdict(claim(LOSES), results).reason.startswith("of at least 3 only a, b;")
@@ -256,19 +261,20 @@ def test_a_claim_is_held_to_all_its_comparisons_at_once(write):
 @pytest.mark.parametrize(
     ("low", "high", "similar", "greater"),
     [
-        (-0.1, 0.1, True, False),  # the margin itself is similar
+        (-0.0999, 0.0999, True, False),
+        (-0.1, 0.1, None, False),  # the margin itself is not similar
         (-0.10001, 0.1, None, False),
         (-0.1, 0.10001, None, None),
         (0.10001, 0.2, False, True),
-        (0.1, 0.2, None, None),  # and is not above itself
-        (-0.2, -0.1, None, False),
+        (0.1, 0.2, False, None),  # and not above itself
+        (-0.2, -0.1, False, False),
         (-0.2, -0.10001, False, False),
-        (0.0, 0.1, True, False),
+        (0.0, 0.0999, True, False),
         (-0.5, 0.5, None, None),
         (math.nan, math.nan, None, None),
     ],
 )
-def test_the_margin_counts_as_similar_and_not_as_above(low, high, similar, greater):
+def test_a_margin_is_neither_similar_nor_above(low, high, similar, greater):
     middle = Quantity(low + (high - low) / 2, low, high, {}, "")
     for relation, expected in (("similar", similar), (">", greater)):
         assert v.Pair(Comparison(relation, of(), 0.0, margin=0.1), middle, ZERO).outcome() is expected
