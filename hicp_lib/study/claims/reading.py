@@ -23,9 +23,9 @@ def verdict_table(verdicts: Iterable[Verdict]) -> pd.DataFrame:
         claim, beside = said.claim, said.of_class or Verdict(said.claim, "")
         row = {"id": claim.id, "section": claim.section, "claim": claim.text, "tested": claim.statement}
         row |= {"paper": claim.paper, "ours": said.ours, "verdict": said.verdict, "why_not": said.reason}
-        row |= {"command": said.command, "n_comparisons": said.n_comparisons}
-        row |= {"class_tested": claim.class_statement, "class_ours": beside.ours}
-        rows.append(row | {"class_verdict": beside.verdict, "class_why_not": beside.reason})
+        row |= {"command": said.command, "class_tested": claim.class_statement, "class_ours": beside.ours}
+        row |= {"class_verdict": beside.verdict, "class_why_not": beside.reason}
+        rows.append(row | {"n_comparisons": said.n_comparisons})
     return pd.DataFrame(rows)
 
 

@@ -47,7 +47,7 @@ class Quantity:
         if math.isnan(self.value):
             return f"{self.name} nothing found"
         interval = f" [{self.low:.3g}, {self.high:.3g}]" if self.low < self.high else ""
-        return f"{self.name} {self.value:.3g}{interval}".strip()
+        return f"{self.name} {self.value + 0:.3g}{interval}".strip()  # + 0: never "-0"
 
 
 class MissingError(Exception):
@@ -84,6 +84,7 @@ def select(side: Selection | float, results: Path) -> tuple[list[Quantity], list
         return [Quantity(side, side, side, {}, "")], []
     table = _read(side, results)
     columns = _systems(table)
+    run = {name for column in columns for name in table[column]}
     for column, wanted in side.where.items():
         if column not in SYSTEMS:
             table = table[table[column].isin(_listed(wanted))]
@@ -93,12 +94,13 @@ def select(side: Selection | float, results: Path) -> tuple[list[Quantity], list
     quantities = [_quantity(side, row) for row in table.to_dict("records")]
     absent = [name for column in SYSTEMS for name in side.named(column) if name not in present]
     if not quantities and not absent:
-        asked = ", ".join(f"{column} {value}" for column, value in side.where.items())
-        raise MissingError(f"{side.notebook}/{side.table} has no result for {asked.replace(CLASS, 'any ')}")
+        about = [column for column in columns if column in side.where] or list(side.where)
+        asked = ", ".join(f"{column} {side.where[column]}" for column in about).replace(CLASS, "any ")
+        raise MissingError(f"{side.notebook}/{side.table} has no result for {asked}")
     if side.greatest and quantities:
         known = [quantity for quantity in quantities if not math.isnan(quantity.value)] or quantities
         quantities = [replace(max(known, key=lambda quantity: quantity.value), n=len(known))]
-    return quantities, absent
+    return quantities, [name for name in absent if name not in run] or absent
 
 
 def command_to_test(names: Iterable[str]) -> str:
@@ -173,7 +175,7 @@ def _quantity(selection: Selection, row: dict[str, Any]) -> Quantity:
         return Quantity(math.nan, math.nan, math.nan, row, name)
     columns = [column or selection.value for column in (selection.value, selection.low, selection.high)]
     value, *bounds = (float(row[column]) * selection.scale for column in columns)
-    return Quantity(value, *sorted(bounds), row, name)
+    return Quantity(value, min(bounds), max(bounds), row, name)
 
 
 def _plain(label: Any) -> str:

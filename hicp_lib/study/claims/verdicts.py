@@ -140,7 +140,7 @@ def _judge(claim: Claim, results: Path) -> Verdict:
         pairs, absent = _compared(claim, results)
     except MissingError as missing:
         return Verdict(claim, NOT_TESTABLE, reason=str(missing), command=missing.command)
-    limits = [f"not run, or without such a result: {', '.join(absent)}"] * bool(absent)
+    limits = [f"no result of {', '.join(absent)}"] * bool(absent)
     command = command_to_test(absent) if absent else _MORE_DETECTORS
     if not pairs:
         return Verdict(claim, NOT_TESTABLE, reason=limits[0], command=command)
@@ -166,7 +166,7 @@ def _saw_rendered(claim: Claim, results: Path) -> bool:
 
 def _compared(claim: Claim, results: Path) -> tuple[list[Pair], list[str]]:
     """What the tests of a claim compare, and the systems they name that were not run."""
-    pairs, absent = [], {}
+    pairs, absent = list[Pair](), dict[str, None]()
     for test in claim.tests:
         (left, absent_left), (right, absent_right) = select(test.left, results), select(test.right, results)
         agree = [(a, b) for a in left for b in right if all(a.row[c] == b.row[c] for c in test.match)]

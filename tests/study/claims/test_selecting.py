@@ -27,6 +27,13 @@ def test_a_system_that_was_not_run_is_told(write):
     assert len(found) == 1 and absent == ["mmpose"]
 
 
+def test_of_two_that_are_missing_the_one_that_was_not_run_is_told(write):
+    """What has no row only because the other was not run is not to blame."""
+    results = write(rows(a=(1, 1, 1)) + [row | {"group": "hand"} for row in rows(mediapipe=(1, 1, 1))])
+    assert select(of("mediapipe", "mmpose"), results)[1] == ["mmpose"]
+    assert select(of("mediapipe"), results)[1] == ["mediapipe"]
+
+
 def test_a_detector_that_has_no_number_does_not_leave_the_claim(write):
     found, absent = select(of("a", "b"), write(rows(a=(math.nan, math.nan, math.nan), b=(0.5, 0.4, 0.6))))
     assert [str(quantity) for quantity in found] == ["a nothing found", "b 0.5 [0.4, 0.6]"] and absent == []
