@@ -33,17 +33,16 @@ def for_reading(table: pd.DataFrame, verdict: str) -> pd.DataFrame:
     """The claims with one verdict, for a page.
 
     `table` from `verdict_table`; columns `section, claim` (with what was tested, and the paper's value),
-    `ours` (with what leaves it open; for what could not be tested, why not, and what would), and, where some
-    claim has a statement beside it, `BEYOND`.
+    `ours` (with what leaves it open; `why not` for what could not be tested), and, where some claim has a
+    statement beside it, `BEYOND`.
     """
     rows = table[table["verdict"] == verdict]
     paper = (" Paper: " + rows["paper"] + ".").where(rows["paper"] != "", "")
     shown = rows[["section"]].assign(claim=rows["claim"] + " Tested: " + rows["tested"] + paper)
-    why = rows["why_not"] + (": " + rows["command"]).where(rows["command"] != "", "")
     if verdict == NOT_TESTABLE:
-        shown["why not, and what would test it"] = why
+        shown["why not"] = rows["why_not"]
     else:
-        shown["ours"] = rows["ours"] + (" (" + why + ")").where(why != "", "")
+        shown["ours"] = rows["ours"] + (" (" + rows["why_not"] + ")").where(rows["why_not"] != "", "")
     if (rows["class_tested"] != "").any():
         open_at = rows[["class_why_not", "class_ours"]].agg(lambda two: ": ".join(filter(None, two)), axis=1)
         of_class = rows["class_tested"] + " " + rows["class_verdict"].str.capitalize() + ": " + open_at

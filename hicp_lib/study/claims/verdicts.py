@@ -214,6 +214,6 @@ def _evidence(claim: Claim, pairs: list[Pair], decisive: list[Pair]) -> str:
     parts = [f"{'; '.join(texts[:SHOWN])} {claim.unit}".strip()]
     if len(texts) > SHOWN:
         parts.append(f"{len(texts) - SHOWN} numbers more")
-    if tested_on := {name for names in _every(pairs) for name in names}:
-        parts.append(f"tested on {', '.join(sorted(tested_on))}")
+    if others := {name for names in _every(pairs) for name in names if name not in parts[0]}:
+        parts.append(f"also tested on {', '.join(sorted(others))}")
     return "; ".join(parts)

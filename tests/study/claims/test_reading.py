@@ -30,7 +30,7 @@ def test_for_reading_every_claim_appears_once(table):
     assert reading.verdict_counts(table)[v.REPRODUCED] == 1
     assert reading.verdict_counts(table, "class_verdict")[v.NOT_REPRODUCED] == 1
     assert parts[v.REPRODUCED]["claim"].tolist() == ["text Tested: statement Paper: -.4."]
-    assert "no robot: buy one" in set(parts[v.NOT_TESTABLE]["why not, and what would test it"])
+    assert parts[v.NOT_TESTABLE]["why not"].tolist() == ["no robot"]
 
 
 def test_what_holds_beyond_the_papers_systems_stands_in_a_column_of_its_own(table):
@@ -43,9 +43,7 @@ def test_what_leaves_a_claim_open_is_said_beside_its_numbers(write):
     results = write(rows(mmpose=(0.1, -0.1, 0.3)))
     table = reading.verdict_table(v.judge_claims([claim(KEPT)], results))
     (ours,) = reading.for_reading(table, v.UNDECIDED)["ours"]
-    assert ours.startswith(
-        "mmpose 0.1 [-0.1, 0.3] (the least difference that this run could have seen is 0.2: hicp"
-    )
+    assert ours == "mmpose 0.1 [-0.1, 0.3] (the least difference that this run could have seen is 0.2)"
 
 
 def test_every_number_and_ordering_of_the_paper_has_a_claim_or_a_reason():

@@ -50,7 +50,7 @@ def test_what_is_partly_tested_says_on_whom_and_what_came_out(write):
 def test_every_detector_is_at_least_three_and_is_named(write):
     three = {"a": LOST, "b": LOST, "c": LOST}
     found = verdict(claim(LOSES), write(rows(**three)))
-    assert found.verdict == v.REPRODUCED and found.ours.endswith("; tested on a, b, c")
+    assert found.verdict == v.REPRODUCED and found.ours.startswith("a -0.4 [-0.5, -0.3]; b -0.4")
     two = verdict(claim(LOSES), write(rows(a=LOST, b=LOST) + rows(**{"b-imported": LOST})))
     assert (two.verdict, two.reason) == (v.PARTLY, "of at least 3 only a, b; what was tested is reproduced")
 
@@ -85,12 +85,11 @@ def test_undecided_tells_the_smallest_difference_the_run_could_have_seen(write):
 def test_evidence_shows_what_decides_and_counts_the_rest(write):
     many = {f"d{k}": (-0.1 * k, -0.1 * k - 0.01, -0.1 * k + 0.01) for k in range(1, 10)}
     found = verdict(claim(LOSES, unit="AP"), write(rows(**many)))
-    assert (
-        found.ours.startswith("d1 -0.1 [-0.11, -0.09]; d2 ")
-        and " AP; 3 numbers more; tested on" in found.ours
+    assert found.ours.startswith("d1 -0.1 [-0.11, -0.09]; d2 ") and found.ours.endswith(
+        " AP; 3 numbers more; also tested on d7, d8, d9"
     )
     refuted = verdict(claim(LOSES), write(rows(**many | {"bad": KEPT})))
-    assert refuted.ours.startswith("bad 0.2 [0.1, 0.3]; tested on bad, d1")
+    assert refuted.ours.startswith("bad 0.2 [0.1, 0.3]; also tested on d1, d2")
 
 
 def test_evidence_without_an_interval_has_no_brackets(write):
@@ -133,7 +132,7 @@ def test_what_holds_of_a_class_never_stands_in_for_the_named_system(write):
     found = verdict(claim(NAMED, class_tests=(CLASS,), class_statement="Every one."), write(table))
     assert found.verdict == v.NOT_TESTABLE and found.reason.endswith("no result of mmpose, alphapose")
     assert found.of_class.verdict == v.REPRODUCED
-    assert found.of_class.ours.endswith("tested on mediapipe, movenet-lightning, movenet-thunder")
+    assert all(name in found.of_class.ours for name in ("mediapipe", "movenet-lightning", "movenet-thunder"))
 
 
 def test_a_class_statement_has_its_own_verdict(write):
