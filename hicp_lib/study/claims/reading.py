@@ -15,7 +15,7 @@ BEYOND = "beyond the paper's systems"
 def verdict_table(verdicts: Iterable[Verdict]) -> pd.DataFrame:
     """One row per claim.
 
-    Columns `id, section, claim, tested, paper, ours, verdict, why_not, command, n_comparisons`; of the
+    Columns `id, section, claim, tested, paper, ours, verdict, why_not, n_comparisons`; of the
     statement beside it `class_tested, class_ours, class_verdict, class_why_not`, "" where there is none.
     """
     rows = []
@@ -23,7 +23,7 @@ def verdict_table(verdicts: Iterable[Verdict]) -> pd.DataFrame:
         claim, beside = said.claim, said.of_class or Verdict(said.claim, "")
         row = {"id": claim.id, "section": claim.section, "claim": claim.text, "tested": claim.statement}
         row |= {"paper": claim.paper, "ours": said.ours, "verdict": said.verdict, "why_not": said.reason}
-        row |= {"command": said.command, "class_tested": claim.class_statement, "class_ours": beside.ours}
+        row |= {"class_tested": claim.class_statement, "class_ours": beside.ours}
         row |= {"class_verdict": beside.verdict, "class_why_not": beside.reason}
         rows.append(row | {"n_comparisons": said.n_comparisons})
     return pd.DataFrame(rows)

@@ -51,11 +51,7 @@ class Quantity:
 
 
 class MissingError(Exception):
-    """What a claim needs is not among the results; carries the command that would give it."""
-
-    def __init__(self, reason: str, command: str = "hicp report"):
-        super().__init__(reason)
-        self.command = command
+    """What a claim needs is not among the results."""
 
 
 def select(side: Selection | float, results: Path) -> tuple[list[Quantity], list[str]]:
@@ -101,22 +97,6 @@ def select(side: Selection | float, results: Path) -> tuple[list[Quantity], list
         known = [quantity for quantity in quantities if not math.isnan(quantity.value)] or quantities
         quantities = [replace(max(known, key=lambda quantity: quantity.value), n=len(known))]
     return quantities, [name for name in absent if name not in run] or absent
-
-
-def command_to_test(names: Iterable[str]) -> str:
-    """What runs detectors, or combinations with these bodies, in the report; it tells which need weights.
-
-    Examples
-    --------
-    >>> command_to_test(["openpose-mobilenet"])
-    'hicp report -p detectors mediapipe,openpose-mobilenet'
-    """
-    bodies = {name: name.removeprefix(COMBINED).partition("+")[0] for name in names}
-    if not DETECTORS.keys() >= set(bodies.values()):
-        return "hicp report"
-    detectors = ",".join(dict.fromkeys(["mediapipe", *bodies.values()]))
-    combined = [f" -p body {body}" for name, body in bodies.items() if body != name]
-    return "".join([f"hicp report -p detectors {detectors}", *combined[:1]])
 
 
 def is_rendered(results: Path, notebook: str) -> bool:

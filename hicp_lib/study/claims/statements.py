@@ -128,8 +128,8 @@ class Claim:
     only_on : str
         "", or one of `ONLY_ON`. "photographs": the claim is about these, and nothing rendered can test it.
         "rendered people": its tables hold nothing else, whatever data the run was given.
-    reason, command : str
-        For what no result can test here: why not, and what would.
+    reason : str
+        For what no result can test here: why not.
     class_statement : str
         The same about the class the named systems belong to, for readers; "" for none.
     class_tests : tuple of Comparison
@@ -145,7 +145,6 @@ class Claim:
     tests: tuple[Comparison, ...] = ()
     only_on: str = ""
     reason: str = ""
-    command: str = ""
     class_statement: str = ""
     class_tests: tuple[Comparison, ...] = ()
 

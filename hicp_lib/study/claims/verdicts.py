@@ -17,7 +17,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from hicp_lib.study.claims.selecting import MissingError, Quantity, command_to_test, is_rendered, select
+from hicp_lib.study.claims.selecting import MissingError, Quantity, is_rendered, select
 from hicp_lib.study.claims.statements import SYSTEMS, Claim, Comparison
 
 REPRODUCED = "reproduced"
@@ -30,9 +30,6 @@ VERDICTS = (REPRODUCED, ON_RENDERED_DATA, NOT_REPRODUCED, UNDECIDED, PARTLY, NOT
 EVERY_NEEDS = 3  # detectors, to speak of every one
 SHOWN = 6  # numbers of the evidence, those that decide
 
-_PHOTOGRAPHS = "hicp report -p source halpe -p annotations_path HALPE.json -p images_dir DIR"
-_MORE_DATA = "hicp report -p n_scenes 1000 -p n_frames 1000"
-_MORE_DETECTORS = "hicp report -p detectors NAME,NAME,NAME"
 _SURE = NormalDist().inv_cdf(0.975)
 
 
@@ -47,8 +44,8 @@ class Verdict:
         One of `VERDICTS`.
     ours : str
         The evidence.
-    reason, command : str
-        Why the claim was not tested, or not decided, and what would.
+    reason : str
+        Why the claim was not tested, or not decided.
     n_comparisons : int
         How many the claim made.
     of_class : Verdict or None
@@ -59,7 +56,6 @@ class Verdict:
     verdict: str
     ours: str = ""
     reason: str = ""
-    command: str = ""
     n_comparisons: int = 0
     of_class: "Verdict | None" = None
 
@@ -134,16 +130,15 @@ def judge_claims(claims: list[Claim], results: Path) -> list[Verdict]:
 
 def _judge(claim: Claim, results: Path) -> Verdict:
     if not claim.tests:
-        return Verdict(claim, NOT_TESTABLE, reason=claim.reason, command=claim.command)
+        return Verdict(claim, NOT_TESTABLE, reason=claim.reason)
     try:
         rendered = _saw_rendered(claim, results)
         pairs, absent = _compared(claim, results)
     except MissingError as missing:
-        return Verdict(claim, NOT_TESTABLE, reason=str(missing), command=missing.command)
+        return Verdict(claim, NOT_TESTABLE, reason=str(missing))
     limits = [f"no result of {', '.join(absent)}"] * bool(absent)
-    command = command_to_test(absent) if absent else _MORE_DETECTORS
     if not pairs:
-        return Verdict(claim, NOT_TESTABLE, reason=limits[0], command=command)
+        return Verdict(claim, NOT_TESTABLE, reason=limits[0])
     said = _decide(claim, pairs, rendered)
     too_few = [", ".join(names) for names in _every(pairs) if len(names) < EVERY_NEEDS]
     limits += [f"of at least {EVERY_NEEDS} only {names}" for names in too_few]
@@ -152,7 +147,7 @@ def _judge(claim: Claim, results: Path) -> Verdict:
     if not limits:
         return said
     part = ", ".join(filter(None, [f"what was tested is {said.verdict}", said.reason]))
-    return replace(said, verdict=PARTLY, reason="; ".join([*limits, part]), command=command)
+    return replace(said, verdict=PARTLY, reason="; ".join([*limits, part]))
 
 
 def _saw_rendered(claim: Claim, results: Path) -> bool:
@@ -160,7 +155,7 @@ def _saw_rendered(claim: Claim, results: Path) -> bool:
     rendered = any([is_rendered(results, notebook) for notebook in sorted(notebooks)])
     rendered |= claim.only_on == "rendered people"
     if claim.only_on == "photographs" and rendered:
-        raise MissingError("the claim is about photographs; this run saw rendered people", _PHOTOGRAPHS)
+        raise MissingError("the claim is about photographs; this run saw rendered people")
     return rendered
 
 
@@ -192,7 +187,7 @@ def _decide(claim: Claim, pairs: list[Pair], rendered: bool) -> Verdict:
     reason = f"the least difference that this run could have seen is {half:.2g} {claim.unit}".strip()
     if math.isnan(half):
         reason = "too few images for an interval, or nothing found"
-    return replace(said, reason=reason, command=_MORE_DATA)
+    return replace(said, reason=reason)
 
 
 def _every(pairs: Iterable[Pair]) -> list[list[str]]:

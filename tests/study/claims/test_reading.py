@@ -17,7 +17,7 @@ def table(write):
     claims = [
         claim(NAMED, paper="-.4", class_tests=(KEPT,), class_statement="It rises."),
         claim(KEPT),
-        claim(reason="no robot", command="buy one"),
+        claim(reason="no robot"),
     ]
     return reading.verdict_table(v.judge_claims(claims, results))
 

@@ -6,7 +6,7 @@ import pytest
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.registry import COMBINED
-from hicp_lib.study.claims.selecting import MissingError, _plain, command_to_test, is_rendered, select
+from hicp_lib.study.claims.selecting import MissingError, _plain, is_rendered, select
 from hicp_lib.study.claims.statements import Selection
 from tests.study.claims.made_up import of, rows
 
@@ -87,19 +87,6 @@ def test_a_simulated_recording_is_no_recording_of_a_lab(write, tmp_path):
     assert not is_rendered(results, "02")
     (recordings[1] / "simulation.json").write_text("{}")
     assert is_rendered(results, "02")
-
-
-@pytest.mark.parametrize(
-    ("names", "command"),
-    [
-        (["mmpose", "alphapose"], "hicp report -p detectors mediapipe,mmpose,alphapose"),
-        (["mediapipe"], "hicp report -p detectors mediapipe"),
-        ([f"{COMBINED}mmpose+mediapipe-hands"], "hicp report -p detectors mediapipe,mmpose -p body mmpose"),
-        (["ground truth"], "hicp report"),
-    ],
-)
-def test_the_command_names_what_was_missing(names, command):
-    assert command_to_test(names) == command
 
 
 def test_labels_are_shown_for_reading():
