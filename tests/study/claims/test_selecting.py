@@ -2,13 +2,18 @@
 
 import math
 
+import numpy as np
 import pytest
 
+from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.registry import COMBINED
+from hicp_lib.evaluation.ap.metric_table import compare
 from hicp_lib.study.claims.selecting import MissingError, _plain, is_rendered, select
-from hicp_lib.study.claims.statements import Selection
-from tests.study.claims.made_up import of, rows
+from hicp_lib.study.claims.statements import Comparison, Selection
+from hicp_lib.study.claims.verdicts import NOT_REPRODUCED
+from tests.evaluation.made_people import make_annotations, make_detections
+from tests.study.claims.made_up import claim, of, rows, verdict
 
 CHANGE = Selection("02", "loss", {}, "change", low="low", high="high")
 
@@ -37,6 +42,18 @@ def test_of_two_that_are_missing_the_one_that_was_not_run_is_told(write):
 def test_a_detector_that_has_no_number_does_not_leave_the_claim(write):
     found, absent = select(of("a", "b"), write(rows(a=(math.nan, math.nan, math.nan), b=(0.5, 0.4, 0.6))))
     assert [str(quantity) for quantity in found] == ["a nothing found", "b 0.5 [0.4, 0.6]"] and absent == []
+
+
+def test_a_detector_that_finds_nobody_has_a_precision_of_nought_and_refutes_what_is_said_of_every(write):
+    points = np.random.default_rng(3).uniform(50, 400, (12, 136, 2))
+    seen = {i: make_detections(points[i]) for i in range(12)}
+    found = {("basic", name): seen for name in ("mmpose", "alphapose", "detectron2")}
+    found["basic", "posenet"] = {i: Detections.none() for i in range(12)}
+    table = compare({"basic": make_annotations(points, range(12))}, found, n_resamples=20)
+    ap = {"group": "body", "metric": "AP"}
+    every = claim(Comparison(">", Selection("02", "loss", ap, "value", low="low", high="high"), 0.5))
+    said = verdict(every, write(table))
+    assert (said.verdict, said.ours[:9]) == (NOT_REPRODUCED, "posenet 0")
 
 
 def test_a_number_may_be_compared_with_another(write):

@@ -89,6 +89,12 @@ def test_evidence_shows_what_decides_and_counts_the_rest(write):
     assert refuted.ours.startswith("bad 0.2 [0.1, 0.3]; also tested on d1, d2")
 
 
+def test_the_closest_call_is_the_one_whose_worse_end_is_nearest(write):
+    table = rows(a=(-0.3, -0.35, -0.25), b=(-0.4, -0.8, -0.1))
+    found = verdict(claim(Comparison("<", of("a", "b"), 0.0)), write(table))
+    assert found.ours == "b -0.4 [-0.8, -0.1]; a -0.3 [-0.35, -0.25]"
+
+
 def test_evidence_without_an_interval_has_no_brackets(write):
     made = claim(Comparison("<", of("mmpose"), 0.0), unit="AP")
     assert verdict(made, write(rows(mmpose=(-0.4, -0.4, -0.4)))).ours == "mmpose -0.4 AP"
@@ -194,6 +200,8 @@ def test_one_that_is_picked_is_corrected_for_the_choice(write):
     found = verdict(claim(some), results)
     assert (found.verdict, found.n_comparisons, found.ours) == (v.UNDECIDED, 3, "b 0.3 [0.05, 0.55]")
     assert verdict(claim(Comparison(">", of("b"), 0.0)), results).verdict == v.REPRODUCED
+    than_best = Comparison("<", of("a", "c", greatest=True), of("a", "b", "c", greatest=True))
+    assert verdict(claim(than_best), results).n_comparisons == 6
 
 
 def test_missing_results_are_not_verdicts(tmp_path):
