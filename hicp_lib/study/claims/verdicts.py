@@ -140,8 +140,8 @@ def _judge(claim: Claim, results: Path) -> Verdict:
     if not pairs:
         return Verdict(claim, NOT_TESTABLE, reason=limits[0])
     said = _decide(claim, pairs, rendered)
-    too_few = [", ".join(names) for names in _every(pairs) if len(names) < EVERY_NEEDS]
-    limits += [f"of at least {EVERY_NEEDS} only {names}" for names in too_few]
+    too_few = [names for names in _every(pairs) if len(names) < EVERY_NEEDS]
+    limits += [f"only {len(names)} of at least {EVERY_NEEDS}: {', '.join(names)}" for names in too_few]
     if said.verdict == NOT_REPRODUCED and not absent:  # one that contradicts "every" is enough
         return replace(said, reason="; ".join(limits))
     if not limits:
