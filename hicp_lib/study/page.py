@@ -69,6 +69,8 @@ class Study:
     results : Path
         Where the notebooks before this one left theirs, a folder each; in Jupyter, those of the last full
         report.
+    stamp : dict of str to object
+        What the provenance stamp is to say beside what every notebook's says.
 
     Examples
     --------
@@ -90,6 +92,7 @@ class Study:
         self.folder = results / name
         self.results = Path(os.environ.get(checkout.EARLIER_RESULTS_VARIABLE) or kept / "full")
         self._link = f"../results/{profile}/{name}"
+        self.stamp: dict[str, Any] = {}
         self._values: dict[str, Any] = {}
         self._captions: dict[str, dict[str, str]] = {}
         self._start_s = time.perf_counter()
@@ -180,7 +183,8 @@ class Study:
     def finish(self) -> None:
         """Write the values and the provenance stamp, and show the stamp. The last line of every notebook."""
         stamp = {"notebook": self.name, "schema": SCHEMA_VERSION} | provenance(self.parameters)
-        stamp |= {"wall_s": round(time.perf_counter() - self._start_s, 2), "peak_memory_mb": peak_memory_mb()}
+        wall_s = round(time.perf_counter() - self._start_s, 2)
+        stamp |= self.stamp | {"wall_s": wall_s, "peak_memory_mb": peak_memory_mb()}
         write_json(self.folder / "values.json", self._values, indent=2)
         write_json(self.folder / "captions.json", self._captions, indent=2)
         write_json(self.folder / "provenance.json", stamp, indent=2)

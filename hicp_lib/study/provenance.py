@@ -60,12 +60,13 @@ def git_state() -> dict[str, Any]:
 
     An installed library may lie within somebody else's repository, whose commit says nothing of it.
     """
-    status = _git("status", "--porcelain")
+    status = git("status", "--porcelain")
     changed_files = None if status is None else len(status.splitlines())
-    return {"commit": _git("rev-parse", "HEAD") or "unknown", "changed_files": changed_files}
+    return {"commit": git("rev-parse", "HEAD") or "unknown", "changed_files": changed_files}
 
 
-def _git(*arguments: str) -> str | None:
+def git(*arguments: str) -> str | None:
+    """What git says in the library's checkout; None without git or a checkout, or where it refuses."""
     if CHECKOUT is None:
         return None
     try:

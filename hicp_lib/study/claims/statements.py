@@ -1,19 +1,21 @@
 """Claims as data: what the paper says, in our words, and the statement about result files that tests it.
 
-`data/claims.json` holds a list of claims. The tests of one claim must all hold. A test compares
-`left` with `right` (each a number or a selection of rows in a result table) by a `relation`:
+`data/claims.json` holds `tables` (where quantities are read, by short names), `claims`, `sentences` (the
+paper's numbers and orderings, each with the claims that cover it or the reason why none does) and what
+`hicp_lib.study.claims.fixed` reads. The tests of one claim must all hold. A test compares `left` with `right`
+(each a number or a selection of rows in a result table) by a `relation`:
 
-    >, <      the difference left - right lies above `margin`, or below -`margin`
-    within    left and right differ by at most `tolerance`
+    >, <       the difference left - right lies above `margin`, or below -`margin`
+    similar    left and right differ by less than `margin`
 
-A claim that names systems is tested on these systems only. Beside it may stand a statement about the class
-that they belong to (`class_statement`, `class_tests`), tested on whatever of that class was run: it says how
-far a claim carries, and never decides its verdict.
-
-Margins and tolerances are fixed in the file, before any result is seen.
+A claim that names systems is tested on these only. A selection that names no detector speaks of *every* one
+that was run by itself (a combination has the body of another), and asks for `EVERY_NEEDS` of them. Beside a
+claim may stand a statement about the class that its systems belong to, or under choices of ours
+(`class_statement`, `class_tests`): it says how far a claim carries, and never decides its verdict.
 """
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +24,9 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
 
 CLAIMS_FILE = DATA_DIR / "claims.json"
-RELATIONS = (">", "<", "within")
-PICKS = ("each", "least", "greatest")
+CLASS = "@"
+SYSTEMS = ("detector", "other")  # columns that name a detector
+RELATIONS = (">", "<", "similar")
 ONLY_ON = ("photographs", "rendered people")
 
 
@@ -38,15 +41,13 @@ class Selection:
     where : dict of str to object
         Column -> the value rows must have there, or a list of such values; imported detections
         (`mmpose-imported`) count as the detector's. "@top-down" and "@bottom-up" are all detectors of the
-        registry that are so.
+        registry that are so, "@combined" all combinations.
     value : str
         Column of the quantity.
-    unlike : dict of str to object
-        Column -> the value, or values, that rows must not have.
-    pick : str
-        "each" row, or the one with the "least" or "greatest" value.
+    greatest : bool
+        Only the row with the greatest value: what is so of one of them at least.
     low, high : str
-        Columns of the quantity's interval; no interval when they are "".
+        Columns of the quantity's interval; the number counts as exact when they are "".
     scale : float
         Multiplies the quantity, to bring it to the claim's unit.
     name : tuple of str
@@ -57,12 +58,21 @@ class Selection:
     table: str
     where: dict[str, Any]
     value: str
-    unlike: dict[str, Any] = field(default_factory=dict)
-    pick: str = "each"
+    greatest: bool = False
     low: str = ""
     high: str = ""
     scale: float = 1.0
     name: tuple[str, ...] = ("detector",)
+
+    def named(self, column: str) -> list[str]:
+        """The systems that `column` must be one of; none where every one is meant, or a class."""
+        given = self.where.get(column, [])
+        names = given if isinstance(given, list) else [given]
+        return [name for name in names if not name.startswith(CLASS)]
+
+    def every(self, column: str) -> bool:
+        """Whether every detector that was run is meant, or every one of a class."""
+        return not self.greatest and not self.named(column)
 
 
 @dataclass(frozen=True)
@@ -76,9 +86,7 @@ class Comparison:
     left : Selection
     right : Selection or float
     margin : float
-        Of `>` and `<`: the difference must be larger than this.
-    tolerance : float
-        Of `within`: the difference may be as large as this.
+        Of `>` and `<`: the difference must be larger than this; of `similar`: smaller.
     match : tuple of str
         Columns that must agree between the two rows compared.
     """
@@ -87,8 +95,18 @@ class Comparison:
     left: Selection
     right: Selection | float
     margin: float = 0.0
-    tolerance: float = 0.0
     match: tuple[str, ...] = ()
+
+    @property
+    def claimed(self) -> tuple[float, float]:
+        """Between which bounds the difference left - right is claimed to lie."""
+        above, below = (self.margin, math.inf), (-math.inf, -self.margin)
+        return {">": above, "<": below, "similar": (-self.margin, self.margin)}[self.relation]
+
+    @property
+    def selections(self) -> list[Selection]:
+        """The sides that select rows."""
+        return [side for side in (self.left, self.right) if isinstance(side, Selection)]
 
 
 @dataclass(frozen=True)
@@ -110,8 +128,8 @@ class Claim:
     only_on : str
         "", or one of `ONLY_ON`. "photographs": the claim is about these, and nothing rendered can test it.
         "rendered people": its tables hold nothing else, whatever data the run was given.
-    reason, command : str
-        For what no result can test here: why not, and what would.
+    reason : str
+        For what no result can test here: why not.
     class_statement : str
         The same about the class the named systems belong to, for readers; "" for none.
     class_tests : tuple of Comparison
@@ -127,7 +145,6 @@ class Claim:
     tests: tuple[Comparison, ...] = ()
     only_on: str = ""
     reason: str = ""
-    command: str = ""
     class_statement: str = ""
     class_tests: tuple[Comparison, ...] = ()
 
@@ -137,8 +154,8 @@ def read_claims(path: Path = CLAIMS_FILE) -> list[Claim]:
 
     Parameters
     ----------
-    path : Path
-        A JSON list of claims.
+    path : Path, optional
+        In the layout of `data/claims.json`.
 
     Returns
     -------
@@ -155,13 +172,14 @@ def read_claims(path: Path = CLAIMS_FILE) -> list[Claim]:
     >>> len({claim.id for claim in claims}) == len(claims)
     True
     """
-    rows = read_json(path)
+    content = read_json(path)
+    rows = content.get("claims") if isinstance(content, dict) else None
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise InputError(f"{path}: expected a list of claims, each an object")
+        raise InputError(f"{path}: expected a list of claims, each an object, under the key 'claims'")
     claims = []
     for number, row in enumerate(rows):
         try:
-            claims.append(_claim(row))
+            claims.append(_claim(row, content.get("tables", {})))
         except (TypeError, KeyError, ValueError, AttributeError) as error:
             name = row.get("id", f"number {number}")
             raise InputError(
@@ -173,8 +191,8 @@ def read_claims(path: Path = CLAIMS_FILE) -> list[Claim]:
     return claims
 
 
-def _claim(row: dict[str, Any]) -> Claim:
-    tests = {key: tuple(_test(test) for test in row.get(key, [])) for key in ("tests", "class_tests")}
+def _claim(row: dict[str, Any], tables: dict[str, Any]) -> Claim:
+    tests = {key: tuple(_test(test, tables) for test in row.get(key, [])) for key in ("tests", "class_tests")}
     claim = Claim(**row | tests)
     if not claim.tests and not claim.reason:
         raise ValueError("has neither tests nor a reason why it has none")
@@ -185,24 +203,25 @@ def _claim(row: dict[str, Any]) -> Claim:
     return claim
 
 
-def _test(row: dict[str, Any]) -> Comparison:
+def _test(row: dict[str, Any], tables: dict[str, Any]) -> Comparison:
     if row["relation"] not in RELATIONS:
         raise ValueError(f"relation {row['relation']!r} is unknown; use one of {', '.join(RELATIONS)}")
-    if row["relation"] == "within" and not row.get("tolerance", 0) > 0:
-        raise ValueError("`within` needs a tolerance above 0")
-    sides = {side: _side(row[side]) for side in ("left", "right")}
+    if row["relation"] == "similar" and not row.get("margin", 0) > 0:
+        raise ValueError("`similar` needs a margin above 0")
+    sides = {side: _side(row[side], tables) for side in ("left", "right")}
     if not isinstance(sides["left"], Selection):
         raise ValueError("the left side must select rows of a table")
     return Comparison(**row | sides | {"match": tuple(row.get("match", ()))})
 
 
-def _side(side: Any) -> Selection | float:
+def _side(side: Any, tables: dict[str, Any]) -> Selection | float:
     if isinstance(side, (int, float)):
         return float(side)
+    if side["table"] in tables:
+        base = tables[side["table"]]
+        side = base | side | {"table": base["table"], "where": base.get("where", {}) | side["where"]}
     notebook, _, table = side["table"].partition("/")
     if not table:
-        raise ValueError(f"table {side['table']!r} is not NOTEBOOK/TABLE")
-    if side.get("pick", "each") not in PICKS:
-        raise ValueError(f"pick {side['pick']!r} is unknown; use one of {', '.join(PICKS)}")
+        raise ValueError(f"table {side['table']!r} is neither one of `tables` nor NOTEBOOK/TABLE")
     name = tuple(side.get("name", ("detector",)))
     return Selection(**side | {"notebook": notebook, "table": table, "name": name})

@@ -1,33 +1,36 @@
 """Verdicts: what a run's result files say about each claim.
 
-A test *holds* when the whole 95 % interval of the difference lies on the claimed side, *fails* when
-none of it does, and is *open* otherwise, or where there is no interval (NaN). Tables of differences come
-with intervals of their own, from paired draws; the difference of two rows with an interval each takes the
-widest: that asks for more than a paired comparison would, never for less.
+A test *holds* when the whole interval of the difference lies on the claimed side, *fails* when none of it
+does, and is *open* otherwise, or where there is no interval (NaN). Two are similar when the whole interval
+lies within the margin: two one-sided tests. Tables of differences come with intervals of their own, from
+paired draws; the difference of two rows with an interval each takes the widest: that asks for more than a
+paired comparison would, never for less. A claim that makes k comparisons takes each at 1 - .05 / k
+(Bonferroni), so that with 95 % all of them are told right, whether they hold or fail: the half-widths of the
+95 % intervals grow as those of a normal distribution do.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from statistics import NormalDist
 
-import pandas as pd
+import numpy as np
 
-from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_json
-from hicp_lib.detectors.registry import COMBINED, DETECTORS, command_to_use
-from hicp_lib.recordings.recording import SIMULATION_FILE
-from hicp_lib.study.claims.statements import Claim, Comparison, Selection
+from hicp_lib.study.claims.selecting import MissingError, Quantity, is_rendered, select
+from hicp_lib.study.claims.statements import SYSTEMS, Claim, Comparison
 
 REPRODUCED = "reproduced"
 ON_RENDERED_DATA = "reproduced on rendered data only"
 NOT_REPRODUCED = "not reproduced"
+UNDECIDED = "undecided"
+PARTLY = "partly tested"
 NOT_TESTABLE = "not testable here"
-VERDICTS = (REPRODUCED, ON_RENDERED_DATA, NOT_REPRODUCED, NOT_TESTABLE)
+VERDICTS = (REPRODUCED, ON_RENDERED_DATA, NOT_REPRODUCED, UNDECIDED, PARTLY, NOT_TESTABLE)
+EVERY_NEEDS = 3  # detectors, to speak of every one
+SHOWN = 6  # numbers of the evidence, those that decide
 
-_TABLE_COLUMNS = ["section", "claim", "tested", "paper", "ours", "verdict", "why_not", "command", "of_class"]
-_CLASS = "@"
-_PHOTOGRAPHS = "hicp report -p source halpe -p annotations_path HALPE.json -p images_dir DIR"
+_SURE = NormalDist().inv_cdf(0.975)
 
 
 @dataclass(frozen=True)
@@ -41,9 +44,11 @@ class Verdict:
         One of `VERDICTS`.
     ours : str
         The evidence.
-    reason, command : str
-        Why the claim was not tested, and what would test it.
-    of_class : str
+    reason : str
+        Why the claim was not tested, or not decided.
+    n_comparisons : int
+        How many the claim made.
+    of_class : Verdict or None
         What the run says of the class that the claim's systems belong to; no part of the verdict.
     """
 
@@ -51,38 +56,51 @@ class Verdict:
     verdict: str
     ours: str = ""
     reason: str = ""
-    command: str = ""
-    of_class: str = ""
+    n_comparisons: int = 0
+    of_class: "Verdict | None" = None
 
 
 @dataclass(frozen=True)
-class Quantity:
-    """A number of a result table.
+class Pair:
+    """Two quantities that a test compares.
 
     Attributes
     ----------
-    value : float
-    low, high : float
-        Its 95 % interval; the number itself where it has none.
-    row : dict of str to object
-        The row it is from.
-    name : str
-        The row's, in the evidence.
+    test : Comparison
+    left, right : Quantity
     """
 
-    value: float
-    low: float
-    high: float
-    row: dict[str, Any]
-    name: str
+    test: Comparison
+    left: Quantity
+    right: Quantity
 
+    def interval(self, n_comparisons: int = 1) -> tuple[float, float]:
+        """Of the difference, when it is one of so many."""
+        value = self.left.value - self.right.value
+        grows = NormalDist().inv_cdf(1 - 0.025 / n_comparisons) / _SURE
+        low, high = self.left.low - self.right.high, self.left.high - self.right.low
+        return value - grows * (value - low), value + grows * (high - value)
 
-class _MissingError(Exception):
-    """What a claim needs is not among the results; carries the command that would give it."""
+    def slack(self, n_comparisons: int = 1) -> tuple[float, float]:
+        """How far the interval's worse and better end are within what is claimed; below 0 outside."""
+        (low, high), (above, below) = self.interval(n_comparisons), self.test.claimed
+        return float(np.minimum(low - above, below - high)), float(np.minimum(high - above, below - low))
 
-    def __init__(self, reason: str, command: str):
-        super().__init__(reason)
-        self.command = command
+    def outcome(self, n_comparisons: int = 1) -> bool | None:
+        """Whether it holds; None when that is open.
+
+        Examples
+        --------
+        >>> from hicp_lib.study.claims.statements import Selection
+        >>> test = Comparison(">", Selection("02_evaluation_2d", "ap", {}, "value"), 0.5)
+        >>> half, left = Quantity(0.5, 0.5, 0.5, {}, ""), Quantity(0.7, 0.55, 0.85, {}, "mmpose")
+        >>> [Pair(test, *two).outcome() for two in ((left, half), (half, left), (left, left))]
+        [True, False, None]
+        >>> Pair(test, left, half).outcome(n_comparisons=10) is None
+        True
+        """
+        worse, better = self.slack(n_comparisons)
+        return True if worse > 0 else False if better <= 0 else None
 
 
 def judge_claims(claims: list[Claim], results: Path) -> list[Verdict]:
@@ -103,231 +121,94 @@ def judge_claims(claims: list[Claim], results: Path) -> list[Verdict]:
     InputError
         If a claim asks for a column that its table does not have.
     """
-    return [_with_class(_judge_claim(claim, results), results) for claim in claims]
+    verdicts = []
+    for claim in claims:
+        of_class = _judge(replace(claim, tests=claim.class_tests), results) if claim.class_tests else None
+        verdicts.append(replace(_judge(claim, results), of_class=of_class))
+    return verdicts
 
 
-def verdict_table(verdicts: list[Verdict]) -> pd.DataFrame:
-    """One row per claim: `section, claim, tested, paper, ours, verdict, why_not, command, of_class`."""
-    rows = [
-        (
-            c.section,
-            c.text,
-            c.statement,
-            c.paper or "–",
-            v.ours or "–",
-            v.verdict,
-            v.reason,
-            v.command,
-            v.of_class or "–",
-        )
-        for c, v in ((verdict.claim, verdict) for verdict in verdicts)
-    ]
-    return pd.DataFrame(rows, columns=_TABLE_COLUMNS)
-
-
-def for_reading(table: pd.DataFrame, verdict: str) -> pd.DataFrame:
-    """The claims with one verdict, for a page.
-
-    `table` from `verdict_table`; columns `section, claim` (with what was tested), `paper` and `ours`, or in
-    the place of the last, for what could not be tested, `why not, and what would test it`; and, where some
-    claim has one, `of its class`.
-    """
-    rows = table[table["verdict"] == verdict]
-    shown = rows[["section"]].assign(claim=rows["claim"] + " Tested: " + rows["tested"], paper=rows["paper"])
-    of_class = {"of its class": rows["of_class"]} if (rows["of_class"] != "–").any() else {}
-    if verdict != NOT_TESTABLE:
-        return shown.assign(ours=rows["ours"], **of_class)
-    open_at = rows["ours"].map(lambda ours: "" if ours == "–" else f" ({ours})")
-    reasons = rows["why_not"] + open_at + ": " + rows["command"]
-    return shown.assign(**{"why not, and what would test it": reasons}, **of_class)
-
-
-def verdict_counts(table: pd.DataFrame) -> dict[str, int]:
-    """How many claims got each verdict, by `VERDICTS`; `table` from `verdict_table`."""
-    return {verdict: int((table["verdict"] == verdict).sum()) for verdict in VERDICTS}
-
-
-def _with_class(verdict: Verdict, results: Path) -> Verdict:
-    """The verdict, with what the run says of the class beside it."""
-    claim = verdict.claim
-    if not claim.class_tests:
-        return verdict
-    of_class = _judge_claim(replace(claim, tests=claim.class_tests), results)
-    said = ": ".join(text for text in (of_class.reason, of_class.ours) if text)
-    return replace(verdict, of_class=f"{claim.class_statement} {of_class.verdict.capitalize()}: {said}")
-
-
-def _judge_claim(claim: Claim, results: Path) -> Verdict:
+def _judge(claim: Claim, results: Path) -> Verdict:
     if not claim.tests:
-        return Verdict(claim, NOT_TESTABLE, reason=claim.reason, command=claim.command)
+        return Verdict(claim, NOT_TESTABLE, reason=claim.reason)
     try:
-        rendered = any([is_rendered(results, notebook) for notebook in _notebooks(claim)])
-        rendered |= claim.only_on == "rendered people"
-        if claim.only_on == "photographs" and rendered:
-            raise _MissingError("the claim is about photographs; this run saw rendered people", _PHOTOGRAPHS)
-        outcomes, evidence = zip(*(_try(test, results) for test in claim.tests), strict=True)
-    except _MissingError as missing:
-        return Verdict(claim, NOT_TESTABLE, reason=str(missing), command=missing.command)
-    ours = "; ".join(dict.fromkeys(text for texts in evidence for text in texts))
-    ours = f"{ours} {claim.unit}".strip()
-    if False in outcomes:
-        return Verdict(claim, NOT_REPRODUCED, ours)
-    if None in outcomes:
-        reason = "the 95 % intervals leave it open; more scenes or frames would decide"
-        return Verdict(claim, NOT_TESTABLE, ours, reason, "hicp report -p n_scenes 1000 -p n_frames 1000")
-    return Verdict(claim, ON_RENDERED_DATA if rendered else REPRODUCED, ours)
-
-
-def _notebooks(claim: Claim) -> set[str]:
-    """The notebooks whose results a claim rests on."""
-    sides = [side for test in claim.tests for side in (test.left, test.right)]
-    return {side.notebook for side in sides if isinstance(side, Selection)}
-
-
-def _try(test: Comparison, results: Path) -> tuple[bool | None, list[str]]:
-    """Whether a test holds (None: open), and the quantities it rests on in words."""
-    left = select(test.left, results)
-    if isinstance(test.right, float):
-        right, shown_right = [Quantity(test.right, test.right, test.right, {}, "")], False
-    else:
-        right, shown_right = select(test.right, results), True
-    pairs = [(a, b) for a in left for b in right if all(a.row.get(c) == b.row.get(c) for c in test.match)]
+        rendered = _saw_rendered(claim, results)
+        pairs, absent = _compared(claim, results)
+    except MissingError as missing:
+        return Verdict(claim, NOT_TESTABLE, reason=str(missing))
+    limits = [f"no result of {', '.join(absent)}"] * bool(absent)
     if not pairs:
-        reason = f"no two rows of {test.left.table} agree in {', '.join(test.match)}"
-        raise _MissingError(reason, "hicp report")
-    shown = [a for a, _ in pairs] + [b for _, b in pairs if shown_right]
-    return holds(test, pairs), [_in_words(quantity) for quantity in shown]
+        return Verdict(claim, NOT_TESTABLE, reason=limits[0])
+    said = _decide(claim, pairs, rendered)
+    too_few = [names for names in _every(pairs) if len(names) < EVERY_NEEDS]
+    limits += [f"only {len(names)} of at least {EVERY_NEEDS}: {', '.join(names)}" for names in too_few]
+    if said.verdict == NOT_REPRODUCED and not absent:  # one that contradicts "every" is enough
+        return replace(said, reason="; ".join(limits))
+    if not limits:
+        return said
+    part = ", ".join(filter(None, [f"what was tested is {said.verdict}", said.reason]))
+    return replace(said, verdict=PARTLY, reason="; ".join([*limits, part]))
 
 
-def holds(test: Comparison, pairs: list[tuple[Quantity, Quantity]]) -> bool | None:
-    """True when every pair's interval is on the claimed side, False when one is wholly off it, else None.
-
-    Parameters
-    ----------
-    test : Comparison
-    pairs : list of (Quantity, Quantity)
-        The left and the right side.
-
-    Examples
-    --------
-    >>> from hicp_lib.study.claims.statements import Selection
-    >>> test = Comparison(">", Selection("02_evaluation_2d", "ap", {}, "value"), 0.5)
-    >>> half, left = Quantity(0.5, 0.5, 0.5, {}, ""), Quantity(0.7, 0.6, 0.8, {}, "mmpose")
-    >>> holds(test, [(left, half)]), holds(test, [(half, left)]), holds(test, [(left, left)])
-    (True, False, None)
-    """
-    outcomes = [_compare(test, a.low - b.high, a.high - b.low) for a, b in pairs]
-    return False if False in outcomes else None if None in outcomes else True
+def _saw_rendered(claim: Claim, results: Path) -> bool:
+    notebooks = {side.notebook for test in claim.tests for side in test.selections}
+    rendered = any([is_rendered(results, notebook) for notebook in sorted(notebooks)])
+    rendered |= claim.only_on == "rendered people"
+    if claim.only_on == "photographs" and rendered:
+        raise MissingError("the claim is about photographs; this run saw rendered people")
+    return rendered
 
 
-def _compare(test: Comparison, low: float, high: float) -> bool | None:
-    if test.relation == "within":
-        claimed = -test.tolerance, test.tolerance
-        inside = claimed[0] <= low and high <= claimed[1]
-        outside = high < claimed[0] or low > claimed[1]
-    else:
-        if test.relation == "<":
-            low, high = -high, -low
-        inside, outside = low > test.margin, high <= test.margin
-    return True if inside else False if outside else None
+def _compared(claim: Claim, results: Path) -> tuple[list[Pair], list[str]]:
+    """What the tests of a claim compare, and the systems they name that were not run."""
+    pairs, absent = list[Pair](), dict[str, None]()
+    for test in claim.tests:
+        (left, absent_left), (right, absent_right) = select(test.left, results), select(test.right, results)
+        agree = [(a, b) for a in left for b in right if all(a.row[c] == b.row[c] for c in test.match)]
+        matching = [Pair(test, *two) for two in agree]
+        if not matching + absent_left + absent_right:
+            raise MissingError(f"no two rows of {test.left.table} agree in {', '.join(test.match)}")
+        pairs += matching
+        absent |= dict.fromkeys(absent_left + absent_right)
+    return pairs, list(absent)
 
 
-def select(selection: Selection, results: Path) -> list[Quantity]:
-    """The quantities of the rows a selection asks for; rows without a number are left out."""
-    path = results / selection.notebook / f"{selection.table}.parquet"
-    if not path.is_file():
-        raise _MissingError(f"{selection.notebook} has no results in this run", "hicp report")
-    table = pd.read_parquet(path)
-    asked = {*selection.where, *selection.unlike, *selection.name}
-    asked |= {selection.value, selection.low, selection.high} - {""}
-    if unknown := asked - set(table.columns):
-        raise InputError(
-            f"{path}: a claim asks for column {min(unknown)!r}; there are {', '.join(table.columns)}"
-        )
-    table = table[table[selection.value].map(lambda value: value is not None and math.isfinite(value))]
-    present = {name for column in ("detector", "other") if column in table for name in table[column]}
-    for column, wanted in selection.where.items():
-        table = table[table[column].isin(_values(wanted))]
-    for column, unwanted in selection.unlike.items():
-        table = table[~table[column].isin(_values(unwanted))]
-    if table.empty:
-        raise _absent(selection, present)
-    quantities = [_quantity(selection, row) for row in table.to_dict("records")]
-    if selection.pick == "each":
-        return quantities
-    return [(min if selection.pick == "least" else max)(quantities, key=lambda quantity: quantity.value)]
+def _decide(claim: Claim, pairs: list[Pair], rendered: bool) -> Verdict:
+    n = sum(pair.left.n * pair.right.n for pair in pairs)
+    outcomes = [pair.outcome(n) for pair in pairs]
+    decided = False if False in outcomes else None if None in outcomes else True
+    decisive = [pair for pair, outcome in zip(pairs, outcomes, strict=True) if outcome is decided]
+    decisive.sort(key=lambda pair: pair.slack(n)[0])
+    verdict = {None: UNDECIDED, False: NOT_REPRODUCED, True: ON_RENDERED_DATA if rendered else REPRODUCED}
+    said = Verdict(claim, verdict[decided], _evidence(claim, pairs, decisive), n_comparisons=n)
+    if decided is not None:
+        return said
+    half = float(np.max([np.ptp(pair.interval(n)) / 2 for pair in decisive]))  # NaN where one has none
+    reason = f"the least difference that this run could have seen is {half:.2g} {claim.unit}".strip()
+    if math.isnan(half):
+        reason = "too few images for an interval, or nothing found"
+    return replace(said, reason=reason)
 
 
-def _values(given: Any) -> list:
-    """The values a column may have, imported detections of a detector and members of a class among them."""
-    values = given if isinstance(given, list) else [given]
-    values = [member for value in values for member in _members(value)]
-    return values + [f"{value}-imported" for value in values if isinstance(value, str)]
+def _every(pairs: Iterable[Pair]) -> list[list[str]]:
+    """Who was run, of each selection that means every detector, or every one of a class."""
+    run: dict[tuple, set[str]] = {}
+    for pair in pairs:
+        for selection, quantity in zip(pair.test.selections, (pair.left, pair.right), strict=False):
+            for column in SYSTEMS:
+                if selection.every(column) and isinstance(quantity.row.get(column), str):
+                    key = column, str(selection.where.get(column))
+                    run.setdefault(key, set()).add(quantity.row[column])
+    return [sorted(names) for names in run.values()]
 
 
-def _members(value: Any) -> list:
-    """What a value stands for: "@top-down" for the detectors of that paradigm, any other for itself."""
-    if not (isinstance(value, str) and value.startswith(_CLASS)):
-        return [value]
-    return [name for name, entry in DETECTORS.items() if entry.facts.paradigm == value.removeprefix(_CLASS)]
-
-
-def _absent(selection: Selection, present: set[str]) -> _MissingError:
-    """Why a selection is empty: a detector it names was not run, or else its table has no such row."""
-    for column in ("detector", "other"):
-        names = selection.where.get(column, [])
-        for name in [names] if isinstance(names, str) else names:
-            if not present & set(_values(name)):
-                if name.startswith(_CLASS):
-                    return _MissingError(f"no {name.removeprefix(_CLASS)} detector was run", "hicp report")
-                return _MissingError(f"{name} was not run", _command_to_run(name))
-    asked = ", ".join(f"{column} {value}" for column, value in selection.where.items())
-    return _MissingError(f"{selection.notebook} has no result for {asked}", "hicp report")
-
-
-def _command_to_run(name: str) -> str:
-    """What runs a detector, or a combination of two, in the report."""
-    base = name.removeprefix(COMBINED).partition("+")[0]
-    report = f"hicp report -p detectors mediapipe,{base}" + (f" -p body {base}" if base != name else "")
-    needs_model = base in DETECTORS and DETECTORS[base].needs_model
-    return f"{command_to_use(base)} && {report}" if needs_model else report
-
-
-def _quantity(selection: Selection, row: dict[str, Any]) -> Quantity:
-    value, low, high = (
-        float(row[column or selection.value]) * selection.scale
-        for column in (selection.value, selection.low, selection.high)
-    )
-    name = " ".join(_plain(row[column]) for column in selection.name)
-    low, high = sorted((low, high))
-    return Quantity(value, low, high, row, name)
-
-
-def _plain(label: Any) -> str:
-    """A row's label for reading: 160 for 160.0, "left wrist" for "left_wrist"."""
-    return f"{label:g}" if isinstance(label, float) else str(label).replace("_", " ")
-
-
-def _in_words(quantity: Quantity) -> str:
-    text = f"{quantity.name} {quantity.value:.3g}".strip()
-    if quantity.low < quantity.high:
-        text += f" [{quantity.low:.3g}, {quantity.high:.3g}]"
-    return text
-
-
-def is_rendered(results: Path, notebook: str) -> bool:
-    """Whether a notebook's run saw rendered people or simulated recordings.
-
-    Its stamp names the source and the recordings it was given; one of these may be simulated as well, and
-    says so in its folder.
-    """
-    path = results / notebook / "provenance.json"
-    if not path.is_file():
-        raise _MissingError(f"{notebook} has no results in this run", "hicp report")
-    parameters = read_json(path)["parameters"]
-    recordings = [value for name, value in parameters.items() if name.startswith("recording")]
-    made = [parameters["source"] == "rendered"] if "source" in parameters else []
-    if recordings:
-        given = [Path(folder) for folder in recordings if folder]
-        made.append(not given or any((folder / SIMULATION_FILE).is_file() for folder in given))
-    return any(made) or not made  # a notebook that takes neither makes all it looks at
+def _evidence(claim: Claim, pairs: list[Pair], decisive: list[Pair]) -> str:
+    """The numbers that decide, closest calls first, and whom a claim on every detector was tested on."""
+    sides = [side for pair in decisive for side in (pair.left, pair.right) if side.row]
+    texts = list(dict.fromkeys(str(side) for side in sides))
+    parts = [f"{'; '.join(texts[:SHOWN])} {claim.unit}".strip()]
+    if len(texts) > SHOWN:
+        parts.append(f"{len(texts) - SHOWN} numbers more")
+    if others := {name for names in _every(pairs) for name in names if name not in parts[0]}:
+        parts.append(f"also tested on {', '.join(sorted(others))}")
+    return "; ".join(parts)

@@ -3,22 +3,16 @@
 import pandas as pd
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.study.claims.verdicts import (
-    NOT_REPRODUCED,
-    NOT_TESTABLE,
-    ON_RENDERED_DATA,
-    REPRODUCED,
-    VERDICTS,
-)
+from hicp_lib.study.claims.verdicts import VERDICTS
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 
-# Okabe and Ito's palette; the hatch says the same without colour.
+# By `VERDICTS`: Okabe and Ito's palette; the hatch says the same without colour.
+_COLOURS = ("#009E73", "#56B4E9", "#D55E00", "#F0E442", "#CC79A7", "#D9D9D9")
+_HATCHES = ("", "//", "xx", "oo", "--", "..")
 _FILLS = {
-    REPRODUCED: {"color": "#009E73", "hatch": "", "edgecolor": "white"},
-    ON_RENDERED_DATA: {"color": "#56B4E9", "hatch": "//", "edgecolor": "white"},
-    NOT_REPRODUCED: {"color": "#D55E00", "hatch": "xx", "edgecolor": "white"},
-    NOT_TESTABLE: {"color": "#D9D9D9", "hatch": "..", "edgecolor": "white"},
+    verdict: {"color": colour, "hatch": hatch, "edgecolor": "white"}
+    for verdict, colour, hatch in zip(VERDICTS, _COLOURS, _HATCHES, strict=True)
 }
 
 
@@ -41,7 +35,7 @@ def verdicts(table: pd.DataFrame) -> Figure:
     axis.set(yticks=range(len(sections)), yticklabels=sections)
     axis.invert_yaxis()
     axis.set(xlabel="claims", ylabel="section of the paper", xticks=range(int(counts.sum(axis=1).max()) + 1))
-    figure.legend(loc="outside upper center", ncols=2)
+    figure.legend(loc="outside upper center", ncols=3)
     said = [f"{counts[verdict].sum()} {verdict}" for verdict in VERDICTS]
     caption = f"The paper's claims by section and verdict: {in_words(said)}."
     numbers = counts.reset_index().melt("section", var_name="verdict", value_name="claims")
