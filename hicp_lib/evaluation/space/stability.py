@@ -17,18 +17,21 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.keypoints import LEFT_HAND, NAMES, RIGHT_HAND
+from hicp_lib.core.keypoints import GROUPS, INDEX, LEFT_HAND, NAMES, RIGHT_HAND
+from hicp_lib.evaluation.cases import groups_of
 from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
 
 CASE = ["view", "detector", "method"]
 POSITION = ["x_m", "y_m", "z_m"]
+PIXEL = ["u_px", "v_px"]
 THRESHOLDS_M = (0.025, 0.05, 0.1)
 MIN_SCORE = 0.1
 
 _Truth = Mapping[str, pd.DataFrame]  # view -> true positions
+Parts = Mapping[str, Sequence[str]]
 
 # What the paper reports. All 21 keypoints of a hand count, each against its own median position.
-PARTS: dict[str, tuple[str, ...]] = {
+PARTS: Parts = {
     f"{side} {part}": keypoints
     for part in ("shoulder", "elbow", "wrist", "hand")
     for side, hand in (("left", LEFT_HAND), ("right", RIGHT_HAND))
@@ -36,8 +39,10 @@ PARTS: dict[str, tuple[str, ...]] = {
 }
 
 
-def counted(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
-    """The rows that count: the best person of an image, score above `min_score`, lifted.
+def counted(
+    points: pd.DataFrame, min_score: float = MIN_SCORE, columns: Sequence[str] = POSITION
+) -> pd.DataFrame:
+    """The rows that count: the best person of an image, score above `min_score`, with a place in `columns`.
 
     Examples
     --------
@@ -45,8 +50,8 @@ def counted(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
     >>> counted(rows).index.tolist()
     [0]
     """
-    lifted = points[POSITION].notna().all(axis=1)
-    return points[(points["person"] == 0) & (points["score"] > min_score) & lifted]
+    placed = points[list(columns)].notna().all(axis=1)
+    return points[(points["person"] == 0) & (points["score"] > min_score) & placed]
 
 
 def median_positions(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
@@ -74,7 +79,7 @@ def within_distance(
     """Fraction of images in which a keypoint was found within a distance of where it should be.
 
     An image in which it was not found counts as not within. For a hand, each of its keypoints counts alike.
-    A detector that finds a part in no image and on neither side does not give it, and has no row.
+    A detector that does not give a part has no row; one that gives it has, though it may never find it.
 
     Parameters
     ----------
@@ -101,7 +106,7 @@ def within_distance(
     rows: list[tuple] = []
     reference = "median" if truth is None else "truth"
     weights_of = {n: draw_counts(n, n_resamples, seed) for n in set(n_frames.values())}
-    for case, part, found_m, true_m in _cases(points, n_frames, truth, min_score):
+    for case, part, found_m, true_m in cases(points, n_frames, truth, min_score):
         weights = weights_of[len(found_m)]
         fractions = np.zeros((len(weights), len(thresholds_m)))
         for k in range(found_m.shape[1]):
@@ -148,7 +153,7 @@ def spread_and_bias(
     """
     rows = []
     weights_of = {n: draw_counts(n, n_resamples, seed) for n in set(n_frames.values())}
-    for case, part, found_m, true_m in _cases(points, n_frames, truth, min_score):
+    for case, part, found_m, true_m in cases(points, n_frames, truth, min_score):
         n_images = np.isfinite(found_m[..., 0]).sum(axis=0).mean()
         row = dict(zip([*CASE, "part", "n_images"], (*case, part, n_images), strict=True))
         for name, draws in _distances_drawn(found_m, true_m, weights_of[len(found_m)]).items():
@@ -171,37 +176,78 @@ def position_array(
     n_frames : int
         Number of images.
     columns : sequence of str, optional
-        The three coordinates, metres.
+        The coordinates, d of them.
 
     Returns
     -------
-    array, shape (n_frames, len(keypoints), 3)
-        Metres; NaN where not found.
+    array, shape (n_frames, len(keypoints), d)
+        NaN where not found.
     """
-    result = np.full((n_frames, len(keypoints), 3), np.nan)
+    result = np.full((n_frames, len(keypoints), len(columns)), np.nan)
     place = {name: k for k, name in enumerate(keypoints)}
     rows = rows[rows["keypoint"].isin(place)]
     result[rows["frame"], rows["keypoint"].map(place).astype(int)] = rows[list(columns)]
     return result
 
 
-def _cases(
-    points: pd.DataFrame, n_frames: Mapping[str, int], truth: _Truth | None, min_score: float
+def cases(
+    points: pd.DataFrame,
+    n_frames: Mapping[str, int],
+    truth: _Truth | None = None,
+    min_score: float = MIN_SCORE,
+    parts: Parts = PARTS,
+    columns: Sequence[str] = POSITION,
 ) -> Iterator[tuple[tuple[str, str, str], str, np.ndarray, np.ndarray | None]]:
-    """Case, part, positions found and true positions (None without truth) of every part a detector gives."""
-    given = {
-        detector: {name.split()[1] for name in PARTS if set(PARTS[name]) & set(rows["keypoint"].unique())}
-        for detector, rows in points.groupby("detector", sort=False)
+    """Every part that a detector gives, in every view.
+
+    A detector of the registry gives the groups of keypoints named there; of any detector counts what it found
+    of a part, or of its counterpart on the other side, in some view.
+
+    Parameters
+    ----------
+    points : DataFrame
+        What was lifted, as the module says.
+    n_frames : mapping of str to int
+        Number of images, by view.
+    truth : mapping of str to DataFrame, optional
+        By view, a table with `frame, keypoint` and `columns`.
+    min_score : float, optional
+        Keypoints above it count.
+    parts : mapping of str to tuple of str, optional
+        Keypoints by part.
+    columns : sequence of str, optional
+        The coordinates, d of them.
+
+    Yields
+    ------
+    tuple
+        View, detector and method; part; places found and true places, arrays (n_frames, n_keypoints, d), the
+        latter None without `truth`.
+    """
+    given = {detector: set(rows["keypoint"].unique()) for detector, rows in points.groupby("detector")}
+    found = dict(list(counted(points, min_score, columns).groupby(CASE, sort=False)))
+    runs = list(points[["detector", "method"]].drop_duplicates().itertuples(index=False, name=None))
+    names = list(dict.fromkeys(itertools.chain(*parts.values())))
+    places = {part: [names.index(name) for name in keypoints] for part, keypoints in parts.items()}
+    for view, n in n_frames.items():
+        true = None if truth is None else position_array(truth[view], names, n, columns)
+        for detector, method in runs:
+            # A detector that finds nobody in a view has no rows there, and is counted all the same.
+            rows = found.get((view, detector, method), points[:0])
+            places_found = position_array(rows, names, n, columns)
+            for part, of_part in places.items():
+                if _gives(detector, given[detector], parts[part]):
+                    true_places = None if true is None else true[:, of_part]
+                    yield (view, detector, method), part, places_found[:, of_part], true_places
+
+
+def _gives(detector: str, given: set[str], keypoints: Sequence[str]) -> bool:
+    """Whether a detector gives one of some keypoints: by the registry, or by what it found on either side."""
+    known = np.concatenate([[], *(GROUPS[group] for group in groups_of({}, detector))])
+    either_side = {
+        name.replace(*sides) for name in keypoints for sides in (("left", "right"), ("right", "left"))
     }
-    found = dict(list(counted(points, min_score).groupby(CASE, sort=False)))
-    runs = points[["detector", "method"]].drop_duplicates().itertuples(index=False, name=None)
-    for (view, n), (detector, method) in itertools.product(n_frames.items(), runs):
-        # A detector that finds nobody in a view has no rows there, and is counted all the same.
-        rows = found.get((view, detector, method), points[:0])
-        for part, keypoints in PARTS.items():
-            if part.split()[1] in given[detector]:
-                true = None if truth is None else position_array(truth[view], keypoints, n)
-                yield (view, detector, method), part, position_array(rows, keypoints, n), true
+    return bool(given & either_side) or any(INDEX[name] in known for name in keypoints)
 
 
 def _median_position(found_m: np.ndarray, weights: np.ndarray) -> np.ndarray:
