@@ -7,9 +7,9 @@ is known, the same measure on it says how often a perfect answer would be called
   adults' trunk is long: .288 of the stature (Winter 2009) of a woman of 1.52 m, whom one in twenty
   is shorter than.
 - A finger is *broken* when its middle and its end joint bend to opposite sides, each by more than 20 degrees
-  as the image shows it. They bend in one plane and to one side only (Chen Chen et al. 2013), so from wherever it
-  is seen, a finger turns one way all along. Hence the image alone tells.
-  Angles in space would not: noise in depth breaks the fingers of true pixels.
+  as the image shows it. They bend in one plane and to one side only (Chen Chen et al. 2013), so from wherever
+  it is seen, a finger turns one way all along. Hence the image alone tells. Angles in space would not: noise
+  in depth breaks the fingers of true pixels.
 - The *shoulder line* of somebody who sits upright is level: its angle to the horizontal is its tilt.
 """
 

@@ -16,16 +16,10 @@ WITHIN_M = 0.05
 FOUND, NEAR_MEDIAN, NEAR_TRUTH = "found", "within 5 cm of the median", "within 5 cm of the truth"
 ROW = [*CASE, "part", "measure"]
 
-_ARMS = {
-    f"{side} arm": tuple(f"{side}_{joint}" for joint in ("shoulder", "elbow", "wrist"))
-    for side in ("left", "right")
-}
-ALL_PARTS: Parts = {
-    **PARTS,
-    **_ARMS,
-    "any arm joint": (*_ARMS["left arm"], *_ARMS["right arm"]),
-    "any hand": (*PARTS["left hand"], *PARTS["right hand"]),
-}
+_ARMS = {f"{side} arm": (f"{side}_elbow", f"{side}_wrist") for side in ("left", "right")}
+_ANY = {"any arm joint": sum(_ARMS.values(), ()), "any hand": (*PARTS["left hand"], *PARTS["right hand"])}
+ALL_PARTS: Parts = {**PARTS, **_ARMS, **_ANY}
+"""An arm is an elbow or a wrist, as in `hicp_lib.datasets.visibility`."""
 
 
 def sightings(

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.keypoints import GROUPS, INDEX, LEFT_HAND, NAMES, RIGHT_HAND
+from hicp_lib.core.keypoints import GROUPS, LEFT_HAND, NAMES, RIGHT_HAND
 from hicp_lib.evaluation.cases import groups_of
 from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
 
@@ -200,8 +200,8 @@ def cases(
 ) -> Iterator[tuple[tuple[str, str, str], str, np.ndarray, np.ndarray | None]]:
     """Every part that a detector gives, in every view.
 
-    A detector of the registry gives the groups of keypoints named there; of any detector counts what it found
-    of a part, or of its counterpart on the other side, in some view.
+    A detector of the registry gives the groups of keypoints named there, any other those it finds one of in
+    some view. A group that is given and not found counts.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def cases(
         View, detector and method; part; places found and true places, arrays (n_frames, n_keypoints, d), the
         latter None without `truth`.
     """
-    given = {detector: set(rows["keypoint"].unique()) for detector, rows in points.groupby("detector")}
+    given = {name: _gives(name, set(rows["keypoint"].unique())) for name, rows in points.groupby("detector")}
     found = dict(list(counted(points, min_score, columns).groupby(CASE, sort=False)))
     runs = list(points[["detector", "method"]].drop_duplicates().itertuples(index=False, name=None))
     names = list(dict.fromkeys(itertools.chain(*parts.values())))
@@ -236,18 +236,16 @@ def cases(
             rows = found.get((view, detector, method), points[:0])
             places_found = position_array(rows, names, n, columns)
             for part, of_part in places.items():
-                if _gives(detector, given[detector], parts[part]):
+                if given[detector] & set(parts[part]):
                     true_places = None if true is None else true[:, of_part]
                     yield (view, detector, method), part, places_found[:, of_part], true_places
 
 
-def _gives(detector: str, given: set[str], keypoints: Sequence[str]) -> bool:
-    """Whether a detector gives one of some keypoints: by the registry, or by what it found on either side."""
-    known = np.concatenate([[], *(GROUPS[group] for group in groups_of({}, detector))])
-    either_side = {
-        name.replace(*sides) for name in keypoints for sides in (("left", "right"), ("right", "left"))
-    }
-    return bool(given & either_side) or any(INDEX[name] in known for name in keypoints)
+def _gives(detector: str, found: set[str]) -> set[str]:
+    """The keypoints of the groups that a detector gives, or found one of if the registry does not know it."""
+    names = {group: {NAMES[i] for i in keypoints} for group, keypoints in GROUPS.items()}
+    groups = groups_of({}, detector) or [group for group in names if names[group] & found]
+    return set().union(*(names[group] for group in groups))
 
 
 def _median_position(found_m: np.ndarray, weights: np.ndarray) -> np.ndarray:

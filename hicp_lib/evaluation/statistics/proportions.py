@@ -55,7 +55,7 @@ def paired_differences(
     Parameters
     ----------
     rows : DataFrame
-        Has a column `source_image`, and at most one row per source image, group and value of `over`.
+        Has a column `source_image`; rows of one source image, group and value of `over` are averaged.
     by : sequence of str
         Columns that make the groups.
     over : str
@@ -79,7 +79,7 @@ def paired_differences(
     """
     table = []
     for group, part in rows.groupby(list(by), sort=False, observed=True):
-        values = part.pivot(index="source_image", columns=over, values=of)
+        values = part.pivot_table(of, "source_image", over)
         for a, b in combinations(dict.fromkeys(part[over]), 2):
             less = (values[a] - values[b]).dropna()
             value, low, high = mean_with_interval(less, less.index, n_resamples, seed)

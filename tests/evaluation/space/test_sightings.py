@@ -37,7 +37,7 @@ def test_near_is_within_5_cm_of_the_median_or_of_the_truth():
     rows = sightings(points, {"upper": 6}, {"upper": make_truth(6)})
     assert of(rows, "left wrist", NEAR_MEDIAN) == [1, 1, 1, 1, 0, 0]
     assert of(rows, "left wrist", NEAR_TRUTH) == [0] * 6
-    assert of(rows, "left arm", NEAR_MEDIAN) == pytest.approx([1 / 3] * 4 + [0, 0])
+    assert of(rows, "left arm", NEAR_MEDIAN) == pytest.approx([1 / 2] * 4 + [0, 0])
 
 
 def test_a_detector_that_finds_nobody_in_a_view_is_compared_all_the_same():
