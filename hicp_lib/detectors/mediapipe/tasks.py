@@ -197,8 +197,8 @@ def _process(
     )
     if model:
         process.start()
-    tracking = {"tracking_hz": tracking_hz} if tracking_hz else {}
-    return process, {"bundle_sha256": sha256_bytes(bundle), "mediapipe": program_version()} | tracking
+    known = {"bundle_sha256": sha256_bytes(bundle), "mediapipe": program_version()}
+    return process, known | ({"tracking_hz": tracking_hz} if tracking_hz else {})
 
 
 def _positions_px(fractions: np.ndarray, image: np.ndarray) -> np.ndarray:

@@ -25,9 +25,8 @@ from hicp_lib.evaluation.statistics.proportions import mean_with_interval
 SHORTEST_TRUNK_M = 0.288 * 1.52
 IN_ABDOMEN_M = SHORTEST_TRUNK_M - 0.05
 BACKWARDS_RAD = float(np.radians(20))
-_FINGERS = np.arange(5, 21).reshape(
-    4, 4
-)  # of a hand's keypoints, from knuckle to tip; the thumb bends otherwise
+# Of a hand's keypoints, from knuckle to tip; the thumb bends otherwise.
+_FINGERS = np.arange(5, 21).reshape(4, 4)
 
 
 def implausible(
@@ -42,8 +41,16 @@ def implausible(
 
     Parameters
     ----------
-    points, n_frames, truth, min_score, n_resamples, seed
-        As of `hicp_lib.evaluation.space.stability.within_distance`.
+    points : DataFrame
+        What was lifted, as `hicp_lib.evaluation.space.stability` says, with its pixels.
+    n_frames : mapping of str to int
+        Number of images, by view.
+    truth : mapping of str to DataFrame, optional
+        By view, a table with `frame, keypoint` and the same coordinates.
+    min_score : float, optional
+        Keypoints above it count.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
 
     Returns
     -------
@@ -76,11 +83,9 @@ def backwards(hands_px: np.ndarray) -> np.ndarray:
     array, shape (n,)
         1 or 0; NaN where no finger is found whole.
     """
-    segments = np.diff(hands_px[:, _FINGERS], axis=2)  # (n, finger, 3, 2)
-    (first_u, first_v), (then_u, then_v) = (
-        np.moveaxis(part, -1, 0) for part in (segments[:, :, :-1], segments[:, :, 1:])
-    )
-    bends_rad = np.arctan2(first_u * then_v - first_v * then_u, first_u * then_u + first_v * then_v)
+    fingers = hands_px[:, _FINGERS] @ [1, 1j]  # (n, finger, 4), as complex numbers
+    bones = np.diff(fingers, axis=2)
+    bends_rad = np.angle(bones[:, :, 1:] * bones[:, :, :-1].conj())
     broken = (bends_rad.min(axis=2) < -BACKWARDS_RAD) & (bends_rad.max(axis=2) > BACKWARDS_RAD)
     whole = np.isfinite(bends_rad).all(axis=2).any(axis=1)
     return np.where(whole, broken.any(axis=1), np.nan)
@@ -99,12 +104,9 @@ def _tilt_rad(shoulders_m: np.ndarray) -> np.ndarray:
 
 
 _Measure = tuple[Callable[[np.ndarray], np.ndarray], Parts, Sequence[str]]
+_TRUNKS = {f"{side} hip": (f"{side}_shoulder", f"{side}_hip") for side in ("left", "right")}
 _MEASURES: dict[str, _Measure] = {
-    "hips in the abdomen": (
-        _short,
-        {f"{side} hip": (f"{side}_shoulder", f"{side}_hip") for side in ("left", "right")},
-        POSITION,
-    ),
+    "hips in the abdomen": (_short, _TRUNKS, POSITION),
     "broken fingers": (backwards, {part: PARTS[part] for part in ("left hand", "right hand")}, PIXEL),
     "shoulder line tilt [rad]": (_tilt_rad, {"shoulders": ("left_shoulder", "right_shoulder")}, POSITION),
 }

@@ -32,8 +32,14 @@ def sightings(
 
     Parameters
     ----------
-    points, n_frames, truth, min_score
-        As of `hicp_lib.evaluation.space.stability.within_distance`.
+    points : DataFrame
+        What was lifted, as `hicp_lib.evaluation.space.stability` says.
+    n_frames : mapping of str to int
+        Number of images, by view.
+    truth : mapping of str to DataFrame, optional
+        By view, a table with `frame, keypoint` and `x_m, y_m, z_m`.
+    min_score : float, optional
+        Keypoints above it count.
 
     Returns
     -------

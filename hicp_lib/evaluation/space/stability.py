@@ -44,6 +44,19 @@ def counted(
 ) -> pd.DataFrame:
     """The rows that count: the best person of an image, score above `min_score`, with a place in `columns`.
 
+    Parameters
+    ----------
+    points : DataFrame
+        What was lifted, as the module says.
+    min_score : float, optional
+        Keypoints above it count.
+    columns : sequence of str, optional
+        The coordinates that must be there.
+
+    Returns
+    -------
+    DataFrame
+
     Examples
     --------
     >>> rows = pd.DataFrame({"person": [0, 1, 0], "score": [0.9, 0.9, 0.1]}).assign(x_m=0.0, y_m=0.0, z_m=1.0)
@@ -105,9 +118,8 @@ def within_distance(
     """
     rows: list[tuple] = []
     reference = "median" if truth is None else "truth"
-    weights_of = {n: draw_counts(n, n_resamples, seed) for n in set(n_frames.values())}
     for case, part, found_m, true_m in cases(points, n_frames, truth, min_score):
-        weights = weights_of[len(found_m)]
+        weights = draw_counts(len(found_m), n_resamples, seed)
         fractions = np.zeros((len(weights), len(thresholds_m)))
         for k in range(found_m.shape[1]):
             distances = _distances(found_m[:, k], None if true_m is None else true_m[:, k], weights)
@@ -152,11 +164,11 @@ def spread_and_bias(
         the truth. For a hand, the mean of each over its keypoints; NaN where nothing was found.
     """
     rows = []
-    weights_of = {n: draw_counts(n, n_resamples, seed) for n in set(n_frames.values())}
     for case, part, found_m, true_m in cases(points, n_frames, truth, min_score):
         n_images = np.isfinite(found_m[..., 0]).sum(axis=0).mean()
         row = dict(zip([*CASE, "part", "n_images"], (*case, part, n_images), strict=True))
-        for name, draws in _distances_drawn(found_m, true_m, weights_of[len(found_m)]).items():
+        weights = draw_counts(len(found_m), n_resamples, seed)
+        for name, draws in _distances_drawn(found_m, true_m, weights).items():
             row |= zip((name, f"{name}_low", f"{name}_high"), with_interval(draws), strict=True)
         rows.append(row)
     return pd.DataFrame(rows)
