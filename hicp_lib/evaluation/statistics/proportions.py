@@ -84,7 +84,7 @@ def paired_differences(
             less = (values[a] - values[b]).dropna()
             value, low, high = mean_with_interval(less, less.index, n_resamples, seed)
             table.append((*group, a, b, f"{a} less {b}", value, low, high, len(less)))
-            table.append((*group, b, a, f"{b} less {a}", -value, -high, -low, len(less)))
+            table.append((*group, b, a, f"{b} less {a}", 0 - value, 0 - high, 0 - low, len(less)))
     return pd.DataFrame(table, columns=[*by, over, "other", "pair", "value", "low", "high", "n_images"])
 
 
