@@ -122,56 +122,14 @@ def within_distance(
         weights = draw_counts(len(found_m), n_resamples, seed)
         fractions = np.zeros((len(weights), len(thresholds_m)))
         for k in range(found_m.shape[1]):
-            distances = _distances(found_m[:, k], None if true_m is None else true_m[:, k], weights)
+            off_m = distances(found_m[:, k], None if true_m is None else true_m[:, k], weights)
             for j, threshold_m in enumerate(thresholds_m):
-                fractions[:, j] += np.einsum("dn,dn->d", weights, distances <= threshold_m) / found_m.size * 3
+                fractions[:, j] += np.einsum("dn,dn->d", weights, off_m <= threshold_m) / found_m.size * 3
         found = np.isfinite(found_m[..., 0]).mean()
         bounds = zip(thresholds_m, *with_interval(fractions), strict=True)
         rows += [(*case, part, reference, *numbers, found) for numbers in bounds]
     columns = [*CASE, "part", "reference", "threshold_m", "value", "low", "high", "found"]
     return pd.DataFrame(rows, columns=columns)
-
-
-def spread_and_bias(
-    points: pd.DataFrame,
-    n_frames: Mapping[str, int],
-    truth: _Truth | None = None,
-    min_score: float = MIN_SCORE,
-    n_resamples: int = 1000,
-    seed: int = 0,
-) -> pd.DataFrame:
-    """Stability and accuracy as distances, over the images in which a keypoint was found.
-
-    Parameters
-    ----------
-    points : DataFrame
-        What was lifted, as the module says.
-    n_frames : mapping of str to int
-        Number of images, by view.
-    truth : mapping of str to DataFrame, optional
-        By view, a table with `frame, keypoint, x_m, y_m, z_m`.
-    min_score : float, optional
-        Keypoints above it count.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
-
-    Returns
-    -------
-    DataFrame
-        Columns `view, detector, method, part, n_images` (in which it was found), then in metres, each with
-        `_low` and `_high` beside it: `spread_m`, the median distance to the median position; with `truth`
-        also `bias_m`, how far the median position is from the true one, and `error_m`, the median distance to
-        the truth. For a hand, the mean of each over its keypoints; NaN where nothing was found.
-    """
-    rows = []
-    for case, part, found_m, true_m in cases(points, n_frames, truth, min_score):
-        n_images = np.isfinite(found_m[..., 0]).sum(axis=0).mean()
-        row = dict(zip([*CASE, "part", "n_images"], (*case, part, n_images), strict=True))
-        weights = draw_counts(len(found_m), n_resamples, seed)
-        for name, draws in _distances_drawn(found_m, true_m, weights).items():
-            row |= zip((name, f"{name}_low", f"{name}_high"), with_interval(draws), strict=True)
-        rows.append(row)
-    return pd.DataFrame(rows)
 
 
 def position_array(
@@ -260,31 +218,29 @@ def _gives(detector: str, found: set[str]) -> set[str]:
     return set().union(*(names[group] for group in groups))
 
 
-def _median_position(found_m: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def median_position(found_m: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Coordinate-wise median of one keypoint's positions (n, 3) in every draw, shape (draws, 3)."""
     return np.stack([weighted_median(found_m[:, i], weights) for i in range(3)], axis=1)
 
 
-def _distances(found_m: np.ndarray, true_m: np.ndarray | None, weights: np.ndarray) -> np.ndarray:
-    """Distances of one keypoint's positions (n, 3): to the truth (1, n), or each draw's median (draws, n)."""
+def distances(found_m: np.ndarray, true_m: np.ndarray | None, weights: np.ndarray) -> np.ndarray:
+    """How far one keypoint is from where it should be, image by image.
+
+    Parameters
+    ----------
+    found_m : array, shape (n, 3)
+        Positions; NaN where not found.
+    true_m : array or None, shape (n, 3)
+        Where it should be. None: at the median position of each draw.
+    weights : array of int, shape (draws, n)
+        How often each image counts.
+
+    Returns
+    -------
+    array, shape (1, n) or (draws, n)
+        The first with `true_m`.
+    """
     if true_m is not None:
         return np.linalg.norm(found_m - true_m, axis=1)[None]
-    median_m = _median_position(found_m, weights)
+    median_m = median_position(found_m, weights)
     return np.sqrt(sum((found_m[:, i] - median_m[:, i, None]) ** 2 for i in range(3)))
-
-
-def _distances_drawn(
-    found_m: np.ndarray, true_m: np.ndarray | None, weights: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Spread, bias and error in every draw, shape (draws,), mean over the keypoints found."""
-    draws: dict[str, list[np.ndarray]] = {"spread_m": [], "bias_m": [], "error_m": []}
-    for k in np.flatnonzero(np.isfinite(found_m[..., 0]).any(axis=0)):
-        found = found_m[:, k]
-        draws["spread_m"].append(weighted_median(_distances(found, None, weights), weights))
-        if true_m is not None:
-            true = true_m[:, k]
-            draws["bias_m"].append(np.linalg.norm(_median_position(found - true, weights), axis=1))
-            draws["error_m"].append(weighted_median(_distances(found, true, weights), weights))
-    names = ("spread_m",) if true_m is None else tuple(draws)
-    nothing = [np.full(len(weights), np.nan)]
-    return {name: np.mean(draws[name] or nothing, axis=0) for name in names}

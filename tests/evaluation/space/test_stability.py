@@ -4,11 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from hicp_lib.evaluation.space.spread import spread_and_bias
 from hicp_lib.evaluation.space.stability import (
     PARTS,
     counted,
     median_positions,
-    spread_and_bias,
     within_distance,
 )
 from tests.evaluation.still_person import KEYPOINTS, TRUE_M, make_points, make_truth
