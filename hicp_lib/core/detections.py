@@ -86,10 +86,8 @@ class Detector(Protocol):
 
     A detector with a true attribute `takes_boxes` is given the people's boxes, `detect(image, boxes_px)`. One
     that is made of others has them in a dictionary `parts` and asks them there, so that their answers can be
-    cached (see `hicp_lib.detectors.runtime.cached_parts`). One with a true attribute `remembers` answers by
-    the images before, too, and is not run over sets of images. One whose first call would take longer than
-    the others, since something is started for it, starts that in a method `start()` too, if it is called
-    before.
+    cached (see `hicp_lib.detectors.runtime.cached_parts`). One whose first call would take longer than the
+    others, since something is started for it, starts that in a method `start()` too, if it is called before.
 
     Attributes
     ----------

@@ -16,7 +16,7 @@ What MediaPipe gives and what is made of it:
   tests hold this against rendered hands, of which about four in five get the true label.
 - Tracking: `tracking_hz` says that images are those of a video. What was found in an image is then looked for
   where it was, and everywhere only when its score falls below the threshold; points are smoothed over time.
-  Such a detector `remembers`: its answer depends on the images before.
+  The answer then depends on the images before.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -61,7 +61,6 @@ class MediaPipePose:
         tracking_hz: float = 0,
     ) -> None:
         self._process, identity = _process(self.name, "pose", num_poses, min_score, model, tracking_hz)
-        self.remembers = tracking_hz > 0
         self.settings = {"num_poses": num_poses, "min_score": min_score, **identity}
         self.start = self._process.start
 
@@ -103,7 +102,6 @@ class MediaPipeHands:
         tracking_hz: float = 0,
     ) -> None:
         self._process, identity = _process(self.name, "hand", num_hands, min_score, model, tracking_hz)
-        self.remembers = tracking_hz > 0
         self.settings = {"num_hands": num_hands, "min_score": min_score, **identity}
         self.start = self._process.start
 

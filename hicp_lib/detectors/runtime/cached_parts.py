@@ -56,7 +56,7 @@ class Runner:
     """
 
     def __init__(self, detector: Detector, workers: int) -> None:
-        if _remembers(detector):
+        if _tracks(detector):
             raise InputError(f"{detector.name}: tracking_hz is for a video, these images stand by themselves")
         self.detector, self._shown = detector, _Shown(workers)
         self._asked = _with_cached_parts(detector, self._shown)
@@ -110,9 +110,9 @@ class CachedPart:
         return result_path(self._folder / "squares", pixels_sha256(image), boxes_px)
 
 
-def _remembers(detector: Detector) -> bool:
-    parts = getattr(detector, "parts", {}).values()
-    return getattr(detector, "remembers", False) or any(map(_remembers, parts))
+def _tracks(detector: Detector) -> bool:
+    """Whether its settings, or those of a part, say that images are those of a video."""
+    return "tracking_hz" in detector.settings or any(map(_tracks, getattr(detector, "parts", {}).values()))
 
 
 def start(detector: Detector) -> None:
