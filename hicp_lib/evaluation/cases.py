@@ -11,7 +11,7 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import GROUPS, N_KEYPOINTS
-from hicp_lib.detectors.registry import DETECTORS
+from hicp_lib.detectors.registry import COMBINED, DETECTORS
 from hicp_lib.formats.annotations import Annotations, source_images
 
 Truth = Mapping[str, Annotations]
@@ -21,7 +21,7 @@ Found = Mapping[tuple[str, str], Mapping[int, Detections]]
 def groups_of(found: Found, detector: str) -> tuple[str, ...]:
     """The keypoint groups a detector is scored on: its own, or those an imported one gives a keypoint of.
 
-    One run in several ways is labelled "NAME, how", and keeps its groups.
+    A combination gives both. One run in several ways is labelled "NAME, how", and keeps its groups.
 
     Examples
     --------
@@ -33,6 +33,8 @@ def groups_of(found: Found, detector: str) -> tuple[str, ...]:
     known = DETECTORS.get(detector.partition(", ")[0])
     if known:
         return known.groups
+    if detector.startswith(COMBINED):
+        return tuple(GROUPS)
     given = np.zeros(N_KEYPOINTS, dtype=bool)
     for (_, name), images in found.items():
         if name == detector:

@@ -114,6 +114,21 @@ def test_classes_are_evaluated_apart_and_small_ones_not_at_all():
     assert np.isnan(table.loc["only legs", ["value", "low", "high"]].astype(float)).all()
 
 
+def test_detectors_are_ordered_on_the_same_pictures_of_a_class():
+    n = MIN_PEOPLE
+    people = make_annotations(np.stack([POINTS] * n), range(n), visibility=np.concatenate([flags(HEAD)] * n))
+    right = {i: make_detections(POINTS[None]) for i in range(n)}
+    half = {i: right[i] for i in range(n // 2)}
+    found = {("basic", "mediapipe-pose"): right, ("basic", "movenet-thunder"): half}
+    table = compare_classes({"basic": people}, found, n_resamples=200)
+    assert set(table[table["other"] == ""]["detector"]) == {"mediapipe-pose", "movenet-thunder"}
+    less = table[table["metric"] == "AR50"].set_index("pair")
+    ahead = less.loc["mediapipe-pose less movenet-thunder"]
+    assert ahead["class"] == "only head" and ahead["value"] == pytest.approx(0.5) and ahead["n_people"] == n
+    assert 0 < ahead["low"] < 0.5 < ahead["high"] < 1
+    assert less.loc["movenet-thunder less mediapipe-pose", "value"] == pytest.approx(-0.5)
+
+
 def test_twenty_people_are_judged_and_nineteen_are_not():
     assert MIN_PEOPLE == 20
     people = pd.DataFrame({"subset": "basic", "class": ["no head"] * 20 + ["only legs"] * 19})

@@ -19,6 +19,7 @@ def found_by(detector: str, with_hands: bool = True):
 def test_known_detectors_have_their_groups_and_others_those_they_give():
     found = found_by("mediapipe-pose") | found_by("mine") | found_by("bare", with_hands=False)
     assert groups_of(found, "mediapipe-pose") == ("body",)
+    assert groups_of({}, "combined:mediapipe-pose+mediapipe-hands") == ("body", "hand")
     assert groups_of(found, "mine") == ("body", "hand") and groups_of(found, "bare") == ("body",)
     assert list(all_cases(found)) == [
         ("basic", "mediapipe-pose", "body"), ("basic", "mine", "body"), ("basic", "mine", "hand"),

@@ -7,6 +7,7 @@ bytes. The first one's head tells the task's options and its body is the bundle;
 a pipe a call would take a tenth longer. Answers are arrays of float64 (`shape`) or an `error` in one line.
 """
 
+import itertools
 import json
 import mmap
 import os
@@ -95,13 +96,17 @@ def _serve(questions: IO[bytes], answers: IO[bytes], folder: str, shared: int) -
         send(answers, head, body)
 
 
-def detection(bundle: bytes, task: str, **options: Any) -> Callable[[np.ndarray], np.ndarray]:
+def detection(
+    bundle: bytes, task: str, tracking_hz: float = 0.0, **options: Any
+) -> Callable[[np.ndarray], np.ndarray]:
     """A function from an image to what `_poses` or `_hands` say.
 
     Parameters
     ----------
     bundle : bytes
     task : {"pose", "hand"}
+    tracking_hz : float, optional
+        Above 0, images are those of a video of this rate: what was found in one is looked for in the next.
     **options : object
         As of `landmarker`.
 
@@ -109,14 +114,16 @@ def detection(bundle: bytes, task: str, **options: Any) -> Callable[[np.ndarray]
     -------
     callable
     """
-    task_is_ready = landmarker(bundle, task, **options)
+    ready = landmarker(bundle, task, follows=tracking_hz > 0, **options)
     pixels = import_module(f"{_VISION}.core.image")
     rows = {"pose": _poses, "hand": _hands}[task]
-    return lambda image: rows(task_is_ready.detect(pixels.Image(pixels.ImageFormat.SRGB, image)))
+    times_ms = (round(1e3 * k / tracking_hz) for k in itertools.count())
+    look = (lambda image: ready.detect_for_video(image, next(times_ms))) if tracking_hz else ready.detect
+    return lambda image: rows(look(pixels.Image(pixels.ImageFormat.SRGB, image)))
 
 
-def landmarker(bundle: bytes, task: str, n: int, min_score: float) -> Any:
-    """MediaPipe's task for still images, ready.
+def landmarker(bundle: bytes, task: str, n: int, min_score: float, follows: bool = False) -> Any:
+    """MediaPipe's task, ready.
 
     Parameters
     ----------
@@ -125,7 +132,9 @@ def landmarker(bundle: bytes, task: str, n: int, min_score: float) -> Any:
     n : int
         Most people, or hands.
     min_score : float
-        Threshold of the detector and of the presence check.
+        Threshold of the detector, of the presence check and of the tracking.
+    follows : bool, optional
+        Whether images are those of a video. If not, each stands by itself.
     """
     base_options = import_module("mediapipe.tasks.python.core.base_options")
     module = import_module(f"{_VISION}.{task}_landmarker")
@@ -135,6 +144,9 @@ def landmarker(bundle: bytes, task: str, n: int, min_score: float) -> Any:
         **{f"num_{task}s": n},
         **{f"min_{task}_{step}_confidence": min_score for step in ("detection", "presence")},
     )
+    if follows:
+        options.running_mode = type(options.running_mode).VIDEO
+        options.min_tracking_confidence = min_score
     return getattr(module, f"{kind}Landmarker").create_from_options(options)
 
 

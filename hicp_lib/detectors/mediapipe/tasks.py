@@ -1,4 +1,4 @@
-"""MediaPipe Pose and Hands (Tasks API, still images) as detectors.
+"""MediaPipe Pose and Hands (Tasks API) as detectors.
 
 What MediaPipe gives and what is made of it:
 
@@ -14,6 +14,9 @@ What MediaPipe gives and what is made of it:
 - Sides: the Tasks API labels hands for images that are not mirrored: "Left" is the person's left
   hand. (The older solutions API means mirrored images, and has it the other way round.) The
   tests hold this against rendered hands, of which about four in five get the true label.
+- Tracking: `tracking_hz` says that images are those of a video. What was found in an image is then looked for
+  where it was, and everywhere only when its score falls below the threshold; points are smoothed over time.
+  The answer then depends on the images before.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -44,12 +47,20 @@ class MediaPipePose:
         Threshold of MediaPipe's person detector and of its presence check.
     model : str or Path, optional
         An official `.task` bundle to use in place of the fetched weights.
+    tracking_hz : float, optional
+        Rate of a video whose images come one after the other; 0 for images that stand by themselves.
     """
 
     name = "mediapipe-pose"
 
-    def __init__(self, num_poses: int = 1, min_score: float = 0.5, model: str | Path | None = None) -> None:
-        self._process, identity = _process(self.name, "pose", num_poses, min_score, model)
+    def __init__(
+        self,
+        num_poses: int = 1,
+        min_score: float = 0.5,
+        model: str | Path | None = None,
+        tracking_hz: float = 0,
+    ) -> None:
+        self._process, identity = _process(self.name, "pose", num_poses, min_score, model, tracking_hz)
         self.settings = {"num_poses": num_poses, "min_score": min_score, **identity}
         self.start = self._process.start
 
@@ -77,12 +88,20 @@ class MediaPipeHands:
         Threshold of MediaPipe's palm detector and of its presence check.
     model : str or Path, optional
         An official `.task` bundle to use in place of the fetched weights.
+    tracking_hz : float, optional
+        Rate of a video whose images come one after the other; 0 for images that stand by themselves.
     """
 
     name = "mediapipe-hands"
 
-    def __init__(self, num_hands: int = 2, min_score: float = 0.5, model: str | Path | None = None) -> None:
-        self._process, identity = _process(self.name, "hand", num_hands, min_score, model)
+    def __init__(
+        self,
+        num_hands: int = 2,
+        min_score: float = 0.5,
+        model: str | Path | None = None,
+        tracking_hz: float = 0,
+    ) -> None:
+        self._process, identity = _process(self.name, "hand", num_hands, min_score, model, tracking_hz)
         self.settings = {"num_hands": num_hands, "min_score": min_score, **identity}
         self.start = self._process.start
 
@@ -112,15 +131,20 @@ class MediaPipe:
     side_by_side : bool
         Look for both at the same time, in two threads: an answer comes sooner where a processor is free,
         which is what a robot waits for.
+    tracking_hz : float, optional
+        As of its parts.
     """
 
     name = "mediapipe"
 
-    def __init__(self, num_people: int = 1, min_score: float = 0.5, side_by_side: bool = False) -> None:
+    def __init__(
+        self, num_people: int = 1, min_score: float = 0.5, side_by_side: bool = False, tracking_hz: float = 0
+    ) -> None:
         self._thread = ThreadPoolExecutor(1) if side_by_side else None
         self.parts: dict[str, MediaPipePose | MediaPipeHands] = {
-            "pose": MediaPipePose(num_people, min_score), "hands": MediaPipeHands(2 * num_people, min_score)
-        }  # fmt: skip
+            "pose": MediaPipePose(num_people, min_score, tracking_hz=tracking_hz),
+            "hands": MediaPipeHands(2 * num_people, min_score, tracking_hz=tracking_hz),
+        }
         self.settings = {name: part.settings for name, part in self.parts.items()}
 
     def start(self) -> None:
@@ -152,27 +176,27 @@ def attach_hands(bodies: Detections, found: Detections) -> Detections:
 
 
 def _process(
-    name: str, task: str, n: int, min_score: float, model: str | Path | None
+    name: str, task: str, n: int, min_score: float, model: str | Path | None, tracking_hz: float
 ) -> tuple[IsolatedProcess, dict]:
     """MediaPipe's task in a process of its own, and what identifies its models in a detector's settings.
 
     Its start takes half a second and waits for the first image; a bundle of the user's own is tried at once.
     """
-    if n < 1 or not 0 <= min_score <= 1:
-        raise InputError(
-            f"{name}: finds {n} at scores from {min_score}; expected 1 or more, and a score from 0 to 1"
-        )
+    if n < 1 or not 0 <= min_score <= 1 or not 0 <= tracking_hz < np.inf:
+        given = f"finds {n} at scores from {min_score}, tracks at {tracking_hz} Hz"
+        raise InputError(f"{name}: {given}; expected 1 or more, a score from 0 to 1, and a rate or 0")
     bundle = bundles.read_bundle(task, model) if model else bundles.assemble(task)
     process = IsolatedProcess(
         [child.__file__, str(program_folder().parent)],
-        {"task": task, "n": n, "min_score": min_score},
+        {"task": task, "n": n, "min_score": min_score, "tracking_hz": tracking_hz},
         bundle,
         name=f"{model}: cannot be used by {name}" if model else name,
         remedy="give another .task file" if model else "run: hicp doctor",
     )
     if model:
         process.start()
-    return process, {"bundle_sha256": sha256_bytes(bundle), "mediapipe": program_version()}
+    known = {"bundle_sha256": sha256_bytes(bundle), "mediapipe": program_version()}
+    return process, known | ({"tracking_hz": tracking_hz} if tracking_hz else {})
 
 
 def _positions_px(fractions: np.ndarray, image: np.ndarray) -> np.ndarray:

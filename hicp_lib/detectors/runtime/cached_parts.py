@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.detections import Detections, Detector
+from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.runtime.results import Timed, cache_folder, cached, pixels_sha256, result_path
 
 
@@ -47,9 +48,16 @@ class Runner:
         What runs. It stays as it is: the runner asks a copy of it, whose `parts`, if it has any, are cached.
     workers : int
         How many such runners work side by side.
+
+    Raises
+    ------
+    InputError
+        For a detector whose answers depend on the images before: they come in any order here.
     """
 
     def __init__(self, detector: Detector, workers: int) -> None:
+        if _tracks(detector):
+            raise InputError(f"{detector.name}: tracking_hz is for a video, these images stand by themselves")
         self.detector, self._shown = detector, _Shown(workers)
         self._asked = _with_cached_parts(detector, self._shown)
 
@@ -100,6 +108,11 @@ class CachedPart:
         if image is self._shown.image:
             return result_path(self._folder, self._shown.image_sha256, boxes_px)
         return result_path(self._folder / "squares", pixels_sha256(image), boxes_px)
+
+
+def _tracks(detector: Detector) -> bool:
+    """Whether its settings, or those of a part, say that images are those of a video."""
+    return "tracking_hz" in detector.settings or any(map(_tracks, getattr(detector, "parts", {}).values()))
 
 
 def start(detector: Detector) -> None:

@@ -6,13 +6,13 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.datasets.visibility import CLASSES, MIN_PEOPLE, people_classes
-from hicp_lib.evaluation.ap.metric_table import compare
+from hicp_lib.evaluation.ap.metric_table import draw_cases, metric_table, pairs
 from hicp_lib.evaluation.cases import Found, Truth
 from hicp_lib.formats.annotations import Annotations, ImageInfo
 
 
 def compare_classes(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
-    """AP and AR per class and detector, over the crops of all subsets together.
+    """AP and AR per class and detector, and their differences, over the crops of all subsets together.
 
     Every image shows one person who counts, as HiCP's crops do. Crops of one source image, in whatever
     subset, are drawn together in the bootstrap.
@@ -29,8 +29,9 @@ def compare_classes(truth: Truth, found: Found, n_resamples: int = 1000, seed: i
     Returns
     -------
     DataFrame
-        As `compare`, with the class in the place of `subset`; with fewer than `MIN_PEOPLE` people who count,
-        figures are NaN.
+        As `metric_table.metric_table`, with the class in the place of `subset`, and columns `other, pair`: ""
+        for a detector's own figures, then those of `metric_table.pairs`. With fewer than `MIN_PEOPLE` people
+        who count, figures are NaN.
     """
     classes = people_classes(truth)
     people, detections = pooled(truth, found)
@@ -42,7 +43,11 @@ def compare_classes(truth: Truth, found: Found, n_resamples: int = 1000, seed: i
         for name in parts
         for detector, run in detections.items()
     }
-    table = compare(parts, cases, n_resamples, seed).rename(columns={"subset": "class"})
+    drawn = draw_cases(parts, cases, n_resamples, seed)
+    own = metric_table(drawn)
+    less = pairs(drawn).merge(own[["subset", "group", "detector", "metric", "n_people"]])
+    table = pd.concat([own.assign(other="", pair=""), less], ignore_index=True)
+    table = table.rename(columns={"subset": "class"})
     figures = ["value", "low", "high"]
     table[figures] = table[figures].where(table["n_people"] >= MIN_PEOPLE)
     return table

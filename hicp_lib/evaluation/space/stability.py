@@ -17,18 +17,21 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.keypoints import LEFT_HAND, NAMES, RIGHT_HAND
+from hicp_lib.core.keypoints import GROUPS, LEFT_HAND, NAMES, RIGHT_HAND
+from hicp_lib.evaluation.cases import groups_of
 from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
 
 CASE = ["view", "detector", "method"]
 POSITION = ["x_m", "y_m", "z_m"]
+PIXEL = ["u_px", "v_px"]
 THRESHOLDS_M = (0.025, 0.05, 0.1)
 MIN_SCORE = 0.1
 
 _Truth = Mapping[str, pd.DataFrame]  # view -> true positions
+Parts = Mapping[str, Sequence[str]]
 
 # What the paper reports. All 21 keypoints of a hand count, each against its own median position.
-PARTS: dict[str, tuple[str, ...]] = {
+PARTS: Parts = {
     f"{side} {part}": keypoints
     for part in ("shoulder", "elbow", "wrist", "hand")
     for side, hand in (("left", LEFT_HAND), ("right", RIGHT_HAND))
@@ -36,8 +39,23 @@ PARTS: dict[str, tuple[str, ...]] = {
 }
 
 
-def counted(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
-    """The rows that count: the best person of an image, score above `min_score`, lifted.
+def counted(
+    points: pd.DataFrame, min_score: float = MIN_SCORE, columns: Sequence[str] = POSITION
+) -> pd.DataFrame:
+    """The rows that count: the best person of an image, score above `min_score`, with a place in `columns`.
+
+    Parameters
+    ----------
+    points : DataFrame
+        What was lifted, as the module says.
+    min_score : float, optional
+        Keypoints above it count.
+    columns : sequence of str, optional
+        The coordinates that must be there.
+
+    Returns
+    -------
+    DataFrame
 
     Examples
     --------
@@ -45,8 +63,8 @@ def counted(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
     >>> counted(rows).index.tolist()
     [0]
     """
-    lifted = points[POSITION].notna().all(axis=1)
-    return points[(points["person"] == 0) & (points["score"] > min_score) & lifted]
+    placed = points[list(columns)].notna().all(axis=1)
+    return points[(points["person"] == 0) & (points["score"] > min_score) & placed]
 
 
 def median_positions(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
@@ -74,7 +92,7 @@ def within_distance(
     """Fraction of images in which a keypoint was found within a distance of where it should be.
 
     An image in which it was not found counts as not within. For a hand, each of its keypoints counts alike.
-    A detector that finds a part in no image and on neither side does not give it, and has no row.
+    A detector that does not give a part has no row; one that gives it has, though it may never find it.
 
     Parameters
     ----------
@@ -100,61 +118,18 @@ def within_distance(
     """
     rows: list[tuple] = []
     reference = "median" if truth is None else "truth"
-    weights_of = {n: draw_counts(n, n_resamples, seed) for n in set(n_frames.values())}
-    for case, part, found_m, true_m in _cases(points, n_frames, truth, min_score):
-        weights = weights_of[len(found_m)]
+    for case, part, found_m, true_m in cases(points, n_frames, truth, min_score):
+        weights = draw_counts(len(found_m), n_resamples, seed)
         fractions = np.zeros((len(weights), len(thresholds_m)))
         for k in range(found_m.shape[1]):
-            distances = _distances(found_m[:, k], None if true_m is None else true_m[:, k], weights)
+            off_m = distances(found_m[:, k], None if true_m is None else true_m[:, k], weights)
             for j, threshold_m in enumerate(thresholds_m):
-                fractions[:, j] += np.einsum("dn,dn->d", weights, distances <= threshold_m) / found_m.size * 3
+                fractions[:, j] += np.einsum("dn,dn->d", weights, off_m <= threshold_m) / found_m.size * 3
         found = np.isfinite(found_m[..., 0]).mean()
         bounds = zip(thresholds_m, *with_interval(fractions), strict=True)
         rows += [(*case, part, reference, *numbers, found) for numbers in bounds]
     columns = [*CASE, "part", "reference", "threshold_m", "value", "low", "high", "found"]
     return pd.DataFrame(rows, columns=columns)
-
-
-def spread_and_bias(
-    points: pd.DataFrame,
-    n_frames: Mapping[str, int],
-    truth: _Truth | None = None,
-    min_score: float = MIN_SCORE,
-    n_resamples: int = 1000,
-    seed: int = 0,
-) -> pd.DataFrame:
-    """Stability and accuracy as distances, over the images in which a keypoint was found.
-
-    Parameters
-    ----------
-    points : DataFrame
-        What was lifted, as the module says.
-    n_frames : mapping of str to int
-        Number of images, by view.
-    truth : mapping of str to DataFrame, optional
-        By view, a table with `frame, keypoint, x_m, y_m, z_m`.
-    min_score : float, optional
-        Keypoints above it count.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
-
-    Returns
-    -------
-    DataFrame
-        Columns `view, detector, method, part, n_images` (in which it was found), then in metres, each with
-        `_low` and `_high` beside it: `spread_m`, the median distance to the median position; with `truth`
-        also `bias_m`, how far the median position is from the true one, and `error_m`, the median distance to
-        the truth. For a hand, the mean of each over its keypoints; NaN where nothing was found.
-    """
-    rows = []
-    weights_of = {n: draw_counts(n, n_resamples, seed) for n in set(n_frames.values())}
-    for case, part, found_m, true_m in _cases(points, n_frames, truth, min_score):
-        n_images = np.isfinite(found_m[..., 0]).sum(axis=0).mean()
-        row = dict(zip([*CASE, "part", "n_images"], (*case, part, n_images), strict=True))
-        for name, draws in _distances_drawn(found_m, true_m, weights_of[len(found_m)]).items():
-            row |= zip((name, f"{name}_low", f"{name}_high"), with_interval(draws), strict=True)
-        rows.append(row)
-    return pd.DataFrame(rows)
 
 
 def position_array(
@@ -171,64 +146,101 @@ def position_array(
     n_frames : int
         Number of images.
     columns : sequence of str, optional
-        The three coordinates, metres.
+        The coordinates, d of them.
 
     Returns
     -------
-    array, shape (n_frames, len(keypoints), 3)
-        Metres; NaN where not found.
+    array, shape (n_frames, len(keypoints), d)
+        NaN where not found.
     """
-    result = np.full((n_frames, len(keypoints), 3), np.nan)
+    result = np.full((n_frames, len(keypoints), len(columns)), np.nan)
     place = {name: k for k, name in enumerate(keypoints)}
     rows = rows[rows["keypoint"].isin(place)]
     result[rows["frame"], rows["keypoint"].map(place).astype(int)] = rows[list(columns)]
     return result
 
 
-def _cases(
-    points: pd.DataFrame, n_frames: Mapping[str, int], truth: _Truth | None, min_score: float
+def cases(
+    points: pd.DataFrame,
+    n_frames: Mapping[str, int],
+    truth: _Truth | None = None,
+    min_score: float = MIN_SCORE,
+    parts: Parts = PARTS,
+    columns: Sequence[str] = POSITION,
 ) -> Iterator[tuple[tuple[str, str, str], str, np.ndarray, np.ndarray | None]]:
-    """Case, part, positions found and true positions (None without truth) of every part a detector gives."""
-    given = {
-        detector: {name.split()[1] for name in PARTS if set(PARTS[name]) & set(rows["keypoint"].unique())}
-        for detector, rows in points.groupby("detector", sort=False)
-    }
-    found = dict(list(counted(points, min_score).groupby(CASE, sort=False)))
-    runs = points[["detector", "method"]].drop_duplicates().itertuples(index=False, name=None)
-    for (view, n), (detector, method) in itertools.product(n_frames.items(), runs):
-        # A detector that finds nobody in a view has no rows there, and is counted all the same.
-        rows = found.get((view, detector, method), points[:0])
-        for part, keypoints in PARTS.items():
-            if part.split()[1] in given[detector]:
-                true = None if truth is None else position_array(truth[view], keypoints, n)
-                yield (view, detector, method), part, position_array(rows, keypoints, n), true
+    """Every part that a detector gives, in every view.
+
+    A detector of the registry gives the groups of keypoints named there, any other those it finds one of in
+    some view. A group that is given and not found counts.
+
+    Parameters
+    ----------
+    points : DataFrame
+        What was lifted, as the module says.
+    n_frames : mapping of str to int
+        Number of images, by view.
+    truth : mapping of str to DataFrame, optional
+        By view, a table with `frame, keypoint` and `columns`.
+    min_score : float, optional
+        Keypoints above it count.
+    parts : mapping of str to tuple of str, optional
+        Keypoints by part.
+    columns : sequence of str, optional
+        The coordinates, d of them.
+
+    Yields
+    ------
+    tuple
+        View, detector and method; part; places found and true places, arrays (n_frames, n_keypoints, d), the
+        latter None without `truth`.
+    """
+    given = {name: _gives(name, set(rows["keypoint"].unique())) for name, rows in points.groupby("detector")}
+    found = dict(list(counted(points, min_score, columns).groupby(CASE, sort=False)))
+    runs = list(points[["detector", "method"]].drop_duplicates().itertuples(index=False, name=None))
+    names = list(dict.fromkeys(itertools.chain(*parts.values())))
+    places = {part: [names.index(name) for name in keypoints] for part, keypoints in parts.items()}
+    for view, n in n_frames.items():
+        true = None if truth is None else position_array(truth[view], names, n, columns)
+        for detector, method in runs:
+            # A detector that finds nobody in a view has no rows there, and is counted all the same.
+            rows = found.get((view, detector, method), points[:0])
+            places_found = position_array(rows, names, n, columns)
+            for part, of_part in places.items():
+                if given[detector] & set(parts[part]):
+                    true_places = None if true is None else true[:, of_part]
+                    yield (view, detector, method), part, places_found[:, of_part], true_places
 
 
-def _median_position(found_m: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def _gives(detector: str, found: set[str]) -> set[str]:
+    """The keypoints of the groups that a detector gives, or found one of if the registry does not know it."""
+    names = {group: {NAMES[i] for i in keypoints} for group, keypoints in GROUPS.items()}
+    groups = groups_of({}, detector) or [group for group in names if names[group] & found]
+    return set().union(*(names[group] for group in groups))
+
+
+def median_position(found_m: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Coordinate-wise median of one keypoint's positions (n, 3) in every draw, shape (draws, 3)."""
     return np.stack([weighted_median(found_m[:, i], weights) for i in range(3)], axis=1)
 
 
-def _distances(found_m: np.ndarray, true_m: np.ndarray | None, weights: np.ndarray) -> np.ndarray:
-    """Distances of one keypoint's positions (n, 3): to the truth (1, n), or each draw's median (draws, n)."""
+def distances(found_m: np.ndarray, true_m: np.ndarray | None, weights: np.ndarray) -> np.ndarray:
+    """How far one keypoint is from where it should be, image by image.
+
+    Parameters
+    ----------
+    found_m : array, shape (n, 3)
+        Positions; NaN where not found.
+    true_m : array or None, shape (n, 3)
+        Where it should be. None: at the median position of each draw.
+    weights : array of int, shape (draws, n)
+        How often each image counts.
+
+    Returns
+    -------
+    array, shape (1, n) or (draws, n)
+        The first with `true_m`.
+    """
     if true_m is not None:
         return np.linalg.norm(found_m - true_m, axis=1)[None]
-    median_m = _median_position(found_m, weights)
+    median_m = median_position(found_m, weights)
     return np.sqrt(sum((found_m[:, i] - median_m[:, i, None]) ** 2 for i in range(3)))
-
-
-def _distances_drawn(
-    found_m: np.ndarray, true_m: np.ndarray | None, weights: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Spread, bias and error in every draw, shape (draws,), mean over the keypoints found."""
-    draws: dict[str, list[np.ndarray]] = {"spread_m": [], "bias_m": [], "error_m": []}
-    for k in np.flatnonzero(np.isfinite(found_m[..., 0]).any(axis=0)):
-        found = found_m[:, k]
-        draws["spread_m"].append(weighted_median(_distances(found, None, weights), weights))
-        if true_m is not None:
-            true = true_m[:, k]
-            draws["bias_m"].append(np.linalg.norm(_median_position(found - true, weights), axis=1))
-            draws["error_m"].append(weighted_median(_distances(found, true, weights), weights))
-    names = ("spread_m",) if true_m is None else tuple(draws)
-    nothing = [np.full(len(weights), np.nan)]
-    return {name: np.mean(draws[name] or nothing, axis=0) for name in names}

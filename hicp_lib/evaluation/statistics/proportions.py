@@ -1,6 +1,7 @@
 """Proportions of rows that are something, with intervals from drawing whole source images."""
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 import pandas as pd
@@ -44,6 +45,47 @@ def proportions(
         interval = mean_with_interval(part[of], images, n_resamples, seed)
         table.append((*group, *interval, len(part), images.nunique()))
     return pd.DataFrame(table, columns=[*by, "value", "low", "high", "n", "n_images"])
+
+
+def paired_differences(
+    rows: pd.DataFrame, by: Sequence[str], over: str, of: str, n_resamples: int = 1000, seed: int = 0
+) -> pd.DataFrame:
+    """Mean of a column where another has one value, less that where it has another, on the same images.
+
+    Parameters
+    ----------
+    rows : DataFrame
+        Has a column `source_image`; rows of one source image, group and value of `over` are averaged.
+    by : sequence of str
+        Columns that make the groups.
+    over : str
+        Column whose values are compared, all with all.
+    of : str
+        Column of booleans or numbers; source images that lack one of a pair are left out of it.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
+
+    Returns
+    -------
+    DataFrame
+        Columns `by`, then `over, other, pair` ("a less b"), `value, low, high, n_images`.
+
+    Examples
+    --------
+    >>> rows = pd.DataFrame({"side": list("lrlr"), "source_image": [1, 1, 2, 2], "hit": [0, 1, 1, 1]})
+    >>> rows["view"] = "upper"
+    >>> paired_differences(rows, ["view"], "side", "hit")[["pair", "value"]].values.tolist()
+    [['l less r', -0.5], ['r less l', 0.5]]
+    """
+    table = []
+    for group, part in rows.groupby(list(by), sort=False, observed=True):
+        values = part.pivot_table(of, "source_image", over)
+        for a, b in combinations(dict.fromkeys(part[over]), 2):
+            less = (values[a] - values[b]).dropna()
+            value, low, high = mean_with_interval(less, less.index, n_resamples, seed)
+            table.append((*group, a, b, f"{a} less {b}", value, low, high, len(less)))
+            table.append((*group, b, a, f"{b} less {a}", 0 - value, 0 - high, 0 - low, len(less)))
+    return pd.DataFrame(table, columns=[*by, over, "other", "pair", "value", "low", "high", "n_images"])
 
 
 def mean_with_interval(

@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from hicp_lib.core.memo import memoised
+
 PERCENTILES = (2.5, 97.5)  # of 95 % intervals
 MIN_DRAWN = 10  # a percentile interval from fewer covers far less than 95 %, and from one nothing
 
 
+@memoised(4)
 def draw_counts(n: int, n_resamples: int, seed: int) -> np.ndarray:
     """How often each image is drawn.
 

@@ -23,7 +23,7 @@ from hicp_lib.core.images import decode_image
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.results import identity
-from hicp_lib.experiments.avoidance.closed_loop import Trial, TrueKeypoints, simulate
+from hicp_lib.experiments.avoidance.closed_loop import Trial, TrueKeypoints, next_image_s, simulate
 from hicp_lib.experiments.avoidance.head_camera import HeadCamera, ImageCache, Observation
 from hicp_lib.experiments.avoidance.reaching import script
 from hicp_lib.experiments.laboratory import COLOUR, in_root
@@ -34,7 +34,9 @@ from hicp_lib.simulation.world.batch import run_jobs
 NO_AVOIDANCE, TRUE_KEYPOINTS = "no avoidance", "ground truth"
 PUBLISHED_GAINS = "ground truth, published gains"
 IDEAL = (NO_AVOIDANCE, TRUE_KEYPOINTS, PUBLISHED_GAINS)
-"""Conditions without a detector; every other condition is a detector's name."""
+"""Conditions without a detector; every other condition is a detector's name, or that and `TRACKING`."""
+TRACKING = ", tracking"
+"""Of MediaPipe: each image is searched where the person was in the one before."""
 
 _TABLES = ("cycles.parquet", "frames.parquet")
 _SHOWN_PX = (320, 240)  # cached images are for looking at
@@ -50,7 +52,7 @@ class Job:
     ----------
     trial : Trial
     condition : str
-        One of `IDEAL` or a detector's name.
+        One of `IDEAL` or a detector's name; "mediapipe, tracking" is MediaPipe on a video.
     delay_s : float
         From the image to when the loop knows. It is stated: one that is measured would differ by machine
         and by run, and all that is simulated with it.
@@ -160,7 +162,7 @@ def _simulate(job: Job, folder: Path, images: ImageCache) -> None:
         settings = PUBLISHED if job.condition == PUBLISHED_GAINS else None
         cycles = simulate(job.trial, TrueKeypoints(), job.condition != NO_AVOIDANCE, settings)
     else:
-        camera = HeadCamera(_detector(job.condition), job.delay_s, job.trial.seed, images)
+        camera = HeadCamera(_detector(job), job.delay_s, job.trial.seed, images)
         cycles, observations = simulate(job.trial, camera), camera.observations
     scene = script(job.trial.script, job.trial.seed)
     frames = pd.DataFrame([_frame(seen, scene.person_at(seen.perception.time_s)) for seen in observations])
@@ -188,13 +190,20 @@ def _array(flat: np.ndarray, width: int) -> np.ndarray:
 
 
 def _folder(job: Job) -> Path:
-    known = {} if job.condition in IDEAL else identity(_detector(job.condition))
+    known = {} if job.condition in IDEAL else identity(_detector(job))
     # Of the detectors only the one that looks has a say, and its identity says which.
     result_key = key([run_all], without=[make_detector.__module__], job=job, detector=known)
     return cache_dir() / "avoidance" / result_key[:_KEY_LENGTH]
 
 
+def _detector(job: Job) -> Detector:
+    """Made once in every process; one that tracks anew for each run, which begins with nobody seen."""
+    if not job.condition.endswith(TRACKING):
+        return _kept_detector(job.condition)
+    every_s = next_image_s(0.0, job.delay_s, job.trial.camera_hz)
+    return make_detector(job.condition.removesuffix(TRACKING), tracking_hz=float(1 / every_s))
+
+
 @cache
-def _detector(name: str) -> Detector:
-    """Made once in every process."""
+def _kept_detector(name: str) -> Detector:
     return make_detector(name)

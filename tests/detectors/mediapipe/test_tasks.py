@@ -16,6 +16,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.isolation import child_environment
+from hicp_lib.detectors.runtime.pool import DetectorPool
 from tests.detectors.conftest import N_PEOPLE
 
 
@@ -135,6 +136,27 @@ def test_side_by_side_finds_the_same(weights, photograph):
     assert plain.settings == both.settings
 
 
+def test_on_a_video_the_person_is_looked_for_where_they_were(weights, photograph):
+    still, video = make_detector("mediapipe"), make_detector("mediapipe", tracking_hz=10.0)
+    one, two = still.detect(photograph), video.detect(photograph)
+    assert np.array_equal(one.keypoints_px, two.keypoints_px, equal_nan=True)
+    headless = photograph.copy()
+    headless[: int(one.keypoints_px[0, [5, 6], 1].max()) + 10] = 127
+    assert len(still.detect(headless)) == 0 and len(video.detect(headless)) == 1
+    assert len(video.detect(np.full_like(photograph, 127))) == 0
+    assert len(video.detect(headless)) == 0  # once lost, looked for as in a still image
+
+
+def test_what_tracks_is_another_detector_and_not_run_over_sets_of_images(weights):
+    still, video = (
+        make_detector("mediapipe-hands", **options).settings for options in ({}, {"tracking_hz": 5.0})
+    )
+    assert video == still | {"tracking_hz": 5.0}
+    for name in ("mediapipe-pose", "mediapipe", "combined:mediapipe-pose+mediapipe-hands"):
+        with pytest.raises(InputError, match="tracking_hz is for a video"):
+            DetectorPool(name, {"tracking_hz": 5.0}, 1)
+
+
 def test_an_empty_image_has_nobody(weights):
     for name in ("mediapipe-pose", "mediapipe-hands", "mediapipe"):
         found = make_detector(name).detect(np.full((90, 50, 3), 128, np.uint8))
@@ -209,9 +231,13 @@ def test_damaged_members_are_told_at_once(weights, tmp_path):
     assert "\n" not in str(told.value)
 
 
-@pytest.mark.parametrize("options", [{"num_hands": 0}, {"min_score": 1.1}, {"min_score": float("nan")}])
+@pytest.mark.parametrize(
+    "options", [{"num_hands": 0}, {"min_score": 1.1}, {"min_score": float("nan")}, {"tracking_hz": -1.0}]
+)
 def test_options_out_of_bounds_are_refused_before_the_first_image(weights, options):
-    with pytest.raises(InputError, match="^mediapipe-hands: .*expected 1 or more, and a score from 0 to 1$"):
+    with pytest.raises(
+        InputError, match="^mediapipe-hands: .*expected 1 or more, a score from 0 to 1, and a rate or 0$"
+    ):
         make_detector("mediapipe-hands", **options)
 
 

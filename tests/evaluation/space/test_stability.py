@@ -4,11 +4,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from hicp_lib.evaluation.space.spread import spread_and_bias
 from hicp_lib.evaluation.space.stability import (
     PARTS,
     counted,
     median_positions,
-    spread_and_bias,
     within_distance,
 )
 from tests.evaluation.still_person import KEYPOINTS, TRUE_M, make_points, make_truth
@@ -80,7 +80,21 @@ def test_a_hand_counts_all_its_keypoints():
     table = within_distance(points, {"upper": 3}, n_resamples=0)
     assert value(table, "left hand", 0.1) == pytest.approx((7 * 3 + 14) / (21 * 3))
     assert value(table, "right hand", 0.1) == 0  # hands are given, this one was never found
-    assert set(table["part"]) == {"left hand", "right hand"}
+
+
+def test_what_a_detector_gives_but_never_finds_counts_as_nought_and_what_it_does_not_give_has_no_row():
+    wrist = ["left_wrist"]
+    points = pd.concat(
+        [make_points([[0, 0, 0]], wrist, detector=name) for name in ("mediapipe", "movenet-thunder", "mine")]
+        + [make_points([[0, 0, 0]], wrist, detector="combined:movenet-thunder+mediapipe-hands")]
+    )
+    table = within_distance(points, {"upper": 1}, thresholds_m=[0.1], n_resamples=0)
+    parts = table.groupby("detector")["part"].apply(set)
+    body = {part for part in PARTS if "hand" not in part}
+    assert parts["mediapipe"] == parts["combined:movenet-thunder+mediapipe-hands"] == set(PARTS)
+    assert parts["movenet-thunder"] == parts["mine"] == body
+    found = table["part"] == "left wrist"
+    assert (table["value"][found] == 1).all() and (table["value"][~found] == 0).all()
 
 
 def test_views_and_detectors_are_kept_apart():
@@ -101,7 +115,6 @@ def test_views_and_detectors_are_kept_apart():
             ("upper", "openpose-mobilenet"): 0,
         }
     )
-    assert set(table[table["detector"] == "openpose-mobilenet"]["part"]) == {"left wrist", "right wrist"}
 
 
 def test_intervals_hold_the_value_and_narrow_with_more_images():
@@ -109,7 +122,8 @@ def test_intervals_hold_the_value_and_narrow_with_more_images():
     widths = []
     for n in (20, 180):
         points = make_points(rng.normal(0, 0.03, (n, 3)), ["left_wrist", "right_wrist"])
-        row = within_distance(points, {"upper": n}, thresholds_m=[0.05], n_resamples=300).iloc[0]
+        table = within_distance(points, {"upper": n}, thresholds_m=[0.05], n_resamples=300)
+        row = table.set_index("part").loc["left wrist"]
         assert row["low"] < row["value"] < row["high"]
         widths.append(row["high"] - row["low"])
     assert 2 < widths[0] / widths[1] < 4.5  # theory: 3

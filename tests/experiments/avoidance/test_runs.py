@@ -12,7 +12,7 @@ from hicp_lib.experiments.avoidance import head_camera
 from hicp_lib.experiments.avoidance import runs as avoidance_runs
 from hicp_lib.experiments.avoidance.closed_loop import Trial
 from hicp_lib.experiments.avoidance.reaching import script
-from hicp_lib.experiments.avoidance.runs import Job, choose, image, keypoints_m, run_all
+from hicp_lib.experiments.avoidance.runs import TRACKING, Job, choose, image, keypoints_m, run_all
 from hicp_lib.experiments.laboratory import in_root
 
 TRIAL = Trial("sitting, head", 0.14)
@@ -77,6 +77,14 @@ def test_how_long_a_detector_takes_moves_nothing_but_its_time(detector, monkeypa
 def test_a_delay_that_is_none_is_refused(delay_s):
     with pytest.raises(InputError, match="delay of 'two people' is .*; expected seconds, 0 or more"):
         Job(TRIAL, "two people", delay_s)
+
+
+def test_tracking_begins_anew_with_every_run_and_at_the_rate_of_its_images(weights):
+    still, tracking = (Job(TRIAL, f"mediapipe{how}", 0.14) for how in ("", TRACKING))
+    detectors = [avoidance_runs._detector(job) for job in (still, still, tracking, tracking)]
+    assert detectors[0] is detectors[1] and detectors[2] is not detectors[3]
+    rates_hz = [detector.parts["pose"].settings.get("tracking_hz") for detector in detectors]
+    assert rates_hz == [None, None, 5.0, 5.0]  # ten images a second, every other one while it is at work
 
 
 def test_the_run_to_show_is_that_of_the_script_or_the_first_of_the_condition(detector):

@@ -1,0 +1,112 @@
+"""Bodies that no human has: hips in the abdomen, broken fingers, tilted shoulders.
+
+What is held against the keypoints is anatomy, so recordings without truth can be judged, too; where the truth
+is known, the same measure on it says how often a perfect answer would be called wrong.
+
+- A hip is *in the abdomen* when it lies more than 5 cm nearer to the shoulder of its side than the shortest
+  adults' trunk is long: .288 of the stature (Winter 2009) of a woman of 1.52 m, whom one in twenty
+  is shorter than.
+- A finger is *broken* when its middle and its end joint bend to opposite sides, each by more than 20 degrees
+  as the image shows it. They bend in one plane and to one side only (Chen Chen et al. 2013), so from wherever
+  it is seen, a finger turns one way all along. Hence the image alone tells. Angles in space would not: noise
+  in depth breaks the fingers of true pixels.
+- The *shoulder line* of somebody who sits upright is level: its angle to the horizontal is its tilt.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.evaluation.space.sightings import ROW
+from hicp_lib.evaluation.space.stability import MIN_SCORE, PARTS, PIXEL, POSITION, Parts, cases
+from hicp_lib.evaluation.statistics.proportions import mean_with_interval
+
+SHORTEST_TRUNK_M = 0.288 * 1.52
+IN_ABDOMEN_M = SHORTEST_TRUNK_M - 0.05
+BACKWARDS_RAD = float(np.radians(20))
+# Of a hand's keypoints, from knuckle to tip; the thumb bends otherwise.
+_FINGERS = np.arange(5, 21).reshape(4, 4)
+
+
+def implausible(
+    points: pd.DataFrame,
+    n_frames: Mapping[str, int],
+    truth: Mapping[str, pd.DataFrame] | None = None,
+    min_score: float = MIN_SCORE,
+    n_resamples: int = 1000,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """The measures of this module, of every detector in every view.
+
+    Parameters
+    ----------
+    points : DataFrame
+        What was lifted, as `hicp_lib.evaluation.space.stability` says, with its pixels.
+    n_frames : mapping of str to int
+        Number of images, by view.
+    truth : mapping of str to DataFrame, optional
+        By view, a table with `frame, keypoint` and the same coordinates.
+    min_score : float, optional
+        Keypoints above it count.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they are drawn with.
+
+    Returns
+    -------
+    DataFrame
+        Columns `view, detector, method, part, measure`; `value` with `low, high` (95 %, over images), the
+        share of the `n_images` in which the part is found, of the shoulder line the mean angle in radians;
+        `of_truth`, the same of the true keypoints (NaN where they are not known).
+    """
+    rows = []
+    for measure, (values_of, parts, columns) in _MEASURES.items():
+        for case, part, found, true in cases(points, n_frames, truth, min_score, parts, columns):
+            values = values_of(found)
+            seen = np.flatnonzero(np.isfinite(values))
+            interval = mean_with_interval(values[seen], seen, n_resamples, seed)
+            of_truth = np.nan if true is None else np.nanmean(values_of(true))
+            rows.append((*case, part, measure, *interval, len(seen), of_truth))
+    return pd.DataFrame(rows, columns=[*ROW, "value", "low", "high", "n_images", "of_truth"])
+
+
+def backwards(hands_px: np.ndarray) -> np.ndarray:
+    """Which hands have a broken finger.
+
+    Parameters
+    ----------
+    hands_px : array, shape (n, 21, 2)
+        In the order of `hicp_lib.core.keypoints.HAND_NAMES`; NaN where not found.
+
+    Returns
+    -------
+    array, shape (n,)
+        1 or 0; NaN where no finger is found whole.
+    """
+    fingers = hands_px[:, _FINGERS] @ [1, 1j]  # (n, finger, 4), as complex numbers
+    bones = np.diff(fingers, axis=2)
+    bends_rad = np.angle(bones[:, :, 1:] * bones[:, :, :-1].conj())
+    broken = (bends_rad.min(axis=2) < -BACKWARDS_RAD) & (bends_rad.max(axis=2) > BACKWARDS_RAD)
+    whole = np.isfinite(bends_rad).all(axis=2).any(axis=1)
+    return np.where(whole, broken.any(axis=1), np.nan)
+
+
+def _short(trunk_m: np.ndarray) -> np.ndarray:
+    """Whether a shoulder and its hip, (n, 2, 3), are nearer than in the shortest adult."""
+    length_m = np.linalg.norm(np.diff(trunk_m, axis=1)[:, 0], axis=1)
+    return np.where(np.isfinite(length_m), length_m < IN_ABDOMEN_M, np.nan)
+
+
+def _tilt_rad(shoulders_m: np.ndarray) -> np.ndarray:
+    """Angle of the line between two points, (n, 2, 3), to the horizontal; the base frame's z is up."""
+    line_m = np.diff(shoulders_m, axis=1)[:, 0]
+    return np.arctan2(np.abs(line_m[:, 2]), np.linalg.norm(line_m[:, :2], axis=1))
+
+
+_Measure = tuple[Callable[[np.ndarray], np.ndarray], Parts, Sequence[str]]
+_TRUNKS = {f"{side} hip": (f"{side}_shoulder", f"{side}_hip") for side in ("left", "right")}
+_MEASURES: dict[str, _Measure] = {
+    "hips in the abdomen": (_short, _TRUNKS, POSITION),
+    "broken fingers": (backwards, {part: PARTS[part] for part in ("left hand", "right hand")}, PIXEL),
+    "shoulder line tilt [rad]": (_tilt_rad, {"shoulders": ("left_shoulder", "right_shoulder")}, POSITION),
+}

@@ -1,0 +1,61 @@
+"""In which images a part of a still person is found, and found near: what detectors are compared by.
+
+Parts are more than in `hicp_lib.evaluation.space.stability`: an arm is found with any of its joints.
+Rows are per image, for `hicp_lib.evaluation.statistics.proportions`: shares with intervals, and differences
+of detectors or of parts on the same images.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.evaluation.space.stability import CASE, MIN_SCORE, PARTS, Parts, cases
+
+WITHIN_M = 0.05
+FOUND, NEAR_MEDIAN, NEAR_TRUTH = "found", "within 5 cm of the median", "within 5 cm of the truth"
+ROW = [*CASE, "part", "measure"]
+
+_ARMS = {f"{side} arm": (f"{side}_elbow", f"{side}_wrist") for side in ("left", "right")}
+_ANY = {"any arm joint": sum(_ARMS.values(), ()), "any hand": (*PARTS["left hand"], *PARTS["right hand"])}
+ALL_PARTS: Parts = {**PARTS, **_ARMS, **_ANY}
+"""An arm is an elbow or a wrist, as in `hicp_lib.datasets.visibility`."""
+
+
+def sightings(
+    points: pd.DataFrame,
+    n_frames: Mapping[str, int],
+    truth: Mapping[str, pd.DataFrame] | None = None,
+    min_score: float = MIN_SCORE,
+) -> pd.DataFrame:
+    """Of every part in every image, whether it is found and what share of its keypoints is near.
+
+    Parameters
+    ----------
+    points : DataFrame
+        What was lifted, as `hicp_lib.evaluation.space.stability` says.
+    n_frames : mapping of str to int
+        Number of images, by view.
+    truth : mapping of str to DataFrame, optional
+        By view, a table with `frame, keypoint` and `x_m, y_m, z_m`.
+    min_score : float, optional
+        Keypoints above it count.
+
+    Returns
+    -------
+    DataFrame
+        Columns `view, detector, method, part, measure, source_image` (the frame), `value`. `FOUND` is 1 where
+        any of the part's keypoints is found; `NEAR_MEDIAN` and, with truth, `NEAR_TRUTH` are the share of
+        them within `WITHIN_M` of the detector's median position over all images, and of the truth.
+    """
+    tables = []
+    for case, part, found_m, true_m in cases(points, n_frames, truth, min_score, ALL_PARTS):
+        seen = np.isfinite(found_m[..., 0])
+        values = {FOUND: seen.any(axis=1).astype(float)}
+        median_m = np.nanmedian(np.where(seen.any(axis=0)[:, None], found_m, 0.0), axis=0)
+        references = {NEAR_MEDIAN: median_m} | ({} if true_m is None else {NEAR_TRUTH: true_m})
+        for name, reference_m in references.items():
+            values[name] = (np.linalg.norm(found_m - reference_m, axis=-1) <= WITHIN_M).mean(axis=1)
+        labels = dict(zip([*CASE, "part", "source_image"], (*case, part, np.arange(len(seen))), strict=True))
+        tables += [pd.DataFrame(labels | {"measure": name, "value": of}) for name, of in values.items()]
+    return pd.concat(tables, ignore_index=True)[[*ROW, "source_image", "value"]]
