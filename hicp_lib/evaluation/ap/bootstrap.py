@@ -1,6 +1,6 @@
 """95 % bootstrap intervals of AP and AR: images are drawn with replacement (Efron's percentile interval).
 
-What is resampled are the matches pycocotools made, so a thousand draws cost seconds. Images that belong
+What is resampled are the matches, so a thousand draws cost a fraction of a second. Images that belong
 together (crops of one photograph) can be drawn together through `clusters`.
 """
 
@@ -14,6 +14,7 @@ from hicp_lib.evaluation.ap.evaluate import Evaluation
 from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN, PERCENTILES
 
 N_RESAMPLES = 1000
+_BLOCK = 2**17  # detections of several draws that are gone through at a time
 Clusters = Mapping[int, Hashable]
 
 
@@ -90,12 +91,21 @@ def resample(
     n = len(clusters_drawn)
     places = [np.searchsorted(image_ids, e.matches.image_ids) for e in evaluations]
     rng = np.random.default_rng(seed)
-    rows: list[list[dict]] = [[] for _ in evaluations]
-    for _ in range(n_resamples if n >= MIN_DRAWN else 0):
-        weights = np.bincount(rng.integers(n, size=n), minlength=n)[cluster]
-        for e, place, figures in zip(evaluations, places, rows, strict=True):
-            figures.append(cocoeval.metrics(*cocoeval.precision_recall(e.matches, weights[place])))
-    return [pd.DataFrame(figures, columns=list(cocoeval.METRICS)) for figures in rows]
+    n_draws = n_resamples if n >= MIN_DRAWN else 0
+    weights = [np.bincount(rng.integers(n, size=n), minlength=n)[cluster] for _ in range(n_draws)]
+    return [
+        _figures(e.matches, [w[place] for w in weights]) for e, place in zip(evaluations, places, strict=True)
+    ]
+
+
+def _figures(matches: cocoeval.Matches, weights: Sequence[np.ndarray]) -> pd.DataFrame:
+    """A row of figures for every draw."""
+    block = max(1, _BLOCK // max(1, len(matches.image_rows)))
+    parts = [
+        pd.DataFrame(cocoeval.metrics(*cocoeval.precision_recall(matches, np.stack(weights[i : i + block]))))
+        for i in range(0, len(weights), block)
+    ]
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=list(cocoeval.METRICS))
 
 
 def intervals(values: Mapping[str, float], samples: pd.DataFrame) -> pd.DataFrame:

@@ -14,13 +14,11 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND, SIGMAS
 from hicp_lib.detectors.combined.arbitration import ArbitrationRule
 from hicp_lib.detectors.combined.hand_squares import SEED_11, SEED_11_THUNDER, SquareRule
 from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
-from hicp_lib.evaluation.ap.evaluate import check_detections, evaluate
+from hicp_lib.evaluation.ap.evaluate import evaluate, person_oks
 from hicp_lib.evaluation.cases import Found, Truth
-from hicp_lib.evaluation.matching import best_oks
 from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
 from hicp_lib.formats.annotations import Annotations, source_images
 
@@ -60,40 +58,6 @@ def thresholds() -> pd.DataFrame:
     rows = [(field.name, field.default, field.metadata["chosen"]) for field in rules]
     rows += [(name, list(INGREDIENTS.values())[-1][name], chosen) for name, chosen in _CHOSEN.items()]
     return pd.DataFrame(rows, columns=["threshold", "value", "chosen"]).astype({"value": str})
-
-
-def hand_oks(
-    annotations: Annotations, detections: Mapping[int, Detections], sigmas: str = "halpe"
-) -> pd.DataFrame:
-    """OKS of each labelled hand of the people who count, with the detection that fits it best.
-
-    Parameters
-    ----------
-    annotations : Annotations
-        The truth.
-    detections : mapping of int to Detections
-        By image id.
-    sigmas : {"halpe", "wholebody"}
-        Constants of the keypoints.
-
-    Returns
-    -------
-    DataFrame
-        Columns `image_id, annotation_id, side` ("left", "right"), `oks` (0 when not found).
-
-    Raises
-    ------
-    InputError
-        As `hicp_lib.evaluation.ap.evaluate.evaluate`.
-    """
-    check_detections(detections, annotations)
-    people = annotations.take(~annotations.is_other)
-    rows = [
-        (people.image_ids[i], people.ids[i], side, fit)
-        for side, points in (("left", LEFT_HAND), ("right", RIGHT_HAND))
-        for i, fit in best_oks(people, detections, points, SIGMAS[sigmas][points])
-    ]
-    return pd.DataFrame(rows, columns=["image_id", "annotation_id", "side", "oks"])
 
 
 def compare_hands(
@@ -158,8 +122,8 @@ def _of_ap(figures: pd.DataFrame) -> pd.Series:
 
 def _counts(people: Annotations, found: Mapping, baseline: Mapping, clusters: Mapping) -> np.ndarray:
     """Per source image: labelled hands, those found, those the baseline finds; shape (n_sources, 3)."""
-    table = hand_oks(people, found)[["image_id", "oks"]].assign(n=1)
-    table["found"], table["base"] = table["oks"] > FOUND_OKS, hand_oks(people, baseline)["oks"] > FOUND_OKS
+    table, base = (person_oks(people, of, "each hand", sigmas="halpe") for of in (found, baseline))
+    table = table.assign(n=1, found=table["oks"] > FOUND_OKS, base=base["oks"] > FOUND_OKS)
     sources = table["image_id"].map(clusters)
     return table.groupby(sources, sort=True)[["n", "found", "base"]].sum().to_numpy(float)
 
