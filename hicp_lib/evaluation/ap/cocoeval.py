@@ -4,43 +4,39 @@ The rules are pycocotools', and so are the numbers (`tests/evaluation/ap/test_co
 object per person: the surest detections of all images choose at once, then the second ones, and so on.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-
-from hicp_lib.core.oks import oks
 
 OKS_THRESHOLDS = np.linspace(0.5, 0.95, 10)
 RECALLS = np.linspace(0.0, 1.0, 101)
 METRICS = ("AP", "AP50", "AP75", "AR", "AR50", "AR75")
 MAX_DETECTIONS = 20
 _AT_75 = 5  # index into `OKS_THRESHOLDS`
-_BLOCK = 2**16  # keypoints whose similarity is taken at a time: arrays that stay in a processor's cache
+_BLOCK = 2**9  # pairs whose similarity is taken at a time: arrays that stay in a processor's cache
+
+# Rows of people (n, m) and of detections (n,) -> how alike each detection and its m people are (n, m).
+Similarity = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 class People(NamedTuple):
-    """Annotated people (or hands, ...); only those of equal slot and detections of that slot can meet.
+    """Annotated people (or hands, ...), n of them: only those of a detection's slot can be matched to it.
 
-    `slots` (n,) of int, `keypoints_px` (n, k, 2), `labelled` (n, k) of bool, `boxes_px` (n, 4), `areas_px2`
-    (n,), `is_crowd` (n,) of bool. Who is a crowd or has nothing labelled does not count; a crowd forgives any
-    number of detections, others one each.
+    `slots` (n,) of int; `counts` (n,) of bool: who does not count is matched only where nobody else is, and
+    forgives that detection; `is_crowd` (n,) of bool: who is, any number of detections.
     """
 
     slots: np.ndarray
-    keypoints_px: np.ndarray
-    labelled: np.ndarray
-    boxes_px: np.ndarray
-    areas_px2: np.ndarray
+    counts: np.ndarray
     is_crowd: np.ndarray
 
 
 class Found(NamedTuple):
-    """Detections: `slots` (n,) of int, `keypoints_px` (n, k, 2), NaN where not given, `scores` (n,)."""
+    """Detections, n of them: `slots` (n,) of int, finite `scores` (n,)."""
 
     slots: np.ndarray
-    keypoints_px: np.ndarray
     scores: np.ndarray
 
 
@@ -66,9 +62,9 @@ class Matches:
 
 
 def match(
-    image_ids: np.ndarray, people: People, found: Found, sigmas: np.ndarray, per_image: int = 1
+    image_ids: np.ndarray, people: People, found: Found, similarity: Similarity, per_image: int = 1
 ) -> Matches:
-    """Match detections to people by OKS.
+    """Match detections to people, the surest of each slot first.
 
     Parameters
     ----------
@@ -77,53 +73,53 @@ def match(
     people : People
         Who is to be found.
     found : Found
-        What was.
-    sigmas : array, shape (k,)
-        Constants of the keypoints.
+        What was; the 20 best of a slot take part.
+    similarity : callable
+        OKS, or what takes its place.
     per_image : int, optional
-        Number of slots of an image; those of the first come first.
+        Number of slots of an image; those of the first image come first.
 
     Returns
     -------
     Matches
     """
-    people = People(*(column[np.argsort(people.slots, kind="stable")] for column in people))
-    found, rank = _ranked(found)
-    counted = people.labelled.any(axis=1) & ~people.is_crowd
-    taken = np.zeros((len(OKS_THRESHOLDS), len(counted)), dtype=bool)
-    matched = np.full((len(OKS_THRESHOLDS), len(rank)), -1)
-    for rows, who in _rivals(people.slots, found.slots, rank, len(sigmas)):
-        fits = oks(*(column[who] for column in people[1:-1]), found.keypoints_px[rows, None], sigmas)
-        chosen = _chosen(fits, ~taken[:, who] | people.is_crowd[who], counted[who])
+    kept, rank = _ranked(found)
+    by_slot = np.argsort(people.slots, kind="stable")
+    taken = np.zeros((len(OKS_THRESHOLDS), len(by_slot)), dtype=bool)
+    matched = np.full((len(OKS_THRESHOLDS), len(kept)), -1)
+    for rows, sorted_people in _rivals(people.slots[by_slot], found.slots[kept], rank):
+        who = by_slot[sorted_people]
+        fits = similarity(who, kept[rows])
+        chosen = _chosen(fits, ~taken[:, who] | people.is_crowd[who], people.counts[who])
         at, row = np.nonzero(chosen >= 0)
         matched[at, rows[row]] = person = who[row, chosen[at, row]]
         taken[at, person] = True
-    order = np.argsort(-found.scores, kind="stable")
+    order = np.argsort(-found.scores[kept], kind="stable")
     matched = matched[:, order]
-    n_people = np.bincount(people.slots[counted] // per_image, minlength=len(image_ids))
-    is_true = (matched >= 0) & np.append(counted, False)[matched]
-    return Matches(image_ids, n_people, found.slots[order] // per_image, is_true, matched < 0)
+    n_people = np.bincount(people.slots[people.counts] // per_image, minlength=len(image_ids))
+    is_true = (matched >= 0) & np.append(people.counts, False)[matched]
+    return Matches(image_ids, n_people, found.slots[kept][order] // per_image, is_true, matched < 0)
 
 
-def _ranked(found: Found) -> tuple[Found, np.ndarray]:
-    """The best detections of each slot, slot by slot, and each one's place among them."""
+def _ranked(found: Found) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of the best detections of each slot, slot by slot, and each one's place among them."""
     order = np.lexsort((-found.scores, found.slots))
     slots = found.slots[order]
     rank = np.arange(len(slots)) - np.searchsorted(slots, slots)
     best = rank < MAX_DETECTIONS
-    return Found(*(column[order[best]] for column in found)), rank[best]
+    return order[best], rank[best]
 
 
 def _rivals(
-    people_slots: np.ndarray, found_slots: np.ndarray, rank: np.ndarray, n_keypoints: int
+    people_slots: np.ndarray, found_slots: np.ndarray, rank: np.ndarray
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Rows of detections of one rank, the best first, and those of the people in the slot of each."""
+    """Places of detections of one rank, the best first, and those of the people in the slot of each."""
     first = np.searchsorted(people_slots, found_slots)
     n = np.searchsorted(people_slots, found_slots, side="right") - first
-    for place, n_people in sorted(set(zip(rank.tolist(), n.tolist(), strict=True))):
-        rows = np.flatnonzero((rank == place) & (n == n_people))
-        size = max(1, _BLOCK // (n_keypoints * max(1, n_people)))
-        for part in np.split(rows, range(size, len(rows), size)) if n_people else ():
+    for at_rank, n_people in sorted(set(zip(rank.tolist(), n.tolist(), strict=True))):
+        places = np.flatnonzero((rank == at_rank) & (n == n_people))
+        size = max(1, _BLOCK // max(1, n_people))
+        for part in np.split(places, range(size, len(places), size)) if n_people else ():
             yield part, first[part, None] + np.arange(n_people)
 
 

@@ -30,13 +30,12 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal, get_args, get_type_hints
 
 import numpy as np
-import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import GROUPS, HANDS, N_KEYPOINTS, NAMES, SIGMAS
+from hicp_lib.core.oks import oks
 from hicp_lib.evaluation.ap import cocoeval
-from hicp_lib.evaluation.matching import best_oks
 from hicp_lib.formats.annotations import Annotations
 
 _SEGMENT_OF_BOX = 0.53  # area of a person's segment over that of the box, as tools take it
@@ -164,18 +163,24 @@ def evaluate(
         For detections of unknown images or with scores or coordinates that are no numbers, for unknown
         groups and options, and for area "source" where people have none.
     """
-    objects, chosen = _choice(group, options)
+    objects, chosen = choose(group, options)
     image_ids, stacked = check_detections(detections, annotations)
     images = np.array(sorted(annotations.images), dtype=np.int64)
-    people = _people_seen(annotations, objects, chosen)
-    found = _detections_seen(np.searchsorted(images, image_ids), stacked, objects, chosen)
-    truth = cocoeval.People(
-        _slots(np.searchsorted(images, people.image_ids), objects),
-        _flat(people.keypoints_px, objects),
-        _flat(people.visibility, objects) > 0,
-        *(np.repeat(of, len(objects), axis=0) for of in (people.boxes_px, people.areas_px2, people.is_crowd)),
+    people = people_seen(annotations, objects, chosen)
+    slots, found_px, scores = _detections_seen(np.searchsorted(images, image_ids), stacked, objects, chosen)
+    truth_px, labelled = _flat(people.keypoints_px, objects), _flat(people.visibility, objects) > 0
+    boxes_px, areas_px2, is_crowd = (
+        np.repeat(of, len(objects), axis=0) for of in (people.boxes_px, people.areas_px2, people.is_crowd)
     )
-    matches = cocoeval.match(images, truth, found, SIGMAS[chosen.sigmas][objects[0]], len(objects))
+    sigmas = SIGMAS[chosen.sigmas][objects[0]]
+
+    def similarity(who: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        return oks(truth_px[who], labelled[who], boxes_px[who], areas_px2[who], found_px[rows, None], sigmas)
+
+    truth = cocoeval.People(
+        _slots(np.searchsorted(images, people.image_ids), objects), labelled.any(axis=1) & ~is_crowd, is_crowd
+    )
+    matches = cocoeval.match(images, truth, cocoeval.Found(slots, scores), similarity, len(objects))
     precision, recall = cocoeval.precision_recall(matches)
     n_people = int(matches.n_people.sum())
     return Evaluation(
@@ -185,15 +190,32 @@ def evaluate(
         n_people=n_people,
         n_ignored=len(truth.slots) - n_people,
         n_images=len(images),
-        n_detections=len(found.slots),
+        n_detections=len(scores),
         precision=precision,
         recall=recall,
         matches=matches,
     )
 
 
-def _choice(group: str, options: Mapping[str, Any]) -> tuple[np.ndarray, Options]:
-    """The keypoints of a group's objects, (n_objects, k), and what is chosen for it."""
+def definitions(annotations: Annotations, group: str) -> list[tuple[str, str]]:
+    """What belongs side by side: groups and values of `labelled`, the usual ones first.
+
+    Hands as one object and every hand by itself; all labelled keypoints and, where some are marked occluded,
+    the visible ones.
+    """
+    occluded = (annotations.visibility > 0) & (annotations.visibility <= OCCLUDED)
+    groups = (group, "each hand") if group == "hand" else (group,)
+    return [(of, which) for of in groups for which in (("all", "visible") if occluded.any() else ("all",))]
+
+
+def choose(group: str, options: Mapping[str, Any]) -> tuple[np.ndarray, Options]:
+    """The keypoints of a group's objects, shape (n_objects, k), and the options given over its defaults.
+
+    Raises
+    ------
+    InputError
+        For a group that is not known.
+    """
     if group not in OBJECTS:
         raise InputError(f"group {group!r}: expected one of {', '.join(OBJECTS)}")
     objects, defaults = OBJECTS[group]
@@ -257,8 +279,22 @@ def _sound(found: Detections) -> np.ndarray:
     return np.isfinite(found.scores) & (absent | np.isfinite(u) & np.isfinite(v))
 
 
-def _people_seen(annotations: Annotations, objects: np.ndarray, options: Options) -> Annotations:
-    """The people an evaluation sees, with `visibility` and `areas_px2` as the options want them."""
+def people_seen(annotations: Annotations, objects: np.ndarray, options: Options) -> Annotations:
+    """The people an evaluation sees, with `visibility` and `areas_px2` as the options want them.
+
+    Parameters
+    ----------
+    annotations : Annotations
+        All.
+    objects : array of int, shape (n_objects, k)
+        Keypoints of the group.
+    options : Options
+        The choices made.
+
+    Returns
+    -------
+    Annotations
+    """
     visibility = annotations.visibility
     if options.labelled == "visible":
         visibility = np.where(visibility > OCCLUDED, visibility, 0.0)
@@ -290,78 +326,10 @@ def _source_area(people: Annotations, i: int) -> float:
 
 def _detections_seen(
     image_rows: np.ndarray, found: Detections, objects: np.ndarray, options: Options
-) -> cocoeval.Found:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Slots, keypoints and scores of the objects that take part."""
     points = _flat(found.keypoints_px, objects)
     of_group = _flat(found.scores, objects).mean(axis=-1)
     scores = np.repeat(found.person_scores, len(objects)) if options.score == "person" else of_group
-    everyone = cocoeval.Found(_slots(image_rows, objects), points, scores)
-    if options.absent == "count":
-        return everyone
-    given = np.isfinite(points[..., 0]).any(axis=-1)
-    return cocoeval.Found(*(column[given] for column in everyone))
-
-
-def person_oks(
-    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body", **options: Any
-) -> pd.DataFrame:
-    """OKS of the best-fitting detection for each person who counts, 0 when nobody was found.
-
-    Parameters
-    ----------
-    annotations : Annotations
-        The truth.
-    detections : mapping of int to Detections
-        By image id.
-    group : str
-        A key of `OBJECTS`.
-    **options : str
-        Fields of `Options`.
-
-    Returns
-    -------
-    DataFrame
-        Columns `image_id, annotation_id, oks, n_labelled`.
-    """
-    objects, chosen = _choice(group, options)
-    check_detections(detections, annotations)
-    people = _people_seen(annotations, objects, chosen)
-    rows = [
-        (people.image_ids[i], people.ids[i], fit, np.count_nonzero(people.visibility[i, keypoints]))
-        for keypoints in objects
-        for i, fit in best_oks(people, detections, keypoints, SIGMAS[chosen.sigmas][keypoints])
-    ]
-    return pd.DataFrame(rows, columns=["image_id", "annotation_id", "oks", "n_labelled"])
-
-
-def sensitivity_table(
-    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body"
-) -> pd.DataFrame:
-    """How the figures move when one option at a time leaves its default.
-
-    Parameters
-    ----------
-    annotations : Annotations
-        The truth.
-    detections : mapping of int to Detections
-        By image id.
-    group : str
-        A key of `OBJECTS`.
-
-    Returns
-    -------
-    DataFrame
-        Columns `changed` ("default", or e.g. "area=box"), those of `Evaluation.row`, and `AP_change` against
-        the default. Area "source" is left out where people have none.
-    """
-    counted = np.flatnonzero(~annotations.is_crowd)
-    has_source = all("source_area" in annotations.extras[i] for i in counted)
-    variants: dict[str, dict[str, str]] = {"default": {}}
-    default = asdict(_choice(group, {})[1])
-    for name, kind in get_type_hints(Options).items():
-        values = [v for v in get_args(kind) if v != default[name] and (v != "source" or has_source)]
-        variants |= {f"{name}={value}": {name: value} for value in values}
-    table = pd.DataFrame(
-        {"changed": changed, **evaluate(annotations, detections, group, **variant).row()}
-        for changed, variant in variants.items()
-    )
-    return table.assign(AP_change=table["AP"] - table["AP"].iloc[0])
+    seen = np.isfinite(points[..., 0]).any(axis=-1) | (options.absent == "count")
+    return _slots(image_rows, objects)[seen], points[seen], scores[seen]

@@ -17,7 +17,8 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.combined.arbitration import ArbitrationRule
 from hicp_lib.detectors.combined.hand_squares import SEED_11, SEED_11_THUNDER, SquareRule
 from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
-from hicp_lib.evaluation.ap.evaluate import evaluate, person_oks
+from hicp_lib.evaluation.ap.evaluate import evaluate
+from hicp_lib.evaluation.ap.person_oks import person_oks
 from hicp_lib.evaluation.cases import Found, Truth
 from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
 from hicp_lib.formats.annotations import Annotations, source_images
@@ -107,17 +108,13 @@ def _rows(
     samples = resample(evaluations, n_resamples, seed, clusters)
     step: Any = (np.nan,) * 3
     for k, (variant, run) in enumerate(runs.items()):
-        ap = _of_ap(intervals(evaluations[k].metrics(), samples[k]))
+        ap = intervals(evaluations[k].metrics(), samples[k])["AP"]
         if k:
-            step = _of_ap(difference(evaluations[k], evaluations[k - 1], samples[k], samples[k - 1]))
+            step = difference(evaluations[k], evaluations[k - 1], samples[k], samples[k - 1])["AP"]
         counts = _counts(people, run, baseline, clusters)
         n_hands, n_found, _ = (int(n) for n in counts.sum(axis=0))
         found_of, ratio = (_with_interval(counts, 1, per, n_resamples, seed) for per in (0, 2))
         yield variant, *ap, *step, evaluations[k].AR50, n_hands, n_found, *found_of, *ratio
-
-
-def _of_ap(figures: pd.DataFrame) -> pd.Series:
-    return figures.set_index("metric").loc["AP", ["value", "low", "high"]]
 
 
 def _counts(people: Annotations, found: Mapping, baseline: Mapping, clusters: Mapping) -> np.ndarray:

@@ -5,18 +5,22 @@ together in the bootstrap.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 
 from hicp_lib.core.keypoints import GROUPS
 from hicp_lib.detectors.runtime.results import Timed
-from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
-from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate, person_oks
-from hicp_lib.evaluation.cases import Found, Truth, all_cases, labelled, per_case
+from hicp_lib.evaluation.ap.bootstrap import Figures, Samples, difference, intervals, resample
+from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate
+from hicp_lib.evaluation.ap.person_oks import person_oks
+from hicp_lib.evaluation.cases import Found, Truth, groups_of, labelled, per_case
 from hicp_lib.formats.annotations import Annotations, source_images
 
+# All groups an average precision is given for: hands as one object, and every hand by itself.
+GROUPS_OF_OBJECTS = (*GROUPS, "each hand")
 # (subset, detector, group) -> its evaluation, and its figures on draws that all detectors share
-Drawn = Mapping[tuple[str, str, str], tuple[Evaluation, pd.DataFrame]]
+Drawn = Mapping[tuple[str, str, str], tuple[Evaluation, Samples]]
 
 
 def compare(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
@@ -34,7 +38,7 @@ def compare(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) 
     Returns
     -------
     DataFrame
-        Columns `subset, group, detector, metric, value, low, high, n_people`.
+        Columns `subset, group, labelled, detector, metric, value, low, high, n_people`.
     """
     return metric_table(draw_cases(truth, found, n_resamples, seed))
 
@@ -45,7 +49,8 @@ def draw_cases(
     n_resamples: int = 1000,
     seed: int = 0,
     groups: Sequence[str] = tuple(GROUPS),
-) -> dict[tuple[str, str, str], tuple[Evaluation, pd.DataFrame]]:
+    **options: Any,
+) -> dict[tuple[str, str, str], tuple[Evaluation, Samples]]:
     """Every case evaluated, as it is and on draws of source images: what `metric_table` and `pairs` read.
 
     The detectors of one subset and group are drawn together, so that they can be told apart on the same
@@ -60,18 +65,25 @@ def draw_cases(
     n_resamples, seed : int, optional
         Number of bootstrap draws, and what they are drawn with.
     groups : sequence of str, optional
-        Groups of keypoints that are looked at.
+        Keys of `evaluate.OBJECTS` that are looked at, where a detector gives such keypoints.
+    **options : str
+        Fields of `evaluate.Options`.
 
     Returns
     -------
-    dict of (str, str, str) to (Evaluation, DataFrame)
+    dict of (str, str, str) to (Evaluation, Samples)
         By subset, detector and group: its evaluation, and its figures on the draws.
     """
-    cases = [case for case in all_cases(found) if case[-1] in groups]
+    cases = [
+        (subset, detector, group)
+        for subset, detector in found
+        for group in groups
+        if ("hand" if group.endswith("hand") else "body") in groups_of(found, detector)
+    ]
     drawn = {}
     for subset, group in dict.fromkeys((subset, group) for subset, _, group in cases):
         detectors = [case[1] for case in cases if case[::2] == (subset, group)]
-        evaluations = [evaluate(truth[subset], found[subset, detector], group) for detector in detectors]
+        evaluations = [evaluate(truth[subset], found[subset, d], group, **options) for d in detectors]
         samples = resample(evaluations, n_resamples, seed, source_images(truth[subset]))
         for detector, evaluation, sample in zip(detectors, evaluations, samples, strict=True):
             drawn[subset, detector, group] = evaluation, sample
@@ -82,9 +94,15 @@ def metric_table(drawn: Drawn) -> pd.DataFrame:
     """AP and AR of every case of `draw_cases`: what `compare` returns."""
     tables = []
     for (subset, detector, group), (evaluation, samples) in drawn.items():
-        table = intervals(evaluation.metrics(), samples).assign(n_people=evaluation.n_people)
-        tables.append(labelled(table, subset=subset, group=group, detector=detector))
+        table = _table(intervals(evaluation.metrics(), samples)).assign(n_people=evaluation.n_people)
+        labels = {"subset": subset, "group": group, "labelled": evaluation.options.labelled}
+        tables.append(labelled(table, **labels, detector=detector))
     return pd.concat(tables, ignore_index=True)
+
+
+def _table(figures: Figures) -> pd.DataFrame:
+    rows = [(metric, *figure) for metric, figure in figures.items()]
+    return pd.DataFrame(rows, columns=["metric", "value", "low", "high"])
 
 
 def pairs(drawn: Drawn) -> pd.DataFrame:
@@ -101,16 +119,17 @@ def pairs(drawn: Drawn) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns `subset, group, detector, other, pair` ("a less b"), `metric, value, low, high`.
+        Columns `subset, group, labelled, detector, other, pair` ("a less b"), `metric, value, low, high`.
     """
-    columns = ["subset", "group", "detector", "other", "pair", "metric", "value", "low", "high"]
+    columns = "subset group labelled detector other pair metric value low high".split()
     tables = []
     for (subset, detector, group), (evaluation, samples) in drawn.items():
         for (its_subset, other, its_group), (its, of_other) in drawn.items():
             if (its_subset, its_group) == (subset, group) and other != detector:
-                table = difference(evaluation, its, samples, of_other)
-                labels = {"detector": detector, "other": other, "pair": f"{detector} less {other}"}
-                tables.append(labelled(table, subset=subset, group=group, **labels))
+                table = _table(difference(evaluation, its, samples, of_other))
+                labels = {"subset": subset, "group": group, "labelled": evaluation.options.labelled}
+                labels |= {"detector": detector, "other": other, "pair": f"{detector} less {other}"}
+                tables.append(labelled(table, **labels))
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=columns)
 
 
@@ -136,7 +155,7 @@ def head_loss(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0
     for (subset, detector, group), (basic, of_basic) in drawn.items():
         if subset == "basic":
             headless, of_headless = drawn["headless", detector, group]
-            change = difference(headless, basic, of_headless, of_basic).set_index("metric").loc["AP"]
+            change = difference(headless, basic, of_headless, of_basic)["AP"]
             rows.append((group, detector, basic.AP, headless.AP, *change, basic.n_people))
     columns = ["group", "detector", "basic", "headless", "change", "low", "high", "n_people"]
     return pd.DataFrame(rows, columns=columns).sort_values("group", kind="stable", ignore_index=True)
