@@ -72,10 +72,10 @@ class Detections:
             person_scores,
         )
 
-    def concatenate(self, *more: Detections) -> Detections:
-        """These people, then others."""
+    def concatenate(self, more: Detections) -> Detections:
+        """These people, then others in the same image."""
         names = [field.name for field in fields(self)]
-        return Detections(*(np.concatenate([getattr(of, name) for of in (self, *more)]) for name in names))
+        return Detections(*(np.concatenate([getattr(self, name), getattr(more, name)]) for name in names))
 
     def __len__(self) -> int:
         return len(self.person_scores)

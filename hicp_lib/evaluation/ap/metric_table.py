@@ -94,13 +94,14 @@ def metric_table(drawn: Drawn) -> pd.DataFrame:
     """AP and AR of every case of `draw_cases`: what `compare` returns."""
     tables = []
     for (subset, detector, group), (evaluation, samples) in drawn.items():
-        table = _table(intervals(evaluation.metrics(), samples)).assign(n_people=evaluation.n_people)
+        table = figures_table(intervals(evaluation.metrics(), samples)).assign(n_people=evaluation.n_people)
         labels = {"subset": subset, "group": group, "labelled": evaluation.options.labelled}
         tables.append(labelled(table, **labels, detector=detector))
     return pd.concat(tables, ignore_index=True)
 
 
-def _table(figures: Figures) -> pd.DataFrame:
+def figures_table(figures: Figures) -> pd.DataFrame:
+    """Figures of `bootstrap` as a table: columns `metric, value, low, high`."""
     rows = [(metric, *figure) for metric, figure in figures.items()]
     return pd.DataFrame(rows, columns=["metric", "value", "low", "high"])
 
@@ -126,7 +127,7 @@ def pairs(drawn: Drawn) -> pd.DataFrame:
     for (subset, detector, group), (evaluation, samples) in drawn.items():
         for (its_subset, other, its_group), (its, of_other) in drawn.items():
             if (its_subset, its_group) == (subset, group) and other != detector:
-                table = _table(difference(evaluation, its, samples, of_other))
+                table = figures_table(difference(evaluation, its, samples, of_other))
                 labels = {"subset": subset, "group": group, "labelled": evaluation.options.labelled}
                 labels |= {"detector": detector, "other": other, "pair": f"{detector} less {other}"}
                 tables.append(labelled(table, **labels))

@@ -128,7 +128,7 @@ def test_head_points_that_were_right_are_missed_in_the_score():
 
 
 def test_scores_of_the_head_that_put_the_wrong_ones_first_are_the_rankings_share():
-    """One in four is wrong; with the head it comes last, without it first; the keypoints' scores do not change."""
+    """One in four is wrong: with the head last, without it first; the keypoints' own scores do not change."""
     detections = {}
     for wrong_score in (0.1, 0.9):
         detections[wrong_score] = {}
