@@ -175,10 +175,10 @@ def precision_recall(matches: Matches, weights: np.ndarray | None = None) -> tup
         true = np.cumsum(times[:, is_true], axis=1)
         reached = true / np.maximum(n_people, 1)[:, None]
         rising = np.maximum.accumulate((true / (seen[:, is_true] + np.spacing(1)))[:, ::-1], axis=1)[:, ::-1]
-        for draw, (r, envelope) in enumerate(zip(reached, rising, strict=True)):
-            at = np.searchsorted(r, RECALLS)
-            n = np.searchsorted(at, len(r))  # past the last: precision 0
-            precision[draw, t, :n] = envelope[at[:n]]
+        for of_draw, r, envelope in zip(precision[:, t], reached, rising, strict=True):
+            at = r.searchsorted(RECALLS)
+            n = at.searchsorted(len(r))  # past the last: precision 0
+            of_draw[:n] = envelope[at[:n]]
         recall[:, t] = reached[:, -1] if reached.shape[1] else 0.0
     precision[n_people == 0], recall[n_people == 0] = np.nan, np.nan
     return precision.reshape(*weights.shape[:-1], *precision.shape[1:]), recall.reshape(

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from hicp_lib.evaluation.ap.metric_table import Drawn, draw_cases, same_people
+from hicp_lib.evaluation.ap.metric_table import Drawn, draw_cases
 from hicp_lib.evaluation.cases import Found, Truth
 from hicp_lib.evaluation.statistics.resampling import with_interval
 from hicp_lib.formats.annotations import Annotations
@@ -81,7 +81,9 @@ def _values(drawn: Drawn, case: tuple[str, str, str]) -> np.ndarray:
     return np.append(evaluation.AP, samples["AP"])
 
 
-def head_loss_shares(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+def head_loss_shares(
+    truth: Truth, found: Found, drawn: Drawn, n_resamples: int = 1000, seed: int = 0
+) -> pd.DataFrame:
     """The loss of AP from Basic to Headless, and what of it is the definition's.
 
     The loss is taken four times, each time with one thing more held equal: as it is; on the keypoints that
@@ -91,12 +93,12 @@ def head_loss_shares(truth: Truth, found: Found, n_resamples: int = 1000, seed: 
 
     Parameters
     ----------
-    truth : Truth
-        By subset, "basic" and "headless", of HiCP folders.
-    found : Found
-        By image id, of every subset and detector.
+    truth, found : Truth, Found
+        From `metric_table.same_people`, of HiCP folders.
+    drawn : Drawn
+        Of these, from `metric_table.draw_cases`.
     n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+        As given to `draw_cases`.
 
     Returns
     -------
@@ -104,16 +106,13 @@ def head_loss_shares(truth: Truth, found: Found, n_resamples: int = 1000, seed: 
         Columns `group, detector, share` ("total", and `HEAD_SHARES`, which add up to it), `value, low, high`:
         95 % bootstrap intervals over source images, all on the same draws.
     """
-    people, seen = same_people(truth, found)
-    shared = people | _shared_labels(people["basic"], people["headless"])
+    shared = _shared_labels(truth["basic"], truth["headless"])
+    pair = {case: run for case, run in found.items() if case[0] in shared}
     rows = []
     for group, without_head in (("body", "below the head"), ("hand", "hand")):
-        steps = [(people, group, {}), (shared, without_head, {}), (shared, without_head, {"area": "source"})]
-        steps.append((shared, without_head, {"area": "source", "score": "group"}))
-        losses = [
-            _losses(draw_cases(labels, seen, n_resamples, seed, [name], **options))
-            for labels, name, options in steps
-        ]
+        losses = [_losses({case: of for case, of in drawn.items() if case[-1] == group})]
+        for held in ({}, {"area": "source"}, {"area": "source", "score": "group"}):
+            losses.append(_losses(draw_cases(shared, pair, n_resamples, seed, [without_head], **held)))
         for detector, total in losses[0].items():
             chain = [loss[detector] for loss in losses]
             shares = [before - after for before, after in zip(chain, [*chain[1:], 0.0], strict=True)]

@@ -134,24 +134,19 @@ def pairs(drawn: Drawn) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=columns)
 
 
-def head_loss(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+def head_loss(drawn: Drawn) -> pd.DataFrame:
     """Change of AP from Basic to Headless, on the people who are in both.
 
     Parameters
     ----------
-    truth : Truth
-        By subset, "basic" and "headless".
-    found : Found
-        By image id, of every subset and detector.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    drawn : Drawn
+        From `draw_cases`, on `same_people`.
 
     Returns
     -------
     DataFrame
         Columns `group, detector, basic, headless, change, low, high, n_people`; the interval is the change's.
     """
-    drawn = draw_cases(*same_people(truth, found), n_resamples, seed)
     rows = []
     for (subset, detector, group), (basic, of_basic) in drawn.items():
         if subset == "basic":

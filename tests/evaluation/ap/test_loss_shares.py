@@ -98,14 +98,13 @@ def head_shares(basic, headless, headless_area_px2=20_000.0) -> dict[str, float]
         ),
     }
     found = {("basic", "mediapipe-pose"): basic, ("headless", "mediapipe-pose"): headless}
-    table = head_loss_shares(truth, found, 50).set_index(["group", "share"])
+    drawn = draw_cases(truth, found, 50)
+    table = head_loss_shares(truth, found, drawn, 50).set_index(["group", "share"])
     assert ((table["low"] <= table["value"] + 1e-12) & (table["value"] <= table["high"] + 1e-12)).all()
     shares = table.loc["body", "value"].to_dict()
     assert list(shares) == ["total", *HEAD_SHARES]
     assert sum(shares[name] for name in HEAD_SHARES) == pytest.approx(shares["total"])
-    assert shares["total"] == pytest.approx(
-        -head_loss(truth, found, 2).query("group == 'body'")["change"].item()
-    )
+    assert shares["total"] == pytest.approx(-head_loss(drawn)["change"].item())
     return {name: round(value, 6) for name, value in shares.items()}
 
 
