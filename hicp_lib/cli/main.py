@@ -225,8 +225,8 @@ def evaluate(
     Over all labelled keypoints, and over the visible ones only; of hands, as one object and each by itself.
     """
     from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals
-    from hicp_lib.evaluation.ap.evaluate import definitions
     from hicp_lib.evaluation.ap.evaluate import evaluate as evaluate_detections
+    from hicp_lib.evaluation.ap.options import definitions
     from hicp_lib.formats.annotations import read_annotations, read_detections, source_images
 
     people = read_annotations(annotations)

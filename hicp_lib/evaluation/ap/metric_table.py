@@ -65,9 +65,9 @@ def draw_cases(
     n_resamples, seed : int, optional
         Number of bootstrap draws, and what they are drawn with.
     groups : sequence of str, optional
-        Keys of `evaluate.OBJECTS` that are looked at, where a detector gives such keypoints.
+        Keys of `options.OBJECTS` that are looked at, where a detector gives such keypoints.
     **options : str
-        Fields of `evaluate.Options`.
+        Fields of `options.Options`.
 
     Returns
     -------

@@ -7,7 +7,8 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import SIGMAS
-from hicp_lib.evaluation.ap.evaluate import check_detections, choose, people_seen
+from hicp_lib.evaluation.ap.evaluate import check_detections, people_seen
+from hicp_lib.evaluation.ap.options import choose
 from hicp_lib.evaluation.matching import best_oks
 from hicp_lib.formats.annotations import Annotations
 

@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.evaluation.ap.evaluate import Options, choose, evaluate
+from hicp_lib.evaluation.ap.evaluate import evaluate
+from hicp_lib.evaluation.ap.options import Options, choose
 from hicp_lib.formats.annotations import Annotations
 
 
