@@ -13,7 +13,7 @@ from hicp_lib.evaluation.ap.evaluate import Evaluation
 from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN, with_interval
 
 N_RESAMPLES = 1000
-_BLOCK = 2**17  # detections of several draws that are gone through at a time
+_BLOCK = 2**16  # detections of several draws that are gone through at a time
 Clusters = Mapping[int, Hashable]
 Samples = Mapping[str, np.ndarray]  # metric -> its value in every draw
 Figures = dict[str, tuple[float, float, float]]  # metric -> its value, and the ends of its 95 % interval

@@ -172,9 +172,12 @@ def precision_recall(matches: Matches, weights: np.ndarray | None = None) -> tup
             counted = is_true | is_false
             seen = np.cumsum(times * counted, axis=1)
         # Precision rises only at what is right, and recall, too.
-        true = np.cumsum(times[:, is_true], axis=1)
+        rows = np.flatnonzero(is_true)
+        true = np.cumsum(times.take(rows, axis=1), axis=1)
         reached = true / np.maximum(n_people, 1)[:, None]
-        rising = np.maximum.accumulate((true / (seen[:, is_true] + np.spacing(1)))[:, ::-1], axis=1)[:, ::-1]
+        rising = np.maximum.accumulate((true / (seen.take(rows, axis=1) + np.spacing(1)))[:, ::-1], axis=1)[
+            :, ::-1
+        ]
         for of_draw, r, envelope in zip(precision[:, t], reached, rising, strict=True):
             at = r.searchsorted(RECALLS)
             n = at.searchsorted(len(r))  # past the last: precision 0

@@ -93,8 +93,10 @@ def head_loss_shares(
 
     Parameters
     ----------
-    truth, found : Truth, Found
-        From `metric_table.same_people`, of HiCP folders.
+    truth : Truth
+        By subset, from `metric_table.same_people`, of HiCP folders.
+    found : Found
+        By image id, of every subset and detector, from there, too.
     drawn : Drawn
         Of these, from `metric_table.draw_cases`.
     n_resamples, seed : int, optional

@@ -14,7 +14,7 @@ from hicp_lib.detectors.runtime.results import Timed
 from hicp_lib.evaluation.ap.bootstrap import Figures, Samples, difference, intervals, resample
 from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate
 from hicp_lib.evaluation.ap.person_oks import person_oks
-from hicp_lib.evaluation.cases import Found, Truth, groups_of, labelled, per_case
+from hicp_lib.evaluation.cases import Found, Truth, all_cases, labelled, per_case
 from hicp_lib.formats.annotations import Annotations, source_images
 
 # All groups an average precision is given for: hands as one object, and every hand by itself.
@@ -74,12 +74,7 @@ def draw_cases(
     dict of (str, str, str) to (Evaluation, Samples)
         By subset, detector and group: its evaluation, and its figures on the draws.
     """
-    cases = [
-        (subset, detector, group)
-        for subset, detector in found
-        for group in groups
-        if ("hand" if group.endswith("hand") else "body") in groups_of(found, detector)
-    ]
+    cases = list(all_cases(found, groups))
     drawn = {}
     for subset, group in dict.fromkeys((subset, group) for subset, _, group in cases):
         detectors = [case[1] for case in cases if case[::2] == (subset, group)]

@@ -1,10 +1,12 @@
 """Matching, precision and recall are pycocotools' to the last bit, on generated sets and odd ones."""
 
 from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 import pytest
 
+from hicp_lib.core.detections import Detections
 from hicp_lib.evaluation.ap.evaluate import evaluate
 from tests.evaluation.by_pycocotools import figures, run_pycocotools
 
@@ -55,7 +57,7 @@ def test_crowded_sets_with_ties_in_scores_places_and_people(scene):
 
 def test_more_detections_than_take_part_and_images_without_any(scene):
     annotations, detections = scene(1)
-    many = {i: one.concatenate(*[one] * 9) for i, one in detections.items() if i % 3}
+    many = {i: reduce(Detections.concatenate, [one] * 10) for i, one in detections.items() if i % 3}
     assert max(map(len, many.values())) > 20
     assert_the_same(annotations, many, "body")
 
