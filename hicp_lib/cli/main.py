@@ -210,9 +210,7 @@ def export(detections: Path, kind: str, layout: str, annotations: Path | None, o
 @hicp.command()
 @click.option("--annotations", type=PATH, required=True, help="Annotations in Halpe's layout.")
 @click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
-@click.option(
-    "--group", default="body", show_default=True, help="body (17 points), hand (42, and each hand)."
-)
+@click.option("--group", default="body", show_default=True, help="body (17 points) or hand (42; and each).")
 @click.option("--sigmas", help="halpe or wholebody; else halpe, of each hand wholebody.")
 @click.option("--area", default="segment", show_default=True, help="segment, box, box53 or source.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the bootstrap.")

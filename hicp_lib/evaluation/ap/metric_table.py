@@ -11,10 +11,10 @@ import pandas as pd
 
 from hicp_lib.core.keypoints import GROUPS
 from hicp_lib.detectors.runtime.results import Timed
-from hicp_lib.evaluation.ap.bootstrap import Figures, Samples, difference, intervals, resample
+from hicp_lib.evaluation.ap.bootstrap import Samples, difference, intervals, resample
 from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate
 from hicp_lib.evaluation.ap.person_oks import person_oks
-from hicp_lib.evaluation.cases import Found, Truth, all_cases, labelled, per_case
+from hicp_lib.evaluation.cases import Found, Truth, all_cases, per_case
 from hicp_lib.formats.annotations import Annotations, source_images
 
 # All groups an average precision is given for: hands as one object, and every hand by itself.
@@ -74,8 +74,7 @@ def draw_cases(
     dict of (str, str, str) to (Evaluation, Samples)
         By subset, detector and group: its evaluation, and its figures on the draws.
     """
-    cases = list(all_cases(found, groups))
-    drawn = {}
+    cases, drawn = list(all_cases(found, groups)), {}
     for subset, group in dict.fromkeys((subset, group) for subset, _, group in cases):
         detectors = [case[1] for case in cases if case[::2] == (subset, group)]
         evaluations = [evaluate(truth[subset], found[subset, d], group, **options) for d in detectors]
@@ -87,18 +86,13 @@ def draw_cases(
 
 def metric_table(drawn: Drawn) -> pd.DataFrame:
     """AP and AR of every case of `draw_cases`: what `compare` returns."""
-    tables = []
-    for (subset, detector, group), (evaluation, samples) in drawn.items():
-        table = figures_table(intervals(evaluation.metrics(), samples)).assign(n_people=evaluation.n_people)
-        labels = {"subset": subset, "group": group, "labelled": evaluation.options.labelled}
-        tables.append(labelled(table, **labels, detector=detector))
-    return pd.concat(tables, ignore_index=True)
-
-
-def figures_table(figures: Figures) -> pd.DataFrame:
-    """Figures of `bootstrap` as a table: columns `metric, value, low, high`."""
-    rows = [(metric, *figure) for metric, figure in figures.items()]
-    return pd.DataFrame(rows, columns=["metric", "value", "low", "high"])
+    columns = "subset group labelled detector metric value low high n_people".split()
+    rows = [
+        (subset, group, its.options.labelled, detector, metric, *figure, its.n_people)
+        for (subset, detector, group), (its, samples) in drawn.items()
+        for metric, figure in intervals(its.metrics(), samples).items()
+    ]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def pairs(drawn: Drawn) -> pd.DataFrame:
@@ -118,15 +112,14 @@ def pairs(drawn: Drawn) -> pd.DataFrame:
         Columns `subset, group, labelled, detector, other, pair` ("a less b"), `metric, value, low, high`.
     """
     columns = "subset group labelled detector other pair metric value low high".split()
-    tables = []
-    for (subset, detector, group), (evaluation, samples) in drawn.items():
-        for (its_subset, other, its_group), (its, of_other) in drawn.items():
-            if (its_subset, its_group) == (subset, group) and other != detector:
-                table = figures_table(difference(evaluation, its, samples, of_other))
-                labels = {"subset": subset, "group": group, "labelled": evaluation.options.labelled}
-                labels |= {"detector": detector, "other": other, "pair": f"{detector} less {other}"}
-                tables.append(labelled(table, **labels))
-    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=columns)
+    rows = [
+        (subset, group, its.options.labelled, detector, other, f"{detector} less {other}", metric, *figure)
+        for (subset, detector, group), (its, samples) in drawn.items()
+        for (other_subset, other, other_group), (others, of_other) in drawn.items()
+        if (other_subset, other_group) == (subset, group) and other != detector
+        for metric, figure in difference(its, others, samples, of_other).items()
+    ]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def head_loss(drawn: Drawn) -> pd.DataFrame:
