@@ -250,8 +250,8 @@ def _tell_evaluation(result: dict[str, Any]) -> None:
     from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN
 
     of = "all labelled" if result["labelled"] == "all" else "visible"
-    people_in = "{n_people} people in {n_images} images; {sigmas} sigmas, {area} area".format(**result)
-    click.echo(f"{result['group']}, {of} keypoints: {people_in}")
+    where = "{n_people} in {n_images} images; {sigmas} sigmas, {area} area".format(**result)
+    click.echo(f"{result['group']}, {of} keypoints: {where}")
     if all(row["low"] is None for row in result["metrics"].values()):
         click.echo(f"no intervals: they ask for {MIN_DRAWN} source images at least")
     for metric, row in result["metrics"].items():

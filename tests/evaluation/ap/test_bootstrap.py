@@ -30,6 +30,15 @@ def test_a_draw_is_an_evaluation_of_the_images_drawn(scene, seed):
     assert ours == pytest.approx(expected.metrics(), abs=1e-12)
 
 
+def test_draws_together_are_the_draws_one_by_one(scene, monkeypatch):
+    evaluation = evaluate(*scene(1))
+    (together,) = resample([evaluation], 25, seed=4)
+    monkeypatch.setattr(bootstrap, "_BLOCK", 1)
+    (alone,) = resample([evaluation], 25, seed=4)
+    assert all(np.array_equal(together[metric], alone[metric]) for metric in together)
+    assert len(set(together["AP"])) > 20
+
+
 def found_or_not(annotated, detected, found: np.ndarray):
     """One person per image, found exactly or not at all: AR is the share found."""
     person = np.random.default_rng(0).uniform(100, 300, (136, 2))
