@@ -11,7 +11,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES, SIGMAS
 from hicp_lib.core.oks import oks
 from hicp_lib.evaluation.ap import cocoeval
-from hicp_lib.evaluation.ap.options import OCCLUDED, Options, choose
+from hicp_lib.evaluation.ap.options import VISIBLE, Options, choose
 from hicp_lib.formats.annotations import Annotations
 
 _SEGMENT_OF_BOX = 0.53  # area of a person's segment over that of the box, as tools take it
@@ -208,7 +208,7 @@ def people_seen(annotations: Annotations, objects: np.ndarray, options: Options)
     """
     visibility = annotations.visibility
     if options.labelled == "visible":
-        visibility = np.where(visibility > OCCLUDED, visibility, 0.0)
+        visibility = np.where(visibility >= VISIBLE, visibility, 0.0)
     labelled = (visibility[:, objects] > 0).any(axis=(1, 2))
     seen = labelled | annotations.is_crowd | (options.unlabelled == "ignore")
     if options.others == "count":

@@ -35,7 +35,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import GROUPS, HANDS
 from hicp_lib.formats.annotations import Annotations
 
-OCCLUDED = 1  # COCO's flag of a keypoint that is labelled and cannot be seen
+VISIBLE = 2  # COCO's flag; one that is labelled below is occluded
 _HAND_OPTIONS = {"score": "group"}
 _EACH_HAND_OPTIONS = {"score": "group", "sigmas": "wholebody"}
 # What is found one by one, and how unless told otherwise: per group the keypoints of each object of a person.
@@ -86,7 +86,7 @@ def definitions(annotations: Annotations, group: str) -> list[tuple[str, str]]:
     Hands as one object and every hand by itself; all labelled keypoints and, where some are marked occluded,
     the visible ones.
     """
-    occluded = (annotations.visibility > 0) & (annotations.visibility <= OCCLUDED)
+    occluded = (annotations.visibility > 0) & (annotations.visibility < VISIBLE)
     groups = (group, "each hand") if group == "hand" else (group,)
     return [(of, which) for of in groups for which in (("all", "visible") if occluded.any() else ("all",))]
 
