@@ -1,8 +1,9 @@
-"""What checking files, OKS and bootstrapping cost beside the obvious ways to have them.
+"""What checking files, scoring and bootstrapping cost beside the obvious ways to have them.
 
-Three comparisons, each against a baseline of the same run: reading annotations, checked and as
-arrays, against `json.load` alone; OKS of all pairs against pycocotools' loop; a bootstrap from matches
-against pycocotools evaluating each draw anew (timed on a few draws).
+Each against a baseline of the same run: reading annotations, checked and as arrays, against `json.load`;
+AP of all keypoints in memory, and of bodies and hands by `evaluate`, against pycocotools evaluating the
+same rows; a bootstrap from matches against pycocotools evaluating each draw anew (timed on a few draws);
+`hicp evaluate` on files against parsing the same files.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import subprocess
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,15 +20,21 @@ from pathlib import Path
 import numpy as np
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
-from timing import Comparison, best_seconds, run
+from timing import Comparison, best_seconds, processor_s, run
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.keypoints import COCO_17, SIGMAS
+from hicp_lib.core.keypoints import GROUPS, SIGMAS
 from hicp_lib.core.oks import oks
 from hicp_lib.evaluation.ap import cocoeval
 from hicp_lib.evaluation.ap.bootstrap import N_RESAMPLES, bootstrap_intervals
 from hicp_lib.evaluation.ap.evaluate import evaluate
-from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
+from hicp_lib.formats.annotations import (
+    Annotations,
+    ImageInfo,
+    read_annotations,
+    write_annotations,
+    write_detections,
+)
 
 N_FOUND = 3  # detections per image
 
@@ -53,53 +62,101 @@ def reading(people: Annotations) -> Comparison:
     return Comparison("read annotations", ours, "`json.loads` of the file", base)
 
 
-def similarity(people: Annotations, found: dict[int, Detections]) -> Comparison:
-    sigmas = SIGMAS["halpe"][COCO_17]
-    truth, labelled = people.keypoints_px[:, None, COCO_17], people.visibility[:, None, COCO_17] > 0
-    points = np.stack([found[i].keypoints_px[:, COCO_17] for i in people.images])
-    ours, base = best_seconds(
-        lambda: oks(truth, labelled, people.boxes_px[:, None], people.areas_px2[:, None], points, sigmas),
-        _pycocotools_oks(people, found, sigmas),
-    )
-    return Comparison("OKS of all pairs", ours, "`COCOeval.computeOks` of each image", base)
-
-
-def _pycocotools_oks(
-    people: Annotations, found: dict[int, Detections], sigmas: np.ndarray
+def pycocotools(
+    people: Annotations, found: dict[int, Detections], keypoints: np.ndarray
 ) -> Callable[[], object]:
-    rows = (people.keypoints_px[:, COCO_17], people.visibility[:, COCO_17], people.boxes_px, people.areas_px2)
-    truth = [cocoeval.truth_row(i, *row, False) for i, *row in zip(people.images, *rows, strict=True)]
-    results = [cocoeval.found_row(i, person[COCO_17], 1.0) for i in found for person in found[i].keypoints_px]
-    indexed = []
+    """An evaluation of plain rows, indexed beforehand; it prints, but not here."""
+    truth, indexed = [], []
+    for i, (points, flags) in enumerate(zip(people.keypoints_px, people.visibility, strict=True)):
+        triples = np.concatenate([points, flags[:, None]], axis=1)[keypoints]
+        row = {"area": people.areas_px2[i], "bbox": people.boxes_px[i].tolist(), "iscrowd": 0}
+        row |= {"image_id": int(people.image_ids[i]), "num_keypoints": len(keypoints)}
+        truth.append(row | {"keypoints": triples.ravel().tolist()})
+    results = [
+        {"image_id": i, "score": float(score), "area": 1.0,
+         "keypoints": np.insert(person[keypoints], 2, 1.0, axis=1).ravel().tolist()}
+        for i, of in found.items()
+        for person, score in zip(of.keypoints_px, of.person_scores, strict=True)
+    ]  # fmt: skip
     for rows in (truth, results):
         coco = COCO()
         coco.dataset = {"images": [{"id": i} for i in people.images], "categories": [{"id": 1}]}
-        coco.dataset["annotations"] = [row | {"id": i + 1, "category_id": 1} for i, row in enumerate(rows)]
+        coco.dataset["annotations"] = [row | {"id": i, "category_id": 1} for i, row in enumerate(rows, 1)]
         with contextlib.redirect_stdout(io.StringIO()):
             coco.createIndex()
         indexed.append(coco)
-    run = COCOeval(*indexed, "keypoints")
-    run.params.kpt_oks_sigmas = sigmas
-    run._prepare()
-    return lambda: [run.computeOks(i, 1) for i in people.images]
+
+    def anew() -> None:
+        run = COCOeval(*indexed, "keypoints")
+        run.params.kpt_oks_sigmas = SIGMAS["halpe"][keypoints]
+        run.params.areaRng, run.params.areaRngLbl = [[0.0, np.inf]], ["all"]
+        with contextlib.redirect_stdout(io.StringIO()):
+            run.evaluate()
+            run.accumulate()
+
+    return anew
+
+
+def in_memory(people: Annotations, found: dict[int, Detections]) -> Callable[[], object]:
+    """Matching and AP of all 136 keypoints, from arrays."""
+    image_ids, sigmas = np.array(list(people.images)), SIGMAS["halpe"]
+    points, labelled = people.keypoints_px, people.visibility > 0
+    slots = np.repeat(image_ids, [len(of) for of in found.values()])
+    found_px = np.concatenate([of.keypoints_px for of in found.values()])
+    detections = cocoeval.Found(slots, np.concatenate([of.person_scores for of in found.values()]))
+    truth = cocoeval.People(people.image_ids, ~people.is_crowd, people.is_crowd)
+
+    def similarity(who: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        rest = people.boxes_px[who], people.areas_px2[who], found_px[rows, None]
+        return oks(points[who], labelled[who], *rest, sigmas)
+
+    return lambda: cocoeval.precision_recall(cocoeval.match(image_ids, truth, detections, similarity))
+
+
+def scoring(people: Annotations, found: dict[int, Detections]) -> Iterator[Comparison]:
+    every = np.arange(people.keypoints_px.shape[1])
+    ours, base = best_seconds(in_memory(people, found), pycocotools(people, found, every))
+    yield Comparison(
+        "AP of 136 keypoints, arrays", ours, "`COCOeval` of the same, in memory", base, most=30 / 374
+    )
+    for group, keypoints in GROUPS.items():
+        ours, base = best_seconds(
+            lambda group=group: evaluate(people, found, group), pycocotools(people, found, keypoints)
+        )
+        yield Comparison(f"`evaluate`, {group}, {len(keypoints)} keypoints", ours, "the same", base)
 
 
 def bootstrapping(people: Annotations, found: dict[int, Detections], n_draws: int) -> Comparison:
     evaluation = evaluate(people, found)
     (ours,) = best_seconds(lambda: bootstrap_intervals(evaluation, N_RESAMPLES), turns=1)
     # A draw costs pycocotools what the whole set costs.
-    (draw,) = best_seconds(lambda: evaluate(people, found), turns=n_draws)
+    (draw,) = best_seconds(pycocotools(people, found, GROUPS["body"]), turns=n_draws)
     return Comparison(
         f"{N_RESAMPLES} bootstrap draws from matches", ours, "pycocotools anew for each", draw * N_RESAMPLES
     )
 
 
+def command(people: Annotations, found: dict[int, Detections]) -> Comparison:
+    with tempfile.TemporaryDirectory() as folder:
+        files = {"--annotations": Path(folder) / "a.json", "--detections": Path(folder) / "d.json"}
+        write_annotations(files["--annotations"], people)
+        write_detections(files["--detections"], found)
+        options = [str(word) for pair in files.items() for word in pair]
+        program = [sys.executable, "-c", "from hicp_lib.cli.main import main; main()", "evaluate", *options]
+        start_s = processor_s()
+        subprocess.run(program, check=True, stdout=subprocess.DEVNULL)
+        ours = processor_s() - start_s
+        (base,) = best_seconds(lambda: [json.loads(path.read_bytes()) for path in files.values()], turns=1)
+    return Comparison("`hicp evaluate`, all of it", ours, "`json.loads` of its files", base, most_s=2.0)
+
+
 def measure(options) -> Iterator[Comparison]:
     people, found = make_people(options.images)
     yield reading(people)
-    yield similarity(people, found)
+    yield from scoring(people, found)
     yield bootstrapping(people, found, options.draws)
+    yield command(people, found)
 
 
 if __name__ == "__main__":
-    run(measure, __doc__, images=(500, 4), draws=(3, 1))
+    run(measure, __doc__, images=(1624, 12), draws=(1, 1))

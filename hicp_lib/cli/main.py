@@ -210,39 +210,54 @@ def export(detections: Path, kind: str, layout: str, annotations: Path | None, o
 @hicp.command()
 @click.option("--annotations", type=PATH, required=True, help="Annotations in Halpe's layout.")
 @click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
-@click.option("--group", default="body", show_default=True, help="body (17 points) or hand (42).")
-@click.option("--sigmas", default="halpe", show_default=True, help="halpe or wholebody.")
+@click.option("--group", default="body", show_default=True, help="body (17 points) or hand (42; and each).")
+@click.option("--sigmas", help="halpe or wholebody; else halpe, of each hand wholebody.")
 @click.option("--area", default="segment", show_default=True, help="segment, box, box53 or source.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the bootstrap.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def evaluate(
-    annotations: Path, detections: Path, group: str, sigmas: str, area: str, seed: int, as_json
+    annotations: Path, detections: Path, group: str, sigmas: str | None, area: str, seed: int, as_json
 ) -> None:
-    """Average precision and recall by OKS, with 95 % bootstrap intervals over images."""
+    """Average precision and recall by OKS, with 95 % bootstrap intervals over images.
+
+    Over all labelled keypoints, and over the visible ones only; of hands, as one object and each by itself.
+    """
     from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals
     from hicp_lib.evaluation.ap.evaluate import evaluate as evaluate_detections
-    from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN
+    from hicp_lib.evaluation.ap.options import definitions
     from hicp_lib.formats.annotations import read_annotations, read_detections, source_images
 
     people = read_annotations(annotations)
     found = read_detections(detections, people)
-    evaluation = evaluate_detections(people, found, group, sigmas=sigmas, area=area)
     clusters = source_images(people)  # crops of one image are drawn together
-    table = bootstrap_intervals(evaluation, seed=seed, clusters=clusters).set_index("metric")
-    rows = table[["value", "low", "high"]].to_dict("index")
+    options = {"area": area} | ({"sigmas": sigmas} if sigmas else {})
+    results = []
+    for of_group, labelled in definitions(people, group):
+        evaluation = evaluate_detections(people, found, of_group, labelled=labelled, **options)
+        metrics = bootstrap_intervals(evaluation, seed=seed, clusters=clusters).items()
+        rows = {name: _finite(dict(zip(("value", "low", "high"), of, strict=True))) for name, of in metrics}
+        results.append(_finite(evaluation.row()) | {"metrics": rows, "seed": seed})
     if as_json:
-        metrics = {metric: _finite(row) for metric, row in rows.items()}
-        click.echo(json.dumps(_finite(evaluation.row()) | {"metrics": metrics, "seed": seed}, indent=2))
+        click.echo(json.dumps(results[0] | {"other_definitions": results[1:]}, indent=2))
         return
-    people_in = f"{evaluation.n_people} people in {evaluation.n_images} images"
-    click.echo(f"{group}: {people_in}; {sigmas} sigmas, {area} area")
     if not any(map(len, found.values())):
         click.echo(f"{detections}: an empty list: nobody was found in any image")
-    if table["low"].isna().all():
+    for result in results:
+        _tell_evaluation(result)
+
+
+def _tell_evaluation(result: dict[str, Any]) -> None:
+    from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN
+
+    of = "all labelled" if result["labelled"] == "all" else "visible"
+    where = "{n_people} in {n_images} images; {sigmas} sigmas, {area} area".format(**result)
+    click.echo(f"{result['group']}, {of} keypoints: {where}")
+    if all(row["low"] is None for row in result["metrics"].values()):
         click.echo(f"no intervals: they ask for {MIN_DRAWN} source images at least")
-    for metric, row in rows.items():
-        interval = "" if math.isnan(row["low"]) else f"  [{row['low']:.3f}, {row['high']:.3f}]"
-        click.echo(f"{metric:<5} {row['value']:.3f}{interval}")
+    for metric, row in result["metrics"].items():
+        value, *bounds = (math.nan if number is None else number for number in row.values())
+        interval = "" if row["low"] is None else "  [{:.3f}, {:.3f}]".format(*bounds)
+        click.echo(f"{metric:<5} {value:.3f}{interval}")
 
 
 def _finite(row: dict[str, Any]) -> dict[str, Any]:

@@ -35,8 +35,11 @@ def oks_terms(
     >>> oks_terms(truth_px, found_px, np.array(100.0), np.array([0.1, 0.5])).round(3)
     array([1.   , 0.607])
     """
-    offset = found_px - truth_px
-    return _similarity((offset**2).sum(axis=-1), areas_px2, sigmas)
+    return _similarity(_squared(found_px - truth_px), areas_px2, sigmas)
+
+
+def _squared(offset_px: np.ndarray) -> np.ndarray:
+    return offset_px[..., 0] ** 2 + offset_px[..., 1] ** 2
 
 
 def _similarity(squared_px2: np.ndarray, areas_px2: np.ndarray, sigmas: np.ndarray) -> np.ndarray:
@@ -77,13 +80,16 @@ def oks(
     array, shape (...)
         In [0, 1].
     """
-    terms = np.where(labelled, oks_terms(truth_px, found_px, areas_px2, sigmas), 0.0)
-    count = labelled.sum(axis=-1)
-    boxed = _similarity(_squared_to_grown_box(boxes_px, found_px), areas_px2, sigmas).mean(axis=-1)
-    return np.where(count > 0, terms.sum(axis=-1) / np.maximum(count, 1), boxed)
+    squared = _squared(found_px - truth_px)
+    unlabelled = ~labelled.any(axis=-1, keepdims=True)
+    if unlabelled.any():
+        squared = np.where(unlabelled, _squared_to_grown_box(boxes_px, found_px), squared)
+    counts = labelled | unlabelled
+    terms = np.where(counts, _similarity(squared, areas_px2, sigmas), 0.0)
+    return terms.sum(axis=-1) / counts.sum(axis=-1)
 
 
 def _squared_to_grown_box(boxes_px: np.ndarray, found_px: np.ndarray) -> np.ndarray:
     corner, size = boxes_px[..., None, :2], boxes_px[..., None, 2:]
     outside = np.maximum(corner - size - found_px, 0) + np.maximum(found_px - (corner + 2 * size), 0)
-    return (outside**2).sum(axis=-1)
+    return _squared(outside)

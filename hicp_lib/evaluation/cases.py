@@ -4,7 +4,7 @@
 subset, a detector and a group of keypoints.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import numpy as np
 import pandas as pd
@@ -43,11 +43,12 @@ def groups_of(found: Found, detector: str) -> tuple[str, ...]:
     return tuple(group for group, keypoints in GROUPS.items() if given[keypoints].any())
 
 
-def all_cases(found: Found) -> Iterator[tuple[str, str, str]]:
-    """Subset, detector and group of every case."""
+def all_cases(found: Found, groups: Iterable[str] = tuple(GROUPS)) -> Iterator[tuple[str, str, str]]:
+    """Subset, detector and group of every case; a detector of hands gives each hand, too."""
     for subset, detector in found:
-        for group in groups_of(found, detector):
-            yield subset, detector, group
+        for group in groups:
+            if ("hand" if group.endswith("hand") else "body") in groups_of(found, detector):
+                yield subset, detector, group
 
 
 def labelled(table: pd.DataFrame, **labels: object) -> pd.DataFrame:

@@ -28,7 +28,7 @@ LOCK_PATH = (CHECKOUT or LIBRARY_DIR) / "environment.lock"
 
 _SHOWN_VERSIONS = (
     "numpy", "pandas", "opencv-python-headless", "onnxruntime", "mediapipe", "open3d-cpu", "open3d",
-    "pycocotools", "matplotlib",
+    "matplotlib",
 )  # fmt: skip
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 

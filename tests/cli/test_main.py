@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from hicp_lib.cli import main as cli
@@ -135,3 +136,35 @@ def test_evaluation_of_perfect_detections(capsys, tmp_path):
     assert "no intervals: they ask for 10 source images" in printed and "AP    1.000\n" in printed
     assert cli.run([*arguments, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["metrics"]["AP"] == {"value": 1.0, "low": None, "high": None}
+
+
+def test_evaluation_tells_visible_keypoints_and_each_hand(capsys, tmp_path):
+    """The left hand is occluded and not found: half of the hands, and all of what can be seen."""
+    flags = np.full(136, 2)
+    flags[94:115] = 1
+    points = np.stack([100 + np.arange(136.0), 50 + 2 * np.arange(136.0), flags], axis=1)
+    given = np.where((flags == 2)[:, None], points, 0)
+    person = {"category_id": 1, "iscrowd": 0, "bbox": [90, 40, 160, 300], "area": 30000, "num_keypoints": 136}
+    people = [person | {"id": i, "image_id": i, "keypoints": points.ravel().tolist()} for i in range(12)]
+    images = [{"id": i, "file_name": f"{i}.jpg", "width": 400, "height": 400} for i in range(12)]
+    results = [
+        {"image_id": i, "category_id": 1, "score": 0.9, "keypoints": given.ravel().tolist()}
+        for i in range(12)
+    ]
+    truth, found = tmp_path / "annotations.json", tmp_path / "detections.json"
+    truth.write_text(json.dumps({"images": images, "annotations": people, "categories": [{"id": 1}]}))
+    found.write_text(json.dumps(results))
+    arguments = ["evaluate", "--annotations", str(truth), "--detections", str(found), "--group", "hand"]
+    assert cli.run([*arguments, "--json"]) == 0
+    usual = json.loads(capsys.readouterr().out)
+    tables = [usual, *usual["other_definitions"]]
+    recall = {
+        (t["group"], t["labelled"], t["sigmas"], t["n_people"]): t["metrics"]["AR"]["value"] for t in tables
+    }
+    assert recall == {
+        ("hand", "all", "halpe", 12): 0.1, ("hand", "visible", "halpe", 12): 1.0,
+        ("each hand", "all", "wholebody", 24): 0.5, ("each hand", "visible", "wholebody", 12): 1.0,
+    }  # fmt: skip
+    assert cli.run(arguments) == 0
+    said = capsys.readouterr().out
+    assert "each hand, visible keypoints: 12 in 12 images; wholebody sigmas, segment area" in said

@@ -25,6 +25,7 @@ def test_known_detectors_have_their_groups_and_others_those_they_give():
         ("basic", "mediapipe-pose", "body"), ("basic", "mine", "body"), ("basic", "mine", "hand"),
         ("basic", "bare", "body"),
     ]  # fmt: skip
+    assert list(all_cases(found, ["each hand"])) == [("basic", "mine", "each hand")]
 
 
 def test_labels_come_before_the_columns():

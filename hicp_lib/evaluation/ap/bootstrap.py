@@ -1,25 +1,27 @@
 """95 % bootstrap intervals of AP and AR: images are drawn with replacement (Efron's percentile interval).
 
-What is resampled are the matches pycocotools made, so a thousand draws cost seconds. Images that belong
+What is resampled are the matches, so a thousand draws cost a fraction of a second. Images that belong
 together (crops of one photograph) can be drawn together through `clusters`.
 """
 
 from collections.abc import Hashable, Mapping, Sequence
 
 import numpy as np
-import pandas as pd
 
 from hicp_lib.evaluation.ap import cocoeval
 from hicp_lib.evaluation.ap.evaluate import Evaluation
-from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN, PERCENTILES
+from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN, with_interval
 
 N_RESAMPLES = 1000
+_BLOCK = 2**16  # detections of several draws that are gone through at a time
 Clusters = Mapping[int, Hashable]
+Samples = Mapping[str, np.ndarray]  # metric -> its value in every draw
+Figures = dict[str, tuple[float, float, float]]  # metric -> its value, and the ends of its 95 % interval
 
 
 def bootstrap_intervals(
     evaluation: Evaluation, n_resamples: int = N_RESAMPLES, seed: int = 0, clusters: Clusters | None = None
-) -> pd.DataFrame:
+) -> Figures:
     """Figures with their 95 % intervals.
 
     Parameters
@@ -35,14 +37,13 @@ def bootstrap_intervals(
 
     Returns
     -------
-    DataFrame
-        Columns `metric, value, low, high`; NaN where nobody counts, and no interval from fewer than
-        `MIN_DRAWN` clusters.
+    Figures
+        Of every metric; NaN where nobody counts, and no interval from fewer than `MIN_DRAWN` clusters.
     """
     return intervals(evaluation.metrics(), resample([evaluation], n_resamples, seed, clusters)[0])
 
 
-def difference(a: Evaluation, b: Evaluation, of_a: pd.DataFrame, of_b: pd.DataFrame) -> pd.DataFrame:
+def difference(a: Evaluation, b: Evaluation, of_a: Samples, of_b: Samples) -> Figures:
     """Differences a - b with 95 % intervals, both on the same draw of images each time.
 
     The images are paired by their ids: two detectors on one dataset, or one detector on Basic and Headless,
@@ -52,21 +53,22 @@ def difference(a: Evaluation, b: Evaluation, of_a: pd.DataFrame, of_b: pd.DataFr
     ----------
     a, b : Evaluation
         What is compared.
-    of_a, of_b : DataFrame
+    of_a, of_b : Samples
         Their figures on the draws, as from one call of `resample`.
 
     Returns
     -------
-    DataFrame
+    Figures
         As of `bootstrap_intervals`.
     """
     others = b.metrics()
-    return intervals({name: value - others[name] for name, value in a.metrics().items()}, of_a - of_b)
+    values = {name: value - others[name] for name, value in a.metrics().items()}
+    return intervals(values, {name: of_a[name] - of_b[name] for name in values})
 
 
 def resample(
     evaluations: Sequence[Evaluation], n_resamples: int, seed: int, clusters: Clusters | None = None
-) -> list[pd.DataFrame]:
+) -> list[Samples]:
     """Figures on draws of images that all evaluations share.
 
     Parameters
@@ -80,35 +82,39 @@ def resample(
 
     Returns
     -------
-    list of DataFrame
-        Per evaluation `n_resamples` rows and a column per metric; no rows from fewer than `MIN_DRAWN`
-        clusters.
+    list of Samples
+        Per evaluation and metric `n_resamples` values; none from fewer than `MIN_DRAWN` clusters.
     """
     image_ids = np.unique(np.concatenate([e.matches.image_ids for e in evaluations]))
+    rows: dict[Hashable, int] = {}
     names = [i if clusters is None else clusters[i] for i in image_ids.tolist()]
-    cluster, clusters_drawn = pd.factorize(pd.Series(names, dtype=object))
-    n = len(clusters_drawn)
+    cluster = np.array([rows.setdefault(name, len(rows)) for name in names], dtype=int)
+    n = len(rows)
     places = [np.searchsorted(image_ids, e.matches.image_ids) for e in evaluations]
     rng = np.random.default_rng(seed)
-    rows: list[list[dict]] = [[] for _ in evaluations]
-    for _ in range(n_resamples if n >= MIN_DRAWN else 0):
-        weights = np.bincount(rng.integers(n, size=n), minlength=n)[cluster]
-        for e, place, figures in zip(evaluations, places, rows, strict=True):
-            figures.append(cocoeval.metrics(*cocoeval.precision_recall(e.matches, weights[place])))
-    return [pd.DataFrame(figures, columns=list(cocoeval.METRICS)) for figures in rows]
+    n_draws = n_resamples if n >= MIN_DRAWN else 0
+    weights = [np.bincount(rng.integers(n, size=n), minlength=n)[cluster] for _ in range(n_draws)]
+    return [
+        _samples(e.matches, [w[place] for w in weights]) for e, place in zip(evaluations, places, strict=True)
+    ]
 
 
-def intervals(values: Mapping[str, float], samples: pd.DataFrame) -> pd.DataFrame:
-    """Figures by metric, with percentiles over the draws (`resample`) in which somebody counts.
+def _samples(matches: cocoeval.Matches, weights: Sequence[np.ndarray]) -> Samples:
+    block = max(1, _BLOCK // max(1, len(matches.image_rows)))
+    parts = [
+        cocoeval.metrics(*cocoeval.precision_recall(matches, np.stack(weights[i : i + block])))
+        for i in range(0, len(weights), block)
+    ]
+    return {name: np.concatenate([np.zeros(0), *(part[name] for part in parts)]) for name in cocoeval.METRICS}
+
+
+def intervals(values: Mapping[str, float], samples: Samples) -> Figures:
+    """Values by metric, with percentiles over the draws (`resample`) in which somebody counts.
 
     Examples
     --------
-    >>> intervals({"AP": 0.5}, pd.DataFrame({"AP": [0.4, 0.6, np.nan]})).round(3).to_dict("list")
-    {'metric': ['AP'], 'value': [0.5], 'low': [0.405], 'high': [0.595]}
+    >>> low_high = intervals({"AP": 0.5}, {"AP": np.array([0.4, 0.6, np.nan])})["AP"]
+    >>> [round(float(x), 3) for x in low_high]
+    [0.5, 0.405, 0.595]
     """
-    rows = []
-    for name, value in values.items():
-        drawn = samples[name].dropna()
-        low, high = np.percentile(drawn, PERCENTILES) if len(drawn) else (np.nan, np.nan)
-        rows.append((name, value, low, high))
-    return pd.DataFrame(rows, columns=["metric", "value", "low", "high"])
+    return {name: with_interval(np.append(value, samples[name])) for name, value in values.items()}

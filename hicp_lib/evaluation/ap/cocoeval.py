@@ -1,8 +1,12 @@
-"""pycocotools, fed with arrays and kept quiet; and the matches it made, from which AP can be had again."""
+"""COCO's keypoint evaluation on arrays: who is matched to whom, and the precision and recall that follow.
 
+The rules are pycocotools', and so are the numbers (`tests/evaluation/ap/test_cocoeval.py`). There is no
+object per person: the surest detections of all images choose at once, then the second ones, and so on.
+"""
+
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from importlib.util import find_spec, module_from_spec
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,22 +14,30 @@ OKS_THRESHOLDS = np.linspace(0.5, 0.95, 10)
 RECALLS = np.linspace(0.0, 1.0, 101)
 METRICS = ("AP", "AP50", "AP75", "AR", "AR50", "AR75")
 MAX_DETECTIONS = 20
-# Where a keypoint that is not given is put: so far off that it adds 0 to OKS. pycocotools must not
-# see NaN: comparisons with NaN fail, and then everything matches.
-_FAR_PX = -1e12
 _AT_75 = 5  # index into `OKS_THRESHOLDS`
+_BLOCK = 2**9  # pairs whose similarity is taken at a time: arrays that stay in a processor's cache
+
+# Rows of people (n, m) and of detections (n,) -> how alike each detection and its m people are (n, m).
+Similarity = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
-def _quiet(name: str) -> Any:
-    """A module of pycocotools as a copy that prints nothing: the caller's standard output is left alone."""
-    spec: Any = find_spec(f"pycocotools.{name}")
-    module: Any = module_from_spec(spec)
-    module.print = lambda *_: None
-    spec.loader.exec_module(module)
-    return module
+class People(NamedTuple):
+    """Annotated people (or hands, ...), n of them: only those of a detection's slot can be matched to it.
+
+    `slots` (n,) of int; `counts` (n,) of bool: who does not count is matched only where nobody else is, and
+    forgives that detection; `is_crowd` (n,) of bool: who is, any number of detections.
+    """
+
+    slots: np.ndarray
+    counts: np.ndarray
+    is_crowd: np.ndarray
 
 
-COCO, COCOeval = _quiet("coco").COCO, _quiet("cocoeval").COCOeval
+class Found(NamedTuple):
+    """Detections, n of them: `slots` (n,) of int, finite `scores` (n,)."""
+
+    slots: np.ndarray
+    scores: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -49,116 +61,85 @@ class Matches:
     is_false: np.ndarray
 
 
-def truth_row(
-    image_id: int, keypoints_px: np.ndarray, visibility: np.ndarray, box_px: np.ndarray, area_px2: float,
-    ignored: bool,
-) -> dict:  # fmt: skip
-    """An annotated person for `run`.
+def match(
+    image_ids: np.ndarray, people: People, found: Found, similarity: Similarity, per_image: int = 1
+) -> Matches:
+    """Match detections to people, the surest of each slot first.
 
     Parameters
     ----------
-    image_id : int
-        The image.
-    keypoints_px : array, shape (k, 2)
-        Of the group.
-    visibility : array, shape (k,)
-        Above 0 where labelled.
-    box_px : array, shape (4,)
-        x, y, width, height.
-    area_px2 : float
-        The s² of OKS.
-    ignored : bool
-        Whether the person does not count.
-
-    Returns
-    -------
-    dict
-    """
-    labelled = visibility > 0
-    return {
-        "image_id": image_id, "bbox": box_px.tolist(), "area": float(area_px2), "iscrowd": int(ignored),
-        "num_keypoints": int(labelled.sum()), "keypoints": _triples(keypoints_px, labelled, 0.0),
-    }  # fmt: skip
-
-
-def found_row(image_id: int, keypoints_px: np.ndarray, score: float) -> dict:
-    """A detection for `run`.
-
-    Parameters
-    ----------
-    image_id : int
-        The image.
-    keypoints_px : array, shape (k, 2)
-        Of the group; NaN where not given.
-    score : float
-        What detections are ranked by.
-
-    Returns
-    -------
-    dict
-    """
-    given = np.isfinite(keypoints_px).all(axis=-1)
-    # COCO ignores unmatched detections by their area; with one range over all areas any value does.
-    keypoints = _triples(keypoints_px, given, _FAR_PX)
-    return {"image_id": image_id, "area": 1.0, "score": float(score), "keypoints": keypoints}
-
-
-def _triples(keypoints_px: np.ndarray, given: np.ndarray, otherwise: float) -> list[float]:
-    points = np.where(given[:, None], keypoints_px, otherwise)
-    return np.concatenate([points, given[:, None]], axis=-1).ravel().tolist()
-
-
-def run(image_ids: list[int], truth: list[dict], found: list[dict], sigmas: np.ndarray) -> Matches:
-    """Match detections to people by OKS.
-
-    Parameters
-    ----------
-    image_ids : list of int
-        All images.
-    truth, found : list of dict
-        Rows from `truth_row` and `found_row`.
-    sigmas : array, shape (k,)
-        Constants of the keypoints.
+    image_ids : array of int, shape (n_images,)
+        All images, ascending.
+    people : People
+        Who is to be found.
+    found : Found
+        What was; the 20 best of a slot take part.
+    similarity : callable
+        OKS, or what takes its place.
+    per_image : int, optional
+        Number of slots of an image; those of the first image come first.
 
     Returns
     -------
     Matches
     """
-    cocoeval = COCOeval(_index(image_ids, truth), _index(image_ids, found), "keypoints")
-    cocoeval.params.kpt_oks_sigmas = sigmas
-    cocoeval.params.maxDets = [MAX_DETECTIONS]
-    cocoeval.params.iouThrs, cocoeval.params.recThrs = OKS_THRESHOLDS, RECALLS
-    cocoeval.params.areaRng, cocoeval.params.areaRngLbl = [[0.0, np.inf]], ["all"]
-    cocoeval.evaluate()
-    return _matches(cocoeval)
+    kept, rank = _ranked(found)
+    by_slot = np.argsort(people.slots, kind="stable")
+    taken = np.zeros((len(OKS_THRESHOLDS), len(by_slot)), dtype=bool)
+    matched = np.full((len(OKS_THRESHOLDS), len(kept)), -1)
+    for rows, sorted_people in _rivals(people.slots[by_slot], found.slots[kept], rank):
+        who = by_slot[sorted_people]
+        fits = similarity(who, kept[rows])
+        chosen = _chosen(fits, ~taken[:, who] | people.is_crowd[who], people.counts[who])
+        at, row = np.nonzero(chosen >= 0)
+        matched[at, rows[row]] = person = who[row, chosen[at, row]]
+        taken[at, person] = True
+    order = np.argsort(-found.scores[kept], kind="stable")
+    matched = matched[:, order]
+    n_people = np.bincount(people.slots[people.counts] // per_image, minlength=len(image_ids))
+    is_true = (matched >= 0) & np.append(people.counts, False)[matched]
+    return Matches(image_ids, n_people, found.slots[kept][order] // per_image, is_true, matched < 0)
 
 
-def _index(image_ids: list[int], rows: list[dict]) -> Any:
-    # Ids start at 1: to pycocotools a match with id 0 is no match.
-    numbered = [{**row, "id": i, "category_id": 1} for i, row in enumerate(rows, start=1)]
-    coco = COCO()
-    images = [{"id": i} for i in image_ids]
-    coco.dataset = {"images": images, "annotations": numbered, "categories": [{"id": 1}]}
-    coco.createIndex()
-    return coco
+def _ranked(found: Found) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of the best detections of each slot, slot by slot, and each one's place among them."""
+    order = np.lexsort((-found.scores, found.slots))
+    slots = found.slots[order]
+    rank = np.arange(len(slots)) - np.searchsorted(slots, slots)
+    best = rank < MAX_DETECTIONS
+    return order[best], rank[best]
 
 
-def _matches(cocoeval: Any) -> Matches:
-    image_ids = np.array(cocoeval.params.imgIds, dtype=np.int64)
-    n_people = np.zeros(len(image_ids), dtype=int)
-    none = np.zeros((len(OKS_THRESHOLDS), 0), dtype=bool)
-    rows, scores, right, wrong = [np.zeros(0, dtype=int)], [np.zeros(0)], [none], [none]
-    for i, image in enumerate(cocoeval.evalImgs):
-        if image is not None:
-            n_people[i] = np.count_nonzero(np.asarray(image["gtIgnore"]) == 0)
-            rows.append(np.full(len(image["dtScores"]), i))
-            scores.append(np.array(image["dtScores"], dtype=float))
-            matched, counted = image["dtMatches"] > 0, ~image["dtIgnore"]
-            right.append(matched & counted)
-            wrong.append(~matched)  # over all areas, only matched detections are ever ignored
-    order = np.argsort(-np.concatenate(scores), kind="stable")
-    true, false = (np.concatenate(parts, axis=1)[:, order] for parts in (right, wrong))
-    return Matches(image_ids, n_people, np.concatenate(rows)[order], true, false)
+def _rivals(
+    people_slots: np.ndarray, found_slots: np.ndarray, rank: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Places of detections of one rank, the best first, and those of the people in the slot of each."""
+    first = np.searchsorted(people_slots, found_slots)
+    n = np.searchsorted(people_slots, found_slots, side="right") - first
+    for at_rank, n_people in sorted(set(zip(rank.tolist(), n.tolist(), strict=True))):
+        places = np.flatnonzero((rank == at_rank) & (n == n_people))
+        size = max(1, _BLOCK // max(1, n_people))
+        for part in np.split(places, range(size, len(places), size)) if n_people else ():
+            yield part, first[part, None] + np.arange(n_people)
+
+
+def _chosen(fits: np.ndarray, free: np.ndarray, counted: np.ndarray) -> np.ndarray:
+    """Whom detections are matched to: their places, -1 for nobody; shape (10, n_detections).
+
+    A detection takes whom it fits best, of equal ones the last, of those free and near enough who count; only
+    where there is none, of those who do not.
+
+    Parameters
+    ----------
+    fits : array, shape (n_detections, n_people)
+        OKS.
+    free : array of bool, shape (10, n_detections, n_people)
+    counted : array of bool, shape (n_detections, n_people)
+    """
+    near = free & (fits >= OKS_THRESHOLDS[:, None, None])
+    near &= counted | ~(near & counted).any(axis=-1, keepdims=True)
+    last = np.where(near, fits, -1.0)[..., ::-1].argmax(axis=-1)
+    return np.where(near.any(axis=-1), fits.shape[1] - 1 - last, -1)
 
 
 def precision_recall(matches: Matches, weights: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -170,38 +151,52 @@ def precision_recall(matches: Matches, weights: np.ndarray | None = None) -> tup
     ----------
     matches : Matches
         Which detections are right.
-    weights : array of int, shape (n_images,), optional
+    weights : array of int, shape (..., n_images), optional
         How often each image occurs; once when left out.
 
     Returns
     -------
-    precision : array, shape (10, 101)
+    precision : array, shape (..., 10, 101)
         NaN when nobody counts.
-    recall : array, shape (10,)
+    recall : array, shape (..., 10)
         NaN when nobody counts.
     """
     weights = np.ones(len(matches.image_ids), dtype=int) if weights is None else weights
-    n_people = int((matches.n_people * weights).sum())
-    n_thresholds = len(matches.is_true)
-    if n_people == 0:
-        return np.full((n_thresholds, len(RECALLS)), np.nan), np.full(n_thresholds, np.nan)
-    times = weights[matches.image_rows]
-    true = np.cumsum(matches.is_true * times, axis=1, dtype=float)
-    false = np.cumsum(matches.is_false * times, axis=1, dtype=float)
-    recall = true / n_people
-    envelope = np.maximum.accumulate((true / (false + true + np.spacing(1)))[:, ::-1], axis=1)[:, ::-1]
-    reached = np.concatenate([envelope, np.zeros((n_thresholds, 1))], axis=1)  # past the last: precision 0
-    precision = np.stack([row[np.searchsorted(r, RECALLS)] for row, r in zip(reached, recall, strict=True)])
-    return precision, recall[:, -1] if recall.shape[1] else np.zeros(n_thresholds)
+    draws = weights.reshape(-1, weights.shape[-1])
+    n_people = draws @ matches.n_people
+    precision = np.zeros((len(draws), len(OKS_THRESHOLDS), len(RECALLS)))
+    recall = np.zeros(precision.shape[:2])
+    times, counted, seen = draws[:, matches.image_rows], None, None
+    for t, (is_true, is_false) in enumerate(zip(matches.is_true, matches.is_false, strict=True)):
+        if seen is None or (counted != is_true | is_false).any():
+            counted = is_true | is_false
+            seen = np.cumsum(times * counted, axis=1)
+        # Precision rises only at what is right, and recall, too.
+        rows = np.flatnonzero(is_true)
+        true = np.cumsum(times.take(rows, axis=1), axis=1)
+        reached = true / np.maximum(n_people, 1)[:, None]
+        rising = np.maximum.accumulate((true / (seen.take(rows, axis=1) + np.spacing(1)))[:, ::-1], axis=1)[
+            :, ::-1
+        ]
+        for of_draw, r, envelope in zip(precision[:, t], reached, rising, strict=True):
+            at = r.searchsorted(RECALLS)
+            n = at.searchsorted(len(r))  # past the last: precision 0
+            of_draw[:n] = envelope[at[:n]]
+        recall[:, t] = reached[:, -1] if reached.shape[1] else 0.0
+    precision[n_people == 0], recall[n_people == 0] = np.nan, np.nan
+    return precision.reshape(*weights.shape[:-1], *precision.shape[1:]), recall.reshape(
+        *weights.shape[:-1], -1
+    )
 
 
-def metrics(precision: np.ndarray, recall: np.ndarray) -> dict[str, float]:
-    """AP, AP50, AP75, AR, AR50, AR75 from precision (10, 101) and recall (10,).
+def metrics(precision: np.ndarray, recall: np.ndarray) -> dict[str, np.ndarray]:
+    """AP, AP50, AP75, AR, AR50, AR75 from precision (..., 10, 101) and recall (..., 10).
 
     Examples
     --------
-    >>> metrics(np.full((10, 101), 0.5), np.linspace(1.0, 0.1, 10))["AR75"]
+    >>> float(metrics(np.full((10, 101), 0.5), np.linspace(1.0, 0.1, 10))["AR75"])
     0.5
     """
-    values = [part.mean() for of in (precision, recall) for part in (of, of[0], of[_AT_75])]
-    return dict(zip(METRICS, map(float, values), strict=True))
+    of_precision = precision.mean(axis=(-2, -1)), *(precision[..., t, :].mean(axis=-1) for t in (0, _AT_75))
+    of_recall = recall.mean(axis=-1), recall[..., 0], recall[..., _AT_75]
+    return dict(zip(METRICS, (*of_precision, *of_recall), strict=True))

@@ -1,69 +1,20 @@
-"""Average precision and recall of keypoint detections: COCO's protocol, its open choices explicit.
+"""Average precision and recall of keypoint detections: COCO's protocol, its open choices in `options`."""
 
-The options say what tools and papers leave open or do differently; the defaults are the rules of
-COCO and COCO-WholeBody with Halpe's sigmas:
-
-- `sigmas`: "halpe" (every hand keypoint .015) or "wholebody" (.017-.047); the body's 17 are the same.
-- `area`, the s² of OKS: "segment" (annotated), "box" (width x height), "box53" (0.53 of that, as tools
-  do without segments), "source" (the segment before HiCP cut the head off; in HiCP folders only).
-- `unlabelled`, people without a labelled keypoint of the group: "ignore" (COCO: they do not count, and
-  detections in their surroundings are forgiven) or "drop" (as if not there: such detections are wrong).
-- `absent`, detections without a keypoint of the group: "drop" (COCO-WholeBody) or "count" (the Halpe
-  tool: each a false positive).
-- `others`, the other people in a HiCP crop: "ignore" (detections of them are forgiven) or "count" (wrong).
-- `score`, what detections are ranked by: "person", or "group": the mean score of the group's keypoints, 0 for
-  one that is not given, as it adds 0 to OKS. Bodies go by the first; hands by the second, for the score of a
-  person is the body's (COCO-WholeBody ranks hands by it, too).
-
-A keypoint the detection does not give adds 0 to OKS. Crowds are ignored. The 20 best detections of an
-image take part.
-"""
-
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal, get_args, get_type_hints
+from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.keypoints import GROUPS, N_KEYPOINTS, NAMES, SIGMAS
+from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES, SIGMAS
+from hicp_lib.core.oks import oks
 from hicp_lib.evaluation.ap import cocoeval
-from hicp_lib.evaluation.matching import best_oks
+from hicp_lib.evaluation.ap.options import VISIBLE, Options, choose
 from hicp_lib.formats.annotations import Annotations
 
 _SEGMENT_OF_BOX = 0.53  # area of a person's segment over that of the box, as tools take it
-
-
-@dataclass(frozen=True)
-class Options:
-    """The choices of an evaluation; the module's text explains them.
-
-    Raises
-    ------
-    InputError
-        For a value that is not known.
-
-    Examples
-    --------
-    >>> Options(area="bbox")
-    Traceback (most recent call last):
-    hicp_lib.core.errors.InputError: option area='bbox': expected one of segment, box, box53, source
-    """
-
-    sigmas: Literal["halpe", "wholebody"] = "halpe"
-    area: Literal["segment", "box", "box53", "source"] = "segment"
-    unlabelled: Literal["ignore", "drop"] = "ignore"
-    absent: Literal["drop", "count"] = "drop"
-    others: Literal["ignore", "count"] = "ignore"
-    score: Literal["person", "group"] = "person"
-
-    def __post_init__(self) -> None:
-        for name, kind in get_type_hints(Options).items():
-            if getattr(self, name) not in get_args(kind):
-                expected = ", ".join(get_args(kind))
-                raise InputError(f"option {name}={getattr(self, name)!r}: expected one of {expected}")
 
 
 @dataclass(frozen=True)
@@ -79,7 +30,7 @@ class Evaluation:
     AP, AP50, AP75, AR, AR50, AR75 : float
         In [0, 1]; NaN when nobody counts.
     n_people : int
-        People who count.
+        People (or hands) who count.
     n_ignored : int
         Crowds, other people, people without a labelled keypoint of the group.
     n_images, n_detections : int
@@ -130,8 +81,8 @@ def evaluate(
         The truth.
     detections : mapping of int to Detections
         By image id.
-    group : {"body", "hand"}
-        The 17 keypoints all detectors share, or the 42 of the hands.
+    group : str
+        A key of `OBJECTS`: the 17 keypoints all detectors share, the 42 of the hands, ...
     **options : str
         Fields of `Options`.
 
@@ -145,41 +96,61 @@ def evaluate(
         For detections of unknown images or with scores or coordinates that are no numbers, for unknown
         groups and options, and for area "source" where people have none.
     """
-    chosen = Options(**_defaults(group) | options)
-    check_detections(detections, annotations)
-    people = _people_seen(annotations, group, chosen)
-    keypoints = GROUPS[group]
-    truth = [
-        cocoeval.truth_row(image_id, *arrays)
-        for image_id, *arrays in zip(
-            people.image_ids.tolist(), people.keypoints_px[:, keypoints], people.visibility[:, keypoints],
-            people.boxes_px, people.areas_px2, people.is_crowd, strict=True,
-        )
-    ]  # fmt: skip
-    found = list(_detections_seen(detections, keypoints, chosen))
-    matches = cocoeval.run(list(annotations.images), truth, found, SIGMAS[chosen.sigmas][keypoints])
+    objects, chosen = choose(group, options)
+    image_ids, stacked = check_detections(detections, annotations)
+    images = np.array(sorted(annotations.images), dtype=np.int64)
+    people = people_seen(annotations, objects, chosen)
+    slots, found_px, scores = _detections_seen(np.searchsorted(images, image_ids), stacked, objects, chosen)
+    truth_px, labelled = _flat(people.keypoints_px, objects), _flat(people.visibility, objects) > 0
+    boxes_px, areas_px2, is_crowd = (
+        np.repeat(of, len(objects), axis=0) for of in (people.boxes_px, people.areas_px2, people.is_crowd)
+    )
+    sigmas = SIGMAS[chosen.sigmas][objects[0]]
+
+    def similarity(who: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        return oks(truth_px[who], labelled[who], boxes_px[who], areas_px2[who], found_px[rows, None], sigmas)
+
+    truth = cocoeval.People(
+        _slots(np.searchsorted(images, people.image_ids), objects), labelled.any(axis=1) & ~is_crowd, is_crowd
+    )
+    matches = cocoeval.match(images, truth, cocoeval.Found(slots, scores), similarity, len(objects))
     precision, recall = cocoeval.precision_recall(matches)
     n_people = int(matches.n_people.sum())
     return Evaluation(
         group=group,
         options=chosen,
-        **cocoeval.metrics(precision, recall),
+        **{name: float(value) for name, value in cocoeval.metrics(precision, recall).items()},
         n_people=n_people,
-        n_ignored=len(people) - n_people,
-        n_images=len(annotations.images),
-        n_detections=len(found),
+        n_ignored=len(truth.slots) - n_people,
+        n_images=len(images),
+        n_detections=len(scores),
         precision=precision,
         recall=recall,
         matches=matches,
     )
 
 
-def _defaults(group: str) -> dict[str, Any]:
-    return {"score": "group"} if group == "hand" else {}
+def _flat(values: np.ndarray, objects: np.ndarray) -> np.ndarray:
+    """Values of people, (n, 136, ...), as those of their objects, (n * n_objects, k, ...)."""
+    return values[:, objects].reshape(-1, objects.shape[1], *values.shape[2:])
 
 
-def check_detections(detections: Mapping[int, Detections], annotations: Annotations) -> None:
-    """Refuse what pycocotools would swallow or stumble over.
+def _slots(image_rows: np.ndarray, objects: np.ndarray) -> np.ndarray:
+    """Left hands meet left hands: an image has a slot for each of a person's objects."""
+    return (image_rows[:, None] * len(objects) + np.arange(len(objects))).ravel()
+
+
+def check_detections(
+    detections: Mapping[int, Detections], annotations: Annotations
+) -> tuple[np.ndarray, Detections]:
+    """Refuse what an evaluator would swallow or stumble over, and put the rest one after the other.
+
+    Returns
+    -------
+    image_ids : array of int, shape (n,)
+        Of the people found.
+    found : Detections
+        All n of them.
 
     Raises
     ------
@@ -187,36 +158,62 @@ def check_detections(detections: Mapping[int, Detections], annotations: Annotati
         As `evaluate`.
     """
     for image_id, found in detections.items():
-        where = f"detections of image {image_id}"
         if image_id not in annotations.images:
-            raise InputError(
-                f"{where}: not among the annotated images; evaluate them on their own annotations"
-            )
+            problem = "not among the annotated images; evaluate them on their own annotations"
+            raise InputError(f"detections of image {image_id}: {problem}")
         shapes, n = (found.keypoints_px.shape, found.scores.shape), len(found)
         if shapes != ((n, N_KEYPOINTS, 2), (n, N_KEYPOINTS)):
-            raise InputError(
-                f"{where}: shapes {shapes}; expected (n, {N_KEYPOINTS}, 2) and (n, {N_KEYPOINTS})"
-            )
-        for i, score in enumerate(found.person_scores):
-            if not np.isfinite(score):
-                raise InputError(f"{where}: score of person {i} is {score}; expected a finite number")
-        # A keypoint that is not given is NaN in both coordinates and has score 0; all others are finite.
-        given = ~np.isnan(found.keypoints_px).all(axis=-1)
-        sound = np.where(given, np.isfinite(found.keypoints_px).all(axis=-1), found.scores == 0)
-        for i, k in np.argwhere(~(sound & np.isfinite(found.scores)))[:1]:
-            value = (*found.keypoints_px[i, k].tolist(), float(found.scores[i, k]))
-            raise InputError(f"{where}: {NAMES[k]} of person {i} is {value}; expected finite numbers")
+            expected = f"expected (n, {N_KEYPOINTS}, 2) and (n, {N_KEYPOINTS})"
+            raise InputError(f"detections of image {image_id}: shapes {shapes}; {expected}")
+    parts = [
+        (of.keypoints_px, of.scores, of.person_scores) for of in (Detections.none(), *detections.values())
+    ]
+    stacked = Detections(*map(np.concatenate, zip(*parts, strict=True)))
+    image_ids = np.repeat(np.array(list(detections), dtype=np.int64), list(map(len, detections.values())))
+    sound = _sound(stacked)
+    for i in np.flatnonzero(~(np.isfinite(stacked.person_scores) & sound.all(axis=1)))[:1].tolist():
+        where = f"detections of image {image_ids[i]}"
+        person = f"person {i - int(np.argmax(image_ids == image_ids[i]))}"
+        k = int(sound[i].argmin())
+        value = *stacked.keypoints_px[i, k].tolist(), float(stacked.scores[i, k])
+        if sound[i, k]:
+            score = stacked.person_scores[i]
+            raise InputError(f"{where}: score of {person} is {score}; expected a finite number")
+        raise InputError(f"{where}: {NAMES[k]} of {person} is {value}; expected finite numbers")
+    return image_ids, stacked
 
 
-def _people_seen(annotations: Annotations, group: str, options: Options) -> Annotations:
-    """The people an evaluation sees, with `areas_px2` as the options want them."""
-    if group not in GROUPS:
-        raise InputError(f"group {group!r}: expected one of {', '.join(GROUPS)}")
-    labelled = (annotations.visibility[:, GROUPS[group]] > 0).any(axis=1)
+def _sound(found: Detections) -> np.ndarray:
+    """Which keypoints are finite, or not given: NaN in both coordinates, with score 0; (n, 136)."""
+    u, v = found.keypoints_px[..., 0], found.keypoints_px[..., 1]
+    absent = np.isnan(u) & np.isnan(v) & (found.scores == 0)
+    return np.isfinite(found.scores) & (absent | np.isfinite(u) & np.isfinite(v))
+
+
+def people_seen(annotations: Annotations, objects: np.ndarray, options: Options) -> Annotations:
+    """The people an evaluation sees, with `visibility` and `areas_px2` as the options want them.
+
+    Parameters
+    ----------
+    annotations : Annotations
+        All.
+    objects : array of int, shape (n_objects, k)
+        Keypoints of the group.
+    options : Options
+        The choices made.
+
+    Returns
+    -------
+    Annotations
+    """
+    visibility = annotations.visibility
+    if options.labelled == "visible":
+        visibility = np.where(visibility >= VISIBLE, visibility, 0.0)
+    labelled = (visibility[:, objects] > 0).any(axis=(1, 2))
     seen = labelled | annotations.is_crowd | (options.unlabelled == "ignore")
     if options.others == "count":
         seen &= ~annotations.is_other
-    people = annotations.take(seen)
+    people = replace(annotations, visibility=visibility).take(seen)
     return replace(people, areas_px2=_areas(people, options.area))
 
 
@@ -239,79 +236,11 @@ def _source_area(people: Annotations, i: int) -> float:
 
 
 def _detections_seen(
-    detections: Mapping[int, Detections], keypoints: np.ndarray, options: Options
-) -> Iterator[dict]:
-    for image_id, found in detections.items():
-        points = found.keypoints_px[:, keypoints]
-        given = np.isfinite(points).all(axis=-1).any(axis=-1)
-        scores = {"person": found.person_scores, "group": found.scores[:, keypoints].mean(axis=-1)}
-        for person, any_given, score in zip(points, given, scores[options.score], strict=True):
-            if any_given or options.absent == "count":
-                yield cocoeval.found_row(image_id, person, score)
-
-
-def person_oks(
-    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body", **options: Any
-) -> pd.DataFrame:
-    """OKS of the best-fitting detection for each person who counts, 0 when nobody was found.
-
-    Parameters
-    ----------
-    annotations : Annotations
-        The truth.
-    detections : mapping of int to Detections
-        By image id.
-    group : {"body", "hand"}
-        Of keypoints.
-    **options : str
-        Fields of `Options`.
-
-    Returns
-    -------
-    DataFrame
-        Columns `image_id, annotation_id, oks, n_labelled`.
-    """
-    chosen = Options(**_defaults(group) | options)
-    check_detections(detections, annotations)
-    people = _people_seen(annotations, group, chosen)
-    keypoints = GROUPS[group]
-    n_labelled = (people.visibility[:, keypoints] > 0).sum(axis=1)
-    rows = [
-        (people.image_ids[i], people.ids[i], fit, n_labelled[i])
-        for i, fit in best_oks(people, detections, keypoints, SIGMAS[chosen.sigmas][keypoints])
-    ]
-    return pd.DataFrame(rows, columns=["image_id", "annotation_id", "oks", "n_labelled"])
-
-
-def sensitivity_table(
-    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body"
-) -> pd.DataFrame:
-    """How the figures move when one option at a time leaves its default.
-
-    Parameters
-    ----------
-    annotations : Annotations
-        The truth.
-    detections : mapping of int to Detections
-        By image id.
-    group : {"body", "hand"}
-        Of keypoints.
-
-    Returns
-    -------
-    DataFrame
-        Columns `changed` ("default", or e.g. "area=box"), those of `Evaluation.row`, and `AP_change` against
-        the default. Area "source" is left out where people have none.
-    """
-    counted = np.flatnonzero(~annotations.is_crowd)
-    has_source = all("source_area" in annotations.extras[i] for i in counted)
-    variants: dict[str, dict[str, str]] = {"default": {}}
-    default = asdict(Options(**_defaults(group)))
-    for name, kind in get_type_hints(Options).items():
-        values = [v for v in get_args(kind) if v != default[name] and (v != "source" or has_source)]
-        variants |= {f"{name}={value}": {name: value} for value in values}
-    table = pd.DataFrame(
-        {"changed": changed, **evaluate(annotations, detections, group, **variant).row()}
-        for changed, variant in variants.items()
-    )
-    return table.assign(AP_change=table["AP"] - table["AP"].iloc[0])
+    image_rows: np.ndarray, found: Detections, objects: np.ndarray, options: Options
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Slots, keypoints and scores of the objects that take part."""
+    points = _flat(found.keypoints_px, objects)
+    of_group = _flat(found.scores, objects).mean(axis=-1)
+    scores = np.repeat(found.person_scores, len(objects)) if options.score == "person" else of_group
+    seen = np.isfinite(points[..., 0]).any(axis=-1) | (options.absent == "count")
+    return _slots(image_rows, objects)[seen], points[seen], scores[seen]

@@ -14,13 +14,12 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND, SIGMAS
 from hicp_lib.detectors.combined.arbitration import ArbitrationRule
 from hicp_lib.detectors.combined.hand_squares import SEED_11, SEED_11_THUNDER, SquareRule
 from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
-from hicp_lib.evaluation.ap.evaluate import check_detections, evaluate
+from hicp_lib.evaluation.ap.evaluate import evaluate
+from hicp_lib.evaluation.ap.person_oks import person_oks
 from hicp_lib.evaluation.cases import Found, Truth
-from hicp_lib.evaluation.matching import best_oks
 from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
 from hicp_lib.formats.annotations import Annotations, source_images
 
@@ -60,40 +59,6 @@ def thresholds() -> pd.DataFrame:
     rows = [(field.name, field.default, field.metadata["chosen"]) for field in rules]
     rows += [(name, list(INGREDIENTS.values())[-1][name], chosen) for name, chosen in _CHOSEN.items()]
     return pd.DataFrame(rows, columns=["threshold", "value", "chosen"]).astype({"value": str})
-
-
-def hand_oks(
-    annotations: Annotations, detections: Mapping[int, Detections], sigmas: str = "halpe"
-) -> pd.DataFrame:
-    """OKS of each labelled hand of the people who count, with the detection that fits it best.
-
-    Parameters
-    ----------
-    annotations : Annotations
-        The truth.
-    detections : mapping of int to Detections
-        By image id.
-    sigmas : {"halpe", "wholebody"}
-        Constants of the keypoints.
-
-    Returns
-    -------
-    DataFrame
-        Columns `image_id, annotation_id, side` ("left", "right"), `oks` (0 when not found).
-
-    Raises
-    ------
-    InputError
-        As `hicp_lib.evaluation.ap.evaluate.evaluate`.
-    """
-    check_detections(detections, annotations)
-    people = annotations.take(~annotations.is_other)
-    rows = [
-        (people.image_ids[i], people.ids[i], side, fit)
-        for side, points in (("left", LEFT_HAND), ("right", RIGHT_HAND))
-        for i, fit in best_oks(people, detections, points, SIGMAS[sigmas][points])
-    ]
-    return pd.DataFrame(rows, columns=["image_id", "annotation_id", "side", "oks"])
 
 
 def compare_hands(
@@ -143,23 +108,19 @@ def _rows(
     samples = resample(evaluations, n_resamples, seed, clusters)
     step: Any = (np.nan,) * 3
     for k, (variant, run) in enumerate(runs.items()):
-        ap = _of_ap(intervals(evaluations[k].metrics(), samples[k]))
+        ap = intervals(evaluations[k].metrics(), samples[k])["AP"]
         if k:
-            step = _of_ap(difference(evaluations[k], evaluations[k - 1], samples[k], samples[k - 1]))
+            step = difference(evaluations[k], evaluations[k - 1], samples[k], samples[k - 1])["AP"]
         counts = _counts(people, run, baseline, clusters)
         n_hands, n_found, _ = (int(n) for n in counts.sum(axis=0))
         found_of, ratio = (_with_interval(counts, 1, per, n_resamples, seed) for per in (0, 2))
         yield variant, *ap, *step, evaluations[k].AR50, n_hands, n_found, *found_of, *ratio
 
 
-def _of_ap(figures: pd.DataFrame) -> pd.Series:
-    return figures.set_index("metric").loc["AP", ["value", "low", "high"]]
-
-
 def _counts(people: Annotations, found: Mapping, baseline: Mapping, clusters: Mapping) -> np.ndarray:
     """Per source image: labelled hands, those found, those the baseline finds; shape (n_sources, 3)."""
-    table = hand_oks(people, found)[["image_id", "oks"]].assign(n=1)
-    table["found"], table["base"] = table["oks"] > FOUND_OKS, hand_oks(people, baseline)["oks"] > FOUND_OKS
+    table, base = (person_oks(people, of, "each hand", sigmas="halpe") for of in (found, baseline))
+    table = table.assign(n=1, found=table["oks"] > FOUND_OKS, base=base["oks"] > FOUND_OKS)
     sources = table["image_id"].map(clusters)
     return table.groupby(sources, sort=True)[["n", "found", "base"]].sum().to_numpy(float)
 

@@ -1,18 +1,27 @@
-"""What keeps a detector from an average precision of 1: its network, the missing head, the person finder.
+"""What average precision is lost to: network, missing head, person finder; and to how it is measured.
 
 A top-down detector is asked three times: with the whole image as its only box, with the boxes of a person
 finder, and with the true boxes. What it loses with the true boxes is its network's; what it loses beyond that
 with the finder's is the finder's. A bottom-up detector needs no box, and has no such share.
+
+From Basic to Headless the measure changes along with the picture: head keypoints leave the score, the area
+by which OKS allows for errors shrinks with the crop, and the head's scores leave the ranking.
+`head_loss_shares` takes these one by one out of the loss.
 """
 
+from dataclasses import replace
+
+import numpy as np
 import pandas as pd
 
-from hicp_lib.evaluation.ap.bootstrap import intervals
-from hicp_lib.evaluation.ap.metric_table import Drawn
-from hicp_lib.evaluation.cases import labelled
+from hicp_lib.evaluation.ap.metric_table import Drawn, draw_cases
+from hicp_lib.evaluation.cases import Found, Truth
+from hicp_lib.evaluation.statistics.resampling import with_interval
+from hicp_lib.formats.annotations import Annotations
 
 BOX_SOURCES = {"image": "whole image", "detected": "found boxes", "gt": "true boxes"}
 SHARES = ("network", "missing head", "person finder")
+HEAD_SHARES = ("head points", "area", "ranking", "detector")
 
 
 def box_variants(top_down: str, bottom_up: str) -> dict[str, tuple[str, dict[str, str]]]:
@@ -48,7 +57,7 @@ def loss_shares(drawn: Drawn, top_down: str, bottom_up: str) -> pd.DataFrame:
         head's what true boxes lose from there; a share can be negative.
     """
     _, found_boxes, true_boxes, _ = box_variants(top_down, bottom_up)
-    tables = []
+    rows = []
     for subset in dict.fromkeys(subset for subset, *_ in drawn):
         lost = {}
         for ideal, real in ((true_boxes, found_boxes), (bottom_up, bottom_up)):
@@ -56,18 +65,79 @@ def loss_shares(drawn: Drawn, top_down: str, bottom_up: str) -> pd.DataFrame:
             lost[real] = _by_share(drawn, (start, (subset, ideal), (subset, real)))
         pair = {share: lost[bottom_up][share] - lost[found_boxes][share] for share in lost[bottom_up]}
         for detector, shares in (*lost.items(), (f"{bottom_up} less {top_down}", pair)):
-            for share, losses in shares.items():
-                table = intervals({"AP": losses.iloc[0]}, losses.iloc[1:].to_frame("AP"))
-                labels = {"subset": subset, "detector": detector, "share": share}
-                tables.append(labelled(table.drop(columns="metric"), **labels))
-    return pd.concat(tables, ignore_index=True)
+            rows += [(subset, detector, share, *with_interval(loss)) for share, loss in shares.items()]
+    return pd.DataFrame(rows, columns=["subset", "detector", "share", "value", "low", "high"])
 
 
-def _by_share(drawn: Drawn, chain: tuple[tuple[str, str], ...]) -> dict[str, pd.Series]:
+def _by_share(drawn: Drawn, chain: tuple[tuple[str, str], ...]) -> dict[str, np.ndarray]:
     """Losses of AP from case to case of a chain, as it is and on the draws; none between equal cases."""
-    values = [
-        pd.Series([evaluation.AP, *samples["AP"]], dtype=float)
-        for evaluation, samples in (drawn[*case, "body"] for case in chain)
-    ]
+    values = [_values(drawn, (*case, "body")) for case in chain]
     steps = zip(SHARES, (None, *chain), chain, [1.0, *values], values, strict=False)
     return {share: before - after for share, last, case, before, after in steps if case != last}
+
+
+def _values(drawn: Drawn, case: tuple[str, str, str]) -> np.ndarray:
+    evaluation, samples = drawn[case]
+    return np.append(evaluation.AP, samples["AP"])
+
+
+def head_loss_shares(
+    truth: Truth, found: Found, drawn: Drawn, n_resamples: int = 1000, seed: int = 0
+) -> pd.DataFrame:
+    """The loss of AP from Basic to Headless, and what of it is the definition's.
+
+    The loss is taken four times, each time with one thing more held equal: as it is; on the keypoints that
+    are labelled in both; with the person's area before any cut; ranked by the scores of the keypoints below
+    the head (hands are ranked by their own throughout). What a step takes away is that thing's share, what is
+    left is the detector's.
+
+    Parameters
+    ----------
+    truth : Truth
+        By subset, from `metric_table.same_people`, of HiCP folders.
+    found : Found
+        By image id, of every subset and detector, from there, too.
+    drawn : Drawn
+        Of these, from `metric_table.draw_cases`.
+    n_resamples, seed : int, optional
+        As given to `draw_cases`.
+
+    Returns
+    -------
+    DataFrame
+        Columns `group, detector, share` ("total", and `HEAD_SHARES`, which add up to it), `value, low, high`:
+        95 % bootstrap intervals over source images, all on the same draws.
+    """
+    shared = _shared_labels(truth["basic"], truth["headless"])
+    pair = {case: run for case, run in found.items() if case[0] in shared}
+    rows = []
+    for group, without_head in (("body", "below the head"), ("hand", "hand")):
+        losses = [_losses({case: of for case, of in drawn.items() if case[-1] == group})]
+        for held in ({}, {"area": "source"}, {"area": "source", "score": "group"}):
+            losses.append(_losses(draw_cases(shared, pair, n_resamples, seed, [without_head], **held)))
+        for detector, total in losses[0].items():
+            chain = [loss[detector] for loss in losses]
+            shares = [before - after for before, after in zip(chain, [*chain[1:], 0.0], strict=True)]
+            named = zip(("total", *HEAD_SHARES), (total, *shares), strict=True)
+            rows += [(group, detector, share, *with_interval(values)) for share, values in named]
+    return pd.DataFrame(rows, columns=["group", "detector", "share", "value", "low", "high"])
+
+
+def _losses(drawn: Drawn) -> dict[str, np.ndarray]:
+    """By detector, AP on Basic less AP on Headless, as it is and on the draws."""
+    cases = [case for case in drawn if case[0] == "basic"]
+    return {case[1]: _values(drawn, case) - _values(drawn, ("headless", *case[1:])) for case in cases}
+
+
+def _shared_labels(basic: Annotations, headless: Annotations) -> dict[str, Annotations]:
+    """Both subsets with the labels only that the same person has in both."""
+    counted = [np.flatnonzero(~of.is_crowd) for of in (basic, headless)]
+    _, *same = np.intersect1d(basic.ids[counted[0]], headless.ids[counted[1]], return_indices=True)
+    rows = [of_subset[chosen] for of_subset, chosen in zip(counted, same, strict=True)]
+    both = (basic.visibility[rows[0]] > 0) & (headless.visibility[rows[1]] > 0)
+    shared = {}
+    for subset, people, chosen in zip(("basic", "headless"), (basic, headless), rows, strict=True):
+        visibility = people.visibility.copy()
+        visibility[chosen] = np.where(both, visibility[chosen], 0.0)
+        shared[subset] = replace(people, visibility=visibility)
+    return shared

@@ -5,18 +5,22 @@ together in the bootstrap.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 
 from hicp_lib.core.keypoints import GROUPS
 from hicp_lib.detectors.runtime.results import Timed
-from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
-from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate, person_oks
-from hicp_lib.evaluation.cases import Found, Truth, all_cases, labelled, per_case
+from hicp_lib.evaluation.ap.bootstrap import Samples, difference, intervals, resample
+from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate
+from hicp_lib.evaluation.ap.person_oks import person_oks
+from hicp_lib.evaluation.cases import Found, Truth, all_cases, per_case
 from hicp_lib.formats.annotations import Annotations, source_images
 
+# All groups an average precision is given for: hands as one object, and every hand by itself.
+GROUPS_OF_OBJECTS = (*GROUPS, "each hand")
 # (subset, detector, group) -> its evaluation, and its figures on draws that all detectors share
-Drawn = Mapping[tuple[str, str, str], tuple[Evaluation, pd.DataFrame]]
+Drawn = Mapping[tuple[str, str, str], tuple[Evaluation, Samples]]
 
 
 def compare(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
@@ -34,7 +38,7 @@ def compare(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) 
     Returns
     -------
     DataFrame
-        Columns `subset, group, detector, metric, value, low, high, n_people`.
+        Columns `subset, group, labelled, detector, metric, value, low, high, n_people`.
     """
     return metric_table(draw_cases(truth, found, n_resamples, seed))
 
@@ -45,7 +49,8 @@ def draw_cases(
     n_resamples: int = 1000,
     seed: int = 0,
     groups: Sequence[str] = tuple(GROUPS),
-) -> dict[tuple[str, str, str], tuple[Evaluation, pd.DataFrame]]:
+    **options: Any,
+) -> dict[tuple[str, str, str], tuple[Evaluation, Samples]]:
     """Every case evaluated, as it is and on draws of source images: what `metric_table` and `pairs` read.
 
     The detectors of one subset and group are drawn together, so that they can be told apart on the same
@@ -60,18 +65,19 @@ def draw_cases(
     n_resamples, seed : int, optional
         Number of bootstrap draws, and what they are drawn with.
     groups : sequence of str, optional
-        Groups of keypoints that are looked at.
+        Keys of `options.OBJECTS` that are looked at, where a detector gives such keypoints.
+    **options : str
+        Fields of `options.Options`.
 
     Returns
     -------
-    dict of (str, str, str) to (Evaluation, DataFrame)
+    dict of (str, str, str) to (Evaluation, Samples)
         By subset, detector and group: its evaluation, and its figures on the draws.
     """
-    cases = [case for case in all_cases(found) if case[-1] in groups]
-    drawn = {}
+    cases, drawn = list(all_cases(found, groups)), {}
     for subset, group in dict.fromkeys((subset, group) for subset, _, group in cases):
         detectors = [case[1] for case in cases if case[::2] == (subset, group)]
-        evaluations = [evaluate(truth[subset], found[subset, detector], group) for detector in detectors]
+        evaluations = [evaluate(truth[subset], found[subset, d], group, **options) for d in detectors]
         samples = resample(evaluations, n_resamples, seed, source_images(truth[subset]))
         for detector, evaluation, sample in zip(detectors, evaluations, samples, strict=True):
             drawn[subset, detector, group] = evaluation, sample
@@ -80,11 +86,13 @@ def draw_cases(
 
 def metric_table(drawn: Drawn) -> pd.DataFrame:
     """AP and AR of every case of `draw_cases`: what `compare` returns."""
-    tables = []
-    for (subset, detector, group), (evaluation, samples) in drawn.items():
-        table = intervals(evaluation.metrics(), samples).assign(n_people=evaluation.n_people)
-        tables.append(labelled(table, subset=subset, group=group, detector=detector))
-    return pd.concat(tables, ignore_index=True)
+    columns = "subset group labelled detector metric value low high n_people".split()
+    rows = [
+        (subset, group, its.options.labelled, detector, metric, *figure, its.n_people)
+        for (subset, detector, group), (its, samples) in drawn.items()
+        for metric, figure in intervals(its.metrics(), samples).items()
+    ]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def pairs(drawn: Drawn) -> pd.DataFrame:
@@ -101,42 +109,37 @@ def pairs(drawn: Drawn) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns `subset, group, detector, other, pair` ("a less b"), `metric, value, low, high`.
+        Columns `subset, group, labelled, detector, other, pair` ("a less b"), `metric, value, low, high`.
     """
-    columns = ["subset", "group", "detector", "other", "pair", "metric", "value", "low", "high"]
-    tables = []
-    for (subset, detector, group), (evaluation, samples) in drawn.items():
-        for (its_subset, other, its_group), (its, of_other) in drawn.items():
-            if (its_subset, its_group) == (subset, group) and other != detector:
-                table = difference(evaluation, its, samples, of_other)
-                labels = {"detector": detector, "other": other, "pair": f"{detector} less {other}"}
-                tables.append(labelled(table, subset=subset, group=group, **labels))
-    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=columns)
+    columns = "subset group labelled detector other pair metric value low high".split()
+    rows = [
+        (subset, group, its.options.labelled, detector, other, f"{detector} less {other}", metric, *figure)
+        for (subset, detector, group), (its, samples) in drawn.items()
+        for (other_subset, other, other_group), (others, of_other) in drawn.items()
+        if (other_subset, other_group) == (subset, group) and other != detector
+        for metric, figure in difference(its, others, samples, of_other).items()
+    ]
+    return pd.DataFrame(rows, columns=columns)
 
 
-def head_loss(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+def head_loss(drawn: Drawn) -> pd.DataFrame:
     """Change of AP from Basic to Headless, on the people who are in both.
 
     Parameters
     ----------
-    truth : Truth
-        By subset, "basic" and "headless".
-    found : Found
-        By image id, of every subset and detector.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    drawn : Drawn
+        From `draw_cases`, on `same_people`.
 
     Returns
     -------
     DataFrame
         Columns `group, detector, basic, headless, change, low, high, n_people`; the interval is the change's.
     """
-    drawn = draw_cases(*same_people(truth, found), n_resamples, seed)
     rows = []
     for (subset, detector, group), (basic, of_basic) in drawn.items():
         if subset == "basic":
             headless, of_headless = drawn["headless", detector, group]
-            change = difference(headless, basic, of_headless, of_basic).set_index("metric").loc["AP"]
+            change = difference(headless, basic, of_headless, of_basic)["AP"]
             rows.append((group, detector, basic.AP, headless.AP, *change, basic.n_people))
     columns = ["group", "detector", "basic", "headless", "change", "low", "high", "n_people"]
     return pd.DataFrame(rows, columns=columns).sort_values("group", kind="stable", ignore_index=True)

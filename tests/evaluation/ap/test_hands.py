@@ -12,7 +12,7 @@ from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.evaluation.ap import hands
 from hicp_lib.evaluation.ap.evaluate import evaluate
-from hicp_lib.evaluation.ap.hands import INGREDIENTS, compare_hands, hand_oks, thresholds
+from hicp_lib.evaluation.ap.hands import INGREDIENTS, compare_hands, thresholds
 from hicp_lib.report.notebooks import read_notebooks
 from tests.evaluation.made_people import make_annotations, make_detections
 
@@ -32,25 +32,24 @@ def test_each_labelled_hand_is_judged_by_itself():
     visibility = np.full((N, 136), 2.0)
     visibility[3, LEFT_HAND] = 0
     people = make_annotations(POINTS, range(N), visibility=visibility)
-    table = hand_oks(people, detections(left=range(6), right=[0]))
-    assert len(table) == 2 * N - 1
-    found = table[table["oks"] > 0.5]
-    assert sorted(found.loc[found["side"] == "left", "image_id"]) == [0, 1, 2, 4, 5]
-    assert found.loc[found["side"] == "right", "image_id"].tolist() == [0]
+    some = {("basic", "d"): detections(left=range(6), right=[0])}
+    row = compare_hands({"basic": people}, some, some, n_resamples=5).iloc[0]
+    assert (row["n_hands"], row["n_found"]) == (2 * N - 1, 6)  # of the left ones not the fourth
 
 
 def test_a_hand_on_the_wrong_side_is_not_found():
     points = POINTS.copy()
     points[:, LEFT_HAND], points[:, RIGHT_HAND] = POINTS[:, RIGHT_HAND], POINTS[:, LEFT_HAND]
-    people = make_annotations(POINTS, range(N))
-    table = hand_oks(people, {i: make_detections(points[i : i + 1]) for i in range(N)})
-    assert table["oks"].max() < 0.1
+    swapped = {("basic", "d"): {i: make_detections(points[i : i + 1]) for i in range(N)}}
+    people = {"basic": make_annotations(POINTS, range(N))}
+    assert compare_hands(people, swapped, swapped, n_resamples=5)["n_found"].item() == 0
 
 
-def test_crowds_and_others_have_no_hands_to_find():
-    people = make_annotations(POINTS, range(N), crowd=[0], extras=[{"other": i == 1} for i in range(N)])
-    assert set(hand_oks(people, {})["image_id"]) == set(range(2, N))
-    assert hand_oks(people, {})["oks"].eq(0).all()
+def test_crowds_have_no_hands_to_find():
+    people = make_annotations(POINTS, range(N), crowd=[0, 1])
+    everybody = {("basic", "d"): detections(range(N), range(N))}
+    row = compare_hands({"basic": people}, everybody, everybody, n_resamples=5).iloc[0]
+    assert (row["n_hands"], row["n_found"]) == (2 * N - 4, 2 * N - 4)
 
 
 def test_shares_and_ratios_with_intervals_around_them():
@@ -104,9 +103,11 @@ def made(options: dict) -> dict:
 
 def test_a_hand_is_found_above_one_half(monkeypatch):
     people = make_annotations(POINTS, range(N))
-    halves = {"image_id": range(N), "annotation_id": range(1, N + 1), "side": "left"}
+    halves = {"image_id": range(N), "annotation_id": range(1, N + 1)}
     for oks, found in ((0.5, 0), (np.nextafter(0.5, 1), N)):
-        monkeypatch.setattr(hands, "hand_oks", lambda *_, oks=oks: pd.DataFrame(halves | {"oks": oks}))
+        monkeypatch.setattr(
+            hands, "person_oks", lambda *_, oks=oks, **__: pd.DataFrame(halves | {"oks": oks})
+        )
         some = {("basic", "d"): detections(range(4))}
         table = compare_hands({"basic": people}, some, some, n_resamples=5)
         assert table["n_found"].tolist() == [found] and table["n_hands"].tolist() == [N]

@@ -1,11 +1,20 @@
 """Whose fault: shares that sum to what is lost, each where it was made."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.evaluation.ap.loss_shares import SHARES, box_variants, loss_shares
-from hicp_lib.evaluation.ap.metric_table import draw_cases, same_people
+from hicp_lib.core.keypoints import HEAD
+from hicp_lib.evaluation.ap.loss_shares import (
+    HEAD_SHARES,
+    SHARES,
+    box_variants,
+    head_loss_shares,
+    loss_shares,
+)
+from hicp_lib.evaluation.ap.metric_table import draw_cases, head_loss, same_people
 from tests.evaluation.made_people import make_annotations, make_detections
 
 N = 40
@@ -72,3 +81,64 @@ def test_a_run_too_small_for_intervals_has_shares():
     given = {case: {0: make_detections(points[0])} for case in found}
     table = loss_shares(draw_cases({"basic": people, "headless": people}, given, 50, groups=["body"]), *PAIR)
     assert table["value"].notna().all() and table["low"].isna().all()
+
+
+POINTS = np.random.default_rng(5).uniform(50, 400, (N, 136, 2))
+
+
+def head_shares(basic, headless, headless_area_px2=20_000.0) -> dict[str, float]:
+    """Of one detector, from what it finds of the same people with and without their heads."""
+    flags = np.full((N, 136), 2.0)
+    flags[:, HEAD] = 0
+    extras = [{"source_image_id": i, "source_area": 20_000.0} for i in range(N)]
+    truth = {
+        "basic": make_annotations(POINTS, range(N), extras=extras),
+        "headless": make_annotations(
+            POINTS, range(N), visibility=flags, areas_px2=headless_area_px2, extras=extras
+        ),
+    }
+    found = {("basic", "mediapipe-pose"): basic, ("headless", "mediapipe-pose"): headless}
+    drawn = draw_cases(truth, found, 50)
+    table = head_loss_shares(truth, found, drawn, 50).set_index(["group", "share"])
+    assert ((table["low"] <= table["value"] + 1e-12) & (table["value"] <= table["high"] + 1e-12)).all()
+    shares = table.loc["body", "value"].to_dict()
+    assert list(shares) == ["total", *HEAD_SHARES]
+    assert sum(shares[name] for name in HEAD_SHARES) == pytest.approx(shares["total"])
+    assert shares["total"] == pytest.approx(-head_loss(drawn)["change"].item())
+    return {name: round(value, 6) for name, value in shares.items()}
+
+
+def off_by(px, n=N, scores=None):
+    return {i: make_detections(POINTS[i] + [px, 0], scores and [scores[i]]) for i in range(n)}
+
+
+def test_the_same_errors_on_a_smaller_person_are_the_areas_share():
+    shares = head_shares(off_by(8), off_by(8), headless_area_px2=10_000.0)
+    assert shares["area"] > 0.05
+    assert shares["ranking"] == shares["detector"] == 0
+
+
+def test_head_points_that_were_right_are_missed_in_the_score():
+    points = POINTS + [15, 0]
+    points[:, HEAD] = POINTS[:, HEAD]
+    right = {i: make_detections(points[i]) for i in range(N)}
+    shares = head_shares(right, right)
+    assert shares["head points"] == shares["total"] > 0.05
+
+
+def test_scores_of_the_head_that_put_the_wrong_ones_first_are_the_rankings_share():
+    """One in four is wrong: with the head last, without it first; the keypoints' own scores do not change."""
+    detections = {}
+    for wrong_score in (0.1, 0.9):
+        detections[wrong_score] = {}
+        for i in range(N):
+            wrong = i % 4 == 0
+            one = make_detections(POINTS[i] + 5000.0 * wrong, [wrong_score if wrong else 0.5])
+            detections[wrong_score][i] = replace(one, scores=np.full((1, 136), 0.5 - 0.1 * wrong))
+    shares = head_shares(detections[0.1], detections[0.9])
+    assert shares["ranking"] == shares["total"] > 0.1
+
+
+def test_who_is_not_found_without_the_head_is_the_detectors_share():
+    shares = head_shares(off_by(0), off_by(0, n=N // 2))
+    assert shares["detector"] == shares["total"] > 0.4

@@ -1,0 +1,105 @@
+"""What COCO's protocol leaves open: whose keypoints count, how strictly, and what an object is.
+
+The options say what tools and papers leave open or do differently; the defaults are the rules of
+COCO and COCO-WholeBody with Halpe's sigmas:
+
+- `sigmas`: "halpe" (every hand keypoint .015) or "wholebody" (.017-.047); the body's 17 are the same.
+- `labelled`, the keypoints that count: "all" with a label, or "visible": those whose flag says so (2; COCO's
+  1 is occluded). Annotators leave many blank that they cannot see, rendered people have them all.
+- `area`, the s² of OKS: "segment" (annotated), "box" (width x height), "box53" (0.53 of that, as tools
+  do without segments), "source" (the segment before HiCP cut the head off; in HiCP folders only).
+- `unlabelled`, people without a labelled keypoint of the group: "ignore" (COCO: they do not count, and
+  detections in their surroundings are forgiven) or "drop" (as if not there: such detections are wrong).
+- `absent`, detections without a keypoint of the group: "drop" (COCO-WholeBody) or "count" (the Halpe
+  tool: each a false positive).
+- `others`, the other people in a HiCP crop: "ignore" (detections of them are forgiven) or "count" (wrong).
+- `score`, what detections are ranked by: "person", or "group": the mean score of the object's keypoints, 0
+  for one that is not given, as it adds 0 to OKS. Bodies go by the first; hands by the second, for the score
+  of a person is the body's (COCO-WholeBody ranks hands by it, too).
+
+Both hands of a person are one object of 42 keypoints with sigma .015, as in the Halpe tool (AlphaPose's):
+with one of them missing its OKS is at most about .5. "each hand" is COCO-WholeBody's way: every hand an
+object of 21, found only on its own side, with that set's sigmas.
+
+A keypoint the detection does not give adds 0 to OKS. Crowds are ignored. The 20 best detections of an
+image take part.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args, get_type_hints
+
+import numpy as np
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import GROUPS, HANDS
+from hicp_lib.formats.annotations import Annotations
+
+VISIBLE = 2  # COCO's flag; one that is labelled below is occluded
+_HAND_OPTIONS = {"score": "group"}
+_EACH_HAND_OPTIONS = {"score": "group", "sigmas": "wholebody"}
+# What is found one by one, and how unless told otherwise: per group the keypoints of each object of a person.
+OBJECTS: dict[str, tuple[np.ndarray, dict[str, str]]] = {
+    "body": (GROUPS["body"][None], {}),
+    "below the head": (GROUPS["body"][None, 5:], {}),
+    "hand": (HANDS[None], _HAND_OPTIONS),
+    "each hand": (HANDS.reshape(2, -1), _EACH_HAND_OPTIONS),
+    "left hand": (HANDS[None, :21], _EACH_HAND_OPTIONS),
+    "right hand": (HANDS[None, 21:], _EACH_HAND_OPTIONS),
+}
+
+
+@dataclass(frozen=True)
+class Options:
+    """The choices of an evaluation; the module's text explains them.
+
+    Raises
+    ------
+    InputError
+        For a value that is not known.
+
+    Examples
+    --------
+    >>> Options(area="bbox")
+    Traceback (most recent call last):
+    hicp_lib.core.errors.InputError: option area='bbox': expected one of segment, box, box53, source
+    """
+
+    sigmas: Literal["halpe", "wholebody"] = "halpe"
+    labelled: Literal["all", "visible"] = "all"
+    area: Literal["segment", "box", "box53", "source"] = "segment"
+    unlabelled: Literal["ignore", "drop"] = "ignore"
+    absent: Literal["drop", "count"] = "drop"
+    others: Literal["ignore", "count"] = "ignore"
+    score: Literal["person", "group"] = "person"
+
+    def __post_init__(self) -> None:
+        for name, kind in get_type_hints(Options).items():
+            if getattr(self, name) not in get_args(kind):
+                expected = ", ".join(get_args(kind))
+                raise InputError(f"option {name}={getattr(self, name)!r}: expected one of {expected}")
+
+
+def definitions(annotations: Annotations, group: str) -> list[tuple[str, str]]:
+    """What belongs side by side: groups and values of `labelled`, the usual ones first.
+
+    Hands as one object and every hand by itself; all labelled keypoints and, where some are marked occluded,
+    the visible ones.
+    """
+    occluded = (annotations.visibility > 0) & (annotations.visibility < VISIBLE)
+    groups = (group, "each hand") if group == "hand" else (group,)
+    return [(of, which) for of in groups for which in (("all", "visible") if occluded.any() else ("all",))]
+
+
+def choose(group: str, options: Mapping[str, Any]) -> tuple[np.ndarray, Options]:
+    """The keypoints of a group's objects, shape (n_objects, k), and the options given over its defaults.
+
+    Raises
+    ------
+    InputError
+        For a group that is not known.
+    """
+    if group not in OBJECTS:
+        raise InputError(f"group {group!r}: expected one of {', '.join(OBJECTS)}")
+    objects, defaults = OBJECTS[group]
+    return objects, Options(**defaults | dict(options))

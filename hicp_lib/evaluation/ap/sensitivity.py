@@ -1,0 +1,47 @@
+"""How average precision moves with what its definition leaves open."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import get_args, get_type_hints
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.evaluation.ap.evaluate import evaluate
+from hicp_lib.evaluation.ap.options import Options, choose
+from hicp_lib.formats.annotations import Annotations
+
+
+def sensitivity_table(
+    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body"
+) -> pd.DataFrame:
+    """How the figures move when one option at a time leaves its default.
+
+    Parameters
+    ----------
+    annotations : Annotations
+        The truth.
+    detections : mapping of int to Detections
+        By image id.
+    group : str
+        A key of `OBJECTS`.
+
+    Returns
+    -------
+    DataFrame
+        Columns `changed` ("default", or e.g. "area=box"), those of `Evaluation.row`, and `AP_change` against
+        the default. Area "source" is left out where people have none.
+    """
+    counted = np.flatnonzero(~annotations.is_crowd)
+    has_source = all("source_area" in annotations.extras[i] for i in counted)
+    variants: dict[str, dict[str, str]] = {"default": {}}
+    default = asdict(choose(group, {})[1])
+    for name, kind in get_type_hints(Options).items():
+        values = [v for v in get_args(kind) if v != default[name] and (v != "source" or has_source)]
+        variants |= {f"{name}={value}": {name: value} for value in values}
+    table = pd.DataFrame(
+        {"changed": changed, **evaluate(annotations, detections, group, **variant).row()}
+        for changed, variant in variants.items()
+    )
+    return table.assign(AP_change=table["AP"] - table["AP"].iloc[0])
