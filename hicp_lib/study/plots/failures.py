@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.datasets.visibility import CLASSES
+from hicp_lib.datasets.visibility import CLASSES, MIN_PEOPLE
 from hicp_lib.evaluation.failures.error_kinds import KINDS
 from hicp_lib.evaluation.failures.placed_keypoints import STATES
 from hicp_lib.formats.annotations import Annotations
@@ -190,6 +190,33 @@ def hallucinated_heads(table: pd.DataFrame, note: str) -> Figure:
         f"that the cut is above), coloured by score: {note}."
     )
     return Figure(figure, caption, f"Scatter of places. Share put beyond the cut: {said}.", table)
+
+
+@in_style
+def false_presence(table: pd.DataFrame, note: str) -> Figure:
+    """Parts outside the picture that are given inside it, a panel per decision; from `false_presence`."""
+    rows = table[table["n"] >= MIN_PEOPLE]
+    rows = table if rows.empty else rows
+    rows = rows.assign(row=rows["part"] + ", " + rows["subset"] + " (" + rows["n"].astype(str) + ")")
+    names, detectors, decisions = (list(rows[name].unique()) for name in ("row", "detector", "decision"))
+    step = 0.8 / max(len(detectors), 1)
+    size = 4.4 * max(len(decisions), 1) + 1, 1.5 + (0.1 + 0.13 * len(detectors)) * len(names)
+    figure, axes = new_figure(1, max(len(decisions), 1), *size, sharey=True, squeeze=False)
+    for axis, of_panel, _, decision in marks.facets(axes, rows.assign(one=0), "one", "decision"):
+        for k, detector in enumerate(detectors):
+            part = of_panel[of_panel["detector"] == detector]
+            _dots(axis, part, part["row"].map(names.index) + marks.offset(k, len(detectors), step), detector)
+        axis.set(xlim=(-0.02, 1.02), xlabel="share that is given all the same", title=decision)
+    marks.name_rows(axes[0, 0], names)
+    marks.legend_below(figure, axes, ncols=2)
+    heads = rows[(rows["part"] == "head") & (rows["subset"] == "headless")]
+    said = series_text(heads.set_index(["detector", "decision"])["value"], "{0} {2:.2f} ({1})")
+    caption = (
+        "Parts of people that are outside the picture (their number in brackets): the share that a detector "
+        "gives inside it, by what counts as given, with 95 % bootstrap intervals over source images; a head "
+        f"is given when one of its five keypoints is: {note}."
+    )
+    return Figure(figure, caption, f"Dots per part and detector. Heads that were cut off: {said}.", rows)
 
 
 @in_style

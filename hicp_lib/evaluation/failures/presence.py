@@ -1,0 +1,243 @@
+"""Is it there at all? Keypoints declared present by calibrated scores, and parts of people that are invented.
+
+A keypoint that is given inside the picture is *declared present* when its score, or better what that score
+is worth, reaches a cut; one placed outside the picture declares itself absent. What a score is worth is an
+isotonic curve (`calibration.curves`) of how often a keypoint placed in the picture is in the picture at all,
+for each detector and part of the body. It is cross-fitted: source images are split into two halves, and a
+person is judged by the curve of the half they are not in. It holds for people cut off as often as in these
+data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.images import inside
+from hicp_lib.core.keypoints import COCO_17, COCO_NAMES
+from hicp_lib.datasets.crops import with_outside
+from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
+from hicp_lib.evaluation.ap.extended_oks import PRESENCE_CUT, evaluate_extended
+from hicp_lib.evaluation.ap.metric_table import Drawn
+from hicp_lib.evaluation.calibration.curves import Calibration, split_half
+from hicp_lib.evaluation.cases import Found, Truth, labelled
+from hicp_lib.evaluation.failures.false_confidence import SURE
+from hicp_lib.evaluation.failures.placed_keypoints import landed, placed_keypoints
+from hicp_lib.evaluation.statistics.proportions import proportions
+from hicp_lib.formats.annotations import Annotations, source_images
+
+# Of each of the 17 keypoints, the part of the body: the head, or what a pair of keypoints is called.
+PART_OF = np.array(["head"] * 5 + [name.partition("_")[2] for name in COCO_NAMES[5:]])
+PARTS = tuple(dict.fromkeys(PART_OF))
+_FIRST_OF_PAIRS = 5  # the keypoints before are the head's
+MEASURES = ("OKS", "extended OKS, all given", "extended OKS, decided", "gained by deciding")
+DECISIONS = (f"score of at least {SURE}", f"calibrated score of at least {PRESENCE_CUT}")
+_GIVEN = np.nextafter(0.0, 1.0)  # a cut that every keypoint given in the picture reaches
+
+
+@dataclass(frozen=True)
+class Presence:
+    """What scores say of whether a keypoint is in the picture.
+
+    Attributes
+    ----------
+    first_half : frozenset
+        The source images of one half.
+    curves : dict of (str, str, bool) to Calibration
+        By detector, part (of `PARTS`) and whether it was fitted to the first half.
+    """
+
+    first_half: frozenset
+    curves: Mapping[tuple[str, str, bool], Calibration]
+
+    @classmethod
+    def fit(cls, placed: pd.DataFrame, seed: int = 0) -> Presence:
+        """Curves for both halves of the source images.
+
+        Parameters
+        ----------
+        placed : DataFrame
+            `placed_keypoints.placed_keypoints`.
+        seed : int, optional
+            Of the split.
+
+        Returns
+        -------
+        Presence
+        """
+        in_picture = placed["given"] & (landed(placed) != "outside")
+        rows = placed[in_picture & (placed["state"] != "unknown")]
+        half, part = split_half(rows["source_image"], seed), PART_OF[rows["keypoint"]]
+        rows = rows.assign(half=half, part=part, present=rows["state"] != "outside")
+        curves = {
+            (detector, part, bool(half)): Calibration.fit(of["score"].to_numpy(), of["present"].to_numpy())
+            for (detector, part, half), of in rows.groupby(["detector", "part", "half"])
+        }
+        return cls(frozenset(rows.loc[half, "source_image"]), curves)
+
+    def __call__(self, detector: str, source_image: object, scores: np.ndarray) -> np.ndarray:
+        """How probably keypoints that were placed in the picture are in it, by the half the image is not in.
+
+        Parameters
+        ----------
+        detector : str
+            Whose.
+        source_image : object
+            What the picture was cut from.
+        scores : array, shape (..., 17)
+            As the detector gives them; kept for a part without a curve.
+
+        Returns
+        -------
+        array, shape (..., 17)
+        """
+        worth = np.array(scores, dtype=float)
+        for part in PARTS:
+            curve = self.curves.get((detector, part, source_image not in self.first_half))
+            if curve is not None:
+                worth[..., PART_OF == part] = curve(worth[..., PART_OF == part])
+        return worth
+
+
+def declared(truth: Truth, found: Found, presence: Presence | None = None) -> dict:
+    """Detections whose body keypoints' scores say how probably each is in the picture.
+
+    Parameters
+    ----------
+    truth : Truth
+        Of crops, by subset.
+    found : Found
+        By image id, of every subset and detector.
+    presence : Presence, optional
+        What scores are worth; they stay as they are when left out.
+
+    Returns
+    -------
+    dict
+        As `found`; a keypoint placed outside the picture has score 0: it declares itself absent.
+    """
+    result = {}
+    for (subset, detector), run in found.items():
+        sources, images = source_images(truth[subset]), truth[subset].images
+        result[subset, detector] = people = {}
+        for image_id, of_image in run.items():
+            box_px = (0, 0, images[image_id].width_px, images[image_id].height_px)
+            scores = of_image.scores.copy()
+            if presence:
+                scores[:, COCO_17] = presence(detector, sources[image_id], scores[:, COCO_17])
+            scores[~inside(of_image.keypoints_px, box_px)] = 0.0
+            people[image_id] = replace(of_image, scores=scores)
+    return result
+
+
+def extended_table(
+    truth: Truth, found: Found, source: Annotations, drawn: Drawn, n_resamples: int = 1000, seed: int = 0
+) -> pd.DataFrame:
+    """AP of bodies by OKS and by extended OKS, with every given keypoint present and with a decision.
+
+    Parameters
+    ----------
+    truth : Truth
+        Of crops, by subset.
+    found : Found
+        By image id, of every subset and detector.
+    source : Annotations
+        What the crops were made from.
+    drawn : Drawn
+        From `draw_cases` of the same, on as many draws with the same seed.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they and the halves are drawn with.
+
+    Returns
+    -------
+    DataFrame
+        Columns `subset, detector, measure` (of `MEASURES`), `value, low, high, n_people`; the last measure is
+        the second less the one before, on the same draws.
+    """
+    presence = Presence.fit(placed_keypoints(truth, found, source), seed)
+    runs = ((declared(truth, found), _GIVEN), (declared(truth, found, presence), PRESENCE_CUT))
+    rows: list[tuple] = []
+    for subset, people in truth.items():
+        known, clusters = with_outside(people, source), source_images(people)
+        for detector in [d for s, d, group in drawn if (s, group) == (subset, "body")]:
+            plain = drawn[subset, detector, "body"]
+            both = [evaluate_extended(known, run[subset, detector], cut=cut) for run, cut in runs]
+            draws = resample(both, n_resamples, seed, clusters)
+            cases = [plain, *zip(both, draws, strict=True)]
+            tables = [intervals(evaluation.metrics(), samples) for evaluation, samples in cases]
+            tables.append(difference(both[1], both[0], draws[1], draws[0]))
+            n_people = (plain[0].n_people, *[both[0].n_people] * 3)
+            for measure, table, n in zip(MEASURES, tables, n_people, strict=True):
+                ap = table.set_index("metric").loc["AP"]
+                rows.append((subset, detector, measure, *ap, n))
+    columns = ["subset", "detector", "measure", "value", "low", "high", "n_people"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def false_presence(
+    truth: Truth,
+    found: Found,
+    placed: pd.DataFrame,
+    source: Annotations,
+    n_resamples: int = 1000,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """How often parts of people that are outside the picture are given inside it.
+
+    A head is outside when no keypoint of it is in the picture and one is known to be outside, and it is given
+    when one of its keypoints is. All other parts are one keypoint each, on either side.
+
+    Parameters
+    ----------
+    truth : Truth
+        Of crops, by subset.
+    found : Found
+        By image id, of every subset and detector.
+    placed : DataFrame
+        `placed_keypoints.placed_keypoints` of them.
+    source : Annotations
+        What the crops were made from.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they and the halves are drawn with.
+
+    Returns
+    -------
+    DataFrame
+        Columns `subset, detector, part` (of `PARTS`), `decision` (of `DECISIONS`), `value` (share of the
+        parts outside), `low, high` (95 %, over source images), `n` (parts outside), `n_images, n_found`
+        (those of people whom a detection fits; of the others none is given).
+    """
+    calibrated = declared(truth, found, Presence.fit(placed, seed))
+    kinds = {SURE: placed, PRESENCE_CUT: placed_keypoints(truth, calibrated, source)}
+    missing = {subset: _missing(with_outside(people, source)) for subset, people in truth.items()}
+    keys = ["subset", "detector", "image_id", "unit"]
+    rows = []
+    for decision, (cut, table) in zip(DECISIONS, kinds.items(), strict=True):
+        is_given = (table["score"] >= cut) & (landed(table) != "outside")
+        table = table.assign(unit=np.maximum(table["keypoint"] - _FIRST_OF_PAIRS + 1, 0), given=is_given)
+        given = table.groupby(keys)["given"].any().reset_index()
+        for subset, detector in found:
+            labels = {"subset": subset, "detector": detector, "decision": decision}
+            rows.append(labelled(missing[subset], **labels).merge(given, how="left", on=keys))
+    parts = pd.concat(rows).assign(found=lambda t: t["given"].notna())
+    parts["given"] = parts["given"].eq(True)
+    by = ["subset", "detector", "part", "decision"]
+    n_found = parts.groupby(by)["found"].sum().rename("n_found").reset_index()
+    return proportions(parts, by, "given", n_resamples, seed).merge(n_found, on=by)
+
+
+def _missing(people: Annotations) -> pd.DataFrame:
+    """The parts that are outside the picture: columns `image_id, source_image, part, unit`."""
+    people = people.take(~people.is_crowd)
+    flags, sources = people.visibility[:, COCO_17], source_images(people)
+    seen, gone = (
+        np.column_stack([of[:, :_FIRST_OF_PAIRS].any(axis=1), of[:, _FIRST_OF_PAIRS:]])
+        for of in (flags > 0, flags < 0)
+    )
+    who, unit = np.nonzero(gone & ~seen)
+    image_ids = people.image_ids[who].tolist()
+    of_image = {"image_id": image_ids, "source_image": [sources[i] for i in image_ids]}
+    return pd.DataFrame(of_image | {"part": PART_OF[_FIRST_OF_PAIRS - 1 :][unit], "unit": unit})
