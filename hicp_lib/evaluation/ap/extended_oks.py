@@ -31,6 +31,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import COCO_17, GROUPS, SIGMAS
 from hicp_lib.core.oks import oks_terms
 from hicp_lib.evaluation.ap import cocoeval
+from hicp_lib.evaluation.ap.bootstrap import Clusters, bootstrap_intervals
 from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.formats.cropcoco import PAD_KEY
@@ -182,6 +183,41 @@ def evaluate_extended(
         plain, **figures, precision=precision, recall=recall, matches=matches, n_people=n,
         n_ignored=len(annotations) - n,
     )  # fmt: skip
+
+
+def extended_rows(
+    annotations: Annotations,
+    detections: Mapping[int, Detections],
+    group: str,
+    seed: int,
+    clusters: Clusters | None = None,
+) -> dict[str, dict[str, float]]:
+    """Figures by extended OKS with their 95 % intervals, where the annotations know of points outside.
+
+    Parameters
+    ----------
+    annotations : Annotations
+        The truth.
+    detections : mapping of int to Detections
+        By image id.
+    group : {"body", "hand"}
+        Of keypoints.
+    seed : int
+        Of the bootstrap.
+    clusters : Clusters, optional
+        As of `bootstrap.bootstrap_intervals`.
+
+    Returns
+    -------
+    dict of str to dict of str to float
+        "extended AP", ... to `value, low, high`; empty where no point is known to be outside.
+    """
+    if not known_flags(annotations)[1][:, GROUPS[group]].any():
+        return {}
+    evaluation = evaluate_extended(annotations, detections, group)
+    table = bootstrap_intervals(evaluation, seed=seed, clusters=clusters)
+    rows = table.set_index("extended " + table["metric"])[["value", "low", "high"]]
+    return {str(name): row for name, row in rows.to_dict("index").items()}
 
 
 def _best(found: Detections, keypoints: np.ndarray) -> Detections:
