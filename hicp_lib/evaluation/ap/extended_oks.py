@@ -34,11 +34,10 @@ from hicp_lib.evaluation.ap import cocoeval
 from hicp_lib.evaluation.ap.bootstrap import Clusters, bootstrap_intervals
 from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate
 from hicp_lib.formats.annotations import Annotations
-from hicp_lib.formats.cropcoco import PAD_KEY
+from hicp_lib.formats.cropcoco import PAD_KEY, PADDING
 
 PRESENCE_CUT = 0.5  # least score of a keypoint that is declared present, the authors' default
 _ASPECT = 3 / 4  # width by height of a network's input
-_PADDING = 1.25
 
 
 def activation_windows(boxes_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -60,7 +59,7 @@ def activation_windows(boxes_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     [[[92.5, 80.0]], [[167.5, 180.0]]]
     """
     size = boxes_px[:, 2:]
-    shape = np.maximum(size, size[:, ::-1] * [_ASPECT, 1 / _ASPECT]) * _PADDING
+    shape = np.maximum(size, size[:, ::-1] * [_ASPECT, 1 / _ASPECT]) * PADDING
     centre = boxes_px[:, :2] + size / 2
     return centre - shape / 2, centre + shape / 2
 
@@ -81,7 +80,7 @@ def known_flags(people: Annotations) -> tuple[np.ndarray, np.ndarray]:
     for i, extra in enumerate(people.extras):
         if PAD_KEY in extra:
             known = people.visibility[i, COCO_17] != 0
-            beyond = np.array(extra[PAD_KEY], dtype=float) > _PADDING
+            beyond = np.array(extra[PAD_KEY], dtype=float) > PADDING
             inside[i, COCO_17], outside[i, COCO_17] = known & ~beyond, known & beyond
     return inside, outside
 

@@ -5,10 +5,15 @@ import json
 import numpy as np
 import pytest
 
+from hicp_lib.core.detections import Detections
 from hicp_lib.core.files import write_json
-from hicp_lib.evaluation.ap.extended_oks import evaluate_extended, extended_oks
+from hicp_lib.core.keypoints import COCO_17
+from hicp_lib.evaluation.ap.evaluate import evaluate
+from hicp_lib.evaluation.ap.extended_oks import evaluate_extended, extended_oks, extended_rows
 from hicp_lib.formats.annotations import read_annotations, read_detections
+from hicp_lib.formats.cropcoco import OUTSIDE
 from tests.evaluation.ap.cropped_people import NUMBERS, SEEDS, cropped_people
+from tests.evaluation.made_people import make_annotations, make_detections
 
 
 def files(folder, seed):
@@ -31,3 +36,57 @@ def test_is_what_the_authors_tool_gives(tmp_path, seed):
     ours = evaluate_extended(people, found)
     assert ours.metrics() == pytest.approx(expected["metrics"], abs=1e-12)
     assert 0.05 < ours.AP < 0.95  # a case that says something
+
+
+# ---- a person of 60 x 60 px, whose window reaches from (92.5, 80) to (167.5, 180)
+BOX = [[100.0, 100.0, 60.0, 60.0]]
+NOSE = 0
+
+
+def judged(detection, *, nose_outside, cut=0.5):
+    """Extended OKS of a person of whom only the nose, at (120, 110), is known."""
+    flags = np.zeros((1, 136))
+    flags[0, NOSE] = OUTSIDE if nose_outside else 2
+    people = make_annotations(np.full((1, 136, 2), [120.0, 110.0]), [1], visibility=flags, boxes_px=BOX)
+    return float(extended_oks(people, detection, cut=cut)[0, 0])
+
+
+def nose_at(x, y, score=0.9):
+    points = np.full((1, 136, 2), np.nan)
+    points[0, NOSE] = x, y
+    scores = np.zeros((1, 136))
+    scores[0, NOSE] = score
+    return Detections(points, scores, np.ones(1))
+
+
+def test_a_point_outside_is_right_when_declared_absent_and_wrong_when_given_inside():
+    assert judged(nose_at(130, 130, score=0.4), nose_outside=True) == 1
+    assert judged(make_detections(np.full((1, 136, 2), np.nan)), nose_outside=True) == 1
+    assert judged(nose_at(130, 130), nose_outside=True) < 0.001
+    assert judged(nose_at(92.5, 80), nose_outside=True) == 1  # at the border: forgiven
+
+
+def test_a_point_inside_is_placed_when_declared_present_and_lost_when_declared_absent():
+    assert judged(nose_at(120, 110), nose_outside=False) == 1
+    assert judged(nose_at(120, 110, score=0.4), nose_outside=False) < 0.001
+    assert judged(nose_at(120, 110, score=0.4), nose_outside=False, cut=0.4) == 1
+
+
+def test_the_distance_to_the_window_is_to_its_nearest_upright_and_level_edge():
+    # (27.5, 30) from the upper left corner
+    expected = np.exp(-(27.5**2 + 30**2) / (2 * 0.026) ** 2 / 20_000 / 2)
+    assert judged(nose_at(120, 110, score=0), nose_outside=False) == pytest.approx(expected)
+
+
+def test_where_nothing_is_outside_and_all_is_given_it_is_plain_oks(scene):
+    people, found = scene(3)
+    people = people.take((people.visibility[:, COCO_17] > 0).any(axis=1))  # the others' windows forgive less
+    assert evaluate_extended(people, found).metrics() == evaluate(people, found).metrics()
+
+
+def test_rows_for_the_command_are_there_only_where_points_outside_are_known(scene, tmp_path):
+    assert extended_rows(*scene(3), "body", seed=0) == {}
+    people, found = files(tmp_path, 0)
+    rows = extended_rows(people, found, "body", seed=0)
+    assert rows["extended AP"]["value"] == evaluate_extended(people, found).AP
+    assert list(rows) == [f"extended {name}" for name in evaluate(people, found).metrics()]
