@@ -23,6 +23,7 @@ known count as well.
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -176,7 +177,7 @@ def evaluate_extended(
         image_ids, np.array(n_people), np.concatenate(image_rows)[order], is_true, is_false
     )
     precision, recall = cocoeval.precision_recall(matches)
-    figures = cocoeval.metrics(precision, recall)
+    figures: dict[str, Any] = dict(cocoeval.metrics(precision, recall))
     n = int(counted.sum())
     return replace(
         plain, **figures, precision=precision, recall=recall, matches=matches, n_people=n,

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
+from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import inside
 from hicp_lib.core.keypoints import COCO_17, COCO_NAMES
 from hicp_lib.datasets.crops import with_outside
@@ -102,7 +103,7 @@ class Presence:
         return worth
 
 
-def declared(truth: Truth, found: Found, presence: Presence | None = None) -> dict:
+def declared(truth: Truth, found: Found, presence: Presence | None = None) -> Found:
     """Detections whose body keypoints' scores say how probably each is in the picture.
 
     Parameters
@@ -116,13 +117,13 @@ def declared(truth: Truth, found: Found, presence: Presence | None = None) -> di
 
     Returns
     -------
-    dict
+    Found
         As `found`; a keypoint placed outside the picture has score 0: it declares itself absent.
     """
-    result = {}
+    result: dict[tuple[str, str], dict[int, Detections]] = {}
     for (subset, detector), run in found.items():
         sources, images = source_images(truth[subset]), truth[subset].images
-        result[subset, detector] = people = {}
+        people = result[subset, detector] = {}
         for image_id, of_image in run.items():
             box_px = (0, 0, images[image_id].width_px, images[image_id].height_px)
             scores = of_image.scores.copy()
