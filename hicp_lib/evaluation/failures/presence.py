@@ -20,9 +20,9 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import inside
 from hicp_lib.core.keypoints import COCO_17, COCO_NAMES
 from hicp_lib.datasets.crops import with_outside
-from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
-from hicp_lib.evaluation.ap.extended_oks import PRESENCE_CUT, evaluate_extended
-from hicp_lib.evaluation.ap.metric_table import Drawn
+from hicp_lib.evaluation.ap.bootstrap import difference, intervals
+from hicp_lib.evaluation.ap.extended_oks import PRESENCE_CUT
+from hicp_lib.evaluation.ap.metric_table import Drawn, draw_cases
 from hicp_lib.evaluation.calibration.curves import Calibration, split_half
 from hicp_lib.evaluation.cases import Found, Truth, labelled
 from hicp_lib.evaluation.failures.false_confidence import SURE
@@ -36,7 +36,6 @@ PARTS = tuple(dict.fromkeys(PART_OF))
 _FIRST_OF_PAIRS = 5  # the keypoints before are the head's
 MEASURES = ("OKS", "extended OKS, all given", "extended OKS, decided", "gained by deciding")
 DECISIONS = (f"score of at least {SURE}", f"calibrated score of at least {PRESENCE_CUT}")
-_GIVEN = np.nextafter(0.0, 1.0)  # a cut that every keypoint given in the picture reaches
 
 
 @dataclass(frozen=True)
@@ -113,7 +112,7 @@ def declared(truth: Truth, found: Found, presence: Presence | None = None) -> Fo
     found : Found
         By image id, of every subset and detector.
     presence : Presence, optional
-        What scores are worth; they stay as they are when left out.
+        What scores are worth; when left out, whatever is given is declared present, with score 1.
 
     Returns
     -------
@@ -127,9 +126,8 @@ def declared(truth: Truth, found: Found, presence: Presence | None = None) -> Fo
         for image_id, of_image in run.items():
             box_px = (0, 0, images[image_id].width_px, images[image_id].height_px)
             scores = of_image.scores.copy()
-            if presence:
-                scores[:, COCO_17] = presence(detector, sources[image_id], scores[:, COCO_17])
-            scores[~inside(of_image.keypoints_px, box_px)] = 0.0
+            body = presence(detector, sources[image_id], scores[:, COCO_17]) if presence else 1.0
+            scores[:, COCO_17] = np.where(inside(of_image.keypoints_px[:, COCO_17], box_px), body, 0.0)
             people[image_id] = replace(of_image, scores=scores)
     return result
 
@@ -148,7 +146,7 @@ def extended_table(
     source : Annotations
         What the crops were made from.
     drawn : Drawn
-        From `draw_cases` of the same, on as many draws with the same seed.
+        From `draw_cases` of the same.
     n_resamples, seed : int, optional
         Number of bootstrap draws, and what they and the halves are drawn with.
 
@@ -156,24 +154,28 @@ def extended_table(
     -------
     DataFrame
         Columns `subset, detector, measure` (of `MEASURES`), `value, low, high, n_people`; the last measure is
-        the second less the one before, on the same draws.
+        the third less the second, on the same draws.
     """
     presence = Presence.fit(placed_keypoints(truth, found, source), seed)
-    runs = ((declared(truth, found), _GIVEN), (declared(truth, found, presence), PRESENCE_CUT))
-    rows: list[tuple] = []
-    for subset, people in truth.items():
-        known, clusters = with_outside(people, source), source_images(people)
-        for detector in [d for s, d, group in drawn if (s, group) == (subset, "body")]:
-            plain = drawn[subset, detector, "body"]
-            both = [evaluate_extended(known, run[subset, detector], cut=cut) for run, cut in runs]
-            draws = resample(both, n_resamples, seed, clusters)
-            cases = [plain, *zip(both, draws, strict=True)]
-            tables = [intervals(evaluation.metrics(), samples) for evaluation, samples in cases]
-            tables.append(difference(both[1], both[0], draws[1], draws[0]))
-            n_people = (plain[0].n_people, *[both[0].n_people] * 3)
-            for measure, table, n in zip(MEASURES, tables, n_people, strict=True):
-                ap = table.set_index("metric").loc["AP"]
-                rows.append((subset, detector, measure, *ap, n))
+    runs = {
+        (subset, f"{detector}, {way}"): run
+        for way, runs in {
+            "given": declared(truth, found),
+            "decided": declared(truth, found, presence),
+        }.items()
+        for (subset, detector), run in runs.items()
+    }
+    known = {subset: with_outside(people, source) for subset, people in truth.items()}
+    counted = draw_cases(known, runs, n_resamples, seed, groups=["body"], outside="count")
+    rows = []
+    for subset, detector in found:
+        if (subset, detector, "body") in drawn:
+            given, decided = (counted[subset, f"{detector}, {way}", "body"] for way in ("given", "decided"))
+            cases = (drawn[subset, detector, "body"], given, decided)
+            figures = [(intervals(of.metrics(), samples), of) for of, samples in cases]
+            figures.append((difference(decided[0], given[0], decided[1], given[1]), given[0]))
+            for measure, (figure, of) in zip(MEASURES, figures, strict=True):
+                rows.append((subset, detector, measure, *figure["AP"], of.n_people))
     columns = ["subset", "detector", "measure", "value", "low", "high", "n_people"]
     return pd.DataFrame(rows, columns=columns)
 

@@ -105,7 +105,7 @@ def test_a_keypoint_outside_the_picture_declares_itself_absent():
     curve = Calibration(np.array([0.0, 1.0]), np.array([0.7, 0.7]))
     curves = {(NAME, part, half): curve for part in set(PART_OF) for half in (False, True)}
     raw, sure = (declared(truth, found, p)["headless", NAME] for p in (None, Presence(frozenset(), curves)))
-    assert raw[0].scores[0, :6].tolist() == [0.8] * 5 + [0.9] and (raw[1].scores[0, :5] == 0).all()
+    assert raw[0].scores[0, :6].tolist() == [1] * 6 and (raw[1].scores[0, :5] == 0).all()
     assert sure[0].scores[0, COCO_17].tolist() == [0.7] * 17 and (sure[1].scores[0, :5] == 0).all()
     assert (found["headless", NAME][1].scores[0, :5] == 0.9).all()  # what was found stays
 
