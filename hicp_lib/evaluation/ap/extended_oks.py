@@ -17,6 +17,8 @@ away from its border that is wrong by any threshold of AP; at the border it is f
 picture and the window's border is outside, unless the annotations have `pad_to_contain`: then what the
 window contains is inside.
 
+The authors' tool, exococotools, also forgives every detection in a picture where nobody counts, and rounds
+the window to single precision. COCO does neither, nor is it done here.
 `hicp_lib.evaluation.ap.evaluate` takes it with the option `outside`; people of whom only points outside are
 known then count as well.
 """
