@@ -13,7 +13,7 @@ decision, too. A keypoint is declared *present* when its score is at least a cut
 The activation window is what a top-down network sees: the person's box brought to 3:4 and grown 1.25 times
 about its centre. As the authors' tool measures it, the distance to the border is that to the nearest upright
 edge and to the nearest level edge, in one (Euclidean): towards a corner of the window. Inside the window and
-away from its border that is wrong by any threshold of AP; at the border it is forgiven. A truth between the
+away from its corners that is wrong by any threshold of AP; in a corner it is forgiven. A truth between the
 picture and the window's border is outside, unless the annotations have `pad_to_contain`: then what the
 window contains is inside.
 

@@ -72,7 +72,7 @@ def test_a_point_outside_is_right_when_declared_absent_and_wrong_when_given_insi
     assert judged(nose_at(130, 130, score=0.4), nose_outside=True) == 1
     assert judged(make_detections(np.full((1, 136, 2), np.nan)), nose_outside=True) == 1
     assert judged(nose_at(130, 130), nose_outside=True) < 0.001
-    assert judged(nose_at(92.5, 80), nose_outside=True) == 1  # at the border: forgiven
+    assert judged(nose_at(92.5, 80), nose_outside=True) == 1  # in the corner: forgiven
 
 
 def test_a_point_inside_is_placed_when_declared_present_and_lost_when_declared_absent():
