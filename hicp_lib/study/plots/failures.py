@@ -218,7 +218,7 @@ def false_presence(table: pd.DataFrame, note: str) -> Figure:
         "gives inside it, by what counts as given, with 95 % bootstrap intervals over source images; a head "
         f"is given when one of its five keypoints is: {note}."
     )
-    return Figure(figure, caption, f"Dots per part and detector. Heads that were cut off: {said}.", rows)
+    return Figure(figure, caption, f"Dots per part and detector. Heads that were cut off: {said}.", table)
 
 
 @in_style
