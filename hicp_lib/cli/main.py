@@ -220,7 +220,8 @@ def evaluate(
 ) -> None:
     """Average precision and recall by OKS, with 95 % bootstrap intervals over images.
 
-    Over all labelled keypoints, and over the visible ones only; of hands, as one object and each by itself.
+    Over all labelled keypoints, and over the visible ones only; with those outside the picture, by extended
+    OKS, where the annotations know of them; of hands, as one object and each by itself.
     """
     from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals
     from hicp_lib.evaluation.ap.evaluate import evaluate as evaluate_detections
@@ -232,8 +233,8 @@ def evaluate(
     clusters = source_images(people)  # crops of one image are drawn together
     options = {"area": area} | ({"sigmas": sigmas} if sigmas else {})
     results = []
-    for of_group, labelled in definitions(people, group):
-        evaluation = evaluate_detections(people, found, of_group, labelled=labelled, **options)
+    for of_group, way in definitions(people, group):
+        evaluation = evaluate_detections(people, found, of_group, **way, **options)
         metrics = bootstrap_intervals(evaluation, seed=seed, clusters=clusters).items()
         rows = {name: _finite(dict(zip(("value", "low", "high"), of, strict=True))) for name, of in metrics}
         results.append(_finite(evaluation.row()) | {"metrics": rows, "seed": seed})
@@ -250,6 +251,7 @@ def _tell_evaluation(result: dict[str, Any]) -> None:
     from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN
 
     of = "all labelled" if result["labelled"] == "all" else "visible"
+    of += " and outside" if result["outside"] == "count" else ""
     where = "{n_people} in {n_images} images; {sigmas} sigmas, {area} area".format(**result)
     click.echo(f"{result['group']}, {of} keypoints: {where}")
     if all(row["low"] is None for row in result["metrics"].values()):

@@ -24,6 +24,7 @@ import numpy as np
 from hicp_lib.core.images import Box, inside
 from hicp_lib.core.keypoints import BODY, HEAD, INDEX
 from hicp_lib.formats.annotations import Annotations
+from hicp_lib.formats.cropcoco import OUTSIDE
 
 TRUNK = np.setdiff1d(BODY, HEAD)
 _MID_HEAD = np.arange(0, 5)  # nose, eyes, ears
@@ -172,6 +173,33 @@ def crop_people(annotations: Annotations, rows: np.ndarray, crop_px: Box) -> Ann
         visibility=np.where(shown, people.visibility, 0.0),
     )
     return moved.take(area > 0)
+
+
+def with_outside(people: Annotations, source: Annotations) -> Annotations:
+    """People of crops, with what the images they were cut from know of keypoints outside the crops.
+
+    Parameters
+    ----------
+    people : Annotations
+        Of crops; those who count name their `source_id` and `crop_px`.
+    source : Annotations
+        What the crops were made from.
+
+    Returns
+    -------
+    Annotations
+        The same people; keypoints that are labelled in the source only have a place, outside the picture,
+        and the flag `OUTSIDE`.
+    """
+    row_of = {int(i): row for row, i in enumerate(source.ids)}
+    rows = [i for i, about in enumerate(people.extras) if "crop_px" in about]
+    of = [row_of[people.extras[i]["source_id"]] for i in rows]
+    corners = np.array([people.extras[i]["crop_px"][:2] for i in rows], float).reshape(-1, 1, 2)
+    keypoints, visibility = people.keypoints_px.copy(), people.visibility.copy()
+    outside = (visibility[rows] == 0) & (source.visibility[of] != 0)
+    keypoints[rows] = np.where(outside[..., None], source.keypoints_px[of] - corners, keypoints[rows])
+    visibility[rows] = np.where(outside, OUTSIDE, visibility[rows])
+    return replace(people, keypoints_px=keypoints, visibility=visibility)
 
 
 def clip_boxes(boxes_px: np.ndarray, limits_px: Box) -> np.ndarray:

@@ -4,7 +4,8 @@ Both are checked where they enter. Conventions of this module, where formats in 
 
 - People come in the Halpe-136 layout whatever the file has (17, 26, 133 or 136 keypoints).
 - A keypoint is labelled when its flag v > 0; flags are floats and kept as they are (Halpe and
-  COCO-WholeBody files hold values other than 0, 1 and 2), except that v <= 0 becomes 0.
+  COCO-WholeBody files hold values other than 0, 1 and 2), except that v <= 0 becomes 0 and v = 3, in
+  CropCOCO's layout a keypoint outside the picture, becomes `cropcoco.OUTSIDE`; it is written as 3 again.
 - `num_keypoints` is not read (in Halpe's files it counts the body, or nothing); it is written as in
   Halpe's validation set, the number of labelled keypoints out of COCO's 17.
 - Detections keep the scores they come with, which need not lie in [0, 1]. A keypoint 0, 0, 0 is
@@ -24,6 +25,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS, NAMES
+from hicp_lib.formats.cropcoco import FLAG_OUTSIDE, OUTSIDE, outside_from_flags
 from hicp_lib.formats.json_validation import PART_KEYS, Rows
 
 PERSON_CATEGORY = 1
@@ -72,9 +74,9 @@ class Annotations:
     is_crowd : array of bool, shape (n,)
         Never counted; a detection there is neither right nor wrong.
     keypoints_px : array, shape (n, 136, 2)
-        NaN where not labelled.
+        NaN where not known.
     visibility : array, shape (n, 136)
-        0 not labelled, above 0 labelled (1 occluded, 2 visible).
+        0 not labelled, above 0 labelled (1 occluded, 2 visible), below 0 known to lie outside the picture.
     extras : list of dict
         Per person, the further keys of its JSON object.
 
@@ -206,10 +208,13 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo]) -> Annotations:
     for i in np.flatnonzero(areas < 0)[:1]:
         raise rows.error(i, f"area is {areas[i]:g}; expected the segment's area in square pixels")
     triples = rows.keypoints()
-    visibility = np.maximum(triples[..., 2], 0.0)
+    sizes = np.array([(images[i].width_px, images[i].height_px) for i in image_ids.tolist()]).reshape(-1, 2)
+    outside = outside_from_flags(rows, triples, sizes)
+    visibility = np.where(outside, OUTSIDE, np.maximum(triples[..., 2], 0.0))
+    known = (visibility > 0) | (outside & (triples[..., :2] != 0).any(axis=-1))
     return Annotations(
         images, ids, image_ids, boxes, areas, _crowd_flags(rows),
-        np.where(visibility[..., None] > 0, triples[..., :2], np.nan), visibility, rows.extras(_KNOWN_KEYS),
+        np.where(known[..., None], triples[..., :2], np.nan), visibility, rows.extras(_KNOWN_KEYS),
     )  # fmt: skip
 
 
@@ -233,15 +238,17 @@ def _crowd_flags(rows: Rows) -> np.ndarray:
 def write_annotations(path: str | Path, annotations: Annotations) -> None:
     """Write people as a COCO keypoint file with 136 keypoints in Halpe's order."""
     a = annotations
+    triples = keypoint_triples(a.keypoints_px, a.visibility)
+    triples[:, 2::3][a.visibility < 0] = FLAG_OUTSIDE
     people = [
         {
             **extra, "id": i, "image_id": image, "category_id": PERSON_CATEGORY, "bbox": box, "area": area,
-            "iscrowd": crowd, "num_keypoints": count, "keypoints": triples,
+            "iscrowd": crowd, "num_keypoints": count, "keypoints": flat,
         }
-        for extra, i, image, box, area, crowd, count, triples in zip(
+        for extra, i, image, box, area, crowd, count, flat in zip(
             a.extras, a.ids.tolist(), a.image_ids.tolist(), a.boxes_px.tolist(), a.areas_px2.tolist(),
             a.is_crowd.astype(int).tolist(), (a.visibility[:, COCO_17] > 0).sum(axis=1).tolist(),
-            keypoint_triples(a.keypoints_px, a.visibility).tolist(), strict=True,
+            triples.tolist(), strict=True,
         )
     ]  # fmt: skip
     category = {**PERSON, "keypoints": list(NAMES)}

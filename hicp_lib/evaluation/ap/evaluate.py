@@ -11,6 +11,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES, SIGMAS
 from hicp_lib.core.oks import oks
 from hicp_lib.evaluation.ap import cocoeval
+from hicp_lib.evaluation.ap.extended_oks import PRESENCE_CUT, extended_oks, known_flags
 from hicp_lib.evaluation.ap.options import VISIBLE, Options, choose
 from hicp_lib.formats.annotations import Annotations
 
@@ -100,19 +101,22 @@ def evaluate(
     image_ids, stacked = check_detections(detections, annotations)
     images = np.array(sorted(annotations.images), dtype=np.int64)
     people = people_seen(annotations, objects, chosen)
-    slots, found_px, scores = _detections_seen(np.searchsorted(images, image_ids), stacked, objects, chosen)
-    truth_px, labelled = _flat(people.keypoints_px, objects), _flat(people.visibility, objects) > 0
+    image_rows, person_rows = (np.searchsorted(images, of) for of in (image_ids, people.image_ids))
+    slots, found_px, present, scores = _detections_seen(image_rows, stacked, objects, chosen)
+    truth_px, flags = _flat(people.keypoints_px, objects), _flat(people.visibility, objects)
     boxes_px, areas_px2, is_crowd = (
         np.repeat(of, len(objects), axis=0) for of in (people.boxes_px, people.areas_px2, people.is_crowd)
     )
     sigmas = SIGMAS[chosen.sigmas][objects[0]]
 
     def similarity(who: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        return oks(truth_px[who], labelled[who], boxes_px[who], areas_px2[who], found_px[rows, None], sigmas)
+        person, found = (boxes_px[who], areas_px2[who]), found_px[rows, None]
+        if chosen.outside == "count":
+            return extended_oks(truth_px[who], flags[who], *person, found, present[rows, None], sigmas)
+        return oks(truth_px[who], flags[who] > 0, *person, found, sigmas)
 
-    truth = cocoeval.People(
-        _slots(np.searchsorted(images, people.image_ids), objects), labelled.any(axis=1) & ~is_crowd, is_crowd
-    )
+    counts = (flags != 0).any(axis=1) & ~is_crowd
+    truth = cocoeval.People(_slots(person_rows, objects), counts, is_crowd)
     matches = cocoeval.match(images, truth, cocoeval.Found(slots, scores), similarity, len(objects))
     precision, recall = cocoeval.precision_recall(matches)
     n_people = int(matches.n_people.sum())
@@ -206,14 +210,15 @@ def people_seen(annotations: Annotations, objects: np.ndarray, options: Options)
     -------
     Annotations
     """
-    visibility = annotations.visibility
+    counts_outside = options.outside == "count"
+    flags = known_flags(annotations) if counts_outside else np.maximum(annotations.visibility, 0.0)
     if options.labelled == "visible":
-        visibility = np.where(visibility >= VISIBLE, visibility, 0.0)
-    labelled = (visibility[:, objects] > 0).any(axis=(1, 2))
+        flags = np.where((flags >= VISIBLE) | (flags < 0), flags, 0.0)
+    labelled = (flags[:, objects] != 0).any(axis=(1, 2))
     seen = labelled | annotations.is_crowd | (options.unlabelled == "ignore")
     if options.others == "count":
         seen &= ~annotations.is_other
-    people = replace(annotations, visibility=visibility).take(seen)
+    people = replace(annotations, visibility=flags).take(seen)
     return replace(people, areas_px2=_areas(people, options.area))
 
 
@@ -237,10 +242,12 @@ def _source_area(people: Annotations, i: int) -> float:
 
 def _detections_seen(
     image_rows: np.ndarray, found: Detections, objects: np.ndarray, options: Options
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Slots, keypoints and scores of the objects that take part."""
-    points = _flat(found.keypoints_px, objects)
-    of_group = _flat(found.scores, objects).mean(axis=-1)
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Slots, keypoints, which of them are declared present, and scores of the objects that take part."""
+    points, of_keypoints = _flat(found.keypoints_px, objects), _flat(found.scores, objects)
+    of_group = of_keypoints.mean(axis=-1)
+    given = np.isfinite(points[..., 0])
+    present = given & (of_keypoints >= PRESENCE_CUT)
     scores = np.repeat(found.person_scores, len(objects)) if options.score == "person" else of_group
-    seen = np.isfinite(points[..., 0]).any(axis=-1) | (options.absent == "count")
-    return _slots(image_rows, objects)[seen], points[seen], scores[seen]
+    seen = given.any(axis=-1) | (options.absent == "count")
+    return _slots(image_rows, objects)[seen], points[seen], present[seen], scores[seen]

@@ -6,6 +6,8 @@ COCO and COCO-WholeBody with Halpe's sigmas:
 - `sigmas`: "halpe" (every hand keypoint .015) or "wholebody" (.017-.047); the body's 17 are the same.
 - `labelled`, the keypoints that count: "all" with a label, or "visible": those whose flag says so (2; COCO's
   1 is occluded). Annotators leave many blank that they cannot see, rendered people have them all.
+- `outside`, keypoints known to lie outside the picture: "ignore" (OKS), or "count" (`extended_oks`: what has
+  a score of at least .5 is declared present, and giving a keypoint that is outside is wrong).
 - `area`, the s² of OKS: "segment" (annotated), "box" (width x height), "box53" (0.53 of that, as tools
   do without segments), "source" (the segment before HiCP cut the head off; in HiCP folders only).
 - `unlabelled`, people without a labelled keypoint of the group: "ignore" (COCO: they do not count, and
@@ -67,6 +69,7 @@ class Options:
 
     sigmas: Literal["halpe", "wholebody"] = "halpe"
     labelled: Literal["all", "visible"] = "all"
+    outside: Literal["ignore", "count"] = "ignore"
     area: Literal["segment", "box", "box53", "source"] = "segment"
     unlabelled: Literal["ignore", "drop"] = "ignore"
     absent: Literal["drop", "count"] = "drop"
@@ -80,15 +83,19 @@ class Options:
                 raise InputError(f"option {name}={getattr(self, name)!r}: expected one of {expected}")
 
 
-def definitions(annotations: Annotations, group: str) -> list[tuple[str, str]]:
-    """What belongs side by side: groups and values of `labelled`, the usual ones first.
+def definitions(annotations: Annotations, group: str) -> list[tuple[str, dict[str, str]]]:
+    """What belongs side by side: groups and options, the usual ones first.
 
     Hands as one object and every hand by itself; all labelled keypoints and, where some are marked occluded,
-    the visible ones.
+    the visible ones; where some are known to lie outside the picture, with these.
     """
-    occluded = (annotations.visibility > 0) & (annotations.visibility < VISIBLE)
+    flags = annotations.visibility
+    occluded, outside = (flags > 0) & (flags < VISIBLE), flags < 0
     groups = (group, "each hand") if group == "hand" else (group,)
-    return [(of, which) for of in groups for which in (("all", "visible") if occluded.any() else ("all",))]
+    ways = [{"labelled": "all"}]
+    ways += [{"labelled": "visible"}] if occluded.any() else []
+    ways += [{"labelled": "all", "outside": "count"}] if outside.any() else []
+    return [(of, way) for of in groups for way in ways]
 
 
 def choose(group: str, options: Mapping[str, Any]) -> tuple[np.ndarray, Options]:

@@ -31,14 +31,15 @@ def sensitivity_table(
     -------
     DataFrame
         Columns `changed` ("default", or e.g. "area=box"), those of `Evaluation.row`, and `AP_change` against
-        the default. Area "source" is left out where people have none.
+        the default. What the annotations have nothing for is left out: area "source", points outside.
     """
     counted = np.flatnonzero(~annotations.is_crowd)
-    has_source = all("source_area" in annotations.extras[i] for i in counted)
+    missing = set() if all("source_area" in annotations.extras[i] for i in counted) else {("area", "source")}
+    missing |= set() if (annotations.visibility < 0).any() else {("outside", "count")}
     variants: dict[str, dict[str, str]] = {"default": {}}
     default = asdict(choose(group, {})[1])
     for name, kind in get_type_hints(Options).items():
-        values = [v for v in get_args(kind) if v != default[name] and (v != "source" or has_source)]
+        values = [v for v in get_args(kind) if v != default[name] and (name, v) not in missing]
         variants |= {f"{name}={value}": {name: value} for value in values}
     table = pd.DataFrame(
         {"changed": changed, **evaluate(annotations, detections, group, **variant).row()}

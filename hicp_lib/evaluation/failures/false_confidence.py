@@ -58,7 +58,7 @@ def scores_by_state(placed: pd.DataFrame, n_resamples: int = 1000, seed: int = 0
         Columns `detector, state, bin, score` (mean), `value, low, high, n, n_images`, by five equal bins of
         the score.
     """
-    rows = placed[placed["hit"].notna()]
+    rows = placed[placed["hit"].notna()].astype({"hit": bool})
     bins = np.clip((rows["score"] * N_BINS).astype(int), 0, N_BINS - 1)
     keys = ["detector", "state", "bin"]
     rows = rows.assign(bin=bins).sort_values(keys, kind="stable")

@@ -5,12 +5,15 @@ is not in the picture it can be said, too, whether a detector gives it, how sure
 whether that is right. Bodies only: the 17 keypoints all detectors share.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import COCO_17, SIGMAS
 from hicp_lib.core.oks import oks_terms
+from hicp_lib.datasets.crops import with_outside
 from hicp_lib.evaluation.calibration.keypoint_hits import HIT_TERM
 from hicp_lib.evaluation.cases import Found, Truth
 from hicp_lib.evaluation.matching import matched_people
@@ -22,8 +25,8 @@ STATES = ("visible", "hidden", "outside", "unknown")
 BORDER = 0.05  # of the picture's side: what counts as at its border
 _SIGMAS = SIGMAS["halpe"][COCO_17]
 _DTYPES = {
-    "subset": object, "detector": object, "image_id": int, "source_image": object, "cut_side": object,
-    "keypoint": int, "state": object, "given": bool, "score": float, "x": float, "y": float, "hit": float,
+    "subset": str, "detector": str, "image_id": int, "source_image": int, "cut_side": str, "keypoint": int,
+    "state": str, "given": bool, "score": float, "x": float, "y": float, "hit": float,
 }  # fmt: skip
 
 
@@ -47,51 +50,46 @@ def placed_keypoints(truth: Truth, found: Found, source: Annotations) -> pd.Data
         the left or top border to 1 at the other), `hit` (OKS term of at least .5; NaN where not given or
         unknown).
     """
-    source_row = {int(i): row for row, i in enumerate(source.ids)}
-    parts = [pd.DataFrame(columns=list(_DTYPES)).astype(_DTYPES)]
-    for (subset, detector), run in found.items():
-        people, sources = truth[subset], source_images(truth[subset])
-        rows_of = pd.Series(range(len(people))).groupby(people.image_ids).indices
-        for image_id, detections in run.items():
-            here = people.take(rows_of[image_id])
-            for person, row in matched_people(here, detections, COCO_17, _SIGMAS).items():
-                if here.is_crowd[person]:
-                    continue
-                about = here.extras[person]
-                part = _row_per_keypoint(
-                    here, person, detections, row, source, source_row[about["source_id"]]
-                )
-                labels = {"subset": subset, "detector": detector, "image_id": image_id}
-                labels |= {"source_image": sources[image_id], "cut_side": about.get("cut_side", "")}
-                parts.append(part.assign(**labels)[list(_DTYPES)])
-    return pd.concat(parts[1:] or parts, ignore_index=True)
+    seen = {subset: with_outside(people, source) for subset, people in truth.items()}
+    parts = [_of_case(seen[subset], run, subset, detector) for (subset, detector), run in found.items()]
+    return pd.concat([part for part in parts if len(part)] or parts, ignore_index=True)
 
 
-def _row_per_keypoint(
-    people: Annotations, person: int, found: Detections, row: int, source: Annotations, source_row: int
-) -> pd.DataFrame:
-    """What detection `row` makes of a person; the truth, also outside the crop, is the source's."""
-    image, flags = people.images[int(people.image_ids[person])], people.visibility[person, COCO_17]
-    known = source.visibility[source_row, COCO_17] > 0
-    state = np.select([flags >= 2, flags > 0, known], STATES[:3], STATES[3])
-    corner_px = np.array(people.extras[person]["crop_px"][:2], dtype=float)
-    points_px = found.keypoints_px[row, COCO_17]
+def _of_case(people: Annotations, run: Mapping[int, Detections], subset: str, detector: str) -> pd.DataFrame:
+    """What one detector's matched detections make of the people of one subset."""
+    rows_of = pd.Series(range(len(people))).groupby(people.image_ids).indices
+    pairs = [
+        (rows_of[image_id][person], detections, row)
+        for image_id, detections in run.items()
+        for person, row in matched_people(
+            people.take(rows_of[image_id]), detections, COCO_17, _SIGMAS
+        ).items()
+    ]
+    pairs = [pair for pair in pairs if not people.is_crowd[pair[0]]]
+    who = np.array([pair[0] for pair in pairs], dtype=int)
+    points_px = np.array([found.keypoints_px[row, COCO_17] for _, found, row in pairs]).reshape(-1, 17, 2)
+    scores = np.array([found.scores[row, COCO_17] for _, found, row in pairs]).reshape(-1, 17)
+    flags, true_px = people.visibility[who][:, COCO_17], people.keypoints_px[who][:, COCO_17]
+    state = np.select([flags >= 2, flags > 0, flags < 0], STATES[:3], STATES[3])
     given = np.isfinite(points_px).all(axis=-1)
-    true_px = source.keypoints_px[source_row, COCO_17] - corner_px
-    terms = oks_terms(true_px, points_px, people.areas_px2[person], _SIGMAS)
-    x, y = ((points_px + 0.5) / [image.width_px, image.height_px]).T
-    score = np.where(given, found.scores[row, COCO_17], np.nan)
-    hit = np.where(given & (state != "unknown"), terms >= HIT_TERM, np.nan)
-    columns = {
-        "keypoint": COCO_17,
-        "state": state,
-        "given": given,
-        "score": score,
-        "x": x,
-        "y": y,
-        "hit": hit,
-    }
-    return pd.DataFrame(columns)
+    terms = oks_terms(true_px, points_px, people.areas_px2[who], _SIGMAS)
+    images = [people.images[i] for i in people.image_ids[who].tolist()]
+    sizes_px = np.array([(image.width_px, image.height_px) for image in images]).reshape(-1, 1, 2)
+    x, y = np.moveaxis((points_px + 0.5) / sizes_px, -1, 0)
+    sources = source_images(people)
+    of_person = {
+        "subset": subset, "detector": detector, "image_id": people.image_ids[who],
+        "source_image": [sources[image.id] for image in images],
+        "cut_side": [people.extras[i].get("cut_side", "") for i in who.tolist()],
+    }  # fmt: skip
+    of_keypoint = {
+        "keypoint": np.broadcast_to(COCO_17, flags.shape), "state": state, "given": given,
+        "score": np.where(given, scores, np.nan), "x": x, "y": y,
+        "hit": np.where(given & (flags != 0), terms >= HIT_TERM, np.nan),
+    }  # fmt: skip
+    table = pd.DataFrame(of_person, index=np.arange(len(who))).loc[np.repeat(np.arange(len(who)), 17)]
+    table = table.assign(**{name: values.ravel() for name, values in of_keypoint.items()})
+    return table.astype(_DTYPES)[list(_DTYPES)]
 
 
 def landed(placed: pd.DataFrame) -> pd.Series:

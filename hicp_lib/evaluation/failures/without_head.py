@@ -43,45 +43,6 @@ def hallucinated_heads(placed: pd.DataFrame) -> pd.DataFrame:
 
     Further columns: `landed`, and `along`, `below` as from `from_the_cut`.
     """
-    rows = _missing_heads(placed)
-    rows = rows[rows["given"]]
+    rows = placed[(placed["subset"] == "headless") & placed["keypoint"].isin(HEAD_POINTS) & placed["given"]]
+    rows = rows[rows["state"].isin(["outside", "unknown"])]
     return rows.assign(landed=landed(rows), **from_the_cut(rows))
-
-
-def _missing_heads(placed: pd.DataFrame) -> pd.DataFrame:
-    rows = placed[(placed["subset"] == "headless") & placed["keypoint"].isin(HEAD_POINTS)]
-    return rows[rows["state"].isin(["outside", "unknown"])]
-
-
-def hallucinated_proportions(
-    placed: pd.DataFrame, min_score: float, n_resamples: int = 1000, seed: int = 0
-) -> pd.DataFrame:
-    """How many head keypoints are made up, where they go, and how surely.
-
-    Parameters
-    ----------
-    placed : DataFrame
-        `placed_keypoints.placed_keypoints`.
-    min_score : float
-        From which a keypoint counts as sure.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
-
-    Returns
-    -------
-    DataFrame
-        Columns `detector, what, value, low, high, n, n_images`.
-    """
-    missing, given = _missing_heads(placed), hallucinated_heads(placed)
-    sure = given[given["score"] >= min_score]
-    flags = {
-        "given at all": (missing, missing["given"]),
-        f"given with a score of at least {min_score}": (missing, missing["score"] >= min_score),
-        "of those given: put outside": (given, given["landed"] == "outside"),
-        "of those given: put at the border": (given, given["landed"] == "at the border"),
-        "of those given: put inside": (given, given["landed"] == "inside"),
-        "of the sure ones: right": (sure, sure["hit"]),
-    }
-    rows = [rows.assign(what=what, flag=flag.astype(float)) for what, (rows, flag) in flags.items()]
-    table = proportions(pd.concat(rows), ["what", "detector"], "flag", n_resamples, seed)
-    return table[["detector", "what", *table.columns[2:]]]

@@ -7,7 +7,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
+from hicp_lib.evaluation.statistics.resampling import PERCENTILES, draw_counts, with_interval
+
+_TAIL = PERCENTILES[0] / 100  # what an interval leaves out on either side
 
 
 def proportions(
@@ -93,6 +95,9 @@ def mean_with_interval(
 ) -> tuple[float, float, float]:
     """Mean, and its 95 % percentile interval from drawing clusters.
 
+    Flags that are all alike are alike in every draw; that does not make their share certain. There the
+    interval is the exact one of a share that is 0 or 1 (Clopper and Pearson), a cluster counting once.
+
     Parameters
     ----------
     values : array, shape (n,)
@@ -106,11 +111,20 @@ def mean_with_interval(
     -------
     value, low, high : float
         NaN where there are no values; no interval from fewer than `MIN_DRAWN` clusters.
+
+    Examples
+    --------
+    >>> [round(float(x), 3) for x in mean_with_interval(np.zeros(100, bool), np.arange(100))]
+    [0.0, 0.0, 0.036]
     """
-    values = np.asarray(values, float)
+    values = np.asarray(values)
     if not len(values):
         return np.nan, np.nan, np.nan
     cluster, names = pd.factorize(np.asarray(clusters))
-    sums = np.bincount(cluster, weights=values, minlength=len(names))
+    sums = np.bincount(cluster, weights=values.astype(float), minlength=len(names))
     times = draw_counts(len(names), n_resamples, seed)
-    return with_interval(times @ sums / (times @ np.bincount(cluster, minlength=len(names))))
+    value, low, high = with_interval(times @ sums / (times @ np.bincount(cluster, minlength=len(names))))
+    if values.dtype == bool and value in (0, 1) and low == low:
+        reach = _TAIL ** (1 / len(names))
+        low, high = (reach, 1.0) if value else (0.0, 1 - reach)
+    return value, low, high

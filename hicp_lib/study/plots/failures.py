@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.datasets.visibility import CLASSES
+from hicp_lib.datasets.visibility import CLASSES, MIN_PEOPLE
 from hicp_lib.evaluation.failures.error_kinds import KINDS
 from hicp_lib.evaluation.failures.placed_keypoints import STATES
 from hicp_lib.formats.annotations import Annotations
@@ -109,6 +109,14 @@ def _dots(axis, rows: pd.DataFrame, y, detector: str, filled: bool = True, label
     axis.errorbar(value, y, xerr=marks.whiskers(rows), fmt=detector_marker(detector), capsize=2, ms=5, **pen)
 
 
+def _dots_in_rows(axis, table: pd.DataFrame, names: list[str], detectors: list[str]) -> None:
+    """Each detector's dots in the rows of a chart, beside each other."""
+    for k, detector in enumerate(detectors):
+        part = table[table["detector"] == detector]
+        beside = marks.offset(k, len(detectors), 0.8 / len(detectors))
+        _dots(axis, part, part["row"].map(names.index) + beside, detector)
+
+
 def _detector_panels(table: pd.DataFrame, width_in: float, height_in: float, **shared):
     """The figure, its axes, and for each detector of a table its axis with its rows."""
     by_detector = dict(list(table.groupby("detector", sort=False))) or {"none given": table}
@@ -154,11 +162,8 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
 def head_change(table: pd.DataFrame, note: str) -> Figure:
     """Change of the hit rate of each keypoint when the head is cut off; from `change_per_keypoint`."""
     names, detectors = (list(table[name].unique()) for name in ("keypoint", "detector"))
-    step = 0.8 / len(detectors)
     figure, axis = new_figure(1, 1, 7.5, 1.2 + (0.1 + 0.1 * len(detectors)) * len(names))
-    for k, detector in enumerate(detectors):
-        part = table[table["detector"] == detector].rename(columns={"change": "value"})
-        _dots(axis, part, part["keypoint"].map(names.index) + marks.offset(k, len(detectors), step), detector)
+    _dots_in_rows(axis, table.rename(columns={"change": "value", "keypoint": "row"}), names, detectors)
     axis.axvline(0, color="#444444", lw=1)
     marks.name_rows(axis, [name.replace("_", " ") for name in names])
     axis.set(xlabel="change of the share of keypoints hit, without the head")
@@ -190,6 +195,30 @@ def hallucinated_heads(table: pd.DataFrame, note: str) -> Figure:
         f"that the cut is above), coloured by score: {note}."
     )
     return Figure(figure, caption, f"Scatter of places. Share put beyond the cut: {said}.", table)
+
+
+@in_style
+def false_presence(table: pd.DataFrame, note: str) -> Figure:
+    """Parts outside the picture that are given inside it, a panel per decision; from `false_presence`."""
+    rows = table[table["n"] >= MIN_PEOPLE]
+    rows = table if rows.empty else rows
+    rows = rows.assign(row=rows["part"] + ", " + rows["subset"] + " (" + rows["n"].astype(str) + ")")
+    names, detectors, decisions = (list(rows[name].unique()) for name in ("row", "detector", "decision"))
+    size = 4.4 * max(len(decisions), 1) + 1, 1.5 + (0.1 + 0.13 * len(detectors)) * len(names)
+    figure, axes = new_figure(1, max(len(decisions), 1), *size, sharey=True, squeeze=False)
+    for axis, of_panel, _, decision in marks.facets(axes, rows.assign(one=0), "one", "decision"):
+        _dots_in_rows(axis, of_panel, names, detectors)
+        axis.set(xlim=(-0.02, 1.02), xlabel="share that is given all the same", title=decision)
+    marks.name_rows(axes[0, 0], names)
+    marks.legend_below(figure, axes, ncols=2)
+    heads = rows[(rows["part"] == "head") & (rows["subset"] == "headless")]
+    said = series_text(heads.set_index(["detector", "decision"])["value"], "{0} {2:.2f} ({1})")
+    caption = (
+        "Parts of people that are outside the picture (their number in brackets): the share that a detector "
+        "gives inside it, by what counts as given, with 95 % bootstrap intervals over source images; a head "
+        f"is given when one of its five keypoints is: {note}."
+    )
+    return Figure(figure, caption, f"Dots per part and detector. Heads that were cut off: {said}.", table)
 
 
 @in_style

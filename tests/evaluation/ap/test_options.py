@@ -8,13 +8,15 @@ import pytest
 from hicp_lib.evaluation.ap.options import OBJECTS, choose, definitions
 
 
-def test_visible_keypoints_are_told_apart_only_where_some_are_occluded(scene):
+def test_visible_and_outside_keypoints_are_told_apart_only_where_some_are_known(scene):
     people, _ = scene(0)
-    assert definitions(people, "body") == [("body", "all"), ("body", "visible")]
-    for flags in (np.where(people.visibility > 0, 2.0, 0.0), np.where(people.visibility > 0, 2.0, -1.0)):
-        assert definitions(replace(people, visibility=flags), "body") == [("body", "all")]
-        hands = [("hand", "all"), ("each hand", "all")]
-        assert definitions(replace(people, visibility=flags), "hand") == hands
+    every, visible = {"labelled": "all"}, {"labelled": "visible"}
+    assert definitions(people, "body") == [("body", every), ("body", visible)]
+    unmarked = replace(people, visibility=np.where(people.visibility > 0, 2.0, 0.0))
+    assert definitions(unmarked, "body") == [("body", every)]
+    assert definitions(unmarked, "hand") == [("hand", every), ("each hand", every)]
+    beyond = replace(people, visibility=np.where(people.visibility > 0, 2.0, -1.0))
+    assert definitions(beyond, "body") == [("body", every), ("body", every | {"outside": "count"})]
 
 
 @pytest.mark.parametrize("group", OBJECTS)

@@ -66,6 +66,22 @@ def test_hallucinated_heads_are_scattered_where_they_were_put():
     assert "mediapipe 0.50" in figure.alt
 
 
+def test_parts_given_although_outside_have_a_panel_per_decision_and_small_ones_are_left_out():
+    rows = [
+        ("headless", d, part, decision, share, 0.0, 0.5, n)
+        for d, share in zip(DETECTORS, (0.25, 0.0), strict=True)
+        for part, n in (("head", 40), ("wrist", 3))
+        for decision in ("sure", "calibrated")
+    ]
+    columns = ["subset", "detector", "part", "decision", "value", "low", "high", "n"]
+    figure = failures.false_presence(pd.DataFrame(rows, columns=columns), "made up")
+    assert [axis.get_title("left") for axis in figure.figure.axes] == ["sure", "calibrated"]
+    labels = [label.get_text() for label in figure.figure.axes[0].get_yticklabels()]
+    assert labels == ["head, headless (40)"]
+    assert [len(axis.containers) for axis in figure.figure.axes] == [2, 2]
+    assert "mediapipe 0.25 (sure)" in figure.alt and "made up" in figure.caption
+
+
 def test_scores_are_drawn_by_state():
     rows = [
         ("mediapipe", state, 0.9, value, value, value) for state, value in (("visible", 1), ("outside", 0.1))

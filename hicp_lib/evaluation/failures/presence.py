@@ -1,0 +1,175 @@
+"""Is it there at all? Keypoints declared present by calibrated scores, and what extended OKS makes of them.
+
+A keypoint that is given inside the picture is *declared present* when its score, or better what that score
+is worth, reaches a cut; one placed outside the picture declares itself absent. What a score is worth is an
+isotonic curve (`calibration.curves`) of how often a keypoint placed in the picture is in the picture at all,
+for each detector and part of the body. It is cross-fitted: source images are split into two halves, and a
+person is judged by the curve of the half they are not in. It holds for people cut off as often as in these
+data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.images import inside
+from hicp_lib.core.keypoints import COCO_17, COCO_NAMES
+from hicp_lib.datasets.crops import with_outside
+from hicp_lib.evaluation.ap.bootstrap import difference, intervals
+from hicp_lib.evaluation.ap.metric_table import Drawn, draw_cases
+from hicp_lib.evaluation.calibration.curves import Calibration, split_half
+from hicp_lib.evaluation.cases import Found, Truth
+from hicp_lib.evaluation.failures.placed_keypoints import landed, placed_keypoints
+from hicp_lib.formats.annotations import Annotations, source_images
+
+# Of each of the 17 keypoints, the part of the body: the head, or what a pair of keypoints is called.
+PART_OF = np.array(["head"] * 5 + [name.partition("_")[2] for name in COCO_NAMES[5:]])
+PARTS = tuple(dict.fromkeys(PART_OF))
+MEASURES = ("OKS", "extended OKS, all given", "extended OKS, decided", "gained by deciding")
+
+
+@dataclass(frozen=True)
+class Presence:
+    """What scores say of whether a keypoint is in the picture.
+
+    Attributes
+    ----------
+    first_half : frozenset
+        The source images of one half.
+    curves : dict of (str, str, bool) to Calibration
+        By detector, part (of `PARTS`) and whether it was fitted to the first half.
+    """
+
+    first_half: frozenset
+    curves: Mapping[tuple[str, str, bool], Calibration]
+
+    @classmethod
+    def fit(cls, placed: pd.DataFrame, seed: int = 0) -> Presence:
+        """Curves for both halves of the source images.
+
+        Parameters
+        ----------
+        placed : DataFrame
+            `placed_keypoints.placed_keypoints`.
+        seed : int, optional
+            Of the split.
+
+        Returns
+        -------
+        Presence
+        """
+        in_picture = placed["given"] & (landed(placed) != "outside")
+        rows = placed[in_picture & (placed["state"] != "unknown")]
+        half, part = split_half(rows["source_image"], seed), PART_OF[rows["keypoint"]]
+        rows = rows.assign(half=half, part=part, present=rows["state"] != "outside")
+        curves = {
+            (detector, part, bool(half)): Calibration.fit(of["score"].to_numpy(), of["present"].to_numpy())
+            for (detector, part, half), of in rows.groupby(["detector", "part", "half"])
+        }
+        return cls(frozenset(rows.loc[half, "source_image"]), curves)
+
+    def __call__(self, detector: str, source_image: object, scores: np.ndarray) -> np.ndarray:
+        """How probably keypoints that were placed in the picture are in it, by the half the image is not in.
+
+        Parameters
+        ----------
+        detector : str
+            Whose.
+        source_image : object
+            What the picture was cut from.
+        scores : array, shape (..., 17)
+            As the detector gives them; kept for a part without a curve.
+
+        Returns
+        -------
+        array, shape (..., 17)
+        """
+        worth = np.array(scores, dtype=float)
+        for part in PARTS:
+            curve = self.curves.get((detector, part, source_image not in self.first_half))
+            if curve is not None:
+                worth[..., PART_OF == part] = curve(worth[..., PART_OF == part])
+        return worth
+
+
+def declared(truth: Truth, found: Found, presence: Presence | None = None) -> Found:
+    """Detections whose body keypoints' scores say how probably each is in the picture.
+
+    Parameters
+    ----------
+    truth : Truth
+        Of crops, by subset.
+    found : Found
+        By image id, of every subset and detector.
+    presence : Presence, optional
+        What scores are worth; when left out, whatever is given is declared present, with score 1.
+
+    Returns
+    -------
+    Found
+        As `found`; a keypoint placed outside the picture has score 0: it declares itself absent.
+    """
+    result: dict[tuple[str, str], dict[int, Detections]] = {}
+    for (subset, detector), run in found.items():
+        sources, images = source_images(truth[subset]), truth[subset].images
+        people = result[subset, detector] = {}
+        for image_id, of_image in run.items():
+            box_px = (0, 0, images[image_id].width_px, images[image_id].height_px)
+            scores = of_image.scores.copy()
+            body = presence(detector, sources[image_id], scores[:, COCO_17]) if presence else 1.0
+            scores[:, COCO_17] = np.where(inside(of_image.keypoints_px[:, COCO_17], box_px), body, 0.0)
+            people[image_id] = replace(of_image, scores=scores)
+    return result
+
+
+def extended_table(
+    truth: Truth, found: Found, source: Annotations, drawn: Drawn, n_resamples: int = 1000, seed: int = 0
+) -> pd.DataFrame:
+    """AP of bodies by OKS and by extended OKS, with every given keypoint present and with a decision.
+
+    Parameters
+    ----------
+    truth : Truth
+        Of crops, by subset.
+    found : Found
+        By image id, of every subset and detector.
+    source : Annotations
+        What the crops were made from.
+    drawn : Drawn
+        From `draw_cases` of the same.
+    n_resamples, seed : int, optional
+        Number of bootstrap draws, and what they and the halves are drawn with.
+
+    Returns
+    -------
+    DataFrame
+        Columns `subset, detector, measure` (of `MEASURES`), `value, low, high, n_people`; the last measure is
+        the third less the second, on the same draws.
+    """
+    presence = Presence.fit(placed_keypoints(truth, found, source), seed)
+    runs = {
+        (subset, f"{detector}, {way}"): run
+        for way, runs in {
+            "given": declared(truth, found),
+            "decided": declared(truth, found, presence),
+        }.items()
+        for (subset, detector), run in runs.items()
+    }
+    known = {subset: with_outside(people, source) for subset, people in truth.items()}
+    counted = draw_cases(known, runs, n_resamples, seed, groups=["body"], outside="count")
+    rows = []
+    for subset, detector in found:
+        if (subset, detector, "body") in drawn:
+            given, decided = (counted[subset, f"{detector}, {way}", "body"] for way in ("given", "decided"))
+            cases = (drawn[subset, detector, "body"], given, decided)
+            figures = [(intervals(of.metrics(), samples), of) for of, samples in cases]
+            figures.append((difference(decided[0], given[0], decided[1], given[1]), given[0]))
+            for measure, (figure, of) in zip(MEASURES, figures, strict=True):
+                rows.append((subset, detector, measure, *figure["AP"], of.n_people))
+    columns = ["subset", "detector", "measure", "value", "low", "high", "n_people"]
+    return pd.DataFrame(rows, columns=columns)

@@ -1,0 +1,84 @@
+"""Declared present by calibrated scores, and parts of people that are invented."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import COCO_17, HEAD, N_KEYPOINTS
+from hicp_lib.evaluation.ap.metric_table import draw_cases
+from hicp_lib.evaluation.calibration.curves import Calibration
+from hicp_lib.evaluation.failures.placed_keypoints import placed_keypoints
+from hicp_lib.evaluation.failures.presence import MEASURES, PART_OF, Presence, declared, extended_table
+from tests.evaluation.made_people import CROP, POINTS, make_annotations
+
+N_PEOPLE = 40
+NAME = "movenet-thunder"
+
+
+def study(head_score, invents):
+    """Everybody in Headless, and a detection that is right below the head.
+
+    Of those whom `invents` says so, the head is put into the picture, with a score of `head_score`.
+    """
+    source = make_annotations(np.repeat(POINTS[None], N_PEOPLE, 0), range(N_PEOPLE), first_id=0)
+    flags = np.full((N_PEOPLE, N_KEYPOINTS), 2.0)
+    flags[:, HEAD] = 0
+    about = [
+        {"source_id": i, "source_image_id": i, "crop_px": CROP, "cut_side": "top"} for i in range(N_PEOPLE)
+    ]
+    seen = POINTS - CROP[:2]
+    people = make_annotations(
+        np.repeat(seen[None], N_PEOPLE, 0), range(N_PEOPLE), visibility=flags, extras=about
+    )
+    run = {}
+    for i in range(N_PEOPLE):
+        points, scores = seen.copy(), np.full(N_KEYPOINTS, 0.9)
+        points[17:], scores[17:] = np.nan, 0
+        if invents(i):
+            points[:5], scores[:5] = [320.0, 240.0], head_score
+        run[i] = Detections(points[None], scores[None], np.ones(1))
+    return {"headless": people}, {("headless", NAME): run}, source
+
+
+def test_nobody_is_judged_by_a_curve_fitted_to_them():
+    rows = pd.DataFrame({"source_image": range(N_PEOPLE), "detector": "a", "keypoint": 9, "score": 0.5})
+    rows = rows.assign(given=True, x=0.5, y=0.5, state="visible")
+    mine = Presence.fit(rows)
+    state = np.where(rows["source_image"].isin(mine.first_half), "visible", "outside")
+    presence = Presence.fit(rows.assign(state=state))
+    assert presence.first_half == mine.first_half and len(mine.first_half) == N_PEOPLE / 2
+    for image in range(N_PEOPLE):
+        worth = presence("a", image, np.full(17, 0.5))
+        assert worth[9] == (image not in presence.first_half)
+        assert (np.delete(worth, [9, 10]) == 0.5).all()  # no curve: as it was
+
+
+def test_a_keypoint_outside_the_picture_declares_itself_absent():
+    truth, found, _ = study(0.8, lambda i: i == 0)
+    curve = Calibration(np.array([0.0, 1.0]), np.array([0.7, 0.7]))
+    curves = {(NAME, part, half): curve for part in set(PART_OF) for half in (False, True)}
+    raw, sure = (declared(truth, found, p)["headless", NAME] for p in (None, Presence(frozenset(), curves)))
+    assert raw[0].scores[0, :6].tolist() == [1] * 6 and (raw[1].scores[0, :5] == 0).all()
+    assert sure[0].scores[0, COCO_17].tolist() == [0.7] * 17 and (sure[1].scores[0, :5] == 0).all()
+    assert (found["headless", NAME][1].scores[0, :5] == 0.9).all()  # what was found stays
+
+
+def test_extended_ap_falls_with_invented_heads_and_the_decision_brings_it_back():
+    truth, found, source = study(0.8, lambda i: True)
+    drawn = draw_cases(truth, found, 20, 0)
+    table = extended_table(truth, found, source, drawn, 20, 0).set_index("measure")
+    assert list(table.index) == list(MEASURES) and (table["n_people"] == N_PEOPLE).all()
+    plain, given, decided, gained = table["value"]
+    assert plain == decided == pytest.approx(1) and given < 0.7
+    assert gained == pytest.approx(decided - given)
+    assert table["low"].notna().all()
+
+
+def test_of_crops_that_name_no_source_nothing_is_known_outside():
+    truth, found, source = study(0.8, lambda i: False)
+    whole = replace(truth["headless"], extras=[{} for _ in range(N_PEOPLE)])
+    placed = placed_keypoints({"headless": whole}, found, source)
+    assert set(placed["state"]) == {"visible", "unknown"}
