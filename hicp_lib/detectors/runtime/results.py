@@ -16,7 +16,6 @@ import numpy as np
 
 from hicp_lib.core.cache import code, digest
 from hicp_lib.core.detections import Detections, Detector
-from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import cache_dir, read_checked, sha256_bytes, write_checked
 from hicp_lib.core.keypoints import N_KEYPOINTS
 
@@ -69,20 +68,6 @@ def _code(names: tuple[str, ...]) -> tuple[str, str, dict[str, str]]:
 def cache_folder(detector: Detector) -> Path:
     """Folder of this detector's results under its present settings."""
     return cache_dir() / "detections" / detector.name / digest(identity(detector))[:32]
-
-
-def image_bytes(path: str | Path) -> bytes:
-    """Content of an image file.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read.
-    """
-    try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); expected an image file") from None
 
 
 def pixels_sha256(image: np.ndarray) -> str:
