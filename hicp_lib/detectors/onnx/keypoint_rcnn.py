@@ -19,7 +19,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.decode import decode_roi_maps
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.letterbox import Letterbox, letterbox, planes
+from hicp_lib.detectors.onnx.letterbox import Letterbox, letterbox
 from hicp_lib.detectors.onnx.session import Port, open_model
 
 _N_KEYPOINTS = 17
@@ -124,10 +124,9 @@ class KeypointRcnn:
         return Letterbox(cv2.resize(image, size, interpolation=kind), np.array(size) / sides)
 
     def _feed(self, pixels: np.ndarray) -> np.ndarray:
-        feed = np.empty((3, *pixels.shape[:2]), np.float32)
-        step, greatest = (-1, 1.0) if self._family == "detectron2" else (1, 255.0)
-        planes(pixels[..., ::step], (0.0,) * 3, (greatest,) * 3, feed)
-        return feed[None] if len(self._model.inputs[0].shape) == 4 else feed
+        is_bgr = self._family == "detectron2"
+        feed = cv2.dnn.blobFromImage(pixels, 1 if is_bgr else 1 / 255, swapRB=is_bgr)
+        return feed if len(self._model.inputs[0].shape) == 4 else feed[0]
 
     def _roles(self, outputs: list[np.ndarray]) -> dict[str, np.ndarray]:
         """What is there of `_ROLES`; exports differ in order and names, ranks and sizes tell them apart."""

@@ -8,11 +8,12 @@ column per row) or after it (corners, and the class behind the score). The rest 
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.letterbox import letterbox, planes
+from hicp_lib.detectors.onnx.letterbox import letterbox
 from hicp_lib.detectors.onnx.person_boxes import unsuppressed
 from hicp_lib.detectors.onnx.pose_net import CONVENTIONS, convention_of
 from hicp_lib.detectors.onnx.session import open_model
@@ -66,9 +67,7 @@ class OneStage:
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
         fitted = letterbox(image, self._size_px, _FILL, is_centred=not self._is_rtmo)
-        feed = np.empty((1, 3, self._size_px[1], self._size_px[0]), np.float32)
-        step, greatest = (-1, 1.0) if self._is_rtmo else (1, 255.0)
-        planes(fitted.pixels[..., ::step], (0.0,) * 3, (greatest,) * 3, feed[0])
+        feed = cv2.dnn.blobFromImage(fitted.pixels, 1 if self._is_rtmo else 1 / 255, swapRB=self._is_rtmo)
         boxes, keypoints = self._read(self._model.run(feed))
         keep = np.flatnonzero(boxes[:, 4] >= self._min_score)
         keep = keep[unsuppressed(boxes[keep, :4], boxes[keep, 4], self._max_overlap)]

@@ -14,7 +14,7 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, letterbox, planes
+from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, blob, letterbox
 from hicp_lib.detectors.onnx.session import open_model
 
 _FILL = (114, 114, 114)
@@ -70,8 +70,7 @@ class PersonBoxes:
         height, width = self._model.image_size_px
         self._size_px = width or _DEFAULT_SIDE_PX, height or _DEFAULT_SIDE_PX
         self._cells = _cells(self._size_px)
-        outputs = self._model.response_to_zeros(*self._size_px[::-1])
-        rows = self._rows(outputs)
+        rows = self._rows(self._model.response_to_zeros(*self._size_px[::-1]))
         self._is_decoded = rows.shape[1] > _N_BOX and _is_decoded(rows, self._cells)
         own = {"family": self._family, "min_score": min_score, "max_overlap": max_overlap}
         self.settings = own | {"decoded": self._is_decoded} | self._model.settings
@@ -79,12 +78,10 @@ class PersonBoxes:
     def find(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """People in an RGB image (height, width, 3): boxes (n, 4: x, y, width, height) and scores (n,)."""
         fitted = letterbox(image, self._size_px, _FILL)
-        feed = np.empty((1, 3, self._size_px[1], self._size_px[0]), np.float32)
-        planes(fitted.pixels[..., ::-1], *_NORMALISATIONS[self._family], out=feed[0])
-        outputs = self._model.run(feed)
+        outputs = self._model.run(blob([fitted.pixels], *_NORMALISATIONS[self._family], is_bgr=True))
         rows = self._rows(outputs)
         suppressed = rows.shape[1] == _N_BOX
-        corners, scores, labels = (_listed if suppressed else self._from_grid)(rows, outputs)
+        corners, scores, labels = _listed(rows, outputs) if suppressed else self._from_grid(rows)
         keep = (scores >= self._min_score) & np.isfinite(corners).all(axis=1)
         keep &= (corners[:, 2:] > corners[:, :2]).all(axis=1)
         corners, scores, labels = corners[keep] / np.tile(fitted.scale, 2), scores[keep], labels[keep]
@@ -121,9 +118,7 @@ class PersonBoxes:
             )  # fmt: skip
         return rows
 
-    def _from_grid(
-        self, rows: np.ndarray, _outputs: list[np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _from_grid(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Corners, scores and classes of YOLOX's rows: centre, size, object and class scores."""
         centre, size = rows[:, :2].astype(float), rows[:, 2:4].astype(float)
         if not self._is_decoded:
