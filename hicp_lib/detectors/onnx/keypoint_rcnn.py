@@ -17,7 +17,7 @@ import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.detectors.onnx.decode import decode_roi_maps
+from hicp_lib.detectors.onnx.decode import decode_roi_maps, given
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import Letterbox, letterbox
 from hicp_lib.detectors.onnx.session import Port, open_model
@@ -88,9 +88,7 @@ class KeypointRcnn:
         positions_px = positions_px / fitted.scale
         if self._family == "detectron2":
             positions_px = positions_px - 0.5
-        is_given = np.isfinite(positions_px).all(axis=-1) & (scores > 0)
-        positions_px = np.where(is_given[..., None], positions_px, np.nan)
-        return Detections.of_parts(positions_px, scores, people["scores"], "coco17")
+        return Detections.of_parts(*given(positions_px, scores), people["scores"], "coco17")
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""

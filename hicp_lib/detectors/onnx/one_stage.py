@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
+from hicp_lib.detectors.onnx.decode import given
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import letterbox
 from hicp_lib.detectors.onnx.person_boxes import unsuppressed
@@ -73,12 +74,8 @@ class OneStage:
         keep = keep[unsuppressed(boxes[keep, :4], boxes[keep, 4], self._max_overlap)]
         # Both families count from the corners of the input and of the image, not from pixels' centres.
         positions_px = fitted.to_image_px(keypoints[keep, :, :2] - 0.5) + 0.5
-        scores = np.clip(np.nan_to_num(keypoints[keep, :, 2]), 0, 1)
-        is_given = np.isfinite(positions_px).all(axis=-1) & (scores > 0)
-        positions_px = np.where(is_given[..., None], positions_px, np.nan)
-        return Detections.of_parts(
-            positions_px, np.where(is_given, scores, 0), boxes[keep, 4], self._convention
-        )
+        positions_px, scores = given(positions_px, np.clip(np.nan_to_num(keypoints[keep, :, 2]), 0, 1))
+        return Detections.of_parts(positions_px, scores, boxes[keep, 4], self._convention)
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""
