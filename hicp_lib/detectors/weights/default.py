@@ -6,6 +6,7 @@ keeps only these members; `load` hands out bytes that were hashed at that moment
 or executed.
 """
 
+import re
 import tempfile
 import zipfile
 from collections.abc import Iterable
@@ -83,11 +84,21 @@ def registry() -> dict[str, Weight]:
         }
     except (AttributeError, KeyError, TypeError) as error:
         raise InputError(f"{REGISTRY_PATH}: not a weights registry ({error}); restore it") from None
-    for name in [*weights, *(source.file for source in sources.values())]:
-        # Names become files in the cache folder, so none may lead out of it.
-        if not name or name.startswith(".") or set(name) & set("/\\:\0"):
-            raise InputError(f"{REGISTRY_PATH}: {name!r} is not a plain file name; restore it")
+    refuse_other_names(REGISTRY_PATH, [*weights, *(source.file for source in sources.values())])
     return weights
+
+
+def refuse_other_names(path: Path, names: Iterable[str]) -> None:
+    """Names of a registry become files in the cache folder, so none may lead out of it.
+
+    Raises
+    ------
+    InputError
+        For one that is not a plain file name.
+    """
+    for name in names:
+        if not re.fullmatch(r"\w[\w.-]*", name, re.ASCII):
+            raise InputError(f"{path}: {name!r} is not a plain file name; restore the committed file")
 
 
 def weights_dir() -> Path:
