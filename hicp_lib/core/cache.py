@@ -285,9 +285,7 @@ def _data_sha256(patterns: Iterable[str], data: Path) -> dict[str, str]:
     for pattern in patterns:
         found = [path for path in data.glob(pattern) if path.is_file()]
         if not found:
-            raise InputError(
-                f"{data / pattern}: is not there, and a result follows from it; install hicp anew"
-            )
+            raise InputError(f"{data / pattern}: is not there, and a result follows from it; reinstall hicp")
         paths.update(found)
     return {path.relative_to(data).as_posix(): _file_sha256(path, *_state(path)) for path in sorted(paths)}
 

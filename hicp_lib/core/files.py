@@ -154,9 +154,7 @@ def read_json(path: str | Path) -> Any:
             "the file may be cut off, write it again"
         ) from None
     except (RecursionError, ValueError):
-        raise InputError(
-            f"{path}: nested too deeply or with numbers too long to be an annotation file"
-        ) from None
+        raise InputError(f"{path}: nested too deeply, or numbers too long, for an annotation file") from None
 
 
 def sha256_bytes(content: bytes) -> str:

@@ -128,9 +128,7 @@ class Rows:
         first: dict[int, int] = {}
         for i, value in enumerate(values.tolist()):
             if first.setdefault(value, i) != i:
-                raise self.error(
-                    i, f"{key} is used before, by {self.label}[{first[value]}]; it must be unique"
-                )
+                raise self.error(i, f"{key} is used before, by {self.label}[{first[value]}]; make it unique")
         return values
 
     def numbers(self, key: str, default: Any = _REQUIRED) -> np.ndarray:
@@ -175,9 +173,7 @@ class Rows:
             try:
                 json.dumps(extra, allow_nan=False)
             except (ValueError, RecursionError):
-                raise self.error(
-                    i, "a further key holds NaN, infinity or a value nested too deeply"
-                ) from None
+                raise self.error(i, "a further key holds NaN, infinity or too deep a nesting") from None
         return extras
 
     def _keypoint_lists(self) -> list[list]:
@@ -220,9 +216,7 @@ class Rows:
                     return array
         except OverflowError:  # a whole number beyond floats
             pass
-        i, j = next(
-            (i, j) for i, values in enumerate(lists) for j, x in enumerate(values) if not _is_finite(x)
-        )
+        i, j = next((i, j) for i, row in enumerate(lists) for j, x in enumerate(row) if not _is_finite(x))
         problem = f"{name(j)} is {shown(lists[i][j])}; expected a finite number up to {MAX_ABS:g}"
         raise self.error(i if rows is None else rows[i], problem)
 

@@ -160,10 +160,9 @@ def unsuppressed(
     while len(left):
         best, left = left[0], left[1:]
         keep.append(best)
-        sides = np.minimum(corners[best, 2:], corners[left, 2:]) - np.maximum(
-            corners[best, :2], corners[left, :2]
-        )
-        common = np.maximum(sides + side_px, 0).prod(axis=1)
+        low = np.maximum(corners[best, :2], corners[left, :2])
+        high = np.minimum(corners[best, 2:], corners[left, 2:])
+        common = np.maximum(high - low + side_px, 0).prod(axis=1)
         left = left[common <= max_overlap * (areas[best] + areas[left] - common)]
     return np.array(keep, int)
 
