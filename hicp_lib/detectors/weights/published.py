@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from urllib.parse import urlsplit
 
 from hicp_lib.core.datafiles import DATA_DIR
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import cache_dir, read_json, sha256_bytes, sha256_file, write_bytes, write_json
 from hicp_lib.detectors.weights.default import refuse_other_names, weights_dir
 from hicp_lib.detectors.weights.url_download import download
@@ -119,8 +119,7 @@ def fetch_published(name: str) -> Published:
         is not the file that is known or was recorded.
     """
     models = published()
-    if name not in models:
-        raise InputError(f"published model {name!r} is not known; expected one of: {', '.join(models)}")
+    refuse_unknown("published model", name, models)
     model = models[name]
     if status(model) == "present":
         return model
