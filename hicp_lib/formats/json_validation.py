@@ -178,7 +178,7 @@ class Rows:
 
     def _keypoint_lists(self) -> list[list]:
         """Each row's keypoints in one list; its length is one of `CONVENTIONS`, times 3."""
-        lists = self.column("keypoints", _is_list, "a list of x, y, v per keypoint")
+        lists = self.column("keypoints", lambda v: isinstance(v, list), "a list of x, y, v per keypoint")
         for i, row in enumerate(self.rows):
             if len(lists[i]) == 51 and all(isinstance(row.get(key), list) for key in PART_KEYS):
                 lists[i] = list(chain(lists[i], *(row[key] for key in PART_KEYS)))
@@ -219,10 +219,6 @@ class Rows:
         i, j = next((i, j) for i, row in enumerate(lists) for j, x in enumerate(row) if not _is_finite(x))
         problem = f"{name(j)} is {shown(lists[i][j])}; expected a finite number up to {MAX_ABS:g}"
         raise self.error(i if rows is None else rows[i], problem)
-
-
-def _is_list(value: Any) -> bool:
-    return isinstance(value, list)
 
 
 def _is_integer(value: Any) -> bool:
