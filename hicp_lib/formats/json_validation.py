@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -151,16 +152,42 @@ class Rows:
         -------
         array, shape (n, 136, 3)
         """
-        flat = self._keypoint_lists()
-        result = np.zeros((len(flat), N_KEYPOINTS, 3))
-        sizes = np.array([len(value) // 3 for value in flat])
-        for count, convention in CONVENTIONS.items():
-            chosen = np.flatnonzero(sizes == count)
-            if len(chosen):
-                lists = [flat[i] for i in chosen]
-                triples = self.finite(lists, 3 * count, _keypoint_namer(convention), chosen.tolist())
-                result[chosen] = to_halpe(triples.reshape(-1, count, 3), convention, axis=-2, fill=0.0)
-        return result
+        lists = dict(enumerate(self._keypoint_lists()))
+        return self.points("keypoints", lists, CONVENTIONS)[0]
+
+    def points(
+        self, key: str, lists: Mapping[int, list], conventions: Mapping[int, str], width: int = 3
+    ) -> tuple[np.ndarray, Counter[str]]:
+        """Flat lists of numbers of some rows, `width` for each keypoint, in the Halpe-136 order.
+
+        Parameters
+        ----------
+        key : str
+            For messages.
+        lists : mapping of int to list
+            By row.
+        conventions : mapping of int to str
+            By the number of keypoints, a key of `hicp_lib.core.keypoints.TO_HALPE`.
+        width : int, optional
+            Numbers per keypoint.
+
+        Returns
+        -------
+        values : array, shape (n, 136, width)
+            0 where the convention has no such keypoint, and in rows without a list.
+        found : Counter
+            Rows by convention.
+        """
+        values, found = np.zeros((len(self.rows), N_KEYPOINTS, width)), Counter[str]()
+        for n, convention in conventions.items():
+            chosen = {i: numbers for i, numbers in lists.items() if len(numbers) == width * n}
+            if chosen:
+                found[convention] = len(chosen)
+                names = _triples_namer(key, convention) if width == 3 else lambda j: f"{key}[{j}]"
+                numbers = self.finite(list(chosen.values()), width * n, names, list(chosen))
+                points = to_halpe(numbers.reshape(-1, n, width), convention, axis=-2, fill=0.0)
+                values[list(chosen)] = points
+        return values, found
 
     def conventions(self) -> list[str]:
         """Per row, the convention its keypoints come in, a key of `hicp_lib.core.keypoints.TO_HALPE`."""
@@ -229,9 +256,9 @@ def _is_finite(value: Any) -> bool:
     return type(value) in (int, float) and abs(value) <= MAX_ABS
 
 
-def _keypoint_namer(convention: str) -> Callable[[int], str]:
-    indices = TO_HALPE[convention]
-    return lambda j: f"keypoints[{j}] ({NAMES[indices[j // 3]]} {'xyv'[j % 3]})"
+def _triples_namer(key: str, convention: str) -> Callable[[int], str]:
+    names = [NAMES[i] if i >= 0 else "other" for i in TO_HALPE[convention]]
+    return lambda j: f"{key}[{j}] ({names[j // 3]} {'xyv'[j % 3]})"
 
 
 def is_number(value: object) -> TypeGuard[float]:
