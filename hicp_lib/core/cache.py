@@ -11,7 +11,7 @@ import json
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -89,13 +89,13 @@ def key(entry_points: Sequence[Any], *, without: Sequence[str] = (), **inputs: A
     (True, False)
     """
     names = tuple(sorted({_module_name(entry) for entry in entry_points}))
-    return digest([_code_digest(names, tuple(without)), content(inputs)])
+    return digest([asdict(running_code(names, tuple(without))), content(inputs)])
 
 
 @cache  # what a process runs is what it first loaded, whatever becomes of the files
-def _code_digest(names: tuple[str, ...], without: tuple[str, ...]) -> str:
-    found = code(names, without=without)
-    return digest([found.modules, found.data, found.libraries])
+def running_code(names: tuple[str, ...], without: tuple[str, ...] = ()) -> Code:
+    """As `code`, of what this process runs."""
+    return code(names, without=without)
 
 
 def code(
@@ -285,9 +285,7 @@ def _data_sha256(patterns: Iterable[str], data: Path) -> dict[str, str]:
     for pattern in patterns:
         found = [path for path in data.glob(pattern) if path.is_file()]
         if not found:
-            raise InputError(
-                f"{data / pattern}: is not there, and a result follows from it; install hicp anew"
-            )
+            raise InputError(f"{data / pattern}: is not there, and a result follows from it; reinstall hicp")
         paths.update(found)
     return {path.relative_to(data).as_posix(): _file_sha256(path, *_state(path)) for path in sorted(paths)}
 

@@ -5,13 +5,12 @@ process has.
 """
 
 import inspect
+import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from hicp_lib.core.cache import key
 from hicp_lib.core.files import cache_dir, read_checked, write_checked
@@ -46,9 +45,7 @@ def cached(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> 
     path = cache_dir() / "tables" / make.__name__ / f"{result_key[:32]}.bin"
     table = _read(path)
     if table is None:
-        made = pa.BufferOutputStream()
-        pq.write_table(pa.Table.from_pandas(make(*arguments, **named)), made)
-        write_checked(path, made.getvalue().to_pybytes())
+        write_checked(path, make(*arguments, **named).to_parquet())
         table = _read(path)
     return table
 
@@ -56,4 +53,4 @@ def cached(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> 
 def _read(path: Path) -> pd.DataFrame | None:
     """The table of a file of Parquet; None if it is absent or damaged."""
     payload = read_checked(path)
-    return None if payload is None else pq.read_table(pa.BufferReader(payload)).to_pandas()
+    return None if payload is None else pd.read_parquet(io.BytesIO(payload))

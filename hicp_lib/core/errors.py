@@ -1,5 +1,7 @@
 """The one exception the library raises for bad input."""
 
+from collections.abc import Iterable
+
 
 class InputError(ValueError):
     """Something read from outside is not what was expected.
@@ -7,6 +9,31 @@ class InputError(ValueError):
     The message is one line that names the file (and the row or key), what was
     expected, and what to do about it. The command line prints it and exits 2.
     """
+
+
+def refuse_unknown(what: str, value: str, known: Iterable[str]) -> None:
+    """Tell a value that is none of those there are.
+
+    Parameters
+    ----------
+    what : str
+        What the value is, for the message.
+    value : str
+    known : iterable of str
+        What it may be.
+
+    Raises
+    ------
+    InputError
+
+    Examples
+    --------
+    >>> refuse_unknown("format", "xml", ("coco", "mmpose"))
+    Traceback (most recent call last):
+    hicp_lib.core.errors.InputError: format 'xml' is not known; expected one of: coco, mmpose
+    """
+    if value not in known:
+        raise InputError(f"{what} {value!r} is not known; expected one of: {', '.join(known)}")
 
 
 def one_line(error: BaseException) -> str:

@@ -67,6 +67,30 @@ def read_checked(path: str | Path) -> bytes | None:
     return payload if hashlib.sha256(payload).digest() == stated else None
 
 
+def read_bytes(path: str | Path, expected: str) -> bytes:
+    """The content of a file that was named.
+
+    Parameters
+    ----------
+    path : str or Path
+    expected : str
+        What the file should have been, or what to do, for the message.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); {expected}") from None
+
+
 def write_json(path: str | Path, value: Any, *, indent: int | None = None) -> None:
     """Write strict JSON, whole or not at all.
 
@@ -119,11 +143,9 @@ def read_json(path: str | Path) -> Any:
     InputError
         If the file is missing, unreadable or not JSON; the line and column are named.
     """
-    path = Path(path)
+    content = read_bytes(path, "give the path of a JSON file")
     try:
-        return json.loads(path.read_bytes())
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a JSON file") from None
+        return json.loads(content)
     except UnicodeDecodeError:
         raise InputError(f"{path}: is not text in UTF-8; expected a JSON file") from None
     except json.JSONDecodeError as error:
@@ -132,9 +154,7 @@ def read_json(path: str | Path) -> Any:
             "the file may be cut off, write it again"
         ) from None
     except (RecursionError, ValueError):
-        raise InputError(
-            f"{path}: nested too deeply or with numbers too long to be an annotation file"
-        ) from None
+        raise InputError(f"{path}: nested too deeply, or numbers too long, for an annotation file") from None
 
 
 def sha256_bytes(content: bytes) -> str:

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import write_bytes
+from hicp_lib.core.files import read_bytes, write_bytes
 
 Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom exclusive
 
@@ -29,11 +29,18 @@ def read_image(path: str | Path) -> np.ndarray:
     InputError
         If the file is missing or not an image OpenCV can decode.
     """
-    try:
-        content = np.fromfile(path, dtype=np.uint8)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); expected an image file") from None
-    return decode_image(content, path)
+    return decode_image(image_bytes(path), path)
+
+
+def image_bytes(path: str | Path) -> bytes:
+    """Content of an image file, as it lies there.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
+    return read_bytes(path, "expected an image file")
 
 
 def decode_image(content: bytes | np.ndarray, path: str | Path) -> np.ndarray:

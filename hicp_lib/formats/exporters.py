@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import write_json
 from hicp_lib.core.keypoints import LIMBS, NAMES, TO_HALPE
 from hicp_lib.formats.annotations import PERSON, Annotations, image_rows, keypoint_triples, result_row
@@ -63,9 +63,8 @@ def export_detections(
     InputError
         For an unknown format or layout, and images without name and size.
     """
-    for name, value, allowed in (("format", format, FORMATS), ("layout", layout, LAYOUTS)):
-        if value not in allowed:
-            raise InputError(f"{name} {value!r} is not known; expected one of: {', '.join(allowed)}")
+    refuse_unknown("format", format, FORMATS)
+    refuse_unknown("layout", layout, LAYOUTS)
     people = list(_people(detections, TO_HALPE[layout]))
     if format == "coco":
         write_json(out, people)

@@ -44,14 +44,10 @@ def read_imported(
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); expected a folder") from None
     if not detectors:
-        raise InputError(
-            f"{folder}: holds no folder; expected one for each detector, such as mmpose/basic.json"
-        )
+        raise InputError(f"{folder}: holds no folder; expected one per detector, such as mmpose/basic.json")
     for path in detectors:
         if not _NAME.fullmatch(path.name):
-            raise InputError(
-                f"{path}: the folder's name is the detector's; use letters, digits, - and _ only"
-            )
+            raise InputError(f"{path}: the folder's name is the detector's; use letters, digits, - and _")
     return {
         (subset, f"{path.name}-imported"): read_detections(path / f"{subset}.json", people)
         for subset, people in truth.items()

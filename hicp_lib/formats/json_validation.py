@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -128,9 +129,7 @@ class Rows:
         first: dict[int, int] = {}
         for i, value in enumerate(values.tolist()):
             if first.setdefault(value, i) != i:
-                raise self.error(
-                    i, f"{key} is used before, by {self.label}[{first[value]}]; it must be unique"
-                )
+                raise self.error(i, f"{key} is used before, by {self.label}[{first[value]}]; make it unique")
         return values
 
     def numbers(self, key: str, default: Any = _REQUIRED) -> np.ndarray:
@@ -153,16 +152,42 @@ class Rows:
         -------
         array, shape (n, 136, 3)
         """
-        flat = self._keypoint_lists()
-        result = np.zeros((len(flat), N_KEYPOINTS, 3))
-        sizes = np.array([len(value) // 3 for value in flat])
-        for count, convention in CONVENTIONS.items():
-            chosen = np.flatnonzero(sizes == count)
-            if len(chosen):
-                lists = [flat[i] for i in chosen]
-                triples = self.finite(lists, 3 * count, _keypoint_namer(convention), chosen.tolist())
-                result[chosen] = to_halpe(triples.reshape(-1, count, 3), convention, axis=-2, fill=0.0)
-        return result
+        lists = dict(enumerate(self._keypoint_lists()))
+        return self.points("keypoints", lists, CONVENTIONS)[0]
+
+    def points(
+        self, key: str, lists: Mapping[int, list], conventions: Mapping[int, str], width: int = 3
+    ) -> tuple[np.ndarray, Counter[str]]:
+        """Flat lists of numbers of some rows, `width` for each keypoint, in the Halpe-136 order.
+
+        Parameters
+        ----------
+        key : str
+            For messages.
+        lists : mapping of int to list
+            By row.
+        conventions : mapping of int to str
+            By the number of keypoints, a key of `hicp_lib.core.keypoints.TO_HALPE`.
+        width : int, optional
+            Numbers per keypoint.
+
+        Returns
+        -------
+        values : array, shape (n, 136, width)
+            0 where the convention has no such keypoint, and in rows without a list.
+        found : Counter
+            Rows by convention.
+        """
+        values, found = np.zeros((len(self.rows), N_KEYPOINTS, width)), Counter[str]()
+        for n, convention in conventions.items():
+            chosen = {i: numbers for i, numbers in lists.items() if len(numbers) == width * n}
+            if chosen:
+                found[convention] = len(chosen)
+                names = _triples_namer(key, convention) if width == 3 else lambda j: f"{key}[{j}]"
+                numbers = self.finite(list(chosen.values()), width * n, names, list(chosen))
+                points = to_halpe(numbers.reshape(-1, n, width), convention, axis=-2, fill=0.0)
+                values[list(chosen)] = points
+        return values, found
 
     def conventions(self) -> list[str]:
         """Per row, the convention its keypoints come in, a key of `hicp_lib.core.keypoints.TO_HALPE`."""
@@ -175,14 +200,12 @@ class Rows:
             try:
                 json.dumps(extra, allow_nan=False)
             except (ValueError, RecursionError):
-                raise self.error(
-                    i, "a further key holds NaN, infinity or a value nested too deeply"
-                ) from None
+                raise self.error(i, "a further key holds NaN, infinity or too deep a nesting") from None
         return extras
 
     def _keypoint_lists(self) -> list[list]:
         """Each row's keypoints in one list; its length is one of `CONVENTIONS`, times 3."""
-        lists = self.column("keypoints", _is_list, "a list of x, y, v per keypoint")
+        lists = self.column("keypoints", lambda v: isinstance(v, list), "a list of x, y, v per keypoint")
         for i, row in enumerate(self.rows):
             if len(lists[i]) == 51 and all(isinstance(row.get(key), list) for key in PART_KEYS):
                 lists[i] = list(chain(lists[i], *(row[key] for key in PART_KEYS)))
@@ -220,15 +243,9 @@ class Rows:
                     return array
         except OverflowError:  # a whole number beyond floats
             pass
-        i, j = next(
-            (i, j) for i, values in enumerate(lists) for j, x in enumerate(values) if not _is_finite(x)
-        )
+        i, j = next((i, j) for i, row in enumerate(lists) for j, x in enumerate(row) if not _is_finite(x))
         problem = f"{name(j)} is {shown(lists[i][j])}; expected a finite number up to {MAX_ABS:g}"
         raise self.error(i if rows is None else rows[i], problem)
-
-
-def _is_list(value: Any) -> bool:
-    return isinstance(value, list)
 
 
 def _is_integer(value: Any) -> bool:
@@ -239,9 +256,9 @@ def _is_finite(value: Any) -> bool:
     return type(value) in (int, float) and abs(value) <= MAX_ABS
 
 
-def _keypoint_namer(convention: str) -> Callable[[int], str]:
-    indices = TO_HALPE[convention]
-    return lambda j: f"keypoints[{j}] ({NAMES[indices[j // 3]]} {'xyv'[j % 3]})"
+def _triples_namer(key: str, convention: str) -> Callable[[int], str]:
+    names = [NAMES[i] if i >= 0 else "other" for i in TO_HALPE[convention]]
+    return lambda j: f"{key}[{j}] ({names[j // 3]} {'xyv'[j % 3]})"
 
 
 def is_number(value: object) -> TypeGuard[float]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
-from hicp_lib.core.files import atomic_path
+from hicp_lib.core.files import atomic_path, read_bytes
 
 with needs("analysis"):
     import ezc3d
@@ -76,11 +76,7 @@ def read_points(path: Path) -> Points:
     >>> points_m.shape, names, rate_hz
     ((5, 2, 3), ('elbow', 'wrist'), 100.0)
     """
-    try:
-        with open(path, "rb") as file:
-            head = file.read(10)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a C3D file") from None
+    head = read_bytes(path, "give the path of a C3D file")[:10]
     if len(head) < 10 or head[1:2] != b"\x50":
         raise InputError(f"{path}: is not a C3D file (its second byte is not 80); export it again")
     with tempfile.TemporaryDirectory() as folder:

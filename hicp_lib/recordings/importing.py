@@ -21,14 +21,7 @@ from hicp_lib.formats.json_validation import is_number
 from hicp_lib.recordings.camera_file import read_camera
 from hicp_lib.recordings.recording import check_columns
 from hicp_lib.recordings.tum import read_poses
-from hicp_lib.recordings.writer import (
-    depth_name,
-    refuse_used_folder,
-    rgb_name,
-    write_depth,
-    write_index,
-    write_rgb,
-)
+from hicp_lib.recordings.writer import refuse_used_folder, write_frame, write_index
 
 _IMAGE_KINDS = (".png", ".jpg", ".jpeg")
 _MAX_RATE_HZ = 10_000
@@ -164,8 +157,7 @@ def import_bag(bag: str | Path, out: str | Path, poses: Poses) -> int:
         if stamps_s and time_s <= stamps_s[-1]:
             continue  # the reader may return the last frame twice
         rgb = rgb if meta.color_format == "RGB8" else rgb[..., ::-1].copy()
-        write_rgb(out / rgb_name(len(stamps_s)), rgb)
-        write_depth(out / depth_name(len(stamps_s)), depth_units, 1)
+        write_frame(out, len(stamps_s), rgb, depth_units, 1)
         stamps_s.append(time_s)
     if not stamps_s:
         raise InputError(f"{bag}: holds no frames with colour and depth; record both streams")

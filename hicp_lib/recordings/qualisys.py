@@ -13,7 +13,7 @@ from typing import NoReturn
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import write_bytes
+from hicp_lib.core.files import read_bytes, write_bytes
 from hicp_lib.recordings import c3d
 
 _NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*")
@@ -126,10 +126,7 @@ def write_c3d(path: str | Path, mocap: MotionCapture) -> None:
 
 
 def _read_tsv(path: Path) -> MotionCapture:
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give the path of a TSV file") from None
+    raw = read_bytes(path, "give the path of a TSV file")
     lines = re.split(r"\r\n|\n|\r", _decoded(raw).rstrip("\r\n \x1a"))
     start = next((k for k, line in enumerate(lines) if _is_data(line)), None)
     if start is None:

@@ -22,7 +22,7 @@ import pandas as pd
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
-from hicp_lib.core.files import read_json
+from hicp_lib.core.files import read_bytes, read_json
 from hicp_lib.core.images import read_image
 from hicp_lib.recordings.camera_file import read_camera
 from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, associate, read_file_list, read_poses
@@ -303,10 +303,7 @@ def check_columns(path: str | Path, table: pd.DataFrame, columns: Sequence[str])
 
 
 def _read_depth_m(recording: Recording, path: Path) -> np.ndarray:
-    try:
-        content = np.fromfile(path, np.uint8)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); expected a depth image") from None
+    content = np.frombuffer(read_bytes(path, "expected a depth image"), np.uint8)
     units = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
     if units is None or units.dtype != np.uint16 or units.ndim != 2:
         raise InputError(f"{path}: is not a whole 16-bit image of one channel; write depth as 16-bit PNG")

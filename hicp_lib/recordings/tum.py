@@ -12,7 +12,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import write_bytes
+from hicp_lib.core.files import atomic_path, write_bytes
 from hicp_lib.core.quaternions import matrices_from_quaternions, quaternions_from_matrices
 
 MAX_DIFFERENCE_S = 0.02  # images and poses further apart in time do not belong together
@@ -106,8 +106,8 @@ def write_file_list(path: str | Path, times_s: np.ndarray, names: Sequence[str])
     names : sequence of str
         n of them, relative to the list's folder.
     """
-    lines = [f"{time_s:.6f} {name}" for time_s, name in zip(times_s, names, strict=True)]
-    _write(path, [f"# {_LIST_COLUMNS}", *lines])
+    lines = [f"{time_s:.6f} {name}\n" for time_s, name in zip(times_s, names, strict=True)]
+    write_bytes(path, "".join([f"# {_LIST_COLUMNS}\n", *lines]).encode())
 
 
 def write_poses(path: str | Path, times_s: np.ndarray, T_base_cam: np.ndarray) -> None:
@@ -121,12 +121,10 @@ def write_poses(path: str | Path, times_s: np.ndarray, T_base_cam: np.ndarray) -
         Camera coordinates to the robot's base frame, metres.
     """
     T = np.asarray(T_base_cam, float)
-    rows = np.column_stack([T[:, :3, 3], quaternions_from_matrices(T[:, :3, :3])])
-    lines = [
-        " ".join([f"{time_s:.6f}", *(f"{value:.9f}" for value in row)])
-        for time_s, row in zip(times_s, rows, strict=True)
-    ]
-    _write(path, [f"# {_POSE_COLUMNS}; camera in the robot's base frame, metres", *lines])
+    rows = np.column_stack([times_s, T[:, :3, 3], quaternions_from_matrices(T[:, :3, :3])])
+    header = f"{_POSE_COLUMNS}; camera in the robot's base frame, metres"
+    with atomic_path(path) as temporary:
+        np.savetxt(temporary, rows, ["%.6f", *["%.9f"] * 7], header=header)
 
 
 def associate(
@@ -208,7 +206,3 @@ def _is_inside(name: str) -> bool:
 
 def _error(path: str | Path, number: int, problem: str) -> InputError:
     return InputError(f"{path}: line {number}: {problem}")
-
-
-def _write(path: str | Path, lines: list[str]) -> None:
-    write_bytes(path, ("\n".join(lines) + "\n").encode())

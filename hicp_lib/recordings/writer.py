@@ -77,9 +77,7 @@ class RecordingWriter:
         if rgb.shape[:2] != expected or depth_m.shape != expected:
             found = f"colour {rgb.shape[:2]} and depth {depth_m.shape} (height, width)"
             raise InputError(f"{self.folder}: {found} must both be {expected}, as the intrinsics say")
-        index = len(self._times_s)
-        write_rgb(self.folder / rgb_name(index), rgb)
-        write_depth(self.folder / depth_name(index), depth_m, self.depth_units_per_m)
+        write_frame(self.folder, len(self._times_s), rgb, depth_m, self.depth_units_per_m)
         self._times_s.append(float(time_s))
         self._poses.append(np.asarray(T_base_cam, float))
 
@@ -128,6 +126,25 @@ def write_index(
     write_poses(folder / POSES_FILE, times_s if pose_s is None else pose_s, T_base_cam)
     write_file_list(folder / DEPTH_LIST, times_s, depth)
     write_file_list(folder / RGB_LIST, times_s, rgb)
+
+
+def write_frame(
+    folder: Path, index: int, rgb: np.ndarray, depth_m: np.ndarray, depth_units_per_m: float
+) -> None:
+    """Write the images of a frame, by `rgb_name` and `depth_name`.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the recording.
+    index : int
+        The frame's number, from 0.
+    rgb : array, shape (height, width, 3), dtype uint8
+    depth_m : array, shape (height, width)
+    depth_units_per_m : float
+    """
+    write_rgb(folder / rgb_name(index), rgb)
+    write_depth(folder / depth_name(index), depth_m, depth_units_per_m)
 
 
 def rgb_name(index: int) -> str:

@@ -37,11 +37,7 @@ class Regions:
 
     @classmethod
     def around(
-        cls,
-        boxes_px: np.ndarray,
-        input_size_px: tuple[int, int],
-        padding: float = PADDING,
-        udp: bool = False,
+        cls, boxes_px: np.ndarray, input_size_px: tuple[int, int], padding: float = PADDING, udp: bool = False
     ) -> Regions:
         """The regions of boxes for a network's input.
 

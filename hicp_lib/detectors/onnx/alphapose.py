@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.detectors.onnx import pose_nms
 from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.box_source import BoxSource
@@ -119,8 +119,7 @@ def _told_decoding(maps: np.ndarray, n_integral: int) -> str:
 
 
 def _decoder(model: OnnxModel, decoding: str, n_integral: int) -> Decoder:
-    if decoding not in _SCORES:
-        raise InputError(f"decoding {decoding!r}: not known; expected one of: {', '.join(_SCORES)}")
+    refuse_unknown("decoding", decoding, _SCORES)
     if decoding == "combined":
         if not n_integral:
             raise InputError(f"{model.path}: has no face and hands; expected decoding heatmap or integral")

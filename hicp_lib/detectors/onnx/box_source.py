@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.nanodet import NanoDet
 from hicp_lib.detectors.onnx.person_boxes import PersonBoxes
@@ -39,8 +39,7 @@ class BoxSource:
     ) -> None:
         own = {name: value for name, value in own.items() if value is not None}
         self.kind = boxes or ("detected" if person_model else "image")
-        if self.kind not in _MEANINGS:
-            raise InputError(f"boxes {boxes!r}: not known; expected one of: {', '.join(_MEANINGS)}")
+        refuse_unknown("boxes", self.kind, _MEANINGS)
         if person_model is not None and self.kind != "detected":
             raise InputError(
                 f"boxes {self.kind!r}: do not use a person model; give boxes 'detected' together with "

@@ -47,7 +47,7 @@ def decode_quarter(maps: np.ndarray, *, needs_both_axes: bool = False) -> Decode
     with np.errstate(invalid="ignore"):
         step = np.stack([at(1, 0) - at(-1, 0), at(0, 1) - at(0, -1)], axis=-1)
     moved = cells + 0.25 * np.sign(step) * np.stack([moves_x, moves_y], axis=-1)
-    return _given(moved, scores)
+    return given(moved, scores)
 
 
 def decode_dark(maps: np.ndarray, kernel: int = 11) -> Decoded:
@@ -66,7 +66,7 @@ def decode_dark(maps: np.ndarray, kernel: int = 11) -> Decoded:
     x, y = cells[..., 0], cells[..., 1]
     inner = (1 < x) & (x < maps.shape[3] - 2) & (1 < y) & (y < maps.shape[2] - 2)
     offset = _newton_step(gradient, dxx, dyy, dxy)
-    return _given(cells + np.where(inner[..., None], offset, 0.0), scores)
+    return given(cells + np.where(inner[..., None], offset, 0.0), scores)
 
 
 def decode_dark_udp(maps: np.ndarray, kernel: int = 11) -> Decoded:
@@ -82,7 +82,7 @@ def decode_dark_udp(maps: np.ndarray, kernel: int = 11) -> Decoded:
     dxx, dyy = right - 2 * middle + left, below - 2 * middle + above
     dxy = 0.5 * (log(1, 1) - right - below + 2 * middle - left - above + log(-1, -1))
     least = np.finfo(np.float32).eps
-    return _given(cells + _newton_step(gradient, dxx + least, dyy + least, dxy), scores)
+    return given(cells + _newton_step(gradient, dxx + least, dyy + least, dxy), scores)
 
 
 def decode_simcc(simcc_x: np.ndarray, simcc_y: np.ndarray) -> Decoded:
@@ -91,7 +91,7 @@ def decode_simcc(simcc_x: np.ndarray, simcc_y: np.ndarray) -> Decoded:
     (Li et al., "SimCC", ECCV 2022. MMPose takes the lower value, rtmlib the mean.)
     """
     bins = np.stack([simcc_x.argmax(axis=-1), simcc_y.argmax(axis=-1)], axis=-1).astype(float)
-    return _given(bins, np.minimum(simcc_x.max(axis=-1), simcc_y.max(axis=-1)).astype(float))
+    return given(bins, np.minimum(simcc_x.max(axis=-1), simcc_y.max(axis=-1)).astype(float))
 
 
 def decode_integral(maps: np.ndarray) -> Decoded:
@@ -108,7 +108,7 @@ def decode_integral(maps: np.ndarray) -> Decoded:
         total = along_y.sum(axis=-1)
         x = along_x @ np.arange(heat.shape[3]) / total
         y = along_y @ np.arange(heat.shape[2]) / total
-    return _given(np.stack([x, y], axis=-1), heat.max(axis=(2, 3)).astype(float))
+    return given(np.stack([x, y], axis=-1), heat.max(axis=(2, 3)).astype(float))
 
 
 def decode_combined(maps: np.ndarray, n_integral: int) -> Decoded:
@@ -134,6 +134,12 @@ def decode_roi_maps(maps: np.ndarray, boxes_px: np.ndarray) -> Decoded:
         positions[row] = (cells + 0.5) * size / pixels + (x1, y1)
         masses[row] = 1 / np.exp(roi - tops[:, None, None]).sum(axis=(1, 2))
     return positions, masses
+
+
+def given(positions: np.ndarray, scores: np.ndarray) -> Decoded:
+    """Positions (n, k, 2) and scores (n, k); NaN and 0 where a score is not positive, or either no number."""
+    is_given = (scores > 0) & np.isfinite(scores) & np.isfinite(positions).all(axis=-1)
+    return np.where(is_given[..., None], positions, np.nan), np.where(is_given, scores, 0.0)
 
 
 def _around(maps: np.ndarray, cells: np.ndarray) -> Callable[[int, int], np.ndarray]:
@@ -175,8 +181,3 @@ def _blur(maps: np.ndarray, kernel: int) -> np.ndarray:
     tall = padded.reshape(-1, maps.shape[3])
     blurred = cv2.GaussianBlur(tall, (kernel, kernel), 0, borderType=cv2.BORDER_CONSTANT)
     return blurred.reshape(padded.shape)[:, :, border:-border]
-
-
-def _given(positions: np.ndarray, scores: np.ndarray) -> Decoded:
-    given = (scores > 0) & np.isfinite(scores) & np.isfinite(positions).all(axis=-1)
-    return np.where(given[..., None], positions, np.nan), np.where(given, scores, 0.0)

@@ -16,10 +16,10 @@ import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.errors import InputError
-from hicp_lib.detectors.onnx.decode import decode_roi_maps
+from hicp_lib.core.errors import refuse_unknown
+from hicp_lib.detectors.onnx.decode import decode_roi_maps, given
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.letterbox import Letterbox, letterbox, planes
+from hicp_lib.detectors.onnx.letterbox import Letterbox, letterbox
 from hicp_lib.detectors.onnx.session import Port, open_model
 
 _N_KEYPOINTS = 17
@@ -71,8 +71,7 @@ class KeypointRcnn:
             raise self._model.refusal("expected an input of one image, (3, h, w)")
         self._is_told = family is None
         self._family = family or _told_family(self._model.outputs)
-        if self._family not in _FAMILIES:
-            raise InputError(f"{model}: family {family!r} is not known; expected {' or '.join(_FAMILIES)}")
+        refuse_unknown(f"{model}: family", self._family, _FAMILIES)
         self._check([port.shape for port in self._model.outputs])
         self._min_score = min_score
         self.settings = {"model": self._model.settings, "family": self._family, "min_score": min_score}
@@ -88,9 +87,7 @@ class KeypointRcnn:
         positions_px = positions_px / fitted.scale
         if self._family == "detectron2":
             positions_px = positions_px - 0.5
-        is_given = np.isfinite(positions_px).all(axis=-1) & (scores > 0)
-        positions_px = np.where(is_given[..., None], positions_px, np.nan)
-        return Detections.of_parts(positions_px, scores, people["scores"], "coco17")
+        return Detections.of_parts(*given(positions_px, scores), people["scores"], "coco17")
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""
@@ -124,10 +121,9 @@ class KeypointRcnn:
         return Letterbox(cv2.resize(image, size, interpolation=kind), np.array(size) / sides)
 
     def _feed(self, pixels: np.ndarray) -> np.ndarray:
-        feed = np.empty((3, *pixels.shape[:2]), np.float32)
-        step, greatest = (-1, 1.0) if self._family == "detectron2" else (1, 255.0)
-        planes(pixels[..., ::step], (0.0,) * 3, (greatest,) * 3, feed)
-        return feed[None] if len(self._model.inputs[0].shape) == 4 else feed
+        is_bgr = self._family == "detectron2"
+        feed = cv2.dnn.blobFromImage(pixels, 1 if is_bgr else 1 / 255, swapRB=is_bgr)
+        return feed if len(self._model.inputs[0].shape) == 4 else feed[0]
 
     def _roles(self, outputs: list[np.ndarray]) -> dict[str, np.ndarray]:
         """What is there of `_ROLES`; exports differ in order and names, ranks and sizes tell them apart."""

@@ -69,16 +69,22 @@ def letterbox(
     return Letterbox(pixels, scale, (left - 0.5, top - 0.5))
 
 
-def planes(pixels: np.ndarray, mean: tuple[float, ...], std: tuple[float, ...], out: np.ndarray) -> None:
-    """Write (pixels - mean) / std of an image into `out`.
+def blob(
+    images: list[np.ndarray], mean: tuple[float, ...], std: tuple[float, ...], is_bgr: bool = False
+) -> np.ndarray:
+    """What a network is shown of RGB images of one size: (value - mean) / std.
 
     Parameters
     ----------
-    pixels : array, shape (height, width, 3), dtype uint8
+    images : list of array, shape (height, width, 3), dtype uint8
     mean, std : tuple of float
-        One of each channel.
-    out : array, shape (3, height, width), dtype float32
+        One of each of the network's channels.
+    is_bgr : bool
+        Whether the network takes blue first.
+
+    Returns
+    -------
+    array, shape (n, 3, height, width), dtype float32
     """
-    for plane, channel, centre, spread in zip(out, cv2.split(pixels), mean, std, strict=True):
-        np.subtract(channel, np.float32(centre), out=plane, dtype=np.float32)
-        plane *= np.float32(1 / spread)
+    params = cv2.dnn.Image2BlobParams([*(1 / spread for spread in std), 1], mean=mean, swapRB=is_bgr)
+    return cv2.dnn.blobFromImagesWithParams(images, params)

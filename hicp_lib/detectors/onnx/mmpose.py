@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import refuse_unknown
 from hicp_lib.core.keypoints import SIGMAS, TO_HALPE
 from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.box_source import BoxSource
@@ -129,8 +129,7 @@ class MMPose:
 
 
 def _hand_convention(convention: str, hand: str) -> str:
-    if hand not in ("left", "right"):
-        raise InputError(f"hand {hand!r}: not known; expected left or right")
+    refuse_unknown("hand", hand, ("left", "right"))
     return f"{hand}_hand21" if convention.endswith("hand21") else convention
 
 

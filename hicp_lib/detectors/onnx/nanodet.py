@@ -10,7 +10,7 @@ import numpy as np
 
 from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, planes
+from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, blob
 from hicp_lib.detectors.onnx.person_boxes import unsuppressed
 from hicp_lib.detectors.onnx.session import open_committed
 
@@ -46,8 +46,7 @@ class NanoDet:
         """People in an RGB image (height, width, 3): boxes (n, 4: x, y, width, height) and scores (n,)."""
         size_px = self._side_px, self._side_px
         whole = Regions.whole(image, size_px)
-        feed = np.empty((1, 3, *size_px), np.float32)
-        planes(whole.crop(image, size_px)[0][..., ::-1], *IMAGENET_BGR, out=feed[0])
+        feed = blob(whole.crop(image, size_px), *IMAGENET_BGR, is_bgr=True)
         corners, scores = self._read(self._model.run_named(feed))
         ends_px = whole.to_image_px(corners.reshape(1, -1, 2), size_px)[0].clip(0, image.shape[1::-1])
         corners_px = ends_px.reshape(-1, 4)

@@ -8,11 +8,13 @@ column per row) or after it (corners, and the class behind the score). The rest 
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
+from hicp_lib.detectors.onnx.decode import given
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.letterbox import letterbox, planes
+from hicp_lib.detectors.onnx.letterbox import letterbox
 from hicp_lib.detectors.onnx.person_boxes import unsuppressed
 from hicp_lib.detectors.onnx.pose_net import CONVENTIONS, convention_of
 from hicp_lib.detectors.onnx.session import open_model
@@ -66,20 +68,14 @@ class OneStage:
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
         fitted = letterbox(image, self._size_px, _FILL, is_centred=not self._is_rtmo)
-        feed = np.empty((1, 3, self._size_px[1], self._size_px[0]), np.float32)
-        step, greatest = (-1, 1.0) if self._is_rtmo else (1, 255.0)
-        planes(fitted.pixels[..., ::step], (0.0,) * 3, (greatest,) * 3, feed[0])
+        feed = cv2.dnn.blobFromImage(fitted.pixels, 1 if self._is_rtmo else 1 / 255, swapRB=self._is_rtmo)
         boxes, keypoints = self._read(self._model.run(feed))
         keep = np.flatnonzero(boxes[:, 4] >= self._min_score)
         keep = keep[unsuppressed(boxes[keep, :4], boxes[keep, 4], self._max_overlap)]
         # Both families count from the corners of the input and of the image, not from pixels' centres.
         positions_px = fitted.to_image_px(keypoints[keep, :, :2] - 0.5) + 0.5
-        scores = np.clip(np.nan_to_num(keypoints[keep, :, 2]), 0, 1)
-        is_given = np.isfinite(positions_px).all(axis=-1) & (scores > 0)
-        positions_px = np.where(is_given[..., None], positions_px, np.nan)
-        return Detections.of_parts(
-            positions_px, np.where(is_given, scores, 0), boxes[keep, 4], self._convention
-        )
+        positions_px, scores = given(positions_px, np.clip(np.nan_to_num(keypoints[keep, :, 2]), 0, 1))
+        return Detections.of_parts(positions_px, scores, boxes[keep, 4], self._convention)
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""

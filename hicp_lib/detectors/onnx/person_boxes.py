@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import refuse_unknown
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, letterbox, planes
+from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, blob, letterbox
 from hicp_lib.detectors.onnx.session import open_model
 
 _FILL = (114, 114, 114)
@@ -64,14 +64,12 @@ class PersonBoxes:
         folds = self._model.told.first_convolution[1:2] == (_FOLDED_CHANNELS,)
         self._is_told = family is None
         self._family = family or ("yolox" if folds else "rtmdet")
-        if self._family not in _NORMALISATIONS:
-            raise InputError(f"person_family {family!r}: expected one of {', '.join(_NORMALISATIONS)}")
+        refuse_unknown("person_family", self._family, _NORMALISATIONS)
         self._min_score, self._max_overlap = min_score, max_overlap
         height, width = self._model.image_size_px
         self._size_px = width or _DEFAULT_SIDE_PX, height or _DEFAULT_SIDE_PX
         self._cells = _cells(self._size_px)
-        outputs = self._model.response_to_zeros(*self._size_px[::-1])
-        rows = self._rows(outputs)
+        rows = self._rows(self._model.response_to_zeros(*self._size_px[::-1]))
         self._is_decoded = rows.shape[1] > _N_BOX and _is_decoded(rows, self._cells)
         own = {"family": self._family, "min_score": min_score, "max_overlap": max_overlap}
         self.settings = own | {"decoded": self._is_decoded} | self._model.settings
@@ -79,12 +77,10 @@ class PersonBoxes:
     def find(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """People in an RGB image (height, width, 3): boxes (n, 4: x, y, width, height) and scores (n,)."""
         fitted = letterbox(image, self._size_px, _FILL)
-        feed = np.empty((1, 3, self._size_px[1], self._size_px[0]), np.float32)
-        planes(fitted.pixels[..., ::-1], *_NORMALISATIONS[self._family], out=feed[0])
-        outputs = self._model.run(feed)
+        outputs = self._model.run(blob([fitted.pixels], *_NORMALISATIONS[self._family], is_bgr=True))
         rows = self._rows(outputs)
         suppressed = rows.shape[1] == _N_BOX
-        corners, scores, labels = (_listed if suppressed else self._from_grid)(rows, outputs)
+        corners, scores, labels = _listed(rows, outputs) if suppressed else self._from_grid(rows)
         keep = (scores >= self._min_score) & np.isfinite(corners).all(axis=1)
         keep &= (corners[:, 2:] > corners[:, :2]).all(axis=1)
         corners, scores, labels = corners[keep] / np.tile(fitted.scale, 2), scores[keep], labels[keep]
@@ -121,9 +117,7 @@ class PersonBoxes:
             )  # fmt: skip
         return rows
 
-    def _from_grid(
-        self, rows: np.ndarray, _outputs: list[np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _from_grid(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Corners, scores and classes of YOLOX's rows: centre, size, object and class scores."""
         centre, size = rows[:, :2].astype(float), rows[:, 2:4].astype(float)
         if not self._is_decoded:
@@ -165,10 +159,9 @@ def unsuppressed(
     while len(left):
         best, left = left[0], left[1:]
         keep.append(best)
-        sides = np.minimum(corners[best, 2:], corners[left, 2:]) - np.maximum(
-            corners[best, :2], corners[left, :2]
-        )
-        common = np.maximum(sides + side_px, 0).prod(axis=1)
+        low = np.maximum(corners[best, :2], corners[left, :2])
+        high = np.minimum(corners[best, 2:], corners[left, 2:])
+        common = np.maximum(high - low + side_px, 0).prod(axis=1)
         left = left[common <= max_overlap * (areas[best] + areas[left] - common)]
     return np.array(keep, int)
 

@@ -15,7 +15,7 @@ from hicp_lib.core.keypoints import mirror
 from hicp_lib.detectors.onnx.affine import PADDING, Regions
 from hicp_lib.detectors.onnx.decode import Decoded, decode_simcc
 from hicp_lib.detectors.onnx.facts import Fact
-from hicp_lib.detectors.onnx.letterbox import planes
+from hicp_lib.detectors.onnx.letterbox import blob
 from hicp_lib.detectors.onnx.session import OnnxModel
 
 CONVENTIONS = {
@@ -142,8 +142,7 @@ class PoseNet:
     def _run(self, crops: list[np.ndarray]) -> list[np.ndarray]:
         width, height = self.input_size_px
         feed = np.zeros((self.batch or len(crops), 3, height, width), np.float32)
-        for crop, out in zip(crops, feed, strict=False):
-            planes(crop, self._mean, self._std, out)
+        feed[: len(crops)] = blob(crops, self._mean, self._std)
         return [output[: len(crops)] for output in self._ordered(self.model.run(feed), len(feed))]
 
     def _average(self, straight: np.ndarray, flipped: np.ndarray, axis: int, shifts: bool) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 
 from hicp_lib.core.environment import with_variables
 from hicp_lib.core.errors import InputError, one_line
-from hicp_lib.core.files import sha256_bytes
+from hicp_lib.core.files import read_bytes, sha256_bytes
 from hicp_lib.detectors.onnx.facts import KNOWN_NETWORKS, Fact
 from hicp_lib.detectors.onnx.model_file import ModelFile, read_model
 from hicp_lib.detectors.weights.default import find, load
@@ -191,12 +191,7 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
         that was recorded then, or the provider is not to be had.
     """
     path = Path(path)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read ({error.strerror}); give the path of an ONNX file"
-        ) from None
+    content = read_bytes(path, "give the path of an ONNX file")
     check_use(path, content)
     return open_content(content, path, provider, threads)
 
@@ -254,11 +249,8 @@ def open_committed(name: str, provider: str = "cpu", threads: int = 1) -> OnnxMo
 
 def available_providers() -> dict[str, str]:
     """Execution providers of this onnxruntime that compute on this machine, full names by short ones."""
-    names = {
-        name.removesuffix("ExecutionProvider").lower(): name for name in onnxruntime.get_available_providers()
-    }
-    names.pop("azure", None)
-    return names
+    found = onnxruntime.get_available_providers()
+    return {name.removesuffix("ExecutionProvider").lower(): name for name in found if "Azure" not in name}
 
 
 def _start(path: Path, content: bytes, provider: str, threads: int) -> onnxruntime.InferenceSession:

@@ -74,11 +74,9 @@ class OpenPoseHands:
         crop = cv2.warpAffine(image, to_image, (self._side_px, self._side_px), flags=flags)
         maps = self._maps(self._model.run(feed(crop)))
         large = enlarge(maps[:_N_HAND], STRIDE).reshape(_N_HAND, -1)
-        at = large.argmax(axis=1)
+        y, x = np.divmod(large.argmax(axis=1), self._side_px)
         scores = np.clip(np.nan_to_num(large.max(axis=1).astype(float)), 0, 1)
-        points = (
-            np.stack([at % self._side_px, at // self._side_px], axis=1) @ to_image[:, :2].T + to_image[:, 2]
-        )
+        points = np.stack([x, y], axis=1) @ to_image[:, :2].T + to_image[:, 2]
         return np.where(scores[:, None] > 0, points, np.nan), scores
 
     def _maps(self, outputs: list[np.ndarray]) -> np.ndarray:

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from hicp_lib.detectors.onnx.letterbox import Letterbox, planes
+from hicp_lib.detectors.onnx.letterbox import Letterbox
 
 # Wider images are shown smaller, the rest of the height black.
 _MAX_ASPECT = 16 / 9
@@ -40,6 +40,4 @@ def fit(image: np.ndarray, height_px: int, width_px: int | None = None) -> Lette
 
 def feed(pixels: np.ndarray) -> np.ndarray:
     """The network's input, shape (1, 3, height, width), for an RGB image."""
-    feed = np.empty((1, 3, *pixels.shape[:2]), np.float32)
-    planes(pixels[..., ::-1], (128.0,) * 3, (256.0,) * 3, feed[0])
-    return feed
+    return cv2.dnn.blobFromImage(pixels, 1 / 256, mean=(128.0,) * 3, swapRB=True)

@@ -99,7 +99,6 @@ def _windows(
 
 def _nearest(maps: np.ndarray, positions_px: np.ndarray, stride: int, offset_px: float = 0.0) -> np.ndarray:
     limit = np.array([maps.shape[2], maps.shape[1]]) - 1
-    x, y = np.moveaxis(
-        np.clip(np.floor((positions_px + offset_px) / stride + 0.5).astype(int), 0, limit), -1, 0
-    )
+    cells = np.clip(np.floor((positions_px + offset_px) / stride + 0.5).astype(int), 0, limit)
+    x, y = np.moveaxis(cells, -1, 0)
     return maps[:, y, x]

@@ -74,7 +74,9 @@ class OpenPose:
         self._model = open_model(model, provider, threads)
         height, width = self._model.image_size_px
         self._size_px = height or net_height_px, width
-        self._check(net_height_px)
+        shown_px = self._size_px[0], width or net_height_px  # another network is refused before any image
+        answer = self._model.response_to_zeros(*shown_px)
+        self._convention = _split(self._model, answer, shown_px)[2].convention
         self._hands = OpenPoseHands(hand_model, provider, threads) if hand_model is not None else None
         self._as_released = as_released
         self._options = PafOptions()
@@ -116,12 +118,6 @@ class OpenPose:
                  "number of all parts and limbs" if self._as_released else "number of those found"),
                  "as OpenPose" if self._as_released else "option as_released"),
         ]  # fmt: skip
-
-    def _check(self, net_height_px: int) -> None:
-        """Refuse a network that gives other maps, before an image is shown to it."""
-        height, width = self._size_px[0], self._size_px[1] or net_height_px
-        answer = self._model.response_to_zeros(height, width)
-        self._convention = _split(self._model, answer, (height, width))[2].convention
 
 
 def _split(

@@ -28,14 +28,14 @@ import numpy as np
 
 from hicp_lib.core.detections import Detector
 from hicp_lib.core.errors import InputError, one_line
+from hicp_lib.core.extras import needs
 from hicp_lib.core.files import sha256_bytes
-from hicp_lib.core.images import decode_image
+from hicp_lib.core.images import decode_image, image_bytes
 from hicp_lib.detectors.runtime.pool import DetectorPool, naming_image
 from hicp_lib.detectors.runtime.results import (
     Timed,
     cache_folder,
     identity,
-    image_bytes,
     read_result,
     result_path,
     write_result,
@@ -109,12 +109,8 @@ def detect_on_cluster(
 
 @contextmanager
 def _connected(address: str) -> Iterator[Client]:
-    try:
+    with needs("dask"):
         from distributed import Client
-    except ImportError:
-        raise InputError(
-            "Dask is not installed here; install this package's extra 'dask': pip install distributed"
-        ) from None
     if not _ADDRESS.fullmatch(address):
         raise InputError(f"{address}: no Dask scheduler answers (no address); give one's, tcp://HOST:PORT")
     with _quiet():

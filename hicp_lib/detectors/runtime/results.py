@@ -8,15 +8,13 @@ settings (with its weights' hashes), and what the code of the detector and of it
 import io
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
-from hicp_lib.core.cache import code, digest
+from hicp_lib.core.cache import digest, running_code
 from hicp_lib.core.detections import Detections, Detector
-from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import cache_dir, read_checked, sha256_bytes, write_checked
 from hicp_lib.core.keypoints import N_KEYPOINTS
 
@@ -50,8 +48,9 @@ def detections_of(results: Mapping[Key, Timed]) -> dict[Key, Detections]:
 
 def identity(detector: Detector) -> dict:
     """All that this detector's results depend on, besides the image."""
-    modules, data, libraries = _code(tuple(sorted({__name__, *_modules(detector)})))
-    return {"settings": detector.settings, "code": [modules, data], "libraries": libraries}
+    found = running_code(tuple(sorted({__name__, *_modules(detector)})))
+    hashes = [digest(found.modules), digest(found.data)]
+    return {"settings": detector.settings, "code": hashes, "libraries": found.libraries}
 
 
 def _modules(detector: Detector) -> Iterator[str]:
@@ -60,29 +59,9 @@ def _modules(detector: Detector) -> Iterator[str]:
         yield from _modules(part)
 
 
-@cache
-def _code(names: tuple[str, ...]) -> tuple[str, str, dict[str, str]]:
-    found = code(names)
-    return digest(found.modules), digest(found.data), found.libraries
-
-
 def cache_folder(detector: Detector) -> Path:
     """Folder of this detector's results under its present settings."""
     return cache_dir() / "detections" / detector.name / digest(identity(detector))[:32]
-
-
-def image_bytes(path: str | Path) -> bytes:
-    """Content of an image file.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read.
-    """
-    try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); expected an image file") from None
 
 
 def pixels_sha256(image: np.ndarray) -> str:

@@ -17,17 +17,9 @@ from tqdm import tqdm
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.files import sha256_bytes
-from hicp_lib.core.images import decode_image
+from hicp_lib.core.images import decode_image, image_bytes
 from hicp_lib.detectors.runtime.pool import DetectorPool, naming_image, single_threaded_opencv
-from hicp_lib.detectors.runtime.results import (
-    Key,
-    Timed,
-    cache_folder,
-    cached,
-    detections_of,
-    image_bytes,
-    result_path,
-)
+from hicp_lib.detectors.runtime.results import Key, Timed, cache_folder, cached, detections_of, result_path
 from hicp_lib.formats.annotations import Annotations, read_annotations
 
 

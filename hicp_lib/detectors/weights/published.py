@@ -6,7 +6,6 @@ SHA-256. Where the hash is not known, the first fetch records it in the cache, i
 refused. Of an archive one member is read, in memory; nothing is unpacked and nothing fetched is executed.
 """
 
-import re
 import stat
 import tempfile
 import zipfile
@@ -16,9 +15,9 @@ from pathlib import Path, PurePosixPath
 from urllib.parse import urlsplit
 
 from hicp_lib.core.datafiles import DATA_DIR
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import cache_dir, read_json, sha256_bytes, sha256_file, write_bytes, write_json
-from hicp_lib.detectors.weights.default import weights_dir
+from hicp_lib.detectors.weights.default import refuse_other_names, weights_dir
 from hicp_lib.detectors.weights.url_download import download
 
 REGISTRY_PATH = DATA_DIR / "published_weights.json"
@@ -96,11 +95,7 @@ def published() -> dict[str, Published]:
         names = [name for model in models.values() for name in (model.name, model.file)]
     except (AttributeError, TypeError, ValueError) as error:
         raise InputError(f"{REGISTRY_PATH}: not a registry ({error}); restore the committed file") from None
-    for name in names:
-        if not re.fullmatch(r"\w[\w.-]*", name, re.ASCII):
-            raise InputError(
-                f"{REGISTRY_PATH}: {name!r} is not a plain file name; restore the committed file"
-            )
+    refuse_other_names(REGISTRY_PATH, names)
     return models
 
 
@@ -124,8 +119,7 @@ def fetch_published(name: str) -> Published:
         is not the file that is known or was recorded.
     """
     models = published()
-    if name not in models:
-        raise InputError(f"published model {name!r} is not known; expected one of: {', '.join(models)}")
+    refuse_unknown("published model", name, models)
     model = models[name]
     if status(model) == "present":
         return model

@@ -28,7 +28,7 @@ from hicp_lib.experiments.recordings.scenarios import Scenario, scenario
 from hicp_lib.recordings.c3d import MAX_FRAMES as MAX_C3D_FRAMES
 from hicp_lib.recordings.qualisys import write_c3d, write_tsv
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, MOCAP_FILE, RGB_LIST, Recording, open_recording
-from hicp_lib.recordings.writer import depth_name, rgb_name, write_depth, write_rgb
+from hicp_lib.recordings.writer import depth_name, write_depth, write_frame
 from hicp_lib.simulation.world.batch import check_output, run_jobs
 
 
@@ -117,10 +117,8 @@ def record_one(out: Path, name: str, seed: int, k: int) -> None:
         The frame's number is `k`.
     """
     rgb, depth_m, exact_m, truth = record_frame(name, seed, k)
-    write_rgb(out / rgb_name(k), rgb)
-    exact = out / EXACT_DEPTH_DIR / Path(depth_name(k)).name
-    for path, image_m in ((out / depth_name(k), depth_m), (exact, exact_m)):
-        write_depth(path, image_m, DEPTH_UNITS_PER_M)
+    write_frame(out, k, rgb, depth_m, DEPTH_UNITS_PER_M)
+    write_depth(out / EXACT_DEPTH_DIR / Path(depth_name(k)).name, exact_m, DEPTH_UNITS_PER_M)
     write_json(part_path(out, k), truth)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.images import inside
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.formats.importers.matching import match_images
@@ -138,8 +138,7 @@ def import_predictions(
         For anything malformed, coordinates that are no pixels of these images, images that match none or
         several; the message names the file, the entry, the key, what was expected and what to do.
     """
-    if format not in READERS:
-        raise InputError(f"format {format!r} is not known; expected one of: {', '.join(READERS)}")
+    refuse_unknown("format", format, READERS)
     if scale is not None and not 0 < scale < np.inf:
         raise InputError(f"--score-scale is {scale:g}; expected a positive number")
     people = READERS[format](Path(path))

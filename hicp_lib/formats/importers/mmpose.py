@@ -19,7 +19,6 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
-from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.importers.people import FileRows, People, json_files, split
 from hicp_lib.formats.json_validation import CONVENTIONS, Rows, shown
 
@@ -68,16 +67,9 @@ def _triples(rows: FileRows) -> tuple[np.ndarray, Counter[str]]:
     scores = rows.column("keypoint_scores")
     points = rows.column("keypoints", _is_points, "one [x, y] per keypoint")
     flat = {i: _flat(rows, i, *both) for i, both in enumerate(zip(points, scores, strict=True))}
-    triples, conventions = np.zeros((len(flat), N_KEYPOINTS, 3)), Counter[str]()
-    for count, convention in CONVENTIONS.items():
-        chosen = {i: xy for i, xy in flat.items() if len(xy) == 2 * count}
-        if chosen:
-            conventions[convention] = len(chosen)
-            index = list(chosen)
-            triples[index, :, :2] = rows.points("keypoints", convention, chosen, width=2)
-            its_scores = {i: scores[i] for i in index}
-            triples[index, :, 2:] = rows.points("keypoint_scores", convention, its_scores, width=1)
-    return triples, conventions
+    positions, conventions = rows.points("keypoints", flat, CONVENTIONS, width=2)
+    values, _ = rows.points("keypoint_scores", dict(enumerate(scores)), CONVENTIONS, width=1)
+    return np.concatenate([positions, values], axis=-1), conventions
 
 
 def _is_points(value: Any) -> bool:

@@ -85,15 +85,13 @@ def _triples(rows: FileRows) -> tuple[np.ndarray, Counter[str], np.ndarray]:
     conventions: Counter[str] = Counter()
     for key, by_length in _PARTS.items():
         lists = _lists(rows, key, by_length)
-        for length, convention in by_length.items():
-            chosen = {i: values for i, values in lists.items() if len(values) == length}
-            if chosen:
-                conventions[convention] = len(chosen)
-                points = rows.points(key, convention, chosen)
-                if key == _BODY:
-                    n_parts[list(chosen)] = length // 3
-                    points[..., :2] -= OPENPOSE.offset_px * (points[..., 2:] > 0)
-                triples[list(chosen)] += points
+        by_number = {length // 3: convention for length, convention in by_length.items()}
+        points, found = rows.points(key, lists, by_number)
+        if key == _BODY:
+            n_parts[list(lists)] = [len(values) // 3 for values in lists.values()]
+            points[..., :2] -= OPENPOSE.offset_px * (points[..., 2:] > 0)
+        conventions += found
+        triples += points
     return triples, conventions, n_parts
 
 

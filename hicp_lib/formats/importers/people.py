@@ -11,7 +11,6 @@ from typing import Literal
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.keypoints import TO_HALPE, to_halpe
 from hicp_lib.formats.json_validation import Rows
 
 
@@ -100,29 +99,6 @@ class FileRows(Rows):
     def error(self, i: int, problem: str) -> InputError:
         path, entry = self.places[i]
         return InputError(f"{path}: {self.label}[{entry}]: {problem}")
-
-    def points(self, key: str, convention: str, lists: dict[int, list], width: int = 3) -> np.ndarray:
-        """Flat lists of numbers of some rows, one convention's keypoints times `width`, in Halpe-136.
-
-        Parameters
-        ----------
-        key : str
-            For messages.
-        convention : str
-            A key of `hicp_lib.core.keypoints.TO_HALPE`.
-        lists : dict of int to list
-            By row; of the convention's length times `width`.
-        width : int, optional
-            Numbers per keypoint.
-
-        Returns
-        -------
-        array, shape (len(lists), 136, width)
-            0 where the convention has no such keypoint.
-        """
-        n = len(TO_HALPE[convention])
-        values = self.finite(list(lists.values()), width * n, lambda j: f"{key}[{j}]", list(lists))
-        return to_halpe(values.reshape(-1, n, width), convention, axis=-2, fill=0.0)
 
 
 def json_files(folder: Path, ending: str, what: str) -> dict[str, Path]:

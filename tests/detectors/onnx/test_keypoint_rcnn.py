@@ -171,7 +171,7 @@ def test_everything_assumed_is_told(tmp_path):
         facts = {fact.what: fact.value for fact in KeypointRcnn(model).describe()}
         assert facts["family"] == family and facts["input"] == "100 wide, 80 high"
         assert ("softmax" in facts["keypoint score"]) == (family == "detectron2")
-    with pytest.raises(InputError, match="detectron2 or torchvision"):
+    with pytest.raises(InputError, match="expected one of: detectron2, torchvision"):
         KeypointRcnn(model, family="caffe")
 
 

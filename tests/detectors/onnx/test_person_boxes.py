@@ -127,7 +127,7 @@ def test_family_and_thresholds_may_be_given(tmp_path):
     image = np.full((64, 64, 3), (10, 20, 200), np.uint8)
     assert PersonBoxes(path, family="yolox").find(image)[1] == [200]
     assert len(PersonBoxes(path, family="yolox", min_score=201).find(image)[1]) == 0
-    with pytest.raises(InputError, match="expected one of yolox, rtmdet"):
+    with pytest.raises(InputError, match="expected one of: yolox, rtmdet"):
         PersonBoxes(path, family="ssd")
     facts = {fact.what: fact for fact in PersonBoxes(path, family="yolox").describe()}
     assert facts["person detector"].why == "given; option person_family"

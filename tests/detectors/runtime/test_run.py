@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -123,14 +124,11 @@ def test_what_is_read_is_what_was_written(tmp_path, n):
 
 def test_the_key_knows_code_and_libraries(counting, monkeypatch):
     folders = {cache.cache_folder(Counting())}
-    known = cache._code
-    for place in range(3):
+    known = cache.running_code
+    for part in ("modules", "data", "libraries"):
         with monkeypatch.context() as changed:
-            changed.setattr(
-                cache,
-                "_code",
-                lambda names, place=place: [*known(names)[:place], "other", *known(names)[place + 1 :]],
-            )
+            other = {part: {"other": "1"}}
+            changed.setattr(cache, "running_code", lambda names, other=other: replace(known(names), **other))
             folders.add(cache.cache_folder(Counting()))
     folders.add(cache.cache_folder(Counting(version=2)))
     assert len(folders) == 5
