@@ -8,21 +8,20 @@ the number of worker processes changes nothing, and a larger data set contains t
 from functools import partial
 from pathlib import Path
 
-import cv2
 import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.core.cache import key
-from hicp_lib.core.files import read_json, write_bytes, write_json
+from hicp_lib.core.files import read_json, write_json
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
+from hicp_lib.recordings.writer import write_rgb
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import Frame, render
 from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts, run_jobs
 from hicp_lib.simulation.world.staging import Stage, distance_m, random_stage
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
-JPEG_QUALITY = 95
 MAX_SCENES = 1_000_000
 _MAX_NUMBER = 1_000_000_000  # of seeds and workers
 _PARTS_DIR = ".scenes"  # the people of finished images, and what they were made with
@@ -89,9 +88,7 @@ def _people_path(out: Path, index: int) -> Path:
 
 def _render_one(out: Path, seed: int, index: int) -> None:
     image, people = render_scene(seed, index)
-    bgr = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
-    _, encoded = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    write_bytes(_image_path(out, index), encoded.tobytes())
+    write_rgb(_image_path(out, index), image)
     height, width = image.shape[:2]
     write_json(_people_path(out, index), {"width": width, "height": height, "people": people})
 
