@@ -20,7 +20,20 @@ _FINGER_JITTER_DEG = 4.0
 
 
 def sample_hand(rng: np.random.Generator, kind: str, prefix: str = "") -> Joints:
-    """Joint angles (radians) of one hand of a kind in `HANDS_DEG`; `prefix` goes before their names.
+    """Joint angles of one hand.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    kind : str
+        One of `HANDS_DEG`.
+    prefix : str, optional
+        Goes before the names of the joints, such as "left_".
+
+    Returns
+    -------
+    dict of str to float
+        Radians.
 
     Examples
     --------
