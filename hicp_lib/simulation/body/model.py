@@ -73,11 +73,11 @@ class Body:
     bone_names : tuple of str
     bone_parents : array of int, shape (n_bones,)
         -1 for the root, which comes first.
-    skin_weights : sparse array, shape (n_v, n_bones), dtype float32
-        Rows sum to 1. Nearly all are zero: products read a tenth of the memory of a dense array.
+    skin_weights : array, shape (n_v, n_bones), dtype float32
+        Sparse; rows sum to 1. Nearly all are zero: products read a tenth of the memory of a dense array.
     triangles : array, shape (n_t, 3), dtype int32
-    keypoint_weights : sparse array, shape (136, n_v + n_bones), dtype float32
-        Over vertices, then bone heads; rows sum to 1.
+    keypoint_weights : array, shape (136, n_v + n_bones), dtype float32
+        Sparse; over vertices, then bone heads; rows sum to 1.
     regions : array of int, shape (n_v,)
         Indices into `REGIONS`.
     fields : array, shape (n_v, len(FIELDS)), dtype float32
