@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from timing import Comparison, run
 
-from hicp_lib.experiments.recordings.frames import camera_at, record_frame, stage
+from hicp_lib.experiments.recordings.frames import camera_at, record_frame
 from hicp_lib.experiments.recordings.scenarios import SCENARIOS, Scenario
 from hicp_lib.experiments.recordings.simulate import record_one, simulate_recording
 from hicp_lib.simulation.rendering.render import render
@@ -60,7 +60,7 @@ def _capture(plan: Scenario) -> float:
 
 
 def _draw(plan: Scenario, k: int) -> float:
-    world, _ = stage(plan.name, 0)(float(plan.times_s(k + 1)[k]))
+    world, _ = plan.stage(0, float(plan.times_s(k + 1)[k]))
     camera = camera_at(plan, k)
     start_s = time.process_time()
     render(world, camera, np.random.default_rng(k))

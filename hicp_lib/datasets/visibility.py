@@ -21,17 +21,12 @@ MIN_PEOPLE = 20
 
 NONE = "none of these"
 
+_WHOLE_ARMS = ("left_shoulder", "right_shoulder", "whole_left_arm", "whole_right_arm")
 # Class: parts that are in the picture, and parts that are not.
 RULES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "whole upper body": (
-        ("head", "left_shoulder", "right_shoulder", "whole_left_arm", "whole_right_arm"),
-        (),
-    ),
+    "whole upper body": (("head", *_WHOLE_ARMS), ()),
     "only head": (("head",), ("shoulder", "arm", "hip", "leg")),
-    "no head": (
-        ("left_shoulder", "right_shoulder", "whole_left_arm", "whole_right_arm", "hip"),
-        ("head",),
-    ),
+    "no head": ((*_WHOLE_ARMS, "hip"), ("head",)),
     "only left arm": (("left_arm",), ("right_arm", "right_shoulder", "head", "hip", "leg")),
     "only right arm": (("right_arm",), ("left_arm", "left_shoulder", "head", "hip", "leg")),
     "both arms": (("left_arm", "right_arm", "shoulder"), ("head", "hip", "leg")),
@@ -40,19 +35,13 @@ RULES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 }
 CLASSES = (*RULES, NONE)
 
-_PART_KEYPOINTS = {
-    "head": HEAD,
-    **{
-        f"{side}_{part}": np.array([INDEX[f"{side}_{name}"] for name in names])
-        for side in ("left", "right")
-        for part, names in {
-            "shoulder": ["shoulder"],
-            "elbow": ["elbow"],
-            "wrist": ["wrist"],
-            "hip": ["hip"],
-            "leg": ["knee", "ankle"],
-        }.items()
-    },
+_PART_JOINTS = {joint: (joint,) for joint in ("shoulder", "elbow", "wrist", "hip")} | {
+    "leg": ("knee", "ankle")
+}
+_PART_KEYPOINTS = {"head": HEAD} | {
+    f"{side}_{part}": np.array([INDEX[f"{side}_{joint}"] for joint in joints])
+    for side in ("left", "right")
+    for part, joints in _PART_JOINTS.items()
 }
 
 

@@ -204,8 +204,7 @@ def _part(base: Picture, share: float, from_above: bool) -> Picture:
 
 def _bounds(mask: np.ndarray) -> np.ndarray:
     """x, y, width, height of a mask; zeros where it is empty."""
-    v, u = np.nonzero(mask)
-    return np.array([u.min(), v.min(), np.ptp(u) + 1, np.ptp(v) + 1], float) if len(u) else np.zeros(4)
+    return np.array(cv2.boundingRect(mask.astype(np.uint8)), float)
 
 
 def _write_person(folder: Path, seed: int, number: int) -> list[tuple]:

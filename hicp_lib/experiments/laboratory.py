@@ -139,7 +139,7 @@ def table(rng: Rng, low_m: tuple[float, float], high_m: tuple[float, float], hei
     (x0, y0), (x1, y1), below_m = low_m, high_m, height_m - 0.03
     corners = product((x0 + 0.03, x1 - 0.08), (y0 + 0.03, y1 - 0.08))
     feet = [((x, y, 0.0), (x + 0.05, y + 0.05, below_m)) for x, y in corners]
-    return _boxes([((x0, y0, below_m), (x1, y1, height_m)), *feet], m.wooden(rng))
+    return Surface(g.boxes([((x0, y0, below_m), (x1, y1, height_m)), *feet]), m.wooden(rng))
 
 
 def chair(rng: Rng, middle_m: tuple[float, float], seat_m: float) -> list[Surface]:
@@ -169,12 +169,10 @@ def chair(rng: Rng, middle_m: tuple[float, float], seat_m: float) -> list[Surfac
         ((x - half, y - half, below_m), (x + half, y + half, seat_m)),
         ((x - half + 0.01, back - 0.025, seat_m + 0.14), (x + half - 0.01, back, top_m)),
     ]
-    return [_boxes(frame, m.plain(np.full(3, 0.08), 0.3)), _boxes(cushions, m.upholstery(rng))]
-
-
-def _boxes(spans: list, material: m.Material) -> Surface:
-    low, high = np.array(spans, np.float32).swapaxes(0, 1)
-    return Surface(g.boxes(low, high), material)
+    return [
+        Surface(g.boxes(frame), m.plain(np.full(3, 0.08), 0.3)),
+        Surface(g.boxes(cushions), m.upholstery(rng)),
+    ]
 
 
 def _lighting(height_m: float) -> tuple[list[lights.Light], lights.Ambient]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hicp_lib.simulation.body.arms import Joints
+from hicp_lib.simulation.body.joints import Joints
 
 
 @dataclass(frozen=True)

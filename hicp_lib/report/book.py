@@ -59,7 +59,7 @@ def build_book(folders: Folders, left_out: Mapping[str, str] | None = None) -> t
     book = folders.root / "_build" / "book" / folders.profile
     stamp = book.with_suffix(".json")
     left_out = left_out or {}
-    key = provenance.digest([_key(folders), dict(left_out)])
+    key = _key(folders, left_out)
     if read_stamp(stamp) == {"key": key, "outputs": _hashes(book)}:
         return book / "index.html", False
     book.parent.mkdir(parents=True, exist_ok=True)
@@ -80,7 +80,7 @@ def build_book(folders: Folders, left_out: Mapping[str, str] | None = None) -> t
     return book / "index.html", True
 
 
-def _key(folders: Folders) -> str:
+def _key(folders: Folders, left_out: Mapping[str, str]) -> str:
     """Digest of all that the book is made of; the runs' stamps stand for notebooks and their results."""
     return provenance.digest(
         {
@@ -89,6 +89,7 @@ def _key(folders: Folders) -> str:
             "library": provenance.library_sha256(),
             "data": provenance.data_sha256(),
             "installed": provenance.installed_sha256(),
+            "left out": dict(left_out),
         }
     )
 

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.robot.tables import Cable, Row, Tables, read_tables
+from hicp_lib.robot.tables import Row, Tables, read_tables
 
 TORSO_JOINTS = ("torso_pitch", "torso_roll", "torso_yaw")
 HEAD_JOINTS = (*TORSO_JOINTS, "neck_pitch", "neck_roll", "neck_yaw")
@@ -50,7 +50,11 @@ class Chain:
         self.joints = tuple(row.joint for row in rows if row.joint)
         self.links = tuple(row.link for row in rows)
         self.limits_rad = np.array([tables.limits_rad[limits][joint] for joint in self.joints])
-        self.cables, self.cables_lower_rad, self.cables_upper_rad = _cables(tables.cables, self.joints)
+        mine = [cable for cable in tables.cables if set(cable.joints) <= set(self.joints)]
+        factors = [cable.joints.get(joint, 0.0) for cable in mine for joint in self.joints]
+        self.cables = np.reshape(factors, (len(mine), len(self.joints)))
+        self.cables_lower_rad = np.array([cable.lower_rad for cable in mine])
+        self.cables_upper_rad = np.array([cable.upper_rad for cable in mine])
         self._model = _model(tables.T_root_base, rows)
         self._data = self._model.createData()
         self._frames = {link: self._model.getFrameId(link) for link in self.links}
@@ -240,13 +244,3 @@ def _model(T_root_base: np.ndarray, rows: Sequence[Row]) -> pin.Model:
 def _after_joint(row: Row) -> pin.SE3:
     turn = pin.SE3(pin.utils.rotate("z", row.offset_rad), np.array([0.0, 0.0, row.d_m]))
     return turn * pin.SE3(pin.utils.rotate("x", row.alpha_rad), np.array([row.a_m, 0.0, 0.0]))
-
-
-def _cables(cables: Sequence[Cable], joints: Sequence[str]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    mine = [cable for cable in cables if set(cable.joints) <= set(joints)]
-    factors = np.array([[cable.joints.get(joint, 0.0) for joint in joints] for cable in mine])
-    return (
-        factors.reshape(len(mine), len(joints)),
-        np.array([cable.lower_rad for cable in mine]),
-        np.array([cable.upper_rad for cable in mine]),
-    )

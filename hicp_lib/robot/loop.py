@@ -10,13 +10,7 @@ import numpy as np
 
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.robot.controller import Controller, NoSolution
-from hicp_lib.robot.peripersonal_space import (
-    ACTIVATION_THRESHOLD,
-    Obstacle,
-    ReceptiveField,
-    gains,
-    obstacles,
-)
+from hicp_lib.robot.peripersonal_space import ACTIVATION_THRESHOLD, Obstacle, ReceptiveField, gains, obstacles
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.skin import Skin, read_skin
 from hicp_lib.robot.tracking import KeypointTracker

@@ -133,8 +133,8 @@ def styles_drawn() -> np.ndarray:
 
 
 def hair_grown() -> list[np.ndarray]:
-    rest, heads = rest_shape(BODY, shape_weights(BODY, SHAPE))
-    landmarks = BODY.sparse_keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
+    rest, heads = rest_shape(BODY, SHAPE)
+    landmarks = BODY.keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
     posed = pose_body(BODY, SHAPE, {"head": np.array([0, 0.3, 0.2])})
     styles = [
         hair_styles.Style(0.3, 0.28, gravity=1.0, parting=1.0, n_locks=300),
@@ -149,7 +149,7 @@ def hair_grown() -> list[np.ndarray]:
 
 def garments() -> list[np.ndarray]:
     posed = pose_body(BODY, SHAPE, {"upperarm01.L": np.array([0.6, -0.4, 0.2])})
-    rest, _ = rest_shape(BODY, shape_weights(BODY, SHAPE))
+    rest, _ = rest_shape(BODY, SHAPE)
     folds = clothing.random_folds(np.random.default_rng(3), 0.006)
     layers = np.zeros(len(rest), np.float32)
     bottom = clothing.Garment("bottom", 1.93, 0.17)
@@ -162,10 +162,8 @@ def garments() -> list[np.ndarray]:
 
 
 def cloths() -> list[np.ndarray]:
-    rest, heads = rest_shape(BODY, shape_weights(BODY, SHAPE))
-    panels = fabrics.make_panels(
-        BODY.sparse_keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
-    )
+    rest, heads = rest_shape(BODY, SHAPE)
+    panels = fabrics.make_panels(BODY.keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)]))
     made = [fabrics.random_fabric(rng, 0.3) for rng in rngs(12)]
     made += [make(rng) for make in (fabrics.denim, fabrics.plain_fabric) for rng in rngs(2)]
     trims = [fabrics.Trim(0.03, 0.9, line) for line in ("none", "buttons", "zip")]
@@ -232,9 +230,9 @@ def things() -> list[np.ndarray]:
 
 
 def skins() -> list[np.ndarray]:
-    rest, heads = rest_shape(BODY, shape_weights(BODY, SHAPE))
+    rest, heads = rest_shape(BODY, SHAPE)
     coords = skin.paint_coords(
-        BODY, rest, BODY.sparse_keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
+        BODY, rest, BODY.keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
     )
     drawn = [
         skin.random_complexion(rng, 0.1 * (k % 10), k % 2 == 0, 15.0 + k) for k, rng in enumerate(rngs(60))
@@ -325,11 +323,7 @@ def arms_placed() -> list[np.ndarray]:
     for place in placers:
         for rng in rngs(6):
             draft = arms.Draft(rng, BODY, model, 0.01)
-            joints = {
-                f"{side}_{name}": angle
-                for side in ("left", "right")
-                for name, angle in arms.hanging_arm(draft).items()
-            }
+            joints = arms.hanging_arm(draft, "left") | arms.hanging_arm(draft, "right")
             joints |= {
                 f"{side}_hip_flexion": 1.4 if place is arms.in_lap else 0.1 for side in ("left", "right")
             }

@@ -36,7 +36,7 @@ def closed_loop(number: int) -> str:
 def captured(number: int) -> str:
     """Two seconds of motion capture."""
     capture = scenario("mocap").capture(number, 2.0, np.eye(4))
-    return content(*vars(capture).values())
+    return content(*capture)
 
 
 KINDS: dict[str, Callable[[int], str]] = {

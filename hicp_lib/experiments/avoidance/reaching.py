@@ -212,8 +212,7 @@ def _rest(rng, shape: np.ndarray, staging: Staging) -> Posture:
     if staging.sits:
         joints |= radians(_SITTING_DEG, "left_") | radians(_SITTING_DEG, "right_")
     for side in ("left", "right"):
-        hand = sample_hand(rng, "open") | radians(_HAND_DEG)
-        joints |= {f"{side}_{name}": angle for name, angle in hand.items()}
+        joints |= sample_hand(rng, "open", f"{side}_") | radians(_HAND_DEG, f"{side}_")
         if staging.sits:
             wrist_m = _REST_M * [1, 1 if side == "left" else -1, 1]
             joints = reach(load_body(), shape, joints, side, wrist_m, _ELBOW_AT_REST) or joints

@@ -204,6 +204,4 @@ def _detector(job: Job) -> Detector:
     return make_detector(job.condition.removesuffix(TRACKING), tracking_hz=float(1 / every_s))
 
 
-@cache
-def _kept_detector(name: str) -> Detector:
-    return make_detector(name)
+_kept_detector = cache(make_detector)

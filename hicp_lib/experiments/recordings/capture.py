@@ -5,7 +5,6 @@ clock shows something else. What both truly are goes into `simulation.json`, for
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,23 +29,6 @@ LEAD_S = 0.5  # motion capture starts this long before the first frame, and ends
 _BALL_M = 0.006  # radius of a marker
 
 
-@dataclass(frozen=True)
-class Capture:
-    """What motion capture exports, its true frame, and the true offset of its clock.
-
-    Attributes
-    ----------
-    exported : MotionCapture
-    T_mocap_world : array, shape (4, 4)
-    start_s : float
-        When its clock shows zero, in seconds from the first frame.
-    """
-
-    exported: MotionCapture
-    T_mocap_world: np.ndarray
-    start_s: float
-
-
 def capture(
     person_at: Callable[[float], PosedBody],
     vertices: np.ndarray,
@@ -54,7 +36,7 @@ def capture(
     obstacles: tuple[g.Mesh, ...],
     duration_s: float,
     seed: int,
-) -> Capture:
+) -> tuple[MotionCapture, np.ndarray]:
     """Motion capture of a person, from `LEAD_S` before the first frame on.
 
     Parameters
@@ -73,7 +55,9 @@ def capture(
 
     Returns
     -------
-    Capture
+    exported : MotionCapture
+        What the system exports; its clock shows zero `LEAD_S` before the first frame.
+    T_mocap_world : array, shape (4, 4)
     """
     rng = stream(seed, MOTION_CAPTURE)
     T_mocap_world = mocap_frame(rng)
@@ -85,7 +69,7 @@ def capture(
     points_m, n_seeing = track_markers(person_at, vertices, fixed_m, times_s, cameras_m, obstacles=obstacles)
     names = (*JOINT_MARKERS, CAMERA_MARKER)
     exported = measure(clock_s, names, points_m, n_seeing, T_mocap_world, QUALISYS, rng)
-    return Capture(exported, T_mocap_world, -LEAD_S)
+    return exported, T_mocap_world
 
 
 def marker_balls(person: PosedBody, vertices: np.ndarray, number: int) -> list[Surface]:

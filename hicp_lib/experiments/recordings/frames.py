@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from hicp_lib.core.memo import memoised
 from hicp_lib.experiments.laboratory import colour_and_depth, in_root, robot_camera
 from hicp_lib.experiments.random_streams import stream
-from hicp_lib.experiments.recordings.scenarios import Scenario, Stage, scenario
+from hicp_lib.experiments.recordings.scenarios import Scenario, scenario
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.simulation.rendering.camera import PlacedCamera
 from hicp_lib.simulation.rendering.render import render
@@ -31,19 +30,13 @@ def record_frame(name: str, seed: int, k: int) -> tuple[np.ndarray, np.ndarray, 
         `keypoints_m` (136, 3) in the base frame and `visible` (136,).
     """
     plan, rng = scenario(name), stream(seed, k, name)
-    world, person = stage(name, seed)(float(plan.times_s(k + 1)[k]))
+    world, person = plan.stage(seed, float(plan.times_s(k + 1)[k]))
     camera = camera_at(plan, k)
     frame = render(world, camera, rng)
     rgb, depth_m = colour_and_depth(frame, camera, rng)
     _, visible = keypoint_visibility(frame.rays, camera, person.keypoints_m, 0)
     truth = {"keypoints_m": in_root(person.keypoints_m).round(6).tolist(), "visible": visible.tolist()}
     return rgb, depth_m, frame.depth_m, truth
-
-
-@memoised(1)
-def stage(name: str, seed: int) -> Stage:
-    """What a scenario shows when; made once in every process."""
-    return scenario(name).stage(seed)
 
 
 def camera_at(plan: Scenario, k: int) -> PlacedCamera:

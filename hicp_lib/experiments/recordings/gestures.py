@@ -8,8 +8,7 @@ import numpy as np
 
 from hicp_lib.experiments.laboratory import posed
 from hicp_lib.experiments.minimum_jerk import Move, Posture, between
-from hicp_lib.simulation.body.arms import Joints
-from hicp_lib.simulation.body.joints import pose_from_joints, radians, within_limits
+from hicp_lib.simulation.body.joints import Joints, pose_from_joints, radians, within_limits
 from hicp_lib.simulation.body.model import load_body
 from hicp_lib.simulation.body.poses import sample_joints
 from hicp_lib.simulation.body.reach import reach

@@ -9,18 +9,16 @@ import pandas as pd
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.memo import memoised
-from hicp_lib.experiments.recordings.capture import Capture, capture
+from hicp_lib.experiments.recordings.capture import capture
 from hicp_lib.experiments.recordings.moving_person import HEAD_RAD, moving_person
 from hicp_lib.experiments.recordings.seated_person import VIEWS, seated_person
+from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.robot.kinematics import HEAD_JOINTS
 from hicp_lib.simulation.body.model import PosedBody
 from hicp_lib.simulation.rendering.render import World
 from hicp_lib.simulation.sensors.markers import marker_vertices
 
 POSES_FILE = DATA_DIR / "relative_poses.csv"
-
-Stage = Callable[[float], tuple[World, PosedBody]]
-"""What is to be seen at a time (seconds from the first frame), and the person in it."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +27,6 @@ class Scenario:
 
     Attributes
     ----------
-    name : str
-        As the command line and the notebooks call it.
     n_frames, max_frames : int
         By default, and at most.
     rate_hz : float
@@ -40,19 +36,18 @@ class Scenario:
     head_rad : callable
         From the number of frames to joint angles of the robot, (n, 6), in the order of `HEAD_JOINTS`.
     stage : callable
-        From the seed to a `Stage`.
+        From the seed and seconds from the first frame to what is to be seen, and the person in it.
     capture : callable or None
-        From the seed, the duration in seconds and T_world_camera to its motion capture.
+        From the seed, the duration in seconds and T_world_camera to its motion capture, see `capture`.
     """
 
-    name: str
     n_frames: int
     max_frames: int
     rate_hz: float
     mount: str
     head_rad: Callable[[int], np.ndarray]
-    stage: Callable[[int], Stage]
-    capture: Callable[[int, float, np.ndarray], Capture] | None = None
+    stage: Callable[[int, float], tuple[World, PosedBody]]
+    capture: Callable[[int, float, np.ndarray], tuple[MotionCapture, np.ndarray]] | None = None
 
     def times_s(self, n: int) -> np.ndarray:
         """Times (n,) of the frames, the first at 0."""
@@ -88,22 +83,18 @@ def relative_poses_rad(view: str) -> np.ndarray:
 def _relative(view: str) -> Scenario:
     poses_rad = relative_poses_rad(view)
     return Scenario(
-        name=f"relative-{view}",
         n_frames=len(poses_rad),
         max_frames=len(poses_rad),
         rate_hz=0.5,  # the robot moves and settles between two frames
         mount=VIEWS[view],
         head_rad=lambda n: poses_rad[:n],
-        stage=_still,
+        stage=lambda seed, time_s: seated_person(seed),
     )
 
 
-def _still(seed: int) -> Stage:
-    scene = seated_person(seed)
-    return lambda time_s: scene
-
-
-def _capture_moving(seed: int, duration_s: float, T_world_camera: np.ndarray) -> Capture:
+def _capture_moving(
+    seed: int, duration_s: float, T_world_camera: np.ndarray
+) -> tuple[MotionCapture, np.ndarray]:
     scene = moving_person(seed)
     vertices = marker_vertices(scene.appearance.shape)
     return capture(scene.person_at, vertices, T_world_camera, (scene.table.mesh,), duration_s, seed)
@@ -111,13 +102,12 @@ def _capture_moving(seed: int, duration_s: float, T_world_camera: np.ndarray) ->
 
 SCENARIOS = {f"relative-{view}": _relative(view) for view in VIEWS} | {
     "mocap": Scenario(
-        name="mocap",
         n_frames=480,
         max_frames=100_000,
         rate_hz=12.0,
         mount="level",
         head_rad=lambda n: np.tile(HEAD_RAD, (n, 1)),
-        stage=lambda seed: moving_person(seed).at,
+        stage=lambda seed, time_s: moving_person(seed).at(time_s),
         capture=_capture_moving,
     )
 }

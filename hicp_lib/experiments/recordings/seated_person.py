@@ -5,19 +5,21 @@ The person sits at one place in one posture for the whole recording; only the ro
 
 import numpy as np
 
-from hicp_lib.experiments.laboratory import chair, facing_robot, furnished, random_adult, table
+from hicp_lib.core.memo import memoised
+from hicp_lib.experiments.laboratory import chair, furnished, posed, random_adult, table
+from hicp_lib.experiments.minimum_jerk import Posture
 from hicp_lib.experiments.random_streams import SEATED_PERSON, stream
 from hicp_lib.simulation.appearance.people import dress
-from hicp_lib.simulation.body.arms import Joints
 from hicp_lib.simulation.body.hands import sample_hand
-from hicp_lib.simulation.body.joints import pose_from_joints, radians
-from hicp_lib.simulation.body.model import Body, PosedBody, load_body, pose_body
+from hicp_lib.simulation.body.joints import Joints, radians
+from hicp_lib.simulation.body.model import Body, PosedBody, load_body
 from hicp_lib.simulation.body.reach import reach
 from hicp_lib.simulation.rendering.render import World
 
 VIEWS = {"upper": "level", "lower": "tilted"}
 """The paper's two views, and the camera holder each is seen with."""
 DISTANCE_M = 1.15  # of the person's pelvis from the robot's root, along the floor
+_PLACE_M = (0.0, DISTANCE_M)
 TABLE_HEIGHT_M = 0.72
 _TABLE_EDGE_M = 0.20  # the table's edge before the pelvis
 _TABLE_DEPTH_M = 0.55
@@ -34,6 +36,7 @@ _CONTACT_M = 0.003  # between the lowest point of hand or forearm and the table
 _N_ROUNDS = 6
 
 
+@memoised(1)
 def seated_person(seed: int) -> tuple[World, PosedBody]:
     """The scene of a seed: the person at the table in a furnished room. The same in every process."""
     rng = stream(seed, SEATED_PERSON)
@@ -41,7 +44,7 @@ def seated_person(seed: int) -> tuple[World, PosedBody]:
     person = _sit_down(body, appearance.shape, rng)
     edge_m = DISTANCE_M - _TABLE_EDGE_M
     top = table(rng, (-0.65, edge_m - _TABLE_DEPTH_M), (0.65, edge_m), TABLE_HEIGHT_M)
-    seat = chair(rng, (0.0, DISTANCE_M), _seat_height_m(body, person))
+    seat = chair(rng, _PLACE_M, _seat_height_m(body, person))
     surfaces = [top, *seat, *dress(appearance, person, 0)]
     clear = [(0.0, DISTANCE_M - 0.2, 0.9), (0.0, DISTANCE_M + 0.4, 0.7)]
     return furnished(rng, surfaces, clear), person
@@ -51,16 +54,14 @@ def _sit_down(body: Body, shape: np.ndarray, rng: np.random.Generator) -> PosedB
     """The posture, with the arms brought down until the hands lie on the table."""
     joints = radians(_POSTURE_DEG)
     for side in _WRISTS_M:
-        hand = sample_hand(rng, "open") | radians(_HAND_DEG)
-        joints |= {f"{side}_{name}": angle for name, angle in hand.items()}
-    T_world_body = facing_robot(DISTANCE_M)
+        joints |= sample_hand(rng, "open", f"{side}_") | radians(_HAND_DEG, f"{side}_")
     wrist_heights_m = dict.fromkeys(_WRISTS_M, TABLE_HEIGHT_M + 0.05)
     for _ in range(_N_ROUNDS):
-        pelvis_m = pose_body(body, shape, pose_from_joints(joints), T_world_body).heads_m[0, 2]
+        pelvis_m = posed(shape, Posture(joints, _PLACE_M)).heads_m[0, 2]
         for side, (ahead_m, left_m) in _WRISTS_M.items():
             target_m = np.array([ahead_m, left_m, wrist_heights_m[side] - pelvis_m])
             joints = _with_arm(body, shape, joints, side, target_m)
-        person = pose_body(body, shape, pose_from_joints(joints), T_world_body)
+        person = posed(shape, Posture(joints, _PLACE_M))
         for side in _WRISTS_M:
             wrist_heights_m[side] += TABLE_HEIGHT_M + _CONTACT_M - _lowest_m(body, person, side)
     return person

@@ -4,7 +4,6 @@ Frame k depends on scenario, seed and k only, so the number of processes changes
 longer recording begins with the shorter one.
 """
 
-import shutil
 from functools import partial
 from pathlib import Path
 
@@ -12,9 +11,9 @@ import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.core.cache import key
-from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.experiments.laboratory import T_WORLD_ROOT
+from hicp_lib.experiments.recordings.capture import LEAD_S
 from hicp_lib.experiments.recordings.frames import camera_poses, record_frame
 from hicp_lib.experiments.recordings.ground_truth import (
     DEPTH_UNITS_PER_M,
@@ -24,12 +23,14 @@ from hicp_lib.experiments.recordings.ground_truth import (
     finish_recording,
     part_path,
 )
-from hicp_lib.experiments.recordings.scenarios import Scenario, scenario
+from hicp_lib.experiments.recordings.scenarios import scenario
 from hicp_lib.recordings.c3d import MAX_FRAMES as MAX_C3D_FRAMES
 from hicp_lib.recordings.qualisys import write_c3d, write_tsv
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, MOCAP_FILE, RGB_LIST, Recording, open_recording
 from hicp_lib.recordings.writer import depth_name, write_depth, write_frame
-from hicp_lib.simulation.world.batch import check_output, run_jobs
+from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts, run_jobs
+
+_MOCAP_FILES = (MOCAP_FILE, str(Path(MOCAP_FILE).with_suffix(".c3d")))
 
 
 def simulate_recording(
@@ -67,9 +68,12 @@ def simulate_recording(
     """
     out, plan = Path(out), scenario(name)
     n = plan.n_frames if n_frames is None else n_frames
-    _check(out, plan, n, seed, workers)
+    n_workers = 1 if workers is None else workers
+    check_numbers(n_frames=(n, 1, plan.max_frames), seed=(seed, 0, 2**32), workers=(n_workers, 1, 1000))
+    check_output(out, PARTS_DIR, "for the recording", "simulated")
+    (out / RGB_LIST).unlink(missing_ok=True)  # it is no recording until it is finished
     stamp = {"scenario": name, "seed": int(seed), "version": key([simulate_recording])}
-    _prepare(out, stamp)
+    keep_parts(out, PARTS_DIR, stamp, ["rgb/*", "depth/*", f"{EXACT_DEPTH_DIR}/*", *_MOCAP_FILES])
     todo = [partial(record_one, out, name, int(seed), k) for k in range(n) if not part_path(out, k).exists()]
     if plan.capture is not None:
         todo.insert(0, partial(_capture_all, out, name, int(seed), int(n)))  # the longest first
@@ -77,31 +81,6 @@ def simulate_recording(
         pass
     finish_recording(out, plan, int(n), stamp)
     return open_recording(out)
-
-
-def _check(out: Path, plan: Scenario, n: int, seed: int, workers: int | None) -> None:
-    limits = {
-        "n_frames": (n, 1, plan.max_frames),
-        "seed": (seed, 0, 2**32),
-        "workers": (1 if workers is None else workers, 1, 1000),
-    }
-    for what, (value, low, high) in limits.items():
-        if not isinstance(value, int | np.integer) or not low <= value <= high:
-            raise InputError(f"{what} is {value!r}; {plan.name} takes a whole number from {low} to {high}")
-    check_output(out, PARTS_DIR, "for the recording", "simulated")
-
-
-def _prepare(out: Path, stamp: dict) -> None:
-    """No recording until it is finished; drop what another scenario, seed or version left."""
-    (out / RGB_LIST).unlink(missing_ok=True)
-    stamp_file = out / PARTS_DIR / "stamp.json"
-    if stamp_file.exists() and read_json(stamp_file) == stamp:
-        return
-    for folder in ("rgb", "depth", EXACT_DEPTH_DIR, PARTS_DIR):
-        shutil.rmtree(out / folder, ignore_errors=True)
-    for kind in (".tsv", ".c3d"):
-        (out / MOCAP_FILE).with_suffix(kind).unlink(missing_ok=True)
-    write_json(stamp_file, stamp)
 
 
 def record_one(out: Path, name: str, seed: int, k: int) -> None:
@@ -127,10 +106,11 @@ def _capture_all(out: Path, name: str, seed: int, n: int) -> None:
     part, plan = out / PARTS_DIR / MOCAP_PART, scenario(name)
     if plan.capture is None or (part.exists() and read_json(part)["n_frames"] == n):
         return
-    found = plan.capture(seed, float(plan.times_s(n)[-1]), T_WORLD_ROOT @ camera_poses(plan, 1)[0])
-    write_tsv(out / MOCAP_FILE, found.exported)
-    if len(found.exported.times_s) < MAX_C3D_FRAMES:  # a longer one is in the TSV file alone
-        write_c3d((out / MOCAP_FILE).with_suffix(".c3d"), found.exported)
-    T_base_mocap = np.linalg.inv(found.T_mocap_world @ T_WORLD_ROOT)
-    offset_s = START_S + found.start_s
-    write_json(part, {"n_frames": n, "T_base_mocap": T_base_mocap.tolist(), "mocap_offset_s": offset_s})
+    T_world_camera = T_WORLD_ROOT @ camera_poses(plan, 1)[0]
+    exported, T_mocap_world = plan.capture(seed, float(plan.times_s(n)[-1]), T_world_camera)
+    tsv, c3d = (out / name for name in _MOCAP_FILES)
+    write_tsv(tsv, exported)
+    if len(exported.times_s) < MAX_C3D_FRAMES:  # a longer one is in the TSV file alone
+        write_c3d(c3d, exported)
+    T_base_mocap = np.linalg.inv(T_mocap_world @ T_WORLD_ROOT).tolist()
+    write_json(part, {"n_frames": n, "T_base_mocap": T_base_mocap, "mocap_offset_s": START_S - LEAD_S})

@@ -86,9 +86,7 @@ def cut_pattern(garment: Garment) -> Pattern:
 def _cut_pattern(garment: Garment) -> Pattern:
     body = load_body()
     field = _FIELDS[garment.kind](body, garment)
-    candidates = np.flatnonzero((field[body.triangles] > 0).any(axis=1))
-    cut = g.cut(body.triangles[candidates], field)
-    cut = g.Cut(cut.i, cut.j, cut.t, cut.triangles, candidates[cut.source])
+    cut = g.cut(body.triangles, field)
     deep = field > 0.03
     return Pattern(
         cut=cut,

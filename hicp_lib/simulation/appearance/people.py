@@ -7,15 +7,7 @@ import numpy as np
 
 from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.appearance import clothing, fabrics, footwear, hair, hair_styles, skin
-from hicp_lib.simulation.body.model import (
-    BODY_FILE,
-    REGIONS,
-    Body,
-    PosedBody,
-    load_body,
-    rest_shape,
-    shape_weights,
-)
+from hicp_lib.simulation.body.model import BODY_FILE, REGIONS, Body, PosedBody, load_body, rest_shape
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.surfaces import Material, Surface
 
@@ -201,8 +193,8 @@ class _Fitted:
 @memoised(4)  # those who are seen in many frames
 def _fit(appearance: Appearance) -> _Fitted:
     body = load_body()
-    rest, heads = rest_shape(body, shape_weights(body, appearance.shape))
-    landmarks = body.sparse_keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
+    rest, heads = rest_shape(body, appearance.shape)
+    landmarks = body.keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
     grown = None
     if appearance.style is not None:
         grown = hair.grow(appearance.style, body, rest, landmarks, np.random.default_rng(appearance.seed))

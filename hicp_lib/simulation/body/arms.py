@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hicp_lib.simulation.body.hands import sample_hand
-from hicp_lib.simulation.body.joints import pose_from_joints, radians
+from hicp_lib.simulation.body.joints import Joints, pose_from_joints, radians
 from hicp_lib.simulation.body.model import Body, pose_bones
 from hicp_lib.simulation.body.reach import reach
 from hicp_lib.simulation.body.self_collision import CollisionModel
@@ -18,7 +18,6 @@ from hicp_lib.simulation.body.self_collision import CollisionModel
 Rng = np.random.Generator
 Range = tuple[float, float]
 Ranges = dict[str, Range]
-Joints = dict[str, float]
 
 _OTHER = {"left": "right", "right": "left"}
 _OUTWARD = {"left": 1, "right": -1}  # along y, which points to the person's left
@@ -87,11 +86,11 @@ def uniform(rng: Rng, ranges: Ranges, prefix: str = "") -> Joints:
     return radians({name: rng.uniform(*limits) for name, limits in ranges.items()}, prefix)
 
 
-def hanging_arm(draft: Draft) -> Joints:
-    """One arm hanging at ease, its joints without the prefix of a side."""
-    joints = uniform(draft.rng, _HANGING_DEG)
+def hanging_arm(draft: Draft, side: str) -> Joints:
+    """One arm hanging at ease."""
+    joints = uniform(draft.rng, _HANGING_DEG, f"{side}_")
     # An arm half a metre long: this angle moves its middle away by the room.
-    joints["shoulder_abduction"] += draft.room_m / 0.25
+    joints[f"{side}_shoulder_abduction"] += draft.room_m / 0.25
     return joints
 
 
@@ -123,8 +122,7 @@ def both_reaching(draft: Draft, joints: Joints) -> Joints | None:
 def pointing(draft: Draft, joints: Joints) -> Joints | None:
     """One arm, nearly straight, points somewhere ahead or to its side; the other hand is at ease."""
     side = _side(draft.rng)
-    calm = sample_hand(draft.rng, "relaxed")
-    joints = joints | {f"{_OTHER[side]}_{name}": angle for name, angle in calm.items()}
+    joints = joints | sample_hand(draft.rng, "relaxed", f"{_OTHER[side]}_")
     found = _to_the_front(draft, joints, side, (-20, 70), (-35, 45), (0.88, 0.99))
     return found and found | uniform(draft.rng, _WRISTS_DEG["pointing"], f"{side}_")
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hicp_lib.simulation.body.joints import FINGERS, LIMITS_DEG
+from hicp_lib.simulation.body.joints import FINGERS, LIMITS_DEG, Joints, radians
 
 _FINGER_JOINTS = ("spread", "knuckle", "middle", "end")
 _THUMB_JOINTS = ("thumb_base", "thumb_spread", "thumb_knuckle", "thumb_end")
@@ -19,8 +19,21 @@ _STRAIGHT_INDEX_DEG = {"knuckle": (-5, 15), "middle": (0, 12), "end": (0, 8)}
 _FINGER_JITTER_DEG = 4.0
 
 
-def sample_hand(rng: np.random.Generator, kind: str) -> dict[str, float]:
-    """Joint angles (radians) of one hand of a kind in `HANDS_DEG`, without the side's prefix.
+def sample_hand(rng: np.random.Generator, kind: str, prefix: str = "") -> Joints:
+    """Joint angles of one hand.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    kind : str
+        One of `HANDS_DEG`.
+    prefix : str, optional
+        Goes before the names of the joints, such as "left_".
+
+    Returns
+    -------
+    dict of str to float
+        Radians.
 
     Examples
     --------
@@ -41,6 +54,5 @@ def sample_hand(rng: np.random.Generator, kind: str) -> dict[str, float]:
                 value = 0.0
             joints[f"{finger}_{joint}"] = value
     joints |= {joint: rng.uniform(*limits) for joint, limits in zip(_THUMB_JOINTS, thumb, strict=True)}
-    return {
-        name: float(np.radians(np.clip(value, *LIMITS_DEG[f"left_{name}"]))) for name, value in joints.items()
-    }
+    within_deg = {name: np.clip(value, *LIMITS_DEG[f"left_{name}"]) for name, value in joints.items()}
+    return radians(within_deg, prefix)

@@ -1,6 +1,6 @@
 """Joint angles of anatomy and the rotations of bones they stand for.
 
-A `JointAngles` maps joint names to radians, all zero in the body model's reference stance (see
+A `Joints` maps joint names to radians, all zero in the body model's reference stance (see
 `body`): standing at attention, arms hanging, palms to the thighs. Joints of a limb are named
 `left_...` or `right_...`; positive is flexion (for the ankle: toes down), abduction (away from the
 middle), inward rotation (the toes or the bent forearm turn to the middle), supination (the hanging
@@ -15,7 +15,7 @@ from hicp_lib.core.memo import memoised
 from hicp_lib.core.rotations import about, rotation
 from hicp_lib.simulation.body.model import Pose
 
-JointAngles = Mapping[str, float]
+Joints = dict[str, float]
 
 FINGERS = ("index", "middle", "ring", "little")
 
@@ -47,19 +47,20 @@ _NECK_SHARES = {"neck01": 0.25, "neck02": 0.2, "neck03": 0.2, "head": 0.35}
 # The shoulder girdle goes along with an arm that is raised beyond this.
 _GIRDLE_SHARES = {"clavicle": 0.12, "shoulder01": 0.22}
 _GIRDLE_FROM_RAD = np.radians(25.0)
-# Left limbs in the reference stance: direction of the arm, and the hinge the thumb bends about.
+# Left limbs in the reference stance: tilt and direction of the arm, and the hinge the thumb bends about.
 ARM_TILT_RAD = np.radians(9.0)
+HANGING = about(0, ARM_TILT_RAD) @ np.array([0.0, 0.0, -1.0])
 _THUMB_HINGE = np.array([0.61, 0.77, -0.18])
 # Rotations seen in a mirror between left and right: factors of a matrix's elements.
 _MIRROR = np.array([[1.0, -1, 1], [-1, 1, -1], [1, -1, 1]])
 
 
-def radians(angles_deg: Mapping[str, float], prefix: str = "") -> dict[str, float]:
+def radians(angles_deg: Mapping[str, float], prefix: str = "") -> Joints:
     """Joint angles in radians from degrees; `prefix` goes before their names."""
     return {prefix + name: float(np.radians(angle)) for name, angle in angles_deg.items()}
 
 
-def within_limits(angles: JointAngles, margin_rad: float = 1e-9) -> bool:
+def within_limits(angles: Joints, margin_rad: float = 1e-9) -> bool:
     """Whether every joint lies in its range, see `LIMITS_DEG`.
 
     Raises
@@ -76,7 +77,7 @@ def within_limits(angles: JointAngles, margin_rad: float = 1e-9) -> bool:
     return all(low - margin_rad <= angles[name] <= high + margin_rad for name, (low, high) in limits.items())
 
 
-def pose_from_joints(angles: JointAngles) -> Pose:
+def pose_from_joints(angles: Joints) -> Pose:
     """Rotations of the bones; joints left out stay at zero.
 
     Parameters
@@ -146,7 +147,7 @@ def shoulder_angles(swing: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
     return -np.arctan2(m[..., 0, 2], m[..., 2, 2]), abduction, -np.arctan2(m[..., 1, 0], m[..., 1, 1])
 
 
-def _trunk(angles: JointAngles) -> dict[str, np.ndarray]:
+def _trunk(angles: Joints) -> dict[str, np.ndarray]:
     def vector(part: str) -> np.ndarray:
         bend, flexion, turn = (angles.get(f"{part}_{kind}", 0.0) for kind in ("bend", "flexion", "turn"))
         return np.array([-bend, flexion, turn])
@@ -159,11 +160,10 @@ def _trunk(angles: JointAngles) -> dict[str, np.ndarray]:
 
 def _arm(limb: dict[str, float]) -> dict[str, np.ndarray]:
     """A left arm. Turns about its own axis are spread along it, so that the skin twists evenly."""
-    along = about(0, ARM_TILT_RAD) @ np.array([0.0, 0.0, -1.0])
-    turn = limb["shoulder_rotation"] * along
+    turn = limb["shoulder_rotation"] * HANGING
     swing = shoulder_rotation(limb["shoulder_flexion"], limb["shoulder_abduction"], 0.0)
     girdle, upper = _with_girdle(swing)
-    supination = -limb["forearm_supination"] * along
+    supination = -limb["forearm_supination"] * HANGING
     hand = about(1, -limb["wrist_deviation"]) @ about(0, -limb["wrist_flexion"])
     return girdle | {
         "upperarm01": upper @ rotation(turn / 2),

@@ -74,10 +74,10 @@ class Body:
     bone_parents : array of int, shape (n_bones,)
         -1 for the root, which comes first.
     skin_weights : array, shape (n_v, n_bones), dtype float32
-        Rows sum to 1.
+        Sparse; rows sum to 1. Nearly all are zero: products read a tenth of the memory of a dense array.
     triangles : array, shape (n_t, 3), dtype int32
     keypoint_weights : array, shape (136, n_v + n_bones), dtype float32
-        Over vertices, then bone heads; rows sum to 1.
+        Sparse; over vertices, then bone heads; rows sum to 1.
     regions : array of int, shape (n_v,)
         Indices into `REGIONS`.
     fields : array, shape (n_v, len(FIELDS)), dtype float32
@@ -90,9 +90,9 @@ class Body:
     to_reference: np.ndarray
     bone_names: tuple[str, ...]
     bone_parents: np.ndarray
-    skin_weights: np.ndarray
+    skin_weights: sparse.csr_array
     triangles: np.ndarray
-    keypoint_weights: np.ndarray
+    keypoint_weights: sparse.csr_array
     regions: np.ndarray
     fields: np.ndarray
 
@@ -109,17 +109,20 @@ class Body:
         """Index of each bone by its name."""
         return {name: number for number, name in enumerate(self.bone_names)}
 
-    # Nearly all weights are zero: products with these read a tenth of the memory.
+    @cached_property
+    def chains(self) -> np.ndarray:
+        """Which bones lead from the root to each bone, itself included, the root not: (n, n), 0 or 1."""
+        chains = np.zeros((len(self.bone_parents), len(self.bone_parents)))
+        for bone, parent in enumerate(self.bone_parents[1:], start=1):
+            chains[bone] = chains[parent]
+            chains[bone, bone] = 1
+        return chains
 
     @cached_property
-    def sparse_skin_weights(self) -> sparse.csr_array:
-        """`skin_weights`, sparse."""
-        return sparse.csr_array(self.skin_weights)
-
-    @cached_property
-    def sparse_keypoint_weights(self) -> sparse.csr_array:
-        """`keypoint_weights`, sparse."""
-        return sparse.csr_array(self.keypoint_weights)
+    def levels(self) -> list[np.ndarray]:
+        """Bones by depth below the root, without it."""
+        depth = self.chains.sum(axis=1)
+        return [np.flatnonzero(depth == d) for d in range(1, int(depth.max()) + 1)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,12 +182,7 @@ def load_body(path: Path = BODY_FILE) -> Body:
     return body
 
 
-def pose_body(
-    body: Body,
-    shape: Shape,
-    pose: Pose | np.ndarray,
-    T_world_body: np.ndarray | None = None,
-) -> PosedBody:
+def pose_body(body: Body, shape: Shape, pose: Pose, T_world_body: np.ndarray | None = None) -> PosedBody:
     """Pose a person by linear blend skinning.
 
     Parameters
@@ -192,8 +190,8 @@ def pose_body(
     body : Body
     shape : int or str or array, shape (n_shapes,)
         Index or name of a shape, or convex weights to blend shapes.
-    pose : mapping of str to array or array, shape (n_bones, 3, 3)
-        Rotation vectors or matrices by bone name, or all rotation matrices, in body axes.
+    pose : mapping of str to array
+        Rotation vectors or matrices by bone name, in body axes.
     T_world_body : array, shape (4, 4), optional
         Where the person stands and faces; the identity when left out.
 
@@ -227,13 +225,13 @@ def pose_body(
     return PosedBody(
         vertices_m=posed,
         normals=vertex_normals(posed, body.triangles),
-        keypoints_m=body.sparse_keypoint_weights @ points,
+        keypoints_m=body.keypoint_weights @ points,
         heads_m=posed_heads,
         rotations=T[:3, :3] @ rotations,
     )
 
 
-def pose_bones(body: Body, shape: Shape, pose: Pose | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def pose_bones(body: Body, shape: Shape, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
     """The bones of a posed person, without its skin.
 
     Parameters
@@ -241,7 +239,7 @@ def pose_bones(body: Body, shape: Shape, pose: Pose | np.ndarray) -> tuple[np.nd
     body : Body
     shape : int or str or array, shape (n_shapes,)
         As in `pose_body`.
-    pose : mapping of str to array or array, shape (n_bones, 3, 3)
+    pose : mapping of str to array
         As in `pose_body`.
 
     Returns
@@ -251,15 +249,15 @@ def pose_bones(body: Body, shape: Shape, pose: Pose | np.ndarray) -> tuple[np.nd
     heads_m : array, shape (n_bones, 3)
         Where the bones begin, relative to the pelvis, body axes.
     """
-    heads, to_reference = _skeleton(body, shape_weights(body, shape).tobytes())
+    _, heads, to_reference = _rest(body, shape_weights(body, shape).tobytes())
     # Turns of the reference stance add up along the chain; the turn from rest to it comes before all.
-    rotations = rotation_matrices(body, pose).copy()
-    for level in _levels(tuple(body.bone_parents)):
+    rotations = rotation_matrices(body, pose)
+    for level in body.levels:
         rotations[level] = rotations[body.bone_parents[level]] @ rotations[level]
     rotations = rotations @ to_reference
     parents = body.bone_parents
     steps = np.einsum("bij,bj->bi", rotations[parents], heads - heads[parents])
-    return rotations, _chains(tuple(parents)) @ steps
+    return rotations, body.chains @ steps
 
 
 def shape_weights(body: Body, shape: Shape) -> np.ndarray:
@@ -282,7 +280,7 @@ def shape_weights(body: Body, shape: Shape) -> np.ndarray:
     return weights
 
 
-def rotation_matrices(body: Body, pose: Pose | np.ndarray) -> np.ndarray:
+def rotation_matrices(body: Body, pose: Pose) -> np.ndarray:
     """A pose as rotation matrices (n_bones, 3, 3).
 
     Raises
@@ -290,8 +288,6 @@ def rotation_matrices(body: Body, pose: Pose | np.ndarray) -> np.ndarray:
     ValueError
         For a bone the model does not have.
     """
-    if isinstance(pose, np.ndarray):
-        return pose
     number = body.bone_numbers
     vectors: dict[int, np.ndarray] = {}
     matrices: dict[int, np.ndarray] = {}
@@ -308,49 +304,26 @@ def rotation_matrices(body: Body, pose: Pose | np.ndarray) -> np.ndarray:
 
 
 @memoised(16)
-def _skeleton(body: Body, weights: bytes) -> tuple[np.ndarray, np.ndarray]:
-    """Bone heads at rest and rotations to the reference stance of a blend of shapes."""
+def _rest(body: Body, weights: bytes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices and bone heads at rest, and rotations to the reference stance, of a blend of shapes."""
     blend = np.frombuffer(weights, np.float32)
+    mixed = np.flatnonzero(blend)  # mostly one or two shapes
+    vertices = np.tensordot(blend[mixed], body.vertices_m[mixed], 1)
     # Blends of rotations are brought back to the nearest ones (orthogonal Procrustes); these
     # are so alike that their blends never turn inside out.
     u, _, vt = np.linalg.svd(np.tensordot(blend, body.to_reference, 1))
-    return np.tensordot(blend, body.heads_m, 1), u @ vt
+    return vertices, np.tensordot(blend, body.heads_m, 1), u @ vt
 
 
-def rest_shape(body: Body, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n_v, 3) and bone heads (n_bones, 3) at rest of a blend of shapes; not to be written to."""
-    return _rest_vertices(body, weights.tobytes()), _skeleton(body, weights.tobytes())[0]
-
-
-@memoised(16)
-def _rest_vertices(body: Body, weights: bytes) -> np.ndarray:
-    blend = np.frombuffer(weights, np.float32)
-    mixed = np.flatnonzero(blend)  # mostly one or two shapes
-    return np.tensordot(blend[mixed], body.vertices_m[mixed], 1)
-
-
-@memoised(4)
-def _levels(parents: tuple[int, ...]) -> list[np.ndarray]:
-    """Bones by depth below the root, without it."""
-    depth = np.zeros(len(parents), int)
-    for bone, parent in enumerate(parents[1:], start=1):
-        depth[bone] = depth[parent] + 1
-    return [np.flatnonzero(depth == d) for d in range(1, depth.max() + 1)]
-
-
-@memoised(4)
-def _chains(parents: tuple[int, ...]) -> np.ndarray:
-    """Which bones lead from the root to each bone, itself included, the root not: (n, n), 0 or 1."""
-    chains = np.zeros((len(parents), len(parents)))
-    for bone, parent in enumerate(parents[1:], start=1):
-        chains[bone] = chains[parent]
-        chains[bone, bone] = 1
-    return chains
+def rest_shape(body: Body, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n_v, 3) and bone heads (n_bones, 3) of a shape at rest; not to be written to."""
+    vertices, heads, _ = _rest(body, shape_weights(body, shape).tobytes())
+    return vertices, heads
 
 
 def _skin(body: Body, vertices, rotations, translations) -> np.ndarray:
     transforms = np.concatenate([rotations, translations[..., None]], axis=2).astype(np.float32)
-    blended = (body.sparse_skin_weights @ transforms.reshape(len(transforms), 12)).reshape(-1, 3, 4)
+    blended = (body.skin_weights @ transforms.reshape(len(transforms), 12)).reshape(-1, 3, 4)
     return np.einsum("vij,vj->vi", blended[:, :, :3], vertices) + blended[:, :, 3]
 
 
@@ -364,8 +337,8 @@ def _unpack(stored) -> Body:
     keypoints[stored["keypoint_rows"], stored["keypoint_columns"]] = stored["keypoint_values"]
     return Body(
         vertices_m=vertices,
-        skin_weights=skin / skin.sum(axis=1, keepdims=True),
-        keypoint_weights=keypoints / keypoints.sum(axis=1, keepdims=True),
+        skin_weights=sparse.csr_array(skin / skin.sum(axis=1, keepdims=True)),
+        keypoint_weights=sparse.csr_array(keypoints / keypoints.sum(axis=1, keepdims=True)),
         **{name: stored[name].astype(kind) for name, kind in _STORED.items()},
         shape_names=tuple(map(str, stored["shape_names"])),
         bone_names=tuple(map(str, stored["bone_names"])),
@@ -378,7 +351,8 @@ _STORED = {"heads_m": float, "to_reference": float, "bone_parents": int, "triang
 
 def _check(body: Body, path: Path) -> None:
     n_v, n_bones = body.skin_weights.shape
-    numbers = (body.vertices_m, body.heads_m, body.skin_weights, body.keypoint_weights, body.fields)
+    weights = (body.skin_weights.data, body.keypoint_weights.data)
+    numbers = (body.vertices_m, body.heads_m, body.fields, *weights)
     problems = {
         "triangles name missing vertices": body.triangles.min() < 0 or body.triangles.max() >= n_v,
         "bones do not follow their parents": (body.bone_parents >= np.arange(n_bones)).any(),

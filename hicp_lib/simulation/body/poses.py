@@ -10,9 +10,9 @@ from collections.abc import Callable
 import numpy as np
 
 from hicp_lib.simulation.body import arms
-from hicp_lib.simulation.body.arms import Draft, Joints, Ranges, uniform
+from hicp_lib.simulation.body.arms import Draft, Ranges, uniform
 from hicp_lib.simulation.body.hands import sample_hand
-from hicp_lib.simulation.body.joints import LIMITS_DEG, pose_from_joints, within_limits
+from hicp_lib.simulation.body.joints import LIMITS_DEG, Joints, pose_from_joints, within_limits
 from hicp_lib.simulation.body.model import Body, Pose, Shape
 from hicp_lib.simulation.body.self_collision import collision_model, self_collision_distance_m
 
@@ -105,8 +105,8 @@ def _draw(draft: Draft, kind: str) -> Joints | None:
     legs, place_arms, hands = KINDS[kind]
     joints = uniform(draft.rng, _TRUNK_DEG) | legs(draft.rng)
     for side in ("left", "right"):
-        hand = sample_hand(draft.rng, str(draft.rng.choice(hands)))
-        joints |= {f"{side}_{name}": angle for name, angle in (arms.hanging_arm(draft) | hand).items()}
+        hand = sample_hand(draft.rng, str(draft.rng.choice(hands)), f"{side}_")
+        joints |= arms.hanging_arm(draft, side) | hand
     return place_arms(draft, joints)
 
 

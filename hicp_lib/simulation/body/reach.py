@@ -5,13 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hicp_lib.core.rotations import between, rotation, rotations_from_vectors
-from hicp_lib.simulation.body.joints import (
-    ARM_TILT_RAD,
-    LIMITS_DEG,
-    JointAngles,
-    pose_from_joints,
-    shoulder_angles,
-)
+from hicp_lib.simulation.body.joints import HANGING, LIMITS_DEG, Joints, pose_from_joints, shoulder_angles
 from hicp_lib.simulation.body.model import Body, Shape, pose_bones
 
 _SHOULDER = ("shoulder_flexion", "shoulder_abduction", "shoulder_rotation")
@@ -23,11 +17,11 @@ _LONGEST = 0.998  # of the stretched arm
 def reach(
     body: Body,
     shape: Shape,
-    angles: JointAngles,
+    angles: Joints,
     side: str,
     wrist_m: np.ndarray,
     elbow_toward: Sequence[float] = (0.0, 0.3, -1.0),
-) -> dict[str, float] | None:
+) -> Joints | None:
     """Bend shoulder and elbow so that the wrist comes to a point, or as near as the arm is long.
 
     The elbow can still swivel about the line from shoulder to wrist: of the positions within the
@@ -38,7 +32,7 @@ def reach(
     body : Body
     shape : int or str or array, shape (n_shapes,)
         As in `pose_body`.
-    angles : mapping of str to float
+    angles : dict of str to float
         Joint angles of the rest of the body, radians.
     side : str
         "left" or "right".
@@ -74,7 +68,7 @@ def reach(
     return result
 
 
-def _two_segments(target: np.ndarray, lengths: tuple, elbow_toward: np.ndarray) -> dict[str, float] | None:
+def _two_segments(target: np.ndarray, lengths: tuple, elbow_toward: np.ndarray) -> Joints | None:
     """Joint angles of a left arm that bring its wrist to `target`, seen from the shoulder."""
     upper, fore = map(float, lengths)
     distance = min(float(np.linalg.norm(target)), _LONGEST * (upper + fore))
@@ -82,8 +76,7 @@ def _two_segments(target: np.ndarray, lengths: tuple, elbow_toward: np.ndarray) 
     flexion = float(np.pi - np.arccos(np.clip(cosine, -1, 1)))
     if flexion > np.radians(LIMITS_DEG["left_elbow_flexion"][1]):
         return None
-    hanging = np.array([0.0, np.sin(ARM_TILT_RAD), -np.cos(ARM_TILT_RAD)])
-    bent = upper * hanging + fore * rotation((0, -flexion, 0)) @ hanging
+    bent = upper * HANGING + fore * rotation((0, -flexion, 0)) @ HANGING
     aim = target / np.linalg.norm(target)
     align = between(bent / np.linalg.norm(bent), aim)
     swivels = np.arange(_N_SWIVELS)[:, None] * 2 * np.pi / _N_SWIVELS
@@ -93,5 +86,5 @@ def _two_segments(target: np.ndarray, lengths: tuple, elbow_toward: np.ndarray) 
     allowed = ((angles >= low) & (angles <= high)).all(axis=1)
     if not allowed.any():
         return None
-    best = np.argmax(np.where(allowed, rotations @ hanging @ elbow_toward, -np.inf))
+    best = np.argmax(np.where(allowed, rotations @ HANGING @ elbow_toward, -np.inf))
     return dict(zip(_SHOULDER, map(float, angles[best]), strict=True)) | {"elbow_flexion": flexion}

@@ -162,6 +162,6 @@ def _moved_by(body: Body, parts: list[np.ndarray]) -> np.ndarray:
     """The bone that moves most of each part, given as numbers of vertices; (n_parts,)."""
     ends = np.cumsum([0, *map(len, parts)])
     numbers = np.concatenate(parts)
-    shape = (len(parts), len(body.skin_weights))
+    shape = (len(parts), body.skin_weights.shape[0])
     members = sparse.csr_array((np.ones(len(numbers), np.float32), numbers, ends), shape=shape)
-    return (members @ body.sparse_skin_weights).toarray().argmax(axis=1)
+    return (members @ body.skin_weights).toarray().argmax(axis=1)

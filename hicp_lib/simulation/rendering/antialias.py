@@ -66,17 +66,13 @@ def smooth_edges(
     """
     if len(edges) == 0:
         return image
-    around = _borders(edges, *image.shape[:2])
-    used = np.zeros(2 * image.shape[0] * image.shape[1] + sum(image.shape[:2]), bool)
-    for numbers in around:
-        used[numbers] = True
-    shown = _alike(np.flatnonzero(used), trace, scene, camera)
+    borders, around = np.unique(_borders(edges, *image.shape[:2]), return_inverse=True)
+    shown = _alike(borders, trace, scene, camera)
     flat = image.reshape(-1, 3)
     # Averaged after compression: a bright window does not eat its frame.
     colour, mixed = _compressed(flat.take(shown, axis=0)), _compressed(flat.take(edges, axis=0))
-    place = np.cumsum(used) - 1
     for numbers in around:
-        mixed += colour.take(place.take(numbers), axis=0)
+        mixed += colour.take(numbers, axis=0)
     mixed /= 1 + len(around)
     flat[edges] = mixed / (1 - mixed)
     return image

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hicp_lib.core.camera import Camera, project
 
@@ -25,17 +26,13 @@ class PlacedCamera(Camera):
         return self.T_world_camera[:3, 3]
 
 
-def look_at(
-    eye_m: np.ndarray, target_m: np.ndarray, up: tuple[float, float, float] = (0, 0, 1), roll_rad: float = 0.0
-) -> np.ndarray:
-    """Pose of a camera that sees a point in its centre.
+def look_at(eye_m: ArrayLike, target_m: ArrayLike, roll_rad: float = 0.0) -> np.ndarray:
+    """Pose of a camera that sees a point in its centre, the world's z axis upwards.
 
     Parameters
     ----------
     eye_m, target_m : array, shape (3,)
         Where it is, and what it looks at; world frame.
-    up : tuple of float, optional
-        What is up in the image.
     roll_rad : float, optional
         About the line of sight.
 
@@ -52,7 +49,7 @@ def look_at(
     (array([31.5, 23.5]), 3.0)
     """
     forward = _unit(np.asarray(target_m, float) - np.asarray(eye_m, float))
-    right = _unit(np.cross(forward, np.asarray(up, float)))
+    right = _unit(np.cross(forward, [0.0, 0.0, 1.0]))
     down = np.cross(forward, right)
     cos, sin = np.cos(roll_rad), np.sin(roll_rad)
     T_world_camera = np.eye(4)
@@ -117,11 +114,6 @@ def join_rays(origins_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
     return rays
 
 
-def to_camera(camera: PlacedCamera, points_m: np.ndarray) -> np.ndarray:
-    """World points (..., 3) in camera coordinates."""
-    return (points_m - camera.centre_m) @ camera.T_world_camera[:3, :3]
-
-
 def project_world(camera: PlacedCamera, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Project world points.
 
@@ -137,7 +129,7 @@ def project_world(camera: PlacedCamera, points_m: np.ndarray) -> tuple[np.ndarra
     depths_m : array, shape (...)
         Along the camera's z axis.
     """
-    in_camera_m = to_camera(camera, np.asarray(points_m, float))
+    in_camera_m = (np.asarray(points_m, float) - camera.centre_m) @ camera.T_world_camera[:3, :3]
     return project(camera, in_camera_m), in_camera_m[..., 2]
 
 

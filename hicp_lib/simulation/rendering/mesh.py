@@ -95,22 +95,14 @@ def cut(triangles: np.ndarray, field: np.ndarray) -> Cut:
         else:
             corners += [_edges((a, b), (b, b), (c, c)), _edges((a, b), (c, c), (a, c))]
             source += [rows, rows]
-    edges = np.concatenate(corners)
-    edges = np.sort(edges, axis=-1)
+    edges = np.sort(np.concatenate(corners), axis=-1)
     n = len(field)
     keys = edges[..., 0].astype(np.int64) * n + edges[..., 1]
-    whole = edges[..., 0] == edges[..., 1]
-    vertices = np.flatnonzero(np.bincount(edges[..., 0][whole], minlength=n))
-    unique = np.sort(np.concatenate([vertices * (n + 1), np.unique(keys[~whole])]))
-    # As `np.unique` would number them, but nearly all are whole vertices, which a table finds.
-    number = np.empty(n, np.int32)
-    number[vertices] = np.searchsorted(unique, vertices * (n + 1))
-    numbers = number.take(edges[..., 0], mode="clip")
-    numbers[~whole] = np.searchsorted(unique, keys[~whole])
+    unique, numbers = np.unique(keys, return_inverse=True)
     i, j = np.divmod(unique, n)
     gap = field[i] - field[j]
     t = np.where(i == j, 0.0, field[i] / np.where(gap == 0, 1.0, gap))
-    return Cut(i, j, t.astype(np.float32), numbers, np.concatenate(source))
+    return Cut(i, j, t.astype(np.float32), numbers.astype(np.int32), np.concatenate(source))
 
 
 def _edges(*corners: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -195,9 +187,8 @@ def _unit_cube() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     corners, normals, axes = [], [], []
     for normal, u, v in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
         for side in (0, 1):
-            square = [(0, 0), (1, 0), (1, 1), (0, 1)]
-            if np.cross(np.eye(3)[u], np.eye(3)[v])[normal] * (2 * side - 1) < 0:
-                square.reverse()
+            # Around the face in the order in which it looks outwards.
+            square = [(0, 0), (1, 0), (1, 1), (0, 1)][:: 1 if (normal + side) % 2 else -1]
             face = np.zeros((4, 3))
             face[:, normal], face[:, [u, v]] = side, square
             corners.append(face)
@@ -231,13 +222,13 @@ def box(low_m: ArrayLike, high_m: ArrayLike, yaw_rad: float = 0.0) -> Mesh:
     >>> cube.vertices_m.shape, cube.triangles.shape
     ((24, 3), (12, 3))
     """
-    low, high = np.asarray(low_m, np.float32), np.asarray(high_m, np.float32)
-    return turned(boxes(low[None], high[None]), yaw_rad, (low + high) / 2)
+    spans = np.array([[low_m, high_m]], np.float32)
+    return turned(boxes(spans), yaw_rad, spans[0].sum(axis=0) / 2)
 
 
-def boxes(lows_m: np.ndarray, highs_m: np.ndarray) -> Mesh:
-    """Boxes between pairs of corners, (n, 3) each, as one mesh; coords in metres."""
-    lows, highs = np.asarray(lows_m, np.float32), np.asarray(highs_m, np.float32)
+def boxes(spans_m: ArrayLike) -> Mesh:
+    """Boxes between pairs of corners, (n, 2, 3), as one mesh; coords in metres."""
+    lows, highs = np.asarray(spans_m, np.float32).swapaxes(0, 1)
     corners, normals, triangles, uv = _CUBE
     scaled = corners * (highs - lows)[:, None]
     coords = np.take(scaled.reshape(-1, corners.size), uv, axis=1)

@@ -99,7 +99,7 @@ def render(world: World, camera: PlacedCamera, rng: np.random.Generator) -> Fram
     person = scene.owners.take(trace.surface, mode="wrap").reshape(shape)
     is_person = person >= 0
     around = GBuffer.of(trace, centre_m, directions, np.s_[::2, ::2], ~is_person)
-    painted = _paint(world, scene, around, camera, False, rng)
+    painted = _paint(world, around, camera, False, rng)
     image = _enlarge(painted, around, trace.surface.reshape(shape), ~is_person)
     pixels = image.reshape(-1, 3).T
     place(pixels, np.flatnonzero(trace.surface < 0), column(world.backdrop))
@@ -107,26 +107,21 @@ def render(world: World, camera: PlacedCamera, rng: np.random.Generator) -> Fram
     if len(rows):
         crop = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
         people = GBuffer.of(trace, centre_m, directions, crop, is_person)
-        place(pixels, np.flatnonzero(is_person), _paint(world, scene, people, camera, True, rng))
+        place(pixels, np.flatnonzero(is_person), _paint(world, people, camera, True, rng))
         image = smooth_edges(image, edge_pixels(trace, is_person), trace, scene, camera)
     return Frame(image, trace.depth_m.reshape(shape), person, scene)
 
 
 def _paint(
-    world: World,
-    scene: RayScene,
-    gbuffer: GBuffer,
-    camera: PlacedCamera,
-    sharp: bool,
-    rng: np.random.Generator,
+    world: World, gbuffer: GBuffer, camera: PlacedCamera, sharp: bool, rng: np.random.Generator
 ) -> np.ndarray:
     """Linear RGB of a G-buffer's pixels, (3, n)."""
-    shading = evaluate_materials(scene, gbuffer, 1 / camera.fx_px)
+    shading = evaluate_materials(world.rays, gbuffer, 1 / camera.fx_px)
     normals = gbuffer.on_grid(shading.normals)
     if shading.height_m.any():
         tilt_by_height(normals, gbuffer.on_grid(shading.height_m[None])[0], gbuffer)
         shading.normals = gbuffer.from_grid(normals)
-    seen = visibility(world.lights, scene, gbuffer, normals, sharp, rng)
+    seen = visibility(world.lights, world.rays, gbuffer, normals, sharp, rng)
     positions_m, painted = gbuffer.from_grid(gbuffer.positions_m), np.empty_like(shading.normals)
     for start in range(0, len(gbuffer.pixels), _BLOCK):
         block = slice(start, start + _BLOCK)

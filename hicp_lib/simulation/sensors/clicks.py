@@ -55,16 +55,10 @@ def simulate_clicks(
         exact_depth_m = read_exact_depth_m(recording, int(frame))
         if exact_depth_m is None:
             raise InputError(f"{recording.folder}: has no exact depth; give a simulated recording")
-        seen = _is_seen(recording.intrinsics.contains(pixels_px), pixels_px, points_m[:, 2], exact_depth_m)
+        inside = recording.intrinsics.contains(pixels_px)
+        columns, rows = np.floor(np.where(inside[:, None], pixels_px, 0) + 0.5).astype(int).T
+        seen = inside & (exact_depth_m[rows, columns] > points_m[:, 2] - _IN_FRONT_M)
         u_px, v_px = (pixels_px + rng.normal(0, noise_px, pixels_px.shape)).T
-        columns = {"frame": int(frame), "marker": list(mocap.names), "u_px": u_px, "v_px": v_px}
-        tables.append(pd.DataFrame(columns)[seen])
+        clicks = {"frame": int(frame), "marker": list(mocap.names), "u_px": u_px, "v_px": v_px}
+        tables.append(pd.DataFrame(clicks)[seen])
     return pd.concat(tables, ignore_index=True)
-
-
-def _is_seen(
-    inside: np.ndarray, pixels_px: np.ndarray, depths_m: np.ndarray, exact_depth_m: np.ndarray
-) -> np.ndarray:
-    """Which points are in the image with nothing in front of them."""
-    columns, rows = np.floor(np.where(inside[:, None], pixels_px, 0) + 0.5).astype(int).T
-    return inside & (exact_depth_m[rows, columns] > depths_m - _IN_FRONT_M)

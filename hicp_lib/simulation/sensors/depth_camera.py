@@ -14,7 +14,7 @@ import numpy as np
 
 from hicp_lib.simulation.appearance.people import RIGHT
 from hicp_lib.simulation.body.model import REGIONS
-from hicp_lib.simulation.rendering.camera import PlacedCamera, pixel_rays
+from hicp_lib.simulation.rendering.camera import PlacedCamera, image_directions, join_rays, pixel_rays
 from hicp_lib.simulation.rendering.raycast import RayScene, doubled
 from hicp_lib.simulation.sensors.depth_alignment import align_to_colour
 from hicp_lib.simulation.sensors.depth_noise import correlated_noise, patches
@@ -229,9 +229,9 @@ def _true_disparity(
     those bend nowhere what lies between is interpolated; all the rest is cast as well.
     """
     shape = (view.height_px, view.width_px)
-    every_second = _every_second(view)
-    coarse_shape = (every_second.height_px, every_second.width_px)
-    trace = scene.trace(pixel_rays(every_second))
+    directions = image_directions(view)[:, ::2, ::2]
+    coarse_shape = directions.shape[1:]
+    trace = scene.trace(join_rays(view.centre_m, directions.reshape(3, -1)))
     coarse = (np.float32(focal_baseline) / trace.depth_m).reshape(coarse_shape)
     # OpenCV's resizing puts the samples elsewhere: means of neighbours by hand.
     full = np.empty(shape, np.float32)
@@ -248,12 +248,6 @@ def _true_disparity(
     is_hair = np.array([s.parts is not None and np.isin(s.parts, _HAIR_PARTS).all() for s in scene.surfaces])
     hair = np.append(is_hair, False)[trace.surface].reshape(coarse_shape)
     return full, doubled(hair, shape)
-
-
-def _every_second(view: PlacedCamera) -> PlacedCamera:
-    """The camera whose pixels are those of every second row and column."""
-    halves = {name: getattr(view, name) / 2 for name in ("fx_px", "fy_px", "cx_px", "cy_px")}
-    return replace(view, width_px=-(-view.width_px // 2), height_px=-(-view.height_px // 2), **halves)
 
 
 def _bent(coarse_px: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.core.memo import memoised
-from hicp_lib.simulation.body.model import Body, PosedBody, Shape, load_body, pose_body
+from hicp_lib.simulation.body.model import Body, PosedBody, Shape, load_body, pose_body, shape_weights
 from hicp_lib.simulation.rendering.mesh import Mesh
 from hicp_lib.simulation.rendering.raycast import RayScene
 from hicp_lib.simulation.rendering.surfaces import Hits, Look, Surface
@@ -87,13 +87,12 @@ def marker_vertices(shape: Shape) -> np.ndarray:
     True
     """
     body = load_body()
-    key = shape if isinstance(shape, str | int) else np.asarray(shape, np.float32).tobytes()
-    return _marker_vertices(body, key)
+    return _marker_vertices(body, shape_weights(body, shape).tobytes())
 
 
 @memoised(64)
-def _marker_vertices(body: Body, key: int | str | bytes) -> np.ndarray:
-    person = pose_body(body, np.frombuffer(key, np.float32) if isinstance(key, bytes) else key, {})
+def _marker_vertices(body: Body, weights: bytes) -> np.ndarray:
+    person = pose_body(body, np.frombuffer(weights, np.float32), {})
     arm = (body.field("arm") > _BELOW_SHOULDER)[body.triangles].all(axis=1)
     parts = [_place(body, person, "shoulder", np.ones_like(arm))]
     # A heavy person's trunk may touch the hanging arm: the trunk is no place for the elbow's marker.

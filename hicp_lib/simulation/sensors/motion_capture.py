@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import binary_opening
 
 from hicp_lib.core.camera import transform
 from hicp_lib.core.rotations import rotation
@@ -178,19 +179,10 @@ def measure(
     -------
     MotionCapture
     """
-    measured = np.asarray(n_seeing) >= system.min_cameras
-    measured = _without_short_runs(measured, int(round(system.shortest_s * system.rate_hz)))
+    shortest = max(1, int(round(system.shortest_s * system.rate_hz)))
+    seen = np.asarray(n_seeing) >= system.min_cameras
+    measured = binary_opening(seen, np.ones((shortest, 1)))  # without shorter runs
     in_mocap_m = transform(T_mocap_world, np.reshape(points_m, (-1, 3))).reshape(np.shape(points_m))
     in_mocap_m = in_mocap_m + system.noise_m * rng.standard_normal(in_mocap_m.shape)
     in_mocap_m[~measured] = np.nan
     return MotionCapture(np.asarray(times_s, float), tuple(names), in_mocap_m, system.rate_hz)
-
-
-def _without_short_runs(measured: np.ndarray, shortest: int) -> np.ndarray:
-    """Columns of (n, m) with runs of true that are shorter than `shortest` made false."""
-    kept = np.zeros_like(measured)
-    for column in range(measured.shape[1]):
-        change = np.diff(measured[:, column].astype(int), prepend=0, append=0)
-        for start, stop in zip(np.flatnonzero(change > 0), np.flatnonzero(change < 0), strict=True):
-            kept[start:stop, column] = stop - start >= shortest
-    return kept

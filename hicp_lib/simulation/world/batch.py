@@ -2,15 +2,18 @@
 
 import multiprocessing
 import multiprocessing.pool
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from operator import call
 from pathlib import Path
 from typing import TypeVar
 
 import cv2
+import numpy as np
 
 from hicp_lib.core.environment import usable_cores, with_variables
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json, write_json
 
 Result = TypeVar("Result")
 
@@ -53,14 +56,55 @@ def run_jobs(jobs: Sequence[Callable[[], Result]], workers: int | None = None) -
     """
     n_workers = min(workers or usable_cores(), len(jobs))
     if n_workers < 2:
-        yield from map(_call, jobs)
+        yield from map(call, jobs)
         return
     with worker_pool(n_workers) as pool:
-        yield from pool.imap(_call, jobs)
+        yield from pool.imap(call, jobs)
 
 
-def _call(job: Callable[[], Result]) -> Result:
-    return job()
+def check_numbers(**limits: tuple[object, int, int]) -> None:
+    """Refuse numbers out of range.
+
+    Parameters
+    ----------
+    **limits : tuple
+        By its name: what was given, the lowest and the highest number allowed.
+
+    Raises
+    ------
+    InputError
+        For the first that is no whole number or lies outside.
+
+    Examples
+    --------
+    >>> check_numbers(seed=(3, 0, 10))
+    """
+    for name, (value, low, high) in limits.items():
+        if not isinstance(value, int | np.integer) or not low <= value <= high:
+            raise InputError(f"{name} is {value!r}; expected a whole number from {low} to {high}")
+
+
+def keep_parts(out: Path, parts_dir: str, stamp: dict, made: Iterable[str]) -> None:
+    """Keep what an interrupted run finished; drop what was made with something else.
+
+    Parameters
+    ----------
+    out : Path
+        Folder that is written to.
+    parts_dir : str
+        Name of the folder in it that says what is finished.
+    stamp : dict
+        What results depend on, JSON-able; kept there.
+    made : iterable of str
+        Patterns of the files that are made, relative to `out`.
+    """
+    stamp_file = out / parts_dir / "stamp.json"
+    if stamp_file.exists() and read_json(stamp_file) == stamp:
+        return
+    for pattern in (f"{parts_dir}/*.json", *made):
+        for path in out.glob(pattern):
+            path.unlink()
+    write_json(stamp_file, stamp)
 
 
 def check_output(out: Path, marker: str, purpose: str, made: str) -> None:

@@ -45,8 +45,7 @@ def furnish(rng: Rng, half_m: np.ndarray, keep_clear_m: np.ndarray) -> list[Surf
 
 def _boxes_at(place: np.ndarray, yaw: float, spans: list[tuple]) -> g.Mesh:
     """Boxes between pairs of corners about a place, turned about it."""
-    lows, highs = (place + np.array(spans)).swapaxes(0, 1)
-    return g.turned(g.boxes(lows, highs), yaw, place)
+    return g.turned(g.boxes(place + np.array(spans)), yaw, place)
 
 
 def legs(xs: Iterable[float], ys: Iterable[float], half: float, low: float, high: float) -> list[tuple]:

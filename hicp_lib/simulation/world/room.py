@@ -88,7 +88,7 @@ class _Wall:
         """Boxes, each ((u, u), (v, v), (w, w))."""
         u, v, w = (np.array(spans, np.float32)[:, k, :, None] for k in range(3))
         points = self.centre + u * self.u + v * np.array([0, 0, 1], np.float32) + w * self.inward
-        return g.boxes(points.min(axis=1), points.max(axis=1))
+        return g.boxes(np.stack([points.min(axis=1), points.max(axis=1)], axis=1))
 
     def panel(self, u: tuple[float, float], v: tuple[float, float], w: float) -> g.Mesh:
         across, up = (u[1] - u[0]) * self.u, np.array([0, 0, v[1] - v[0]])

@@ -8,22 +8,20 @@ the number of worker processes changes nothing, and a larger data set contains t
 from functools import partial
 from pathlib import Path
 
-import cv2
 import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.core.cache import key
-from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_json, write_bytes, write_json
+from hicp_lib.core.files import read_json, write_json
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
+from hicp_lib.recordings.writer import write_rgb
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import Frame, render
-from hicp_lib.simulation.world.batch import check_output, run_jobs
+from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts, run_jobs
 from hicp_lib.simulation.world.staging import Stage, distance_m, random_stage
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
-JPEG_QUALITY = 95
 MAX_SCENES = 1_000_000
 _MAX_NUMBER = 1_000_000_000  # of seeds and workers
 _PARTS_DIR = ".scenes"  # the people of finished images, and what they were made with
@@ -61,10 +59,12 @@ def render_dataset(
     InputError
         For numbers out of range, or a folder that holds something else.
     """
-    out = Path(out)
-    _check(out, n, seed, workers)
+    out, n_workers = Path(out), 1 if workers is None else workers
+    check_numbers(n=(n, 1, MAX_SCENES), seed=(seed, 0, _MAX_NUMBER), workers=(n_workers, 1, _MAX_NUMBER))
+    check_output(out, _PARTS_DIR, "to render into", "rendered")
+    (out / "annotations.json").unlink(missing_ok=True)
     stamp = {"renderer": key([render_dataset]), "seed": int(seed)}
-    _prepare(out, stamp)
+    keep_parts(out, _PARTS_DIR, stamp, ["images/*.jpg"])
     # The people are written after the image.
     missing = [k for k in range(n) if not (_people_path(out, k).exists() and _image_path(out, k).exists())]
     done = run_jobs([partial(_render_one, out, seed, index) for index in missing], workers)
@@ -78,32 +78,6 @@ def render_dataset(
     return annotations
 
 
-def _check(out: Path, n: int, seed: int, workers: int | None) -> None:
-    for name, value, low in (
-        ("n", n, 1),
-        ("seed", seed, 0),
-        ("workers", 1 if workers is None else workers, 1),
-    ):
-        if not isinstance(value, int | np.integer) or not low <= value <= _MAX_NUMBER:
-            raise InputError(f"{name} is {value!r}; expected a whole number of at least {low}")
-    if n > MAX_SCENES:
-        raise InputError(f"n is {n}; expected at most {MAX_SCENES} images")
-    check_output(out, _PARTS_DIR, "to render into", "rendered")
-
-
-def _prepare(out: Path, stamp: dict) -> None:
-    """Make the folders; drop what another seed or renderer left."""
-    stamp_file = out / _PARTS_DIR / "stamp.json"
-    for folder in (_PARTS_DIR, "images"):
-        (out / folder).mkdir(parents=True, exist_ok=True)
-    (out / "annotations.json").unlink(missing_ok=True)
-    if stamp_file.exists() and read_json(stamp_file) == stamp:
-        return
-    for path in [stamp_file, *(out / _PARTS_DIR).glob("*.json"), *(out / "images").glob("*.jpg")]:
-        path.unlink(missing_ok=True)
-    write_json(stamp_file, stamp)
-
-
 def _image_path(out: Path, index: int) -> Path:
     return out / "images" / f"{index:06d}.jpg"
 
@@ -114,9 +88,7 @@ def _people_path(out: Path, index: int) -> Path:
 
 def _render_one(out: Path, seed: int, index: int) -> None:
     image, people = render_scene(seed, index)
-    bgr = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
-    _, encoded = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    write_bytes(_image_path(out, index), encoded.tobytes())
+    write_rgb(_image_path(out, index), image)
     height, width = image.shape[:2]
     write_json(_people_path(out, index), {"width": width, "height": height, "people": people})
 

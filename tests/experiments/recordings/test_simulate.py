@@ -136,7 +136,7 @@ def test_what_another_seed_made_is_dropped(lower, tmp_path, monkeypatch):
     [
         (dict(name="relative-sideways"), "no scenario"),
         (dict(n_frames=0), "n_frames is 0"),
-        (dict(n_frames=101), "takes a whole number from 1 to 100"),
+        (dict(n_frames=101), "expected a whole number from 1 to 100"),
         (dict(seed=-1), "seed is -1"),
         (dict(workers=0), "workers is 0"),
     ],

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_file
 from hicp_lib.core.keypoints import FACE, INDEX, LEFT_HAND, NAMES
-from hicp_lib.core.rotations import rotation, rotations_from_vectors
+from hicp_lib.core.rotations import rotation
 from hicp_lib.simulation.body.model import BODY_FILE, REGIONS, load_body, pose_body, pose_bones, shape_weights
 
 BODY = load_body()
@@ -17,18 +17,19 @@ SHAPES = st.sampled_from(BODY.shape_names)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def random_pose(seed: int) -> np.ndarray:
+def random_pose(seed: int) -> dict[str, np.ndarray]:
     rng = np.random.default_rng(seed)
-    return rotations_from_vectors(rng.normal(0, 0.4, (len(BODY.bone_names), 3)))
+    vectors = rng.normal(0, 0.4, (len(BODY.bone_names), 3))
+    return dict(zip(BODY.bone_names, vectors, strict=True))
 
 
-def rest_pose(shape: int) -> np.ndarray:
+def rest_pose(shape: int) -> dict[str, np.ndarray]:
     """The pose that undoes the turn to the reference stance."""
     undone = BODY.to_reference[shape].transpose(0, 2, 1)
     parents = np.maximum(BODY.bone_parents, 0)
     local = undone[parents].transpose(0, 2, 1) @ undone
     local[0] = undone[0]
-    return local
+    return dict(zip(BODY.bone_names, local, strict=True))
 
 
 def mirrored_name(name: str) -> str:
@@ -134,7 +135,7 @@ def test_skinning_agrees_with_its_definition():
     heads = BODY.heads_m[shape]
     for v in rng.integers(0, len(BODY.regions), 50):
         expected = np.zeros(3)
-        for bone in np.flatnonzero(BODY.skin_weights[v]):
+        for bone in BODY.skin_weights[[v]].indices:
             turned = posed.rotations[bone] @ (BODY.vertices_m[shape, v] - heads[bone])
             expected += BODY.skin_weights[v, bone] * (turned + posed.heads_m[bone])
         assert posed.vertices_m[v] == pytest.approx(expected, abs=2e-6)
