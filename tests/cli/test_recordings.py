@@ -17,7 +17,10 @@ def small(tmp_path):
     ("arguments", "expected"),
     [
         (["simulate", "nonsense", "out"], "no scenario 'nonsense'; choose one of relative-upper"),
-        (["simulate", "relative-upper", "out", "--n-frames", "101"], "n_frames is 101; relative-upper takes"),
+        (
+            ["simulate", "relative-upper", "out", "--n-frames", "101"],
+            "n_frames is 101; expected a whole number from 1 to 100",
+        ),
         (["import", "out"], "Give either --bag FILE or --open3d DIR"),
         (["import", "out", "--bag", "/no.bag"], "/no.bag: is not there"),
         (["import", "out", "--open3d", "/no"], "/no/intrinsic.json: cannot be read"),
