@@ -12,6 +12,7 @@ import nbformat
 
 from hicp_lib.core.cache import digest, imports_of
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_bytes
 
 PARAMETERS_TAG = "parameters"
 
@@ -140,10 +141,9 @@ def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
         If the file or the profile is missing, names a notebook or parameter that does not exist, or has
         notebooks wait for each other.
     """
+    text = read_bytes(path, "restore the file")
     try:
-        content = tomllib.loads(path.read_text())
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); restore the file") from None
+        content = tomllib.loads(text.decode())
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: not TOML ({error}); correct the file") from None
     after = content.pop("after", {})
