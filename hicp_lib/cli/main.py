@@ -207,6 +207,9 @@ def export(detections: Path, kind: str, layout: str, annotations: Path | None, o
     click.echo(f"{out}: {n} people")
 
 
+_LEAST_AREA = 0.01  # of a person, as a share of their box; a smaller one stands for none
+
+
 @hicp.command()
 @click.option("--annotations", type=PATH, required=True, help="Annotations in Halpe's layout.")
 @click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
@@ -230,6 +233,11 @@ def evaluate(
 
     people = read_annotations(annotations)
     found = read_detections(detections, people)
+    counted = people.take(~people.is_crowd)
+    n_tiny = int((counted.areas_px2 < _LEAST_AREA * counted.boxes_px[:, 2:].prod(axis=1)).sum())
+    if n_tiny and area == "segment":
+        said = f"the area of {n_tiny} of {len(counted)} people is below a hundredth of their box"
+        click.echo(f"{annotations}: {said}, so OKS forgives hardly an error; give --area box", err=True)
     clusters = source_images(people)  # crops of one image are drawn together
     options = {"area": area} | ({"sigmas": sigmas} if sigmas else {})
     results = []

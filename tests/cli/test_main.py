@@ -138,6 +138,27 @@ def test_evaluation_of_perfect_detections(capsys, tmp_path):
     assert json.loads(capsys.readouterr().out)["metrics"]["AP"] == {"value": 1.0, "low": None, "high": None}
 
 
+@pytest.mark.parametrize(("area", "told"), [(0, True), (1, True), (1019, True), (1020, False)])
+def test_areas_that_stand_for_none_are_told(capsys, tmp_path, area, told):
+    """Nobody would know why every AP is 0: the allowance of OKS is a share of the area."""
+    keypoints = [value for i in range(17) for value in (110 + 10 * i, 80 + 25 * i, 2)]
+    person = {"id": 1, "image_id": 1, "category_id": 1, "iscrowd": 0, "keypoints": keypoints}
+    person |= {"bbox": [100, 50, 200, 510], "area": area, "num_keypoints": 17}
+    image = {"id": 1, "file_name": "1.jpg", "width": 400, "height": 600}
+    shifted = [value + (k % 3 < 2) for k, value in enumerate(keypoints)]
+    results = [{"image_id": 1, "category_id": 1, "keypoints": shifted, "score": 0.9}]
+    truth, found = tmp_path / "annotations.json", tmp_path / "detections.json"
+    truth.write_text(json.dumps({"images": [image], "annotations": [person], "categories": [{"id": 1}]}))
+    found.write_text(json.dumps(results))
+    arguments = ["evaluate", "--annotations", str(truth), "--detections", str(found)]
+    for options in ([], ["--json"]):
+        assert cli.run([*arguments, *options]) == 0
+        assert ("the area of 1 of 1 people is below" in capsys.readouterr().err) == told
+    assert cli.run([*arguments, "--area", "box"]) == 0
+    of_box = capsys.readouterr()
+    assert "AP    1.000" in of_box.out and not of_box.err
+
+
 def test_evaluation_tells_visible_keypoints_and_each_hand(capsys, tmp_path):
     """The left hand is occluded and not found: half of the hands, and all of what can be seen."""
     flags = np.full(136, 2)
