@@ -22,6 +22,7 @@ from timing import Comparison, run
 from hicp_lib.experiments.recordings.frames import camera_at, record_frame
 from hicp_lib.experiments.recordings.scenarios import SCENARIOS, Scenario
 from hicp_lib.experiments.recordings.simulate import record_one, simulate_recording
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.rendering.render import render
 from hicp_lib.simulation.world.batch import worker_pool
 
@@ -32,14 +33,14 @@ def frame_cost(name: str, n_timed: int) -> dict[str, float]:
     """Mean processor seconds of `n_timed` frames, and of drawing them alone."""
     plan = SCENARIOS[name]
     last = plan.n_frames - 1
-    record_frame(name, 0, last)  # the scene is made with all movements, textures too
+    record_frame(name, Subject(), last)  # the scene is made with all movements, textures too
     once_s = time.process_time()
     drawn_s, frame_s = [], []
     with tempfile.TemporaryDirectory() as folder:
         for k in np.linspace(0, last - 1, n_timed).astype(int).tolist():
             drawn_s.append(_draw(plan, k))
             start_s = time.process_time()
-            record_one(Path(folder), name, 0, k)
+            record_one(Path(folder), name, Subject(), k)
             frame_s.append(time.process_time() - start_s)
     return {
         "frame_s": float(np.mean(frame_s)),
@@ -60,7 +61,7 @@ def _capture(plan: Scenario) -> float:
 
 
 def _draw(plan: Scenario, k: int) -> float:
-    world, _ = plan.stage(0, float(plan.times_s(k + 1)[k]))
+    world, _ = plan.stage(Subject(), float(plan.times_s(k + 1)[k]))
     camera = camera_at(plan, k)
     start_s = time.process_time()
     render(world, camera, np.random.default_rng(k))

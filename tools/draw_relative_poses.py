@@ -3,7 +3,7 @@
     python tools/draw_relative_poses.py
 
 Torso and neck are drawn evenly within the ranges below, which lie within the software limits of the
-robot; a pose is kept if the person of seed 0 is framed as the view asks. Run once: results refer to
+robot; a pose is kept if a development person (seed 0) is framed as the view asks. Run once: results refer to
 the file as it is.
 """
 
@@ -18,6 +18,7 @@ from hicp_lib.core.keypoints import HANDS, INDEX
 from hicp_lib.experiments.laboratory import robot_camera
 from hicp_lib.experiments.recordings.seated_person import VIEWS, seated_person
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.rendering.camera import project_world
 
 N_POSES = 100
@@ -47,7 +48,7 @@ def main() -> None:
 
 def draw(icub, view: str, rng: np.random.Generator) -> list[np.ndarray]:
     """Poses of a view, degrees, to a tenth."""
-    points_m = seated_person(0)[1].keypoints_m
+    points_m = seated_person(Subject(split="development"))[1].keypoints_m
     low, high = np.array([RANGES_DEG[view][joint] for joint in HEAD_JOINTS], float).T
     limits_deg = np.degrees(icub.chains["head"].limits_rad)
     assert (low >= limits_deg[:, 0] - 1e-9).all() and (high <= limits_deg[:, 1] + 1e-9).all(), limits_deg

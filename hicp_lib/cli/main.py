@@ -18,7 +18,7 @@ import click
 from hicp_lib import __version__
 from hicp_lib.cli.calibration import calibration
 from hicp_lib.cli.models import models
-from hicp_lib.cli.options import PATH, WORKERS, detector_options, given, tell_assumed
+from hicp_lib.cli.options import PATH, WORKERS, detector_options, given, people_option, tell_assumed
 from hicp_lib.cli.recordings import lift, record
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import write_json
@@ -94,12 +94,13 @@ def scenes() -> None:
 @click.argument("out", type=PATH)
 @click.option("--n", default=100, show_default=True, type=click.IntRange(min=1), help="Number of images.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0))
+@people_option
 @click.option("--workers", type=WORKERS, help="Processes; all cores if not given.")
-def scenes_render(out: Path, n: int, seed: int, workers: int | None) -> None:
+def scenes_render(out: Path, n: int, seed: int, people: str, workers: int | None) -> None:
     """Render people at 1-5 m into the folder OUT, with annotations in Halpe's layout."""
     from hicp_lib.simulation.world.scenes import render_dataset
 
-    render_dataset(out, n=n, seed=seed, workers=workers)
+    render_dataset(out, n=n, seed=seed, workers=workers, split=people.replace("-", " "))
     click.echo(f"{out}: {n} images")
 
 

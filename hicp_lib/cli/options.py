@@ -10,6 +10,10 @@ from hicp_lib.core.files import json_or_text
 
 PATH = click.Path(path_type=Path)
 WORKERS = click.IntRange(min=1)
+people_option = click.option(
+    "--people", default="held-out", show_default=True, type=click.Choice(["development", "held-out"]),
+    help="What is tuned is tuned on people for development.",
+)  # fmt: skip
 
 
 def detector_options(command: Callable) -> Callable:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from hicp_lib.cli.options import PATH, WORKERS, detector_options, given
+from hicp_lib.cli.options import PATH, WORKERS, detector_options, given, people_option
 
 
 @click.group()
@@ -18,16 +18,22 @@ def record() -> None:
 @click.argument("out", type=PATH)
 @click.option("--n-frames", type=click.IntRange(min=1), help="The scenario's own number if not given.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0))
+@click.option("--subject", "number", default=0, show_default=True, type=click.IntRange(min=0), help="Who.")
+@people_option
 @click.option("--workers", type=WORKERS, help="Processes; all cores if not given.")
-def simulate(scenario: str, out: Path, n_frames: int | None, seed: int, workers: int | None) -> None:
+def simulate(
+    scenario: str, out: Path, n_frames: int | None, seed: int, number: int, people: str, workers: int | None
+) -> None:
     """Simulate a recording into the folder OUT.
 
     The relative scenarios show a seated person from many poses of the robot, mocap one who moves, with
     motion capture. Finished frames are kept: after an interruption, the same command does only the rest.
     """
     from hicp_lib.experiments.recordings.simulate import simulate_recording
+    from hicp_lib.simulation.body.identities import Subject
 
-    recording = simulate_recording(out, scenario, n_frames, seed, workers, progress=sys.stderr.isatty())
+    subject = Subject(seed, number, people.replace("-", " "))
+    recording = simulate_recording(out, scenario, n_frames, subject, workers, progress=sys.stderr.isatty())
     click.echo(f"{out}: {len(recording)} frames")
 
 

@@ -28,11 +28,11 @@ from hicp_lib.core.cache import key
 from hicp_lib.core.files import cache_dir
 from hicp_lib.core.images import write_png
 from hicp_lib.datasets.crops import inside, whole_pixel_boxes
-from hicp_lib.experiments.laboratory import PHOTOGRAPHIC, facing_robot, furnished, random_adult
-from hicp_lib.experiments.random_streams import stream
+from hicp_lib.experiments.laboratory import PHOTOGRAPHIC, facing_robot, furnished
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.simulation.appearance import materials as m
-from hicp_lib.simulation.appearance.people import dress
+from hicp_lib.simulation.appearance.people import appearance_of, dress
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
 from hicp_lib.simulation.rendering import mesh as g
@@ -42,9 +42,6 @@ from hicp_lib.simulation.rendering.render import Frame, World, render
 from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.world.batch import run_jobs
 from hicp_lib.simulation.world.visibility import keypoint_visibility
-
-Draws = tuple[int, int]
-"""Seed and number of a person: the stream of random numbers that all their pictures are drawn from."""
 
 LEVELS: dict[str, tuple[float, ...]] = {
     "distance": (0.5, 0.75, 1.0, 1.5, 2.5, 3.5),
@@ -93,20 +90,20 @@ def open_doses(n_people: int = 10, seed: int = 0) -> Path:
     """
     folder = cache_dir() / "doses" / key([open_doses], n_people=n_people, seed=seed)[:_KEY_LENGTH]
     if not (folder / "annotations.json").is_file():
-        people = run_jobs([partial(_write_person, folder, seed, number) for number in range(n_people)])
+        subjects = [Subject(seed, number) for number in range(n_people)]
+        people = run_jobs([partial(_write_person, folder, subject) for subject in subjects])
         write_annotations(folder / "annotations.json", _joined([*chain.from_iterable(people)]))
     return folder
 
 
-def doses(seed: int, number: int) -> Iterator[tuple[str, float, Picture]]:
+def doses(subject: Subject) -> Iterator[tuple[str, float, Picture]]:
     """All pictures of one person: dose, level and picture."""
-    draws = (seed, number)
-    person, world = _stage(stream(*draws))
-    base_frame, base = _photograph(person, world, DISTANCE_M, draws)
+    person, world = _stage(subject)
+    base_frame, base = _photograph(person, world, DISTANCE_M, subject)
     taken: dict[str, Callable[[float], Picture]] = {
-        "distance": lambda level: _at_distance(person, world, level, base, draws),
-        "light": lambda level: replace(base, image=_developed(base_frame, _dim(level), draws)),
-        "hidden": lambda level: _hidden(person, world, level, base, draws),
+        "distance": lambda level: _at_distance(person, world, level, base, subject),
+        "light": lambda level: replace(base, image=_developed(base_frame, _dim(level), subject)),
+        "hidden": lambda level: _hidden(person, world, level, base, subject),
         "resolution": lambda level: _smaller(base, level / _HEIGHT_PX),
         "upper part": lambda level: _part(base, level, from_above=True),
         "lower part": lambda level: _part(base, level, from_above=False),
@@ -116,12 +113,13 @@ def doses(seed: int, number: int) -> Iterator[tuple[str, float, Picture]]:
             yield dose, level, taken[dose](level)
 
 
-def _stage(rng: np.random.Generator) -> tuple[PosedBody, World]:
-    body, appearance = load_body(), random_adult(rng)
+def _stage(subject: Subject) -> tuple[PosedBody, World]:
+    body, appearance = load_body(), appearance_of(subject.identity, skirts=False)
+    rng = subject.identity.draw("poses")
     pose = sample_pose(rng, body, str(rng.choice(_POSES)), appearance.shape)
     person = pose_body(body, appearance.shape, pose, facing_robot(_PERSON_Y_M))
     free = [(0.0, y, 0.7) for y in np.linspace(_PERSON_Y_M - LEVELS["distance"][-1], _PERSON_Y_M, 8)]
-    return person, furnished(rng, dress(appearance, person, 0), free)
+    return person, furnished(subject.identity.draw("room"), dress(appearance, person, 0), free)
 
 
 def _camera(distance_m: float) -> PlacedCamera:
@@ -131,16 +129,18 @@ def _camera(distance_m: float) -> PlacedCamera:
     return PlacedCamera(_WIDTH_PX, _HEIGHT_PX, _FOCAL_PX, _FOCAL_PX, *centre, pose)
 
 
-def _photograph(person: PosedBody, world: World, distance_m: float, seed: Draws) -> tuple[Frame, Picture]:
+def _photograph(
+    person: PosedBody, world: World, distance_m: float, subject: Subject
+) -> tuple[Frame, Picture]:
     camera = _camera(distance_m)
-    frame = render(world, camera, stream(*seed))
+    frame = render(world, camera, subject.stream())
     pixels, seen = keypoint_visibility(frame.rays, camera, person.keypoints_m, 0)
     mask = frame.person == 0
-    return frame, Picture(_developed(frame, PHOTOGRAPHIC, seed), mask, pixels, seen, float(mask.sum()))
+    return frame, Picture(_developed(frame, PHOTOGRAPHIC, subject), mask, pixels, seen, float(mask.sum()))
 
 
-def _developed(frame: Frame, sensor: Sensor, seed: Draws) -> np.ndarray:
-    return expose(frame.radiance, sensor, stream(*seed), frame.person >= 0)
+def _developed(frame: Frame, sensor: Sensor, subject: Subject) -> np.ndarray:
+    return expose(frame.radiance, sensor, subject.stream(), frame.person >= 0)
 
 
 def _dim(light: float) -> Sensor:
@@ -148,14 +148,14 @@ def _dim(light: float) -> Sensor:
     return replace(PHOTOGRAPHIC, shot_noise=shot, read_noise=read)
 
 
-def _at_distance(person, world, distance_m: float, base: Picture, seed: Draws) -> Picture:
+def _at_distance(person, world, distance_m: float, base: Picture, subject: Subject) -> Picture:
     if distance_m == DISTANCE_M:
         return base
-    _, picture = _photograph(person, world, distance_m, seed)
+    _, picture = _photograph(person, world, distance_m, subject)
     return replace(picture, area_px2=base.area_px2 * (DISTANCE_M / distance_m) ** 2)
 
 
-def _hidden(person, world, share: float, base: Picture, seed: Draws) -> Picture:
+def _hidden(person, world, share: float, base: Picture, subject: Subject) -> Picture:
     """A board whose upper edge is seen at the given share of the person's height above their feet."""
     if share == 0:
         return base
@@ -165,8 +165,8 @@ def _hidden(person, world, share: float, base: Picture, seed: Draws) -> Picture:
     top_m = EYE_M - (edge_px - (_HEIGHT_PX - 1) / 2) / _FOCAL_PX * depth_m
     y = _PERSON_Y_M - _BOARD_M
     box = g.box([-_BOARD_HALF_M, y, 0], [_BOARD_HALF_M, y + 0.02, top_m])
-    board = Surface(box, m.plain(m.any_colour(stream(*seed))))
-    _, picture = _photograph(person, replace(world, surfaces=[*world.surfaces, board]), DISTANCE_M, seed)
+    board = Surface(box, m.plain(m.any_colour(subject.stream())))
+    _, picture = _photograph(person, replace(world, surfaces=[*world.surfaces, board]), DISTANCE_M, subject)
     return replace(picture, area_px2=base.area_px2)
 
 
@@ -207,13 +207,13 @@ def _bounds(mask: np.ndarray) -> np.ndarray:
     return np.array(cv2.boundingRect(mask.astype(np.uint8)), float)
 
 
-def _write_person(folder: Path, seed: int, number: int) -> list[tuple]:
+def _write_person(folder: Path, subject: Subject) -> list[tuple]:
     """Writes one person's pictures; a row for each: file name, person, dose, level, sizes, truth."""
     rows = []
-    for dose, level, picture in doses(seed, number):
-        name = f"{number:03d}_{dose.replace(' ', '_')}_{level:g}.png"
+    for dose, level, picture in doses(subject):
+        name = f"{subject.number:03d}_{dose.replace(' ', '_')}_{level:g}.png"
         write_png(folder / "images" / name, np.ascontiguousarray(picture.image))
-        about = {"source_image_id": number, "dose": dose, "level": float(level)}
+        about = {"source_image_id": subject.number, "dose": dose, "level": float(level)}
         keypoints = np.where(picture.visibility[:, None] > 0, picture.keypoints_px, np.nan)
         size, box = picture.image.shape[1::-1], _bounds(picture.mask)
         rows.append((name, size, about, box, picture.area_px2, keypoints, picture.visibility))

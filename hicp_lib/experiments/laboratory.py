@@ -12,7 +12,6 @@ import numpy as np
 from hicp_lib.core.camera import Camera, transform
 from hicp_lib.experiments.minimum_jerk import Posture
 from hicp_lib.simulation.appearance import materials as m
-from hicp_lib.simulation.appearance.people import Appearance, random_appearance
 from hicp_lib.simulation.body.joints import pose_from_joints
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.simulation.rendering import lights
@@ -92,15 +91,6 @@ def posed(shape: np.ndarray, posture: Posture) -> PosedBody:
     x, y = posture.place_m
     pose = {**pose_from_joints(joints), "root": np.array([0.0, lean, 0.0])}
     return pose_body(load_body(), shape, pose, facing_robot(y, x))
-
-
-def random_adult(rng: Rng) -> Appearance:
-    """A random adult in trousers: a skirt would have to drape over a seat."""
-    while True:
-        appearance = random_appearance(rng)
-        name = load_body().shape_names[int(np.argmax(appearance.shape))]
-        if appearance.skirt is None and not name.startswith(("girl", "boy")):
-            return appearance
 
 
 def furnished(rng: Rng, surfaces: list[Surface], clear_m: list[tuple[float, float, float]]) -> World:

@@ -18,6 +18,7 @@ from hicp_lib.recordings.recording import Recording, read_joints, read_truth
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.segments import Segment, body_segments
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.study.mocap import detect_frames
 
 Found = Mapping[tuple[str, str], Sequence[Detections]]
@@ -46,7 +47,8 @@ def open_views(
     """
     given = [folder for folder in (recording, recording_lower) if folder]
     if not given:
-        return {view: open_experiment(f"relative-{view}", "", n_frames, seed) for view in ("upper", "lower")}
+        who = Subject(seed)
+        return {view: open_experiment(f"relative-{view}", "", n_frames, who) for view in ("upper", "lower")}
     names = [Path(folder).name for folder in given]
     views = names if len(set(names)) == len(names) else given
     folders = zip(views, given, strict=True)

@@ -6,6 +6,7 @@ import pytest
 
 from hicp_lib.core.keypoints import COCO_17, INDEX
 from hicp_lib.experiments import doses as module
+from hicp_lib.simulation.body.identities import Subject
 
 FEW = {"distance": (2.5,), "light": (1.0, 0.01), "hidden": (0.0, 0.5), "resolution": (640, 160),
        "upper part": (1.0, 0.4), "lower part": (1.0, 0.4)}  # fmt: skip
@@ -15,7 +16,7 @@ FEW = {"distance": (2.5,), "light": (1.0, 0.01), "hidden": (0.0, 0.5), "resoluti
 def pictures():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "LEVELS", FEW)
-        return {(dose, level): picture for dose, level, picture in module.doses(0, 0)}
+        return {(dose, level): picture for dose, level, picture in module.doses(Subject())}
 
 
 def rows_of(picture) -> np.ndarray:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hicp_lib.experiments.minimum_jerk import Motion, Move, Posture, between, minimum_jerk
 from hicp_lib.experiments.recordings.gestures import TABLE_HEIGHT_M
 from hicp_lib.experiments.recordings.moving_person import moving_person
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.body.joints import pose_from_joints, within_limits
 from hicp_lib.simulation.body.model import load_body
 from hicp_lib.simulation.body.self_collision import collision_model, self_collision_distance_m
@@ -73,13 +74,13 @@ def test_whoever_keeps_still_is_posed_once_and_whoever_moves_is_not(scene):
 
 @pytest.fixture(scope="module")
 def scene():
-    return moving_person(0)
+    return moving_person(Subject())
 
 
 def test_a_motion_is_the_same_in_whatever_order_it_is_asked_for(scene):
     late = scene.motion.at(9.3)
-    assert moving_person.__wrapped__(0).motion.at(9.3) == late  # not the one that is kept
-    other = moving_person(1).motion.at(9.3)
+    assert moving_person.__wrapped__(Subject()).motion.at(9.3) == late  # not the one that is kept
+    other = moving_person(Subject(number=1)).motion.at(9.3)
     assert other.joints != late.joints
 
 

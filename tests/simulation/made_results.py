@@ -14,6 +14,7 @@ from hicp_lib.experiments.avoidance.reaching import SCRIPTS, script
 from hicp_lib.experiments.doses import doses
 from hicp_lib.experiments.recordings.frames import record_frame
 from hicp_lib.experiments.recordings.scenarios import scenario
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.world.scenes import render_scene
 from hicp_lib.simulation.world.staging import random_stage
 from tests.simulation.contents import content
@@ -28,24 +29,24 @@ def dressed(number: int) -> str:
 def closed_loop(number: int) -> str:
     """The first steps of a run of avoidance, and what the robot's camera sees then."""
     name = list(SCRIPTS)[number % len(SCRIPTS)]
-    cycles = simulate(Trial(name, 0.2, number), TrueKeypoints())
-    seen = photograph(script(name, number), 2.0, start_posture(), number)
+    cycles = simulate(Trial(name, 0.2, Subject(number=number)), TrueKeypoints())
+    seen = photograph(script(name, Subject(number=number)), 2.0, start_posture())
     return content(cycles.to_dict("list"), seen)
 
 
 def captured(number: int) -> str:
     """Two seconds of motion capture."""
-    capture = scenario("mocap").capture(number, 2.0, np.eye(4))
+    capture = scenario("mocap").capture(Subject(number=number), 2.0, np.eye(4))
     return content(*capture)
 
 
 KINDS: dict[str, Callable[[int], str]] = {
     "dressed": dressed,
     "scene": lambda number: content(*render_scene(0, number)),
-    "mocap": lambda number: content(*record_frame("mocap", 0, number)),
-    "upper": lambda number: content(*record_frame("relative-upper", 0, number)),
-    "lower": lambda number: content(*record_frame("relative-lower", 0, number)),
-    "dose": lambda number: content(*islice(doses(0, number), 1)),
+    "mocap": lambda number: content(*record_frame("mocap", Subject(), number)),
+    "upper": lambda number: content(*record_frame("relative-upper", Subject(), number)),
+    "lower": lambda number: content(*record_frame("relative-lower", Subject(), number)),
+    "dose": lambda number: content(*islice(doses(Subject(number=number)), 1)),
     "capture": captured,
     "avoidance": closed_loop,
 }

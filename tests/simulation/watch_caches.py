@@ -12,12 +12,13 @@ from hicp_lib.experiments.laboratory import COLOUR  # noqa: E402
 from hicp_lib.experiments.recordings.frames import record_frame  # noqa: E402
 from hicp_lib.lifting.paper import lift  # noqa: E402
 from hicp_lib.lifting.robust import lift_robust  # noqa: E402
+from hicp_lib.simulation.body.identities import Subject  # noqa: E402
 from tests.simulation.made_results import made  # noqa: E402
 
 *names, last = sys.argv[1:]
 for name in names:
     print(name, made(name))
-_, depth_m, _, _ = record_frame("mocap", 0, 40)
+_, depth_m, _, _ = record_frame("mocap", Subject(), 40)
 keypoints_px = np.random.default_rng(0).uniform((250, 100), (390, 400), (1, 136, 2))
 for way in (lift, lift_robust):
     way(keypoints_px, depth_m, COLOUR)

@@ -14,6 +14,7 @@ from hicp_lib.experiments.recordings.open import data_note
 from hicp_lib.recordings.recording import JOINTS_FILE, SIMULATION_FILE, TRUTH_FILE
 from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.robot.kinematics import HEAD_JOINTS
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.study import mocap
 from hicp_lib.study import relative as relative_views
 
@@ -50,7 +51,7 @@ def test_without_a_folder_both_views_are_simulated(monkeypatch):
     asked = []
     monkeypatch.setattr(relative_views, "open_experiment", lambda *arguments: asked.append(arguments))
     assert list(relative_views.open_views(n_frames=7, seed=3)) == ["upper", "lower"]
-    assert asked == [("relative-upper", "", 7, 3), ("relative-lower", "", 7, 3)]
+    assert asked == [("relative-upper", "", 7, Subject(3)), ("relative-lower", "", 7, Subject(3))]
 
 
 def test_a_folder_that_is_no_recording_is_refused(tmp_path):

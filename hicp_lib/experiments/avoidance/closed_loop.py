@@ -20,6 +20,7 @@ from hicp_lib.robot.kinematics import ARM_JOINTS, ICub, load_icub
 from hicp_lib.robot.loop import AvoidanceLoop, Command, Perception, Threat
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.tracking import KeypointTracker, Trust
+from hicp_lib.simulation.body.identities import Subject
 
 MOUNT = "tilted"
 NECK_RAD = np.radians([3.0, 0.0, 4.0])
@@ -37,15 +38,15 @@ class Trial:
         What the person does, a key of `SCRIPTS`.
     duration_s : float
         For how long.
-    seed : int
-        Draws person, room and noise.
+    subject : Subject
+        Who the person is; draws room and noise too.
     camera_hz : float
         Images per second, if perception is as fast.
     """
 
     script: str
     duration_s: float = 7.6
-    seed: int = 0
+    subject: Subject = Subject()
     camera_hz: float = 10.0
 
 
@@ -127,7 +128,7 @@ def simulate(
         list) and `activation`, the highest, `status`, `hand_error_m` (from the post), a column per joint in
         radians, and `seen_s`, when the newest image that the loop knows was taken (NaN: none yet).
     """
-    scene, icub = script(trial.script, trial.seed), load_icub()
+    scene, icub = script(trial.script, trial.subject), load_icub()
     posture = start_posture()
     delay_s = perceiver.delay_s
     between_s = next_image_s(0.0, delay_s, trial.camera_hz)
@@ -203,10 +204,10 @@ def person_skin_m(trial: Trial, time_s: float) -> np.ndarray:
     """Vertices (v, 3) of the person's skin at a time, root frame."""
     before = int(time_s / _POSED_S + 1e-9)
     share = time_s / _POSED_S - before
-    first, then = (_posed_skin_m(trial.script, trial.seed, k) for k in (before, before + 1))
+    first, then = (_posed_skin_m(trial.script, trial.subject, k) for k in (before, before + 1))
     return first + np.float32(share) * (then - first)
 
 
 @memoised(256)
-def _posed_skin_m(name: str, seed: int, k: int) -> np.ndarray:
-    return in_root(script(name, seed).person_at(k * _POSED_S).vertices_m).astype(np.float32)
+def _posed_skin_m(name: str, subject: Subject, k: int) -> np.ndarray:
+    return in_root(script(name, subject).person_at(k * _POSED_S).vertices_m).astype(np.float32)

@@ -16,7 +16,6 @@ from hicp_lib.experiments.avoidance.closed_loop import MOUNT, start_posture
 from hicp_lib.experiments.avoidance.reaching import Script
 from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
 from hicp_lib.experiments.laboratory import COLOUR, colour_and_depth, robot_camera
-from hicp_lib.experiments.random_streams import stream
 from hicp_lib.lifting.paper import lift
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.loop import Perception
@@ -60,8 +59,6 @@ class HeadCamera:
         Looks at the images.
     delay_s : float
         From image to keypoints in the loop.
-    seed : int
-        Of the noise of both cameras.
     images : mapping
         Images taken from the robot's post; until it first gives way, all detectors see the same.
     observations : list of Observation
@@ -70,7 +67,6 @@ class HeadCamera:
 
     detector: Detector
     delay_s: float
-    seed: int = 0
     images: ImageCache = field(default_factory=dict)
     observations: list[Observation] = field(default_factory=list)
 
@@ -100,15 +96,15 @@ class HeadCamera:
     def _image(self, script: Script, time_s: float, posture: Posture) -> RgbdImage:
         angles, post = posture.angles("left"), start_posture().angles("left")
         if not np.allclose(angles, post, rtol=0, atol=_AT_POST_RAD):
-            return photograph(script, time_s, posture, self.seed)
-        key = (script.name, self.seed, time_s, angles.tobytes())
+            return photograph(script, time_s, posture)
+        key = (script.name, script.subject, time_s, angles.tobytes())
         taken = self.images.get(key)
         if taken is None:
-            taken = self.images[key] = photograph(script, time_s, posture, self.seed)
+            taken = self.images[key] = photograph(script, time_s, posture)
         return taken
 
 
-def photograph(script: Script, time_s: float, posture: Posture, seed: int) -> RgbdImage:
+def photograph(script: Script, time_s: float, posture: Posture) -> RgbdImage:
     """What the camera on the head takes.
 
     Parameters
@@ -118,15 +114,13 @@ def photograph(script: Script, time_s: float, posture: Posture, seed: int) -> Rg
         From the script's beginning.
     posture : Posture
         The robot's.
-    seed : int
-        Of the noise.
 
     Returns
     -------
     rgb : array, shape (480, 640, 3), dtype uint8
     depth_m : array, shape (480, 640), dtype float32
     """
-    icub, rng = load_icub(), stream(seed, round(1000 * time_s))
+    icub, rng = load_icub(), script.subject.stream(script.name, round(1000 * time_s))
     camera = robot_camera(icub.T_root_camera(posture.angles("head"), MOUNT))
     world, _ = script.at(time_s, robot_surfaces(icub, posture))
     return colour_and_depth(render(world, camera, rng), camera, rng)

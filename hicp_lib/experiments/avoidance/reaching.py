@@ -23,15 +23,14 @@ from hicp_lib.experiments.laboratory import (
     furnished,
     in_root,
     posed,
-    random_adult,
 )
 from hicp_lib.experiments.minimum_jerk import Motion, Move, Posture
-from hicp_lib.experiments.random_streams import AVOIDANCE, stream
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.skin import read_skin
-from hicp_lib.simulation.appearance.people import Appearance, dress
+from hicp_lib.simulation.appearance.people import Appearance, appearance_of, dress
 from hicp_lib.simulation.body.hands import sample_hand
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.body.joints import pose_from_joints, radians
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_bones
 from hicp_lib.simulation.body.reach import reach
@@ -95,6 +94,8 @@ class Script:
     ----------
     name : str
         Key of `SCRIPTS`.
+    subject : Subject
+        Who the person is.
     room : World
         Without the person.
     appearance : Appearance
@@ -104,6 +105,7 @@ class Script:
     """
 
     name: str
+    subject: Subject
     room: World
     appearance: Appearance
     motion: Motion
@@ -131,8 +133,8 @@ def _worn(scene: Script, motion_s: float) -> list[Surface]:
 
 
 @memoised()
-def script(name: str, seed: int = 0) -> Script:
-    """A script of `SCRIPTS`; the seed draws the person and the room. The same in every process.
+def script(name: str, subject: Subject = Subject()) -> Script:
+    """A script of `SCRIPTS` as a subject follows it in a room of theirs. The same in every process.
 
     Examples
     --------
@@ -141,15 +143,16 @@ def script(name: str, seed: int = 0) -> Script:
     >>> bool(np.linalg.norm(in_root(tip) - HOME_M["left"]) < 0.3)
     True
     """
-    staging, rng = SCRIPTS[name], stream(seed, AVOIDANCE, name)
-    appearance = random_adult(rng)
-    rest, ready, near = (_by_head if staging.by_head else _by_hand)(rng, appearance.shape, staging)
+    staging, identity = SCRIPTS[name], subject.identity
+    appearance, rng = appearance_of(identity, skirts=False), identity.draw("room")
+    by = _by_head if staging.by_head else _by_hand
+    rest, ready, near = by(identity.draw("poses"), appearance.shape, staging)
     x, y = staging.place_m
     seat = []
     if staging.sits:
         seat = chair(rng, (x, y), float(posed(appearance.shape, rest).heads_m[0, 2]) - _SEAT_M)
     room = furnished(rng, seat, [(x, y - 0.2, 0.8), (x, y + 0.4, 0.7)])
-    return Script(name, room, appearance, Motion(rest, _moves(rest, ready, near)))
+    return Script(name, subject, room, appearance, Motion(rest, _moves(rest, ready, near)))
 
 
 def _moves(rest: Posture, ready: Posture, near: Posture) -> Iterator[Move]:

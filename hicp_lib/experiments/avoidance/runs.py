@@ -162,9 +162,9 @@ def _simulate(job: Job, folder: Path, images: ImageCache) -> None:
         settings = PUBLISHED if job.condition == PUBLISHED_GAINS else None
         cycles = simulate(job.trial, TrueKeypoints(), job.condition != NO_AVOIDANCE, settings)
     else:
-        camera = HeadCamera(_detector(job), job.delay_s, job.trial.seed, images)
+        camera = HeadCamera(_detector(job), job.delay_s, images)
         cycles, observations = simulate(job.trial, camera), camera.observations
-    scene = script(job.trial.script, job.trial.seed)
+    scene = script(job.trial.script, job.trial.subject)
     frames = pd.DataFrame([_frame(seen, scene.person_at(seen.perception.time_s)) for seen in observations])
     for name, table in zip(reversed(_TABLES), (frames, cycles), strict=True):
         with atomic_path(folder / name) as temporary:

@@ -9,10 +9,10 @@ from collections.abc import Callable
 import numpy as np
 
 from hicp_lib.core.keypoints import INDEX
-from hicp_lib.experiments.random_streams import MOTION_CAPTURE, stream
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.simulation.appearance import materials as m
 from hicp_lib.simulation.appearance.people import part_of_vertices
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.body.model import PosedBody, load_body
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.surfaces import Surface
@@ -35,7 +35,7 @@ def capture(
     T_world_camera: np.ndarray,
     obstacles: tuple[g.Mesh, ...],
     duration_s: float,
-    seed: int,
+    subject: Subject,
 ) -> tuple[MotionCapture, np.ndarray]:
     """Motion capture of a person, from `LEAD_S` before the first frame on.
 
@@ -51,7 +51,8 @@ def capture(
         What hides markers besides the person.
     duration_s : float
         From the first frame to the last.
-    seed : int
+    subject : Subject
+        Who it is; draws the noise.
 
     Returns
     -------
@@ -59,7 +60,7 @@ def capture(
         What the system exports; its clock shows zero `LEAD_S` before the first frame.
     T_mocap_world : array, shape (4, 4)
     """
-    rng = stream(seed, MOTION_CAPTURE)
+    rng = subject.stream("motion capture")
     T_mocap_world = mocap_frame(rng)
     n = int(round((duration_s + 2 * LEAD_S) * QUALISYS.rate_hz)) + 1
     clock_s = np.arange(n) / QUALISYS.rate_hz

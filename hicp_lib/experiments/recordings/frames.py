@@ -3,22 +3,23 @@
 import numpy as np
 
 from hicp_lib.experiments.laboratory import colour_and_depth, in_root, robot_camera
-from hicp_lib.experiments.random_streams import stream
 from hicp_lib.experiments.recordings.scenarios import Scenario, scenario
 from hicp_lib.robot.kinematics import load_icub
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.rendering.camera import PlacedCamera
 from hicp_lib.simulation.rendering.render import render
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
 
-def record_frame(name: str, seed: int, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict]:
+def record_frame(name: str, subject: Subject, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict]:
     """One frame of a scenario.
 
     Parameters
     ----------
     name : str
         Of the scenario.
-    seed, k : int
+    subject : Subject
+    k : int
         The frame's number is `k`.
 
     Returns
@@ -29,8 +30,8 @@ def record_frame(name: str, seed: int, k: int) -> tuple[np.ndarray, np.ndarray, 
     truth : dict of str to list
         `keypoints_m` (136, 3) in the base frame and `visible` (136,).
     """
-    plan, rng = scenario(name), stream(seed, k, name)
-    world, person = plan.stage(seed, float(plan.times_s(k + 1)[k]))
+    plan, rng = scenario(name), subject.stream(name, k)
+    world, person = plan.stage(subject, float(plan.times_s(k + 1)[k]))
     camera = camera_at(plan, k)
     frame = render(world, camera, rng)
     rgb, depth_m = colour_and_depth(frame, camera, rng)

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hicp_lib.core.memo import memoised
-from hicp_lib.experiments.laboratory import furnished, posed, random_adult, table
+from hicp_lib.experiments.laboratory import furnished, posed, table
 from hicp_lib.experiments.minimum_jerk import Motion
-from hicp_lib.experiments.random_streams import MOVING_PERSON, stream
 from hicp_lib.experiments.recordings.capture import marker_balls
 from hicp_lib.experiments.recordings.gestures import DISTANCE_M, TABLE_HEIGHT_M, TABLE_M, Gestures
-from hicp_lib.simulation.appearance.people import Appearance, dress
+from hicp_lib.simulation.appearance.people import Appearance, appearance_of, dress
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.body.model import PosedBody
 from hicp_lib.simulation.rendering.render import World
 from hicp_lib.simulation.rendering.surfaces import Surface
@@ -62,11 +62,10 @@ def _staged(scene: MovingPerson, motion_s: float) -> tuple[World, PosedBody]:
 
 
 @memoised(1)
-def moving_person(seed: int) -> MovingPerson:
-    """The scene of a seed: who moves how, in what room. The same in every process."""
-    rng = stream(seed, MOVING_PERSON)
-    appearance = random_adult(rng)
+def moving_person(subject: Subject) -> MovingPerson:
+    """A subject's scene: who moves how, in what room. The same in every process."""
+    appearance, rng = appearance_of(subject.identity, skirts=False), subject.identity.draw("room")
     top = table(rng, *TABLE_M, TABLE_HEIGHT_M)
     room = furnished(rng, [top], [(0.0, DISTANCE_M, 0.8), (0.0, 0.9, 0.8)])
-    gestures = Gestures(rng, appearance.shape)
+    gestures = Gestures(subject.identity.draw("poses"), appearance.shape)
     return MovingPerson(room, top, appearance, Motion(gestures.now, gestures.moves()))

@@ -7,10 +7,14 @@ from pathlib import Path
 from hicp_lib.core.cache import key
 from hicp_lib.core.files import cache_dir
 from hicp_lib.recordings.recording import RGB_LIST, Recording, first_frames, open_recording, read_simulation
+from hicp_lib.simulation.body.identities import Subject
 
 
 def open_experiment(
-    scenario: str, recording: str | Path = "", n_frames: int | None = None, seed: int = 0
+    scenario: str,
+    recording: str | Path = "",
+    n_frames: int | None = None,
+    subject: Subject = Subject(),
 ) -> Recording:
     """Open the recording of an experiment.
 
@@ -22,7 +26,7 @@ def open_experiment(
         Folder of a lab's own recording.
     n_frames : int, optional
         How many frames, from the first; all of them when left out.
-    seed : int, optional
+    subject : Subject, optional
         Of the simulation.
 
     Returns
@@ -42,11 +46,11 @@ def open_experiment(
     from hicp_lib.experiments.recordings.simulate import simulate_recording
 
     n = known(scenario).n_frames if n_frames is None else n_frames
-    result_key = key([simulate_recording], scenario=scenario, n_frames=n, seed=seed)
+    result_key = key([simulate_recording], scenario=scenario, n_frames=n, subject=subject)
     folder = cache_dir() / "recordings" / result_key[:16]
     if (folder / RGB_LIST).is_file():
         return open_recording(folder)
-    return simulate_recording(folder, scenario, n_frames=n, seed=seed, progress=sys.stderr.isatty())
+    return simulate_recording(folder, scenario, n_frames=n, subject=subject, progress=sys.stderr.isatty())
 
 
 def data_note(recordings: Mapping[str, Recording]) -> str:

@@ -14,6 +14,7 @@ from hicp_lib.experiments.recordings.moving_person import HEAD_RAD, moving_perso
 from hicp_lib.experiments.recordings.seated_person import VIEWS, seated_person
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.robot.kinematics import HEAD_JOINTS
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.body.model import PosedBody
 from hicp_lib.simulation.rendering.render import World
 from hicp_lib.simulation.sensors.markers import marker_vertices
@@ -36,9 +37,9 @@ class Scenario:
     head_rad : callable
         From the number of frames to joint angles of the robot, (n, 6), in the order of `HEAD_JOINTS`.
     stage : callable
-        From the seed and seconds from the first frame to what is to be seen, and the person in it.
+        From the subject and seconds from the first frame to what is to be seen, and the person in it.
     capture : callable or None
-        From the seed, the duration in seconds and T_world_camera to its motion capture, see `capture`.
+        From the subject, the duration in seconds and T_world_camera to its motion capture, see `capture`.
     """
 
     n_frames: int
@@ -46,8 +47,8 @@ class Scenario:
     rate_hz: float
     mount: str
     head_rad: Callable[[int], np.ndarray]
-    stage: Callable[[int, float], tuple[World, PosedBody]]
-    capture: Callable[[int, float, np.ndarray], tuple[MotionCapture, np.ndarray]] | None = None
+    stage: Callable[[Subject, float], tuple[World, PosedBody]]
+    capture: Callable[[Subject, float, np.ndarray], tuple[MotionCapture, np.ndarray]] | None = None
 
     def times_s(self, n: int) -> np.ndarray:
         """Times (n,) of the frames, the first at 0."""
@@ -88,16 +89,16 @@ def _relative(view: str) -> Scenario:
         rate_hz=0.5,  # the robot moves and settles between two frames
         mount=VIEWS[view],
         head_rad=lambda n: poses_rad[:n],
-        stage=lambda seed, time_s: seated_person(seed),
+        stage=lambda subject, time_s: seated_person(subject),
     )
 
 
 def _capture_moving(
-    seed: int, duration_s: float, T_world_camera: np.ndarray
+    subject: Subject, duration_s: float, T_world_camera: np.ndarray
 ) -> tuple[MotionCapture, np.ndarray]:
-    scene = moving_person(seed)
+    scene = moving_person(subject)
     vertices = marker_vertices(scene.appearance.shape)
-    return capture(scene.person_at, vertices, T_world_camera, (scene.table.mesh,), duration_s, seed)
+    return capture(scene.person_at, vertices, T_world_camera, (scene.table.mesh,), duration_s, subject)
 
 
 SCENARIOS = {f"relative-{view}": _relative(view) for view in VIEWS} | {
@@ -107,7 +108,7 @@ SCENARIOS = {f"relative-{view}": _relative(view) for view in VIEWS} | {
         rate_hz=12.0,
         mount="level",
         head_rad=lambda n: np.tile(HEAD_RAD, (n, 1)),
-        stage=lambda seed, time_s: moving_person(seed).at(time_s),
+        stage=lambda subject, time_s: moving_person(subject).at(time_s),
         capture=_capture_moving,
     )
 }

@@ -6,11 +6,11 @@ The person sits at one place in one posture for the whole recording; only the ro
 import numpy as np
 
 from hicp_lib.core.memo import memoised
-from hicp_lib.experiments.laboratory import chair, furnished, posed, random_adult, table
+from hicp_lib.experiments.laboratory import chair, furnished, posed, table
 from hicp_lib.experiments.minimum_jerk import Posture
-from hicp_lib.experiments.random_streams import SEATED_PERSON, stream
-from hicp_lib.simulation.appearance.people import dress
+from hicp_lib.simulation.appearance.people import appearance_of, dress
 from hicp_lib.simulation.body.hands import sample_hand
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.body.joints import Joints, radians
 from hicp_lib.simulation.body.model import Body, PosedBody, load_body
 from hicp_lib.simulation.body.reach import reach
@@ -37,11 +37,11 @@ _N_ROUNDS = 6
 
 
 @memoised(1)
-def seated_person(seed: int) -> tuple[World, PosedBody]:
-    """The scene of a seed: the person at the table in a furnished room. The same in every process."""
-    rng = stream(seed, SEATED_PERSON)
-    body, appearance = load_body(), random_adult(rng)
-    person = _sit_down(body, appearance.shape, rng)
+def seated_person(subject: Subject) -> tuple[World, PosedBody]:
+    """A subject's scene: the person at the table in a furnished room. The same in every process."""
+    identity = subject.identity
+    body, appearance, rng = load_body(), appearance_of(identity, skirts=False), identity.draw("room")
+    person = _sit_down(body, appearance.shape, identity.draw("poses"))
     edge_m = DISTANCE_M - _TABLE_EDGE_M
     top = table(rng, (-0.65, edge_m - _TABLE_DEPTH_M), (0.65, edge_m), TABLE_HEIGHT_M)
     seat = chair(rng, _PLACE_M, _seat_height_m(body, person))

@@ -1,9 +1,10 @@
 """Simulating recordings: what the robot's camera, its joints and motion capture would have recorded.
 
-Frame k depends on scenario, seed and k only, so the number of processes changes nothing, and a
+Frame k depends on scenario, subject and k only, so the number of processes changes nothing, and a
 longer recording begins with the shorter one.
 """
 
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
@@ -28,6 +29,7 @@ from hicp_lib.recordings.c3d import MAX_FRAMES as MAX_C3D_FRAMES
 from hicp_lib.recordings.qualisys import write_c3d, write_tsv
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, MOCAP_FILE, RGB_LIST, Recording, open_recording
 from hicp_lib.recordings.writer import depth_name, write_depth, write_frame
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts, run_jobs
 
 _MOCAP_FILES = (MOCAP_FILE, str(Path(MOCAP_FILE).with_suffix(".c3d")))
@@ -37,7 +39,7 @@ def simulate_recording(
     out: str | Path,
     name: str,
     n_frames: int | None = None,
-    seed: int = 0,
+    subject: Subject = Subject(),
     workers: int | None = None,
     progress: bool = True,
 ) -> Recording:
@@ -50,8 +52,8 @@ def simulate_recording(
         "relative-upper", "relative-lower" or "mocap".
     n_frames : int, optional
         The scenario's own number when left out.
-    seed : int, optional
-        Non-negative; who is there, in what room, how they move, and all noise.
+    subject : Subject, optional
+        Who is there, in what room, how they move, and all noise.
     workers : int, optional
         Processes; as many as there are processors when left out.
     progress : bool, optional
@@ -69,21 +71,22 @@ def simulate_recording(
     out, plan = Path(out), scenario(name)
     n = plan.n_frames if n_frames is None else n_frames
     n_workers = 1 if workers is None else workers
-    check_numbers(n_frames=(n, 1, plan.max_frames), seed=(seed, 0, 2**32), workers=(n_workers, 1, 1000))
+    check_numbers(n_frames=(n, 1, plan.max_frames), workers=(n_workers, 1, 1000))
     check_output(out, PARTS_DIR, "for the recording", "simulated")
     (out / RGB_LIST).unlink(missing_ok=True)  # it is no recording until it is finished
-    stamp = {"scenario": name, "seed": int(seed), "version": key([simulate_recording])}
+    who = {"subject": asdict(subject), "identity": subject.identity.record()}
+    stamp = {"scenario": name, **who, "version": key([simulate_recording])}
     keep_parts(out, PARTS_DIR, stamp, ["rgb/*", "depth/*", f"{EXACT_DEPTH_DIR}/*", *_MOCAP_FILES])
-    todo = [partial(record_one, out, name, int(seed), k) for k in range(n) if not part_path(out, k).exists()]
+    todo = [partial(record_one, out, name, subject, k) for k in range(n) if not part_path(out, k).exists()]
     if plan.capture is not None:
-        todo.insert(0, partial(_capture_all, out, name, int(seed), int(n)))  # the longest first
+        todo.insert(0, partial(_capture_all, out, name, subject, int(n)))  # the longest first
     for _ in tqdm(run_jobs(todo, workers), name, len(todo), unit="frame", disable=not progress or None):
         pass
     finish_recording(out, plan, int(n), stamp)
     return open_recording(out)
 
 
-def record_one(out: Path, name: str, seed: int, k: int) -> None:
+def record_one(out: Path, name: str, subject: Subject, k: int) -> None:
     """Write the images of a frame, then its truth: a frame counts as finished when that is there.
 
     Parameters
@@ -92,22 +95,23 @@ def record_one(out: Path, name: str, seed: int, k: int) -> None:
         Folder of the recording.
     name : str
         Of the scenario.
-    seed, k : int
+    subject : Subject
+    k : int
         The frame's number is `k`.
     """
-    rgb, depth_m, exact_m, truth = record_frame(name, seed, k)
+    rgb, depth_m, exact_m, truth = record_frame(name, subject, k)
     write_frame(out, k, rgb, depth_m, DEPTH_UNITS_PER_M)
     write_depth(out / EXACT_DEPTH_DIR / Path(depth_name(k)).name, exact_m, DEPTH_UNITS_PER_M)
     write_json(part_path(out, k), truth)
 
 
-def _capture_all(out: Path, name: str, seed: int, n: int) -> None:
+def _capture_all(out: Path, name: str, subject: Subject, n: int) -> None:
     """Write motion capture of `n` frames, unless it is there."""
     part, plan = out / PARTS_DIR / MOCAP_PART, scenario(name)
     if plan.capture is None or (part.exists() and read_json(part)["n_frames"] == n):
         return
     T_world_camera = T_WORLD_ROOT @ camera_poses(plan, 1)[0]
-    exported, T_mocap_world = plan.capture(seed, float(plan.times_s(n)[-1]), T_world_camera)
+    exported, T_mocap_world = plan.capture(subject, float(plan.times_s(n)[-1]), T_world_camera)
     tsv, c3d = (out / name for name in _MOCAP_FILES)
     write_tsv(tsv, exported)
     if len(exported.times_s) < MAX_C3D_FRAMES:  # a longer one is in the TSV file alone

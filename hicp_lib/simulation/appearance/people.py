@@ -1,13 +1,13 @@
 """People: a posed body with skin, hair and clothes, as surfaces to render."""
 
-import json
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.appearance import clothing, fabrics, footwear, hair, hair_styles, skin
-from hicp_lib.simulation.body.model import BODY_FILE, REGIONS, Body, PosedBody, load_body, rest_shape
+from hicp_lib.simulation.body.identities import Identity, is_woman, traits
+from hicp_lib.simulation.body.model import REGIONS, Body, PosedBody, load_body, rest_shape
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.surfaces import Material, Surface
 
@@ -77,42 +77,36 @@ class Appearance:
     seed: int
 
 
-def random_appearance(rng: Rng) -> Appearance:
-    """A random person: shape, skin, hair and clothes that could go together.
+def appearance_of(identity: Identity, skirts: bool = True) -> Appearance:
+    """A person's shape, skin, hair and clothes that could go together.
+
+    Parameters
+    ----------
+    identity : Identity
+    skirts : bool, optional
+        Whether they may wear one: it would have to drape over a seat.
+
+    Returns
+    -------
+    Appearance
 
     Examples
     --------
-    >>> someone = random_appearance(np.random.default_rng(0))
+    >>> from hicp_lib.simulation.body.identities import Subject
+    >>> someone = appearance_of(Subject().identity, skirts=False)
     >>> round(float(someone.shape.sum()), 3), [worn.garment.kind for worn in someone.worn]
     (1.0, ['top', 'bottom'])
     """
-    body = load_body()
-    number = int(rng.integers(len(body.shape_names)))
-    name = body.shape_names[number]
-    woman, age = name.startswith(("woman", "girl")), float(name.split("_")[1])
-    traits = json.loads(BODY_FILE.with_suffix(".json").read_text())["shapes"][name]
-    weights = _blend(rng, body, number)
-    tone = np.clip(0.12 + 0.24 * traits["asian"] + 0.62 * traits["african"] + rng.normal(0, 0.09), 0, 1)
+    rng, (name, _) = identity.draw("clothes"), identity.bodies[0]
+    woman, origin, age = is_woman(name), traits(name), float(name.split("_")[1])
+    tone = np.clip(0.12 + 0.24 * origin["asian"] + 0.62 * origin["african"] + rng.normal(0, 0.09), 0, 1)
     complexion = skin.random_complexion(rng, float(tone), woman, age)
     style = hair_styles.random_style(rng, woman, age)
-    if not woman and age > 20 and rng.random() < 0.3:
+    if not woman and rng.random() < 0.3:
         complexion = replace(complexion, stubble=0.85)
-        rng.random()  # was a beard's length; without it everybody who follows would be somebody else
-    worn, skirt = _outfit(rng, woman)
+    worn, skirt = _outfit(rng, woman, skirts)
     shoes = footwear.random_shoes(rng) if rng.random() < 0.93 else None
-    return Appearance(weights, complexion, style, worn, skirt, shoes, int(rng.integers(2**31)))
-
-
-def _blend(rng: Rng, body: Body, number: int) -> np.ndarray:
-    """A shape, with some of another of the same sex and size."""
-    kinds = np.array([name.split("_")[0] for name in body.shape_names])
-    alike = np.flatnonzero((kinds == kinds[number]) & (np.arange(len(kinds)) != number))
-    weights = np.zeros(len(kinds), np.float32)
-    share = rng.uniform(0, 0.4) if len(alike) else 0.0
-    weights[number] = 1 - share
-    if len(alike):
-        weights[rng.choice(alike)] += share
-    return weights
+    return Appearance(identity.shape, complexion, style, worn, skirt, shoes, int(rng.integers(2**31)))
 
 
 # How often, and what of a top differs from `_PLAIN_TOP`: of several values one is drawn, in this order.
@@ -132,9 +126,9 @@ _BOTTOMS = {"jeans": (0.42, 0.45), "chinos": (0.28, 0.37), "shorts": (0.18, 0.18
 """How often women and men wear them."""
 
 
-def _outfit(rng: Rng, woman: bool) -> tuple[list[Worn], Skirt | None]:
+def _outfit(rng: Rng, woman: bool, skirts: bool) -> tuple[list[Worn], Skirt | None]:
     top = _top(rng, str(rng.choice(list(_TOPS), p=list(_TOPS.values()))), woman)
-    if not (woman and rng.random() < 0.22):
+    if not (woman and skirts and rng.random() < 0.22):
         odds = [pair[0 if woman else 1] for pair in _BOTTOMS.values()]
         return [top, _bottom(rng, str(rng.choice(list(_BOTTOMS), p=odds)))], None
     fabric = top.fabric if rng.random() < 0.4 else fabrics.random_fabric(rng, 0.6)

@@ -1,5 +1,6 @@
 """Data sets of rendered people: whole images with annotations in Halpe's layout.
 
+People are either all for development or all held out (see `simulation.body.identities`).
 Images are JPEG at high quality, as the photographs of COCO and Halpe are; a PNG of a noisy
 image would be five times as large and tell no more. Image k depends on the seed and k only, so
 the number of worker processes changes nothing, and a larger data set contains the smaller one.
@@ -16,6 +17,7 @@ from hicp_lib.core.files import read_json, write_json
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.recordings.writer import write_rgb
+from hicp_lib.simulation.body.identities import HELD_OUT, split_members, stream
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import Frame, render
 from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts, run_jobs
@@ -28,7 +30,12 @@ _PARTS_DIR = ".scenes"  # the people of finished images, and what they were made
 
 
 def render_dataset(
-    out: str | Path, n: int, seed: int, workers: int | None = None, progress: bool = True
+    out: str | Path,
+    n: int,
+    seed: int,
+    workers: int | None = None,
+    progress: bool = True,
+    split: str = HELD_OUT,
 ) -> Annotations:
     """Render `n` images with 1 to 3 people each into a dataset folder.
 
@@ -36,7 +43,7 @@ def render_dataset(
     run are kept and not rendered again; what another seed or another version of the renderer
     made is replaced. `area` is the visible segment's, `bbox` its bounds; visibility is 2
     visible, 1 occluded, 0 outside the image (see `visibility.keypoint_visibility`). Each
-    person's true distance is kept as `distance_m`.
+    person's true distance is kept as `distance_m`, and who it is as `identity`.
 
     Parameters
     ----------
@@ -49,6 +56,8 @@ def render_dataset(
         Processes; as many as there are processors when left out.
     progress : bool, optional
         Whether a terminal is shown a bar.
+    split : str, optional
+        Whose people: "development" or "held out".
 
     Returns
     -------
@@ -57,17 +66,18 @@ def render_dataset(
     Raises
     ------
     InputError
-        For numbers out of range, or a folder that holds something else.
+        For an unknown split, numbers out of range, or a folder that holds something else.
     """
     out, n_workers = Path(out), 1 if workers is None else workers
     check_numbers(n=(n, 1, MAX_SCENES), seed=(seed, 0, _MAX_NUMBER), workers=(n_workers, 1, _MAX_NUMBER))
+    split_members(split)  # a wrong name is told before anything is written
     check_output(out, _PARTS_DIR, "to render into", "rendered")
     (out / "annotations.json").unlink(missing_ok=True)
-    stamp = {"renderer": key([render_dataset]), "seed": int(seed)}
+    stamp = {"renderer": key([render_dataset]), "seed": int(seed), "people": split}
     keep_parts(out, _PARTS_DIR, stamp, ["images/*.jpg"])
     # The people are written after the image.
     missing = [k for k in range(n) if not (_people_path(out, k).exists() and _image_path(out, k).exists())]
-    done = run_jobs([partial(_render_one, out, seed, index) for index in missing], workers)
+    done = run_jobs([partial(_render_one, out, seed, index, split) for index in missing], workers)
     for _ in tqdm(done, "rendering", n, initial=n - len(missing), unit="image", disable=not progress or None):
         pass
     annotations = _collect(out, n)
@@ -86,19 +96,21 @@ def _people_path(out: Path, index: int) -> Path:
     return out / _PARTS_DIR / f"{index:06d}.json"
 
 
-def _render_one(out: Path, seed: int, index: int) -> None:
-    image, people = render_scene(seed, index)
+def _render_one(out: Path, seed: int, index: int, split: str) -> None:
+    image, people = render_scene(seed, index, split)
     write_rgb(_image_path(out, index), image)
     height, width = image.shape[:2]
     write_json(_people_path(out, index), {"width": width, "height": height, "people": people})
 
 
-def render_scene(seed: int, index: int) -> tuple[np.ndarray, list[dict]]:
+def render_scene(seed: int, index: int, split: str = HELD_OUT) -> tuple[np.ndarray, list[dict]]:
     """One image of a data set.
 
     Parameters
     ----------
     seed, index : int
+    split : str, optional
+        Whose people: "development" or "held out".
 
     Returns
     -------
@@ -107,9 +119,9 @@ def render_scene(seed: int, index: int) -> tuple[np.ndarray, list[dict]]:
     people : list of dict
         As `annotate` describes them.
     """
-    rng = np.random.default_rng([seed, index])
+    rng = stream(split, seed, index)
     while True:
-        stage = random_stage(rng)
+        stage = random_stage(rng, split)
         frame = render(stage.world, stage.camera, rng)
         people = annotate(stage, frame)
         if people:  # somebody is in the picture
@@ -123,10 +135,10 @@ def annotate(stage: Stage, frame: Frame) -> list[dict]:
     -------
     list of dict
         Of each person `bbox` (x, y, width, height) and `area` of the visible pixels, `keypoints`
-        (136 times u, v, visibility; zeros outside the image) and `distance_m`.
+        (136 times u, v, visibility; zeros outside the image), `distance_m`, and `identity`.
     """
     rows = []
-    for number, person in enumerate(stage.people):
+    for number, (person, identity) in enumerate(zip(stage.people, stage.identities, strict=True)):
         v, u = np.nonzero(frame.person == number)
         if len(u) == 0:
             continue
@@ -136,7 +148,8 @@ def annotate(stage: Stage, frame: Frame) -> list[dict]:
         last = [stage.camera.width_px - 1, stage.camera.height_px - 1, 2]
         keypoints = np.clip(keypoints.round(2), 0, last).tolist()
         away_m = round(distance_m(stage.camera, person), 3)
-        rows.append({"bbox": box, "area": len(u), "keypoints": keypoints, "distance_m": away_m})
+        about = {"distance_m": away_m, "identity": identity.record()}
+        rows.append({"bbox": box, "area": len(u), "keypoints": keypoints} | about)
     return rows
 
 
@@ -158,5 +171,5 @@ def _collect(out: Path, n: int) -> Annotations:
         is_crowd=np.zeros(len(people), bool),
         keypoints_px=np.where(labelled, keypoints[..., :2], np.nan),
         visibility=keypoints[..., 2],
-        extras=[{"distance_m": person["distance_m"]} for person in people],
+        extras=[{name: person[name] for name in ("distance_m", "identity")} for person in people],
     )

@@ -1,13 +1,14 @@
 """Staging: who stands where, in what room and light, and where the photograph is taken from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.simulation.appearance.materials import hsv
-from hicp_lib.simulation.appearance.people import dress, random_appearance
+from hicp_lib.simulation.appearance.people import appearance_of, dress
+from hicp_lib.simulation.body.identities import HELD_OUT, Identity, draw_identity
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
 from hicp_lib.simulation.rendering import lights
@@ -32,16 +33,30 @@ class Stage:
     sensor : Sensor
     people : list of PosedBody
         In the order of the surfaces' person numbers.
+    identities : list of Identity
+        Whose they are; room, lights and camera are those of the first.
     """
 
     world: World
     camera: PlacedCamera
     sensor: Sensor
     people: list[PosedBody]
+    identities: list[Identity]
 
 
-def random_stage(rng: Rng) -> Stage:
+def random_stage(rng: Rng, split: str = HELD_OUT) -> Stage:
     """One to three people, one to five metres from a camera, in a furnished room.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Draws the identities; all else is drawn from theirs.
+    split : str, optional
+        Of the identities.
+
+    Returns
+    -------
+    Stage
 
     Examples
     --------
@@ -49,18 +64,22 @@ def random_stage(rng: Rng) -> Stage:
     >>> len(stage.people), (stage.camera.width_px, stage.camera.height_px)
     (1, (480, 640))
     """
-    places = _places(rng, int(rng.choice([1, 2, 3], p=[0.68, 0.24, 0.08])))
-    people, dressed = zip(*(_person(rng, place, number) for number, place in enumerate(places)), strict=True)
-    camera = _camera(rng, people[0])
+    first = draw_identity(rng, split)
+    taken = first.draw("camera")
+    places = _places(taken, int(taken.choice([1, 2, 3], p=[0.68, 0.24, 0.08])))
+    shared = {"room": first.room, "lights": first.lights, "camera": first.camera}
+    everyone = [first, *(replace(draw_identity(rng, split), **shared) for _ in places[1:])]
+    people, dressed = zip(*map(_person, everyone, places, range(len(places))), strict=True)
+    camera = _camera(taken, people[0])
     centre = camera.centre_m
     clear = [(x, y, 0.55) for x, y in places] + [(centre[0], centre[1], 0.7)]
-    if rng.random() < 0.88:  # the rest of the time something may stand before people
+    if taken.random() < 0.88:  # the rest of the time something may stand before people
         ways = (np.array(place) - centre[:2] for place in places)
         clear += [(*(centre[:2] + t * way), 0.3) for way in ways for t in (0.3, 0.5, 0.7)]
-    room = make_room(rng, np.array(clear))
+    room = make_room(first.draw("room"), np.array(clear))
     surfaces = [*room.surfaces, *chain(*dressed)]
-    world = World(surfaces, *_lighting(rng, room, centre), backdrop=np.zeros(3))
-    return Stage(world, camera, _sensor(rng), list(people))
+    world = World(surfaces, *_lighting(first.draw("lights"), room, centre), backdrop=np.zeros(3))
+    return Stage(world, camera, _sensor(taken), list(people), everyone)
 
 
 def _places(rng: Rng, n_people: int) -> list[tuple[float, float]]:
@@ -74,8 +93,8 @@ def _places(rng: Rng, n_people: int) -> list[tuple[float, float]]:
     return places
 
 
-def _person(rng: Rng, place: tuple[float, float], number: int) -> tuple[PosedBody, list[Surface]]:
-    appearance = random_appearance(rng)
+def _person(identity: Identity, place: tuple[float, float], number: int) -> tuple[PosedBody, list[Surface]]:
+    appearance, rng = appearance_of(identity), identity.draw("poses")
     # Mostly towards the camera (which lies along -y), less often sideways, sometimes away.
     turns = [rng.normal(0, 0.45), rng.uniform(-1.8, 1.8), rng.uniform(-np.pi, np.pi)]
     yaw = -np.pi / 2 + rng.choice(turns, p=[0.76, 0.17, 0.07])

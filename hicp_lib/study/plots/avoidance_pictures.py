@@ -144,7 +144,7 @@ def _drawn(run: Run, frame: pd.Series) -> np.ndarray:
 
 def _draw_space(axis, run: Run, cycle: pd.Series, frame: pd.Series | None) -> None:
     trial = run.job.trial
-    truth_m = in_root(script(trial.script, trial.seed).person_at(cycle["t_s"]).keypoints_m)
+    truth_m = in_root(script(trial.script, trial.subject).person_at(cycle["t_s"]).keypoints_m)
     posture = start_posture().moved("left", np.array([cycle[f"{joint}_rad"] for joint in ARM_JOINTS]))
     _draw_robot(axis, posture)
     limbs = np.stack(_project(truth_m[np.array(LIMBS)]), axis=-1)

@@ -13,6 +13,7 @@ from hicp_lib.experiments.avoidance.head_camera import HeadCamera
 from hicp_lib.experiments.laboratory import COLOUR, ROOT_HEIGHT_M, furnished
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.simulation.appearance import materials as m
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.surfaces import Surface
 
@@ -24,6 +25,7 @@ class Table:
     """A red table before the robot instead of a person."""
 
     name: str = "table"
+    subject: Subject = Subject()
 
     def at(self, time_s, robot):
         high = ROOT_HEIGHT_M + TABLE_M
@@ -69,7 +71,7 @@ def taken(monkeypatch):
     """Postures that pictures were taken in; no picture is rendered."""
     postures = []
 
-    def photograph(script, time_s, posture, seed):
+    def photograph(script, time_s, posture):
         postures.append(posture)
         return np.full((480, 640, 3), len(postures), np.uint8), np.full((480, 640), np.nan, np.float32)
 
@@ -86,7 +88,7 @@ def test_detectors_share_pictures_until_the_robot_gives_way(taken):
         camera.perceive(Table(), 0.1, post)
     assert len(taken) == 1 and np.array_equal(first.observations[0].rgb, second.observations[0].rgb)
     first.perceive(Table(), 0.2, post)
-    HeadCamera(Pointing(pixels), 0.1, seed=1, images=images).perceive(Table(), 0.2, post)
+    second.perceive(Table(subject=Subject(1)), 0.2, post)
     second.perceive(Table("chair"), 0.2, post)
     assert len(taken) == 4
     for camera in (first, second):

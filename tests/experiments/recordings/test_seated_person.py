@@ -11,11 +11,12 @@ from hicp_lib.experiments.laboratory import COLOUR, T_WORLD_ROOT
 from hicp_lib.experiments.recordings.scenarios import SCENARIOS, relative_poses_rad
 from hicp_lib.experiments.recordings.seated_person import TABLE_HEIGHT_M, seated_person
 from hicp_lib.robot.kinematics import load_icub
+from hicp_lib.simulation.body.identities import Subject
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_hands_lie_on_the_table(seed):
-    person = seated_person(seed)[1]
+@pytest.mark.parametrize("number", range(6))
+def test_hands_lie_on_the_table(number):
+    person = seated_person(Subject(number=number))[1]
     for side in ("left", "right"):
         wrist = person.keypoints_m[INDEX[f"{side}_wrist"]]
         assert TABLE_HEIGHT_M + 0.01 < wrist[2] < TABLE_HEIGHT_M + 0.11
@@ -25,8 +26,8 @@ def test_hands_lie_on_the_table(seed):
     assert (feet < 0.12).all()
 
 
-def test_a_seed_always_gives_the_same_person():
-    kept, made_anew = seated_person(3)[1], seated_person.__wrapped__(3)[1]
+def test_a_subject_is_always_the_same_person():
+    kept, made_anew = seated_person(Subject(3))[1], seated_person.__wrapped__(Subject(3))[1]
     np.testing.assert_array_equal(kept.vertices_m, made_anew.vertices_m)
 
 
@@ -38,7 +39,9 @@ def test_the_listed_poses_are_possible_and_frame_the_person(view):
     assert (poses_rad >= low).all() and (poses_rad <= high).all()
     T_root_camera = icub.T_root_camera(poses_rad, SCENARIOS[f"relative-{view}"].mount)
     T_camera_world = np.linalg.inv(T_WORLD_ROOT @ T_root_camera)
-    pixels_px = project(COLOUR, transform(T_camera_world, seated_person(0)[1].keypoints_m))
+    pixels_px = project(
+        COLOUR, transform(T_camera_world, seated_person(Subject(split="development"))[1].keypoints_m)
+    )
     inside = ((pixels_px > 0) & (pixels_px < [639, 479])).all(axis=2).mean(axis=0)
     seen = dict(zip(INDEX, inside, strict=True))
     assert seen["left_wrist"] == seen["right_elbow"] == 1

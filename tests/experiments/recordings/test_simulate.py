@@ -26,6 +26,7 @@ from hicp_lib.recordings.recording import (
     read_truth,
 )
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
+from hicp_lib.simulation.body.identities import Subject
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +48,10 @@ def points_of(truth, frame, names):
 
 def test_a_simulated_recording_has_nothing_to_be_found(lower):
     assert check_recording(lower.folder) == []
-    assert read_simulation(lower)["scenario"] == "relative-lower"
+    told, identity = read_simulation(lower), Subject().identity
+    assert told["scenario"] == "relative-lower"
+    assert told["subject"] == {"seed": 0, "number": 0, "split": "held out"}
+    assert told["identity"] == identity.record() and told["identity"]["room"] == identity.room
 
 
 def test_poses_are_those_of_the_joints(lower):
@@ -90,13 +94,13 @@ def test_measured_depth_is_the_exact_one_but_for_the_sensor(lower):
     assert 0 < np.nanmedian(difference) < 0.01
 
 
-def test_a_frame_depends_on_scenario_seed_and_number_only(lower):
-    rgb, depth_m, _, truth = simulate.record_frame("relative-lower", 0, 1)
+def test_a_frame_depends_on_scenario_subject_and_number_only(lower):
+    rgb, depth_m, _, truth = simulate.record_frame("relative-lower", Subject(), 1)
     stored = read_rgb(lower, 1).astype(int)
     assert np.abs(stored - rgb).mean() < 3  # JPEG
     np.testing.assert_allclose(read_depth_m(lower, 1), depth_m, atol=0.00051)
     np.testing.assert_allclose(truth["keypoints_m"], points_of(read_truth(lower), 1, slice(None))[0])
-    other = simulate.record_frame("relative-lower", 1, 1)[0]
+    other = simulate.record_frame("relative-lower", Subject(number=1), 1)[0]
     assert np.abs(other.astype(int) - rgb).mean() > 10
 
 
@@ -118,7 +122,7 @@ def test_finished_frames_are_kept_and_a_shorter_recording_is_a_prefix(lower, tmp
     assert len(read_truth(shorter)) == 136
 
 
-def test_what_another_seed_made_is_dropped(lower, tmp_path, monkeypatch):
+def test_what_was_made_of_somebody_else_is_dropped(lower, tmp_path, monkeypatch):
     out = tmp_path / "other"
     shutil.copytree(lower.folder, out)
     blank = np.zeros((480, 640, 3), np.uint8)
@@ -126,7 +130,7 @@ def test_what_another_seed_made_is_dropped(lower, tmp_path, monkeypatch):
     fake = blank, np.ones((480, 640)), np.ones((480, 640)), truth
     (out / "mocap.tsv").write_text("of another scenario")
     monkeypatch.setattr(simulate, "record_frame", lambda *job: fake)
-    simulate_recording(out, "relative-lower", n_frames=1, seed=5, workers=1, progress=False)
+    simulate_recording(out, "relative-lower", n_frames=1, subject=Subject(5), workers=1, progress=False)
     assert read_image(out / "rgb" / "000000.jpg").max() == 0
     assert not (out / "rgb" / "000001.jpg").exists() and not (out / "mocap.tsv").exists()
 
@@ -137,7 +141,6 @@ def test_what_another_seed_made_is_dropped(lower, tmp_path, monkeypatch):
         (dict(name="relative-sideways"), "no scenario"),
         (dict(n_frames=0), "n_frames is 0"),
         (dict(n_frames=101), "expected a whole number from 1 to 100"),
-        (dict(seed=-1), "seed is -1"),
         (dict(workers=0), "workers is 0"),
     ],
 )
@@ -181,16 +184,16 @@ def test_an_experiment_is_simulated_once_into_the_cache(tmp_path, monkeypatch, l
     calls = []
 
     def copied(folder, scenario, **keywords):
-        calls.append((scenario, keywords["n_frames"], keywords["seed"]))
+        calls.append((scenario, keywords["n_frames"], keywords["subject"]))
         shutil.copytree(lower.folder, folder)
         return lower
 
     monkeypatch.setattr(simulate, "simulate_recording", copied)
     open_experiment("relative-lower", n_frames=2)
     assert len(open_experiment("relative-lower", n_frames=2)) == 2
-    assert calls == [("relative-lower", 2, 0)]
-    open_experiment("relative-lower", n_frames=2, seed=1)
-    assert calls[1:] == [("relative-lower", 2, 1)]
+    assert calls == [("relative-lower", 2, Subject())]
+    open_experiment("relative-lower", n_frames=2, subject=Subject(1))
+    assert calls[1:] == [("relative-lower", 2, Subject(1))]
 
 
 def test_a_given_recording_is_opened_instead(lower):

@@ -9,8 +9,10 @@ import pytest
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import read_image
 from hicp_lib.formats.annotations import read_annotations
+from hicp_lib.simulation.body.identities import HELD_OUT, KINDS, SPLITS, split_members
 from hicp_lib.simulation.world import scenes
 from hicp_lib.simulation.world.scenes import render_dataset, render_scene
+from hicp_lib.simulation.world.staging import random_stage
 
 N, SEED = 3, 11
 
@@ -64,11 +66,11 @@ def test_an_interrupted_run_is_taken_up_where_it_stopped(dataset, tmp_path, monk
     out = tmp_path / "out"
     rendered = []
 
-    def counted(seed, index):
+    def counted(seed, index, split):
         rendered.append(index)
         if len(rendered) == 2:
             raise KeyboardInterrupt
-        return render_scene(seed, index)
+        return render_scene(seed, index, split)
 
     monkeypatch.setattr(scenes, "render_scene", counted)
     with pytest.raises(KeyboardInterrupt):
@@ -81,25 +83,45 @@ def test_an_interrupted_run_is_taken_up_where_it_stopped(dataset, tmp_path, monk
 
 
 def test_another_seed_reuses_nothing(tmp_path, monkeypatch):
-    fake = {"bbox": [0, 0, 2, 2], "area": 4, "keypoints": np.zeros((136, 3)).tolist(), "distance_m": 1.0}
+    fake = {"bbox": [0, 0, 2, 2], "area": 4, "keypoints": np.zeros((136, 3)).tolist()}
+    fake |= {"distance_m": 1.0, "identity": {}}
     calls = []
 
-    def quick(seed, index):
-        calls.append((seed, index))
+    def quick(seed, index, split):
+        calls.append((seed, index, split))
         return np.zeros((4, 4, 3), np.uint8), [fake]
 
     monkeypatch.setattr(scenes, "render_scene", quick)
     out = tmp_path / "out"
     render_dataset(out, 2, 1, workers=1, progress=False)
     render_dataset(out, 2, 1, workers=1, progress=False)
-    assert calls == [(1, 0), (1, 1)]
+    assert calls == [(1, 0, HELD_OUT), (1, 1, HELD_OUT)]
     render_dataset(out, 2, 2, workers=1, progress=False)
-    assert calls[2:] == [(2, 0), (2, 1)]
+    assert calls[2:] == [(2, 0, HELD_OUT), (2, 1, HELD_OUT)]
     render_dataset(out, 1, 2, workers=1, progress=False)
     assert [p.name for p in (out / "images").iterdir()] == ["000000.jpg"]
     monkeypatch.setattr(scenes, "key", lambda *_, **__: "of another renderer")
     render_dataset(out, 1, 2, workers=1, progress=False)
-    assert calls[4:] == [(2, 0)]
+    assert calls[4:] == [(2, 0, HELD_OUT)]
+
+
+@pytest.mark.parametrize("split", SPLITS)
+def test_a_scene_is_drawn_from_its_split_alone(split):
+    members = split_members(split)
+    for number in range(8):
+        stage = random_stage(np.random.default_rng(number), split)
+        for identity in stage.identities:
+            told = identity.record()
+            assert told["split"] == split and set(told["bodies"]) <= set(members["bodies"])
+            assert all(members[kind][0] <= told[kind] <= members[kind][1] for kind in KINDS)
+
+
+def test_another_split_shows_other_people(tmp_path):
+    told = [render_dataset(tmp_path / split, 1, SEED, 1, False, split).extras[0] for split in SPLITS]
+    assert [about["identity"]["split"] for about in told] == [*SPLITS]
+    with pytest.raises(InputError, match="no people 'all'; choose one of development, held out"):
+        render_dataset(tmp_path / "all", 1, SEED, 1, False, "all")
+    assert not (tmp_path / "all").exists()
 
 
 @pytest.mark.parametrize(

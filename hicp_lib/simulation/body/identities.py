@@ -1,0 +1,198 @@
+"""Who is simulated and what is drawn around them, in two splits that share nothing.
+
+What is tuned, measured or chosen is tuned on *development* identities; what is reported is measured on people
+*held out*. `data/identities.json` deals the shapes of the body model, and the numbers that clothes (with skin
+and hair), rooms, lights, poses and cameras are drawn from; each number seeds a generator of its own.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json
+from hicp_lib.core.memo import memoised, plain_fields
+from hicp_lib.simulation.body.model import load_body
+
+SPLITS = ("development", "held out")
+HELD_OUT = SPLITS[1]
+KINDS = ("clothes", "room", "lights", "poses", "camera")
+_read = memoised()(read_json)
+_MAX_NUMBER = 2**32 - 1
+_MOST_OF_ANOTHER = 0.4  # of a shape that is a blend
+
+
+@dataclass(frozen=True)
+class Identity:
+    """One person and all that is drawn around them.
+
+    Attributes
+    ----------
+    split : str
+        One of `SPLITS`.
+    bodies : tuple of (str, float)
+        Names of one or two shapes, and their shares.
+    clothes, room, lights, poses, camera : int
+        What each is drawn from.
+    """
+
+    split: str
+    bodies: tuple[tuple[str, float], ...]
+    clothes: int
+    room: int
+    lights: int
+    poses: int
+    camera: int
+
+    @property
+    def shape(self) -> np.ndarray:
+        """Weights over the shapes of the body model, shape (n_shapes,)."""
+        names = load_body().shape_names
+        weights = np.zeros(len(names), np.float32)
+        for name, share in self.bodies:
+            weights[names.index(name)] += share
+        return weights
+
+    def draw(self, kind: str) -> np.random.Generator:
+        """The generator of "clothes", "room", "lights", "poses" or "camera", from its beginning."""
+        return stream(kind, getattr(self, kind))
+
+    def record(self) -> dict[str, Any]:
+        """All of it, JSON-able."""
+        return asdict(self) | {"bodies": dict(self.bodies)}
+
+
+@dataclass(frozen=True)
+class Subject:
+    """One person of an experiment, and all that is drawn around them.
+
+    Subjects of one seed are different people: bodies are dealt without repetition, women and men in turn.
+    Those beyond the number of bodies are blends of two.
+
+    Attributes
+    ----------
+    seed : int
+        Of the experiment.
+    number : int
+        Of the person, from 0 on.
+    split : str
+        One of `SPLITS`.
+
+    Raises
+    ------
+    InputError
+        If a number is not whole or out of range, or there is no such split.
+
+    Examples
+    --------
+    >>> len({Subject(0, number).identity.bodies for number in range(12)})
+    12
+    """
+
+    seed: int = 0
+    number: int = 0
+    split: str = HELD_OUT
+
+    def __post_init__(self) -> None:
+        plain_fields(self)
+        split_members(self.split)
+        for name in ("seed", "number"):
+            value = getattr(self, name)
+            if not isinstance(value, int) or not 0 <= value <= _MAX_NUMBER:
+                raise InputError(f"{name} is {value!r}; expected a whole number from 0 to {_MAX_NUMBER}")
+
+    @cached_property
+    def identity(self) -> Identity:
+        """Who it is; the same in every process."""
+        dealt = _dealt(self.split, self.seed)
+        body = dealt[self.number] if self.number < len(dealt) else None
+        return draw_identity(self.stream("identity"), self.split, body)
+
+    def stream(self, *numbers: int | str) -> np.random.Generator:
+        """A generator of noise or whatever else belongs to this subject alone, see `stream`."""
+        return stream(self.split, self.seed, self.number, *numbers)
+
+
+def stream(*numbers: int | str) -> np.random.Generator:
+    """A generator of random numbers; what one stream draws says nothing about what another draws.
+
+    Parameters
+    ----------
+    *numbers : int or str
+        Non-negative; a name counts as its letters' numbers.
+
+    Examples
+    --------
+    >>> stream("clothes", 0).random() == stream("room", 0).random()
+    False
+    """
+    flat = [n for number in numbers for n in (number.encode() if isinstance(number, str) else (number,))]
+    return np.random.default_rng([len(flat), *flat])  # without the length, zeros at the end would not count
+
+
+def draw_identity(rng: np.random.Generator, split: str, body: str | None = None) -> Identity:
+    """A random identity of a split.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    split : str
+        One of `SPLITS`.
+    body : str, optional
+        Name of the shape; a blend of two of the same sex when left out.
+
+    Returns
+    -------
+    Identity
+
+    Raises
+    ------
+    InputError
+        If there is no such split.
+    """
+    members = split_members(split)
+    names, ranges = members["bodies"], {kind: members[kind] for kind in KINDS}
+    numbers = {kind: int(rng.integers(low, high + 1)) for kind, (low, high) in ranges.items()}
+    if body is not None:
+        return Identity(split, ((body, 1.0),), **numbers)
+    first = names[rng.integers(len(names))]
+    alike = [name for name in names if is_woman(name) == is_woman(first) and name != first]
+    share = float(rng.uniform(0, _MOST_OF_ANOTHER))
+    return Identity(split, ((first, 1 - share), (alike[rng.integers(len(alike))], share)), **numbers)
+
+
+def split_members(split: str) -> Mapping[str, Any]:
+    """What belongs to a split: names of its `bodies`, and for each of `KINDS` the least and greatest number.
+
+    Raises
+    ------
+    InputError
+        If there is no such split.
+    """
+    if split not in SPLITS:
+        raise InputError(f"no people {split!r}; choose one of {', '.join(SPLITS)}")
+    return _read(DATA_DIR / "identities.json")[split]
+
+
+def traits(name: str) -> Mapping[str, Any]:
+    """What a shape was made from, see data/body.json."""
+    return _read(DATA_DIR / "body.json")["shapes"][name]
+
+
+def is_woman(name: str) -> bool:
+    """Whether a shape is a woman's; otherwise it is a man's."""
+    return traits(name)["gender"] == 1.0
+
+
+@memoised(16)
+def _dealt(split: str, seed: int) -> list[str]:
+    """A split's shapes in random order, women and men in turn as long as there are both."""
+    mixed = [str(name) for name in stream(split, seed, "bodies").permutation(split_members(split)["bodies"])]
+    women, men = ([name for name in mixed if is_woman(name) == woman] for woman in (True, False))
+    turns = [women, men] if is_woman(mixed[0]) else [men, women]
+    return [name for pair in zip_longest(*turns) for name in pair if name is not None]

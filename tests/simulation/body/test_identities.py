@@ -1,0 +1,75 @@
+"""Two splits that share nothing, and subjects who are who they are in every process."""
+
+import numpy as np
+import pytest
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.simulation.body.identities import (
+    KINDS,
+    SPLITS,
+    Subject,
+    draw_identity,
+    is_woman,
+    split_members,
+    stream,
+)
+from hicp_lib.simulation.body.model import load_body
+
+MEMBERS = [split_members(split) for split in SPLITS]
+
+
+def test_nothing_belongs_to_both_splits_and_every_body_to_one():
+    grown_up = [name for name in load_body().shape_names if not name.startswith(("girl", "boy"))]
+    assert sorted(MEMBERS[0]["bodies"] + MEMBERS[1]["bodies"]) == sorted(grown_up)
+    for kind in KINDS:
+        ranges = sorted(members[kind] for members in MEMBERS)
+        assert ranges[0][0] <= ranges[0][1] < ranges[1][0] <= ranges[1][1]
+
+
+@pytest.mark.parametrize("split", SPLITS)
+def test_subjects_of_a_seed_are_different_people_women_and_men_in_turn(split):
+    members = split_members(split)
+    n = len(members["bodies"])
+    for seed in (0, 3):
+        people = [Subject(seed, number, split).identity for number in range(n + 6)]
+        first = [person.bodies for person in people[:n]]
+        assert sorted(name for ((name, share),) in first) == sorted(members["bodies"])
+        women = [is_woman(name) for ((name, _),) in first[: n - 1]]
+        assert all(a != b for a, b in zip(women, women[1:], strict=False))
+        assert all(len(person.bodies) == 2 for person in people[n:])
+        for kind in KINDS:
+            assert len({getattr(person, kind) for person in people}) == n + 6
+    order = [[Subject(seed, number, split).identity.bodies for number in range(n)] for seed in (0, 3)]
+    assert order[0] != order[1]
+
+
+def test_a_blend_is_of_two_of_the_same_sex_and_split():
+    rng = np.random.default_rng(0)
+    for split in SPLITS * 20:
+        identity = draw_identity(rng, split)
+        (first, most), (other, rest) = identity.bodies
+        assert first != other and is_woman(first) == is_woman(other) and most >= 0.6
+        assert {first, other} <= set(split_members(split)["bodies"])
+        names = load_body().shape_names
+        assert identity.shape[names.index(first)] == pytest.approx(most)
+        assert identity.shape.sum() == pytest.approx(1) and rest == pytest.approx(1 - most)
+
+
+def test_streams_are_of_their_own():
+    subjects = [Subject(seed, number, split) for split in SPLITS for seed in (0, 1) for number in (0, 1)]
+    numbers = [(), (0,), (0, 0), ("mocap",), ("mocap", 0)]
+    drawn = [subject.stream(*more).random() for subject in subjects for more in numbers]
+    identity = subjects[0].identity
+    drawn += [identity.draw(kind).random() for kind in KINDS]
+    assert len(set(drawn)) == len(drawn)
+    assert identity.draw("room").random() == identity.draw("room").random()
+    assert stream("a", 0).random() != stream("a").random() != stream("a", 0, 0).random()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [((-1,), "seed is -1"), ((0, 1.5), "number is 1.5"), ((0, 0, "held-out"), "no people 'held-out'")],
+)
+def test_who_is_nobody_is_refused(arguments, expected):
+    with pytest.raises(InputError, match=expected):
+        Subject(*arguments)
