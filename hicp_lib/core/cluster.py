@@ -227,7 +227,7 @@ def _explained(address: str, client: Client) -> Iterator[None]:
 
 # What follows runs on the workers.
 
-_one_at_a_time = threading.Lock()
+_checking, _writing = threading.Lock(), threading.Lock()  # one at a time
 
 
 def _here(*arguments: Any) -> Any:
@@ -245,7 +245,7 @@ def _run(job: Callable, expected: dict, found_there: Callable[[], dict], write: 
     worker = get_worker().address
     cv2.setNumThreads(1)
     try:
-        with _one_at_a_time:
+        with _checking:
             differing = _differences(expected, found_there())
     except (InputError, OSError) as error:
         raise InputError(f"worker {worker}: {one_line(error)}") from None
@@ -257,7 +257,7 @@ def _run(job: Callable, expected: dict, found_there: Callable[[], dict], write: 
     if not write:
         return job()
     # Jobs that write were made for processes of their own.
-    with _one_at_a_time, tempfile.TemporaryDirectory() as temporary:
+    with _writing, tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         result = job(folder)
         files = sorted(path for path in folder.rglob("*") if path.is_file())
