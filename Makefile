@@ -16,7 +16,7 @@ export PIP_NO_INPUT := 1
 .PHONY: help setup system report test wheel-check test-lowest lab doctor lint coverage mutants lock clean
 
 help:
-	@echo "make report [PROFILE=full|quick]  run the study and build the report"
+	@echo "make report [PROFILE=full]        run the study and build the report; quick, deep"
 	@echo "make test                         run the tests, notebooks included"
 	@echo "make wheel-check                  build the wheel, install and use it elsewhere"
 	@echo "make test-lowest                  test on the lowest versions allowed"

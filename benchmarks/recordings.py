@@ -19,12 +19,12 @@ from pathlib import Path
 import numpy as np
 from timing import Comparison, run
 
+from hicp_lib.core.executor import Processes
 from hicp_lib.experiments.recordings.frames import camera_at, record_frame
 from hicp_lib.experiments.recordings.scenarios import SCENARIOS, Scenario
 from hicp_lib.experiments.recordings.simulate import record_one, simulate_recording
 from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.rendering.render import render
-from hicp_lib.simulation.world.batch import worker_pool
 
 FLOORS_S = {"relative-upper": 40.0, "relative-lower": 40.0, "mocap": 180.0}
 
@@ -78,8 +78,8 @@ def whole_s(name: str, n: int, workers: int) -> float:
 
 def compare(name: str, options) -> Iterator[Comparison]:
     """One scenario's figures."""
-    with worker_pool(1) as pool:  # one thread, as when recordings are made
-        cost = pool.apply(frame_cost, (name, options.timed))
+    with Processes(1) as pool:  # one thread, as when recordings are made
+        cost = pool.submit(frame_cost, name, options.timed).result()
     n_all, workers, drawn_s = SCENARIOS[name].n_frames, options.workers, cost["drawn_s"]
     n = max(2, round(options.share * n_all))
     yield Comparison(f"{name}: a frame", cost["frame_s"], "drawing it alone", drawn_s)

@@ -17,10 +17,10 @@ import numpy as np
 import open3d as o3d
 from timing import Comparison, run
 
+from hicp_lib.core.executor import Processes
 from hicp_lib.simulation.rendering.camera import pixel_rays
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import render
-from hicp_lib.simulation.world.batch import worker_pool
 from hicp_lib.simulation.world.scenes import annotate, render_scene
 from hicp_lib.simulation.world.staging import random_stage
 
@@ -52,13 +52,13 @@ def _whole(index: int) -> float:
 
 
 def measure(options) -> Iterator[Comparison]:
-    with worker_pool(options.workers) as pool:
+    with Processes(options.workers) as pool:
         # Workers keep the textures and patterns of clothes they have made.
-        pool.map(_whole, range(1000, 1000 + options.first * options.workers), chunksize=1)
+        list(pool.map(_whole, range(1000, 1000 + options.first * options.workers)))
         start = time.perf_counter()
-        cpu_s = pool.map(_whole, range(options.frames), chunksize=1)
+        cpu_s = list(pool.map(_whole, range(options.frames)))
         wall_s = (time.perf_counter() - start) / options.frames
-        steps = pool.map(frame_steps, range(options.frames), chunksize=1)
+        steps = list(pool.map(frame_steps, range(options.frames)))
     means_s = {name: float(np.mean([step[name] for step in steps])) for name in steps[0]}
     rays, rays_s = "bare ray casting, one ray a pixel", means_s.pop("bare_rays")
     what = f"a frame, processes: {options.workers}, wall time"

@@ -3,8 +3,8 @@
     python tools/compare_reports.py ONE/results/full OTHER/results/full
 
 Prints a line per file that differs and what differs in it, and ends with 1 if there is any. What is
-measured of the machine is left out, and only that (`is_measured`, `MEASURED`): a page saves it under the
-name `time`, and values of it end in `_time_ms`.
+measured of the machine is left out, and only that (`is_measured` of `hicp_lib/report/repetition.py`, and
+`MEASURED`): a page saves it under the name `time`, and values of it end in `_time_ms`.
 """
 
 from __future__ import annotations
@@ -19,18 +19,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-MEASURED_NAME = "time"
-"""Name of the one figure or table of a page that draws or lists times."""
+from hicp_lib.report.repetition import MEASURED_NAME, is_measured
+
 MEASURED = {
     "captions.json": {MEASURED_NAME},
     "provenance.json": {"wall_s", "peak_memory_mb", "machine"},
 }
 """Entries, by file, that differ from run to run or from machine to machine."""
-
-
-def is_measured(path: Path) -> bool:
-    """Whether a file of a page's results holds times and nothing else."""
-    return path.stem == MEASURED_NAME
 
 
 def differences(one: Path, other: Path) -> Iterator[str]:
@@ -39,7 +34,7 @@ def differences(one: Path, other: Path) -> Iterator[str]:
     for name in sorted(names[0] | names[1]):
         if name not in names[0] & names[1]:
             yield f"{name}: only in {one if name in names[0] else other}"
-        elif not is_measured(name) and (found := _difference(one / name, other / name)):
+        elif not is_measured(name.stem) and (found := _difference(one / name, other / name)):
             yield f"{name}: {found}"
 
 
@@ -60,7 +55,7 @@ def _difference(one: Path, other: Path) -> str:
 def _unmeasured(path: Path) -> dict[str, Any]:
     left_out = MEASURED.get(path.name, set())
     entries = json.loads(path.read_text())
-    return {key: e for key, e in entries.items() if key not in left_out and not key.endswith("_time_ms")}
+    return {key: e for key, e in entries.items() if key not in left_out and not is_measured(key)}
 
 
 def _entries(one: Any, other: Any, at: str = "") -> Iterator[str]:
@@ -101,7 +96,7 @@ def main() -> None:
         print(line)
         n += 1
     files = [path for path in arguments.one.rglob("*") if path.is_file()]
-    times = sorted(str(p.relative_to(arguments.one)) for p in files if is_measured(p))
+    times = sorted(str(p.relative_to(arguments.one)) for p in files if is_measured(p.stem))
     print(f"{n} of {len(files)} files differ; left out as times: {', '.join(times) or 'no file'}")
     sys.exit(n > 0)
 

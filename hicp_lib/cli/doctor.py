@@ -13,8 +13,8 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from hicp_lib.cli.system_libraries import LIBRARIES, missing_packages
 from hicp_lib.core.checkout import working_folder
 from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.executor import run_jobs
 from hicp_lib.core.files import cache_dir
 from hicp_lib.study import provenance
 
@@ -149,8 +150,9 @@ def _installed(name: str) -> str:
 
 def check_probes() -> list[Check]:
     """That detectors, renderer and controller run: as many trials at a time as there are processors."""
-    with ThreadPoolExecutor(usable_cores()) as threads:
-        return list(threads.map(check_probe, probes()))
+    jobs = [(name, partial(check_probe, name)) for name in probes()]
+    done = dict(run_jobs(jobs, usable_cores(), "threads"))
+    return [done[name] for name, _ in jobs]
 
 
 def check_probe(name: str, command: tuple[str, ...] = PROBE, limit_s: float = PROBE_LIMIT_S) -> Check:

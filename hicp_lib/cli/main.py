@@ -18,7 +18,7 @@ import click
 from hicp_lib import __version__
 from hicp_lib.cli.calibration import calibration
 from hicp_lib.cli.models import models
-from hicp_lib.cli.options import PATH, WORKERS, detector_options, given, people_option, tell_assumed
+from hicp_lib.cli.options import PATH, detector_options, given, people_option, tell_assumed, worker_options
 from hicp_lib.cli.recordings import lift, record
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import write_json
@@ -95,8 +95,8 @@ def scenes() -> None:
 @click.option("--n", default=100, show_default=True, type=click.IntRange(min=1), help="Number of images.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0))
 @people_option
-@click.option("--workers", type=WORKERS, help="Processes; all cores if not given.")
-def scenes_render(out: Path, n: int, seed: int, people: str, workers: int | None) -> None:
+@worker_options("Processes")
+def scenes_render(out: Path, n: int, seed: int, people: str, workers: int | str | None) -> None:
     """Render people at 1-5 m into the folder OUT, with annotations in Halpe's layout."""
     from hicp_lib.simulation.world.scenes import render_dataset
 
@@ -127,10 +127,9 @@ def dataset_create(annotations: Path, images: Path, out: Path, min_pixels: int) 
 @click.option("--dataset", "dataset_dir", type=PATH, help="Folder with images/ and annotations.json.")
 @click.option("--images", "images_dir", type=PATH, help="Folder of images without annotations.")
 @click.option("--out", type=PATH, required=True, help="COCO keypoint results to write.")
-@click.option("--workers", type=WORKERS, help="Threads; all cores if not given.")
-@click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster, which then does the work.")
+@worker_options("Threads")
 def detect(
-    detector: str, dataset_dir: Path | None, images_dir: Path | None, out: Path, workers, dask, **chosen
+    detector: str, dataset_dir: Path | None, images_dir: Path | None, out: Path, workers, **chosen
 ) -> None:
     """Find people and their keypoints in images.
 
@@ -143,16 +142,14 @@ def detect(
 
     if (dataset_dir is None) == (images_dir is None):
         raise click.UsageError("Give either --dataset DIR or --images DIR.", click.get_current_context())
-    if workers and dask:
-        raise click.UsageError("Give either --workers N or --dask ADDRESS.", click.get_current_context())
     needs_model = detector in DETECTORS and DETECTORS[detector].needs_model
     # Held until the end: the runs share the network it has open.
     made = make_detector(detector, **given(**chosen)) if needs_model else None
     if dataset_dir is not None:
-        found = detect_dataset(detector, dataset_dir, workers=workers, dask=dask, **given(**chosen))
+        found = detect_dataset(detector, dataset_dir, workers=workers, **given(**chosen))
     elif images_dir is not None:
         paths = _numbered_images(images_dir)
-        found = detections_of(detect_images(detector, paths, workers, dask=dask, **given(**chosen)))
+        found = detections_of(detect_images(detector, paths, workers, **given(**chosen)))
         # COCO's result layout has no place for names: beside it, the image of each id.
         names = [{"id": number, "file_name": path.name} for number, path in paths.items()]
         write_json(out.with_suffix(".images.json"), names, indent=1)
@@ -283,12 +280,21 @@ def _finite(row: dict[str, Any]) -> dict[str, Any]:
 @click.option("--only", metavar="NOTEBOOK", help="Run this one and those it needs; build no book.")
 @click.option("--results", "root", type=PATH,
               help="Where results/ and _build/ are written; the working folder if not given.")  # fmt: skip
-def report(profile: str, pairs: tuple[tuple[str, str], ...], only: str | None, root: Path | None) -> int:
+@click.option("--dask", metavar="ADDRESS", envvar="HICP_DASK",
+              help="Scheduler of a Dask cluster, which renders, simulates and detects.")  # fmt: skip
+def report(
+    profile: str, pairs: tuple[tuple[str, str], ...], only: str | None, root: Path | None, dask: str | None
+) -> int:
     """Run the notebooks and build the book; what has not changed is not done again."""
     from hicp_lib.core.checkout import sources, working_folder
     from hicp_lib.report.build import make_report
     from hicp_lib.report.run import RunError
 
+    if dask is not None:
+        from hicp_lib.core.cluster import connected
+
+        with connected(dask):  # what is amiss is told before any notebook runs
+            os.environ["HICP_DASK"] = dask  # where the notebooks' processes look
     try:
         make_report(profile, list(pairs), click.echo, sources(), root or working_folder(), only)
     except RunError as error:

@@ -1,6 +1,7 @@
 """Kinds of options that the `hicp` command's parts share."""
 
 from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,35 @@ import click
 from hicp_lib.core.files import json_or_text
 
 PATH = click.Path(path_type=Path)
-WORKERS = click.IntRange(min=1)
 people_option = click.option(
     "--people", default="held-out", show_default=True, type=click.Choice(["development", "held-out"]),
     help="What is tuned is tuned on people for development.",
 )  # fmt: skip
+
+
+def worker_options(kind: str) -> Callable[[Callable], Callable]:
+    """The options that say who does the work; they arrive as `workers`, a number, an address or None.
+
+    Parameters
+    ----------
+    kind : str
+        What works on this machine, for the help.
+    """
+
+    def decorate(command: Callable) -> Callable:
+        @click.option("--workers", type=click.IntRange(min=1), help=f"{kind}; all cores if not given.")
+        @click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster, which does the work.")
+        @wraps(command)
+        def chosen(*arguments: Any, workers: int | None, dask: str | None, **named: Any) -> Any:
+            if workers is not None and dask is not None:
+                raise click.UsageError(
+                    "Give either --workers N or --dask ADDRESS.", click.get_current_context()
+                )
+            return command(*arguments, workers=workers if dask is None else dask, **named)
+
+        return chosen
+
+    return decorate
 
 
 def detector_options(command: Callable) -> Callable:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from hicp_lib.cli.options import PATH, WORKERS, detector_options, given, people_option
+from hicp_lib.cli.options import PATH, detector_options, given, people_option, worker_options
 
 
 @click.group()
@@ -20,9 +20,9 @@ def record() -> None:
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0))
 @click.option("--subject", "number", default=0, show_default=True, type=click.IntRange(min=0), help="Who.")
 @people_option
-@click.option("--workers", type=WORKERS, help="Processes; all cores if not given.")
+@worker_options("Processes")
 def simulate(
-    scenario: str, out: Path, n_frames: int | None, seed: int, number: int, people: str, workers: int | None
+    scenario: str, out: Path, n_frames: int | None, seed: int, number: int, people: str, workers
 ) -> None:
     """Simulate a recording into the folder OUT.
 
@@ -91,8 +91,8 @@ def import_(out: Path, bag: Path | None, folder: Path | None, poses: Path | None
 @detector_options
 @click.option("--method", default="robust", show_default=True, help="Or paper: the paper's method.")
 @click.option("--out", type=PATH, required=True, help="Table to write: FILE.parquet, or FILE.csv.")
-@click.option("--workers", type=WORKERS, help="Threads; all cores if not given.")
-def lift(folder: Path, detector: str, method: str, out: Path, workers: int | None, **chosen) -> None:
+@worker_options("Threads")
+def lift(folder: Path, detector: str, method: str, out: Path, workers: int | str | None, **chosen) -> None:
     """Find people in a recording and where their keypoints are in the robot's base frame."""
     from hicp_lib.core.extras import require
     from hicp_lib.core.files import atomic_path

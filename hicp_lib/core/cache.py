@@ -98,6 +98,22 @@ def running_code(names: tuple[str, ...], without: tuple[str, ...] = ()) -> Code:
     return code(names, without=without)
 
 
+def code_identity(*names: str) -> dict[str, Any]:
+    """In short, what of a result follows from modules that this process runs.
+
+    Parameters
+    ----------
+    *names : str
+
+    Examples
+    --------
+    >>> sorted(code_identity("hicp_lib.core.errors"))
+    ['code', 'libraries']
+    """
+    found = running_code(tuple(sorted(set(names))))
+    return {"code": [digest(found.modules), digest(found.data)], "libraries": found.libraries}
+
+
 def code(
     names: Iterable[str],
     *,

@@ -15,8 +15,8 @@ the same person is found in both datasets, whatever the rules select.
 
 import shutil
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +24,9 @@ import pandas as pd
 from tqdm import tqdm
 
 from hicp_lib.core.cache import content, digest
+from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.executor import run_jobs
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.core.images import Box, inside, read_image, write_png
 from hicp_lib.core.keypoints import HEAD
@@ -228,10 +230,10 @@ def create_hicp(
     boxes = {subset: crop_boxes(table, subset) for subset in SUBSETS}
     _claim(out, _digest(table, boxes, images_dir))
     jobs = _jobs(annotations, boxes, out)
-    with ThreadPoolExecutor() as pool:
-        done = pool.map(lambda job: _write_crops(images_dir, *job), jobs.items())
-        for _ in tqdm(done, total=len(jobs), desc="HiCP crops", unit="image", disable=not progress):
-            pass
+    todo = [(image, partial(_write_crops, images_dir, image, crops)) for image, crops in jobs.items()]
+    done = run_jobs(todo, usable_cores(), "threads")
+    for _ in tqdm(done, total=len(jobs), desc="HiCP crops", unit="image", disable=not progress):
+        pass
     for subset in SUBSETS:
         path = out / subset / "annotations.json"
         write_annotations(path, crop_annotations(annotations, table, subset))

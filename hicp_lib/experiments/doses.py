@@ -25,6 +25,7 @@ import cv2
 import numpy as np
 
 from hicp_lib.core.cache import key
+from hicp_lib.core.executor import run_jobs
 from hicp_lib.core.files import cache_dir
 from hicp_lib.core.images import write_png
 from hicp_lib.datasets.crops import inside, whole_pixel_boxes
@@ -40,7 +41,6 @@ from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at
 from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
 from hicp_lib.simulation.rendering.render import Frame, World, render
 from hicp_lib.simulation.rendering.surfaces import Surface
-from hicp_lib.simulation.world.batch import run_jobs
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
 LEVELS: dict[str, tuple[float, ...]] = {
@@ -91,8 +91,9 @@ def open_doses(n_people: int = 10, seed: int = 0) -> Path:
     folder = cache_dir() / "doses" / key([open_doses], n_people=n_people, seed=seed)[:_KEY_LENGTH]
     if not (folder / "annotations.json").is_file():
         subjects = [Subject(seed, number) for number in range(n_people)]
-        people = run_jobs([partial(_write_person, folder, subject) for subject in subjects])
-        write_annotations(folder / "annotations.json", _joined([*chain.from_iterable(people)]))
+        people = dict(run_jobs([(s, partial(_write_person, subject=s)) for s in subjects], folder=folder))
+        rows = chain.from_iterable(people[subject] for subject in subjects)
+        write_annotations(folder / "annotations.json", _joined([*rows]))
     return folder
 
 

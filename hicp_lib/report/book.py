@@ -16,6 +16,7 @@ import nbformat
 from hicp_lib.core.files import sha256_file, write_json
 from hicp_lib.report.checks import book_problems
 from hicp_lib.report.prose import Results, render_page
+from hicp_lib.report.repetition import REFERENCE_DIR
 from hicp_lib.report.run import Folders, RunError
 from hicp_lib.report.runs import read_stamp
 from hicp_lib.report.sphinx_extension import PLOTLY_PATH, SCRIPTS_DIR
@@ -88,6 +89,7 @@ def _key(folders: Folders, left_out: Mapping[str, str]) -> str:
             "runs": {path.name: sha256_file(path) for path in folders.executed.glob("*.json")},
             "library": provenance.library_sha256(),
             "data": provenance.data_sha256(),
+            "reference run": _hashes(REFERENCE_DIR / folders.profile),
             "installed": provenance.installed_sha256(),
             "left out": dict(left_out),
         }

@@ -9,6 +9,7 @@ In a page of `book/`, between double braces:
     profile                                           "quick" or "full"
     notebooks                                         names of the notebooks that were run
     data("paper.json")                                a JSON file of `data/`, for loops over its rows
+    repetition()                                      this run beside the profile's reference run
 
 A name that no result file has stops the build.
 """
@@ -25,8 +26,10 @@ import pandas as pd
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
+from hicp_lib.report import repetition
 
 NOT_RUN = "not run"
+_MOST_SHOWN = 20  # outputs that differ from the reference run's
 
 
 @dataclass(frozen=True)
@@ -107,6 +110,35 @@ class Results:
         """What a notebook was made with."""
         return read_json(self.folder / notebook / "provenance.json")
 
+    def repetition(self) -> dict[str, Any] | None:
+        """This run beside the reference run of its profile; None where there is none.
+
+        Returns
+        -------
+        dict or None
+            The stamp of the reference run's last notebook (`stamp`), tables in Markdown of how many outputs
+            agree (`counts`) and of those outside tolerance (`outside`, the first ones), how many there are
+            in all (`n`) and outside (`n_outside`), and why notebooks are not compared (`left_out`).
+        """
+        reference = repetition.REFERENCE_DIR / self.profile
+        stamps = sorted(reference.glob("*/provenance.json"))
+        if not stamps:
+            return None
+        rows, left_out = repetition.compare(reference, self.folder)
+        counts = pd.crosstab(rows["notebook"], rows["verdict"]).reindex(
+            columns=repetition.VERDICTS, fill_value=0
+        )
+        counts.insert(0, "outputs", counts.sum(axis=1))
+        outside = rows[rows["verdict"] == "outside"].drop(columns="verdict")
+        return {
+            "stamp": read_json(stamps[-1]),
+            "counts": markdown_table(counts.reset_index()),
+            "outside": markdown_table(outside.head(_MOST_SHOWN), digits=4),
+            "n": len(rows),
+            "n_outside": len(outside),
+            "left_out": left_out,
+        }
+
     def _entry(self, notebook: str, file: str, name: str) -> Any:
         path = self.folder / notebook / file
         entries = read_json(path)
@@ -159,7 +191,9 @@ def render_page(source: Path, results: Results, profile: str) -> str:
         If the page uses a name that does not exist, or is not a valid template.
     """
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    names = {name: getattr(results, name) for name in ("value", "raw", "table", "figure", "stamp")}
+    names = {
+        name: getattr(results, name) for name in ("value", "raw", "table", "figure", "stamp", "repetition")
+    }
     names |= {"data": lambda name: json.loads((DATA_DIR / name).read_text())}
     names |= {"profile": profile, "notebooks": results.notebooks()}
     try:

@@ -39,8 +39,12 @@ def library_sha256() -> str:
 
 
 def data_sha256() -> str:
-    """SHA-256 of every file under `data/`; the detector registry with the weights' hashes is among them."""
-    return files_sha256((path for path in DATA_DIR.rglob("*") if path.is_file()), DATA_DIR)
+    """SHA-256 of every file under `data/`, the detector registry with the weights' hashes among them.
+
+    Not of the reference runs: they follow from the rest.
+    """
+    files = (path for path in DATA_DIR.rglob("*") if path.is_file())
+    return files_sha256((path for path in files if DATA_DIR / "reference" not in path.parents), DATA_DIR)
 
 
 def lock_sha256() -> str:

@@ -8,8 +8,8 @@ import cv2
 import pytest
 
 from hicp_lib.core.environment import with_variables
+from hicp_lib.core.executor import single_threaded_opencv
 from hicp_lib.core.files import write_bytes
-from hicp_lib.detectors.runtime.pool import single_threaded_opencv
 
 
 def test_variables_are_as_before_also_after_an_error(monkeypatch):

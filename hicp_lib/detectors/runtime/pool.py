@@ -1,12 +1,10 @@
 """Detectors of one kind for the threads of a process."""
 
 import queue
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from hicp_lib.detectors.registry import make_detector
@@ -69,29 +67,3 @@ def naming_image(path: str | Path) -> Iterator[None]:
         yield
     except IsolationError as error:
         raise IsolationError(f"{path}: {error}") from None
-
-
-class _OneThread:
-    """Holds OpenCV to one thread: the images are what is spread.
-
-    The number is the whole process's: the first of several who want it sets it, the last one restores it.
-    """
-
-    def __init__(self) -> None:
-        self._lock, self._depth, self._before = threading.Lock(), 0, 0
-
-    def __enter__(self) -> None:
-        with self._lock:
-            if self._depth == 0:
-                self._before = cv2.getNumThreads()
-                cv2.setNumThreads(1)
-            self._depth += 1
-
-    def __exit__(self, *_) -> None:
-        with self._lock:
-            self._depth -= 1
-            if self._depth == 0:
-                cv2.setNumThreads(self._before)
-
-
-single_threaded_opencv = _OneThread()

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from hicp_lib.core.cache import digest, running_code
+from hicp_lib.core.cache import code_identity, digest
 from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.files import cache_dir, read_checked, sha256_bytes, write_checked
 from hicp_lib.core.keypoints import N_KEYPOINTS
@@ -48,9 +48,7 @@ def detections_of(results: Mapping[Key, Timed]) -> dict[Key, Detections]:
 
 def identity(detector: Detector) -> dict:
     """All that this detector's results depend on, besides the image."""
-    found = running_code(tuple(sorted({__name__, *_modules(detector)})))
-    hashes = [digest(found.modules), digest(found.data)]
-    return {"settings": detector.settings, "code": hashes, "libraries": found.libraries}
+    return {"settings": detector.settings} | code_identity(__name__, *_modules(detector))
 
 
 def _modules(detector: Detector) -> Iterator[str]:

@@ -1,25 +1,35 @@
 """Run a detector over many images: all cores or a cluster, a progress bar, results kept on disk.
 
-Each result is kept as soon as it is there, so a run that was cut off goes on where it was.
+Each result is kept as soon as it is there, so a run that was cut off goes on where it was. On a cluster, the
+images' bytes travel, and the workers need the weights.
 
 The work is spread over threads, not processes: the networks run outside Python's global lock,
 and threads need no start-up. Every thread has its own detector, and OpenCV is held to one
 thread in each, so the results do not depend on how many there are.
 """
 
-from collections.abc import Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.environment import usable_cores
+from hicp_lib.core.executor import Workers, resolved, run_jobs
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.core.images import decode_image, image_bytes
-from hicp_lib.detectors.runtime.pool import DetectorPool, naming_image, single_threaded_opencv
-from hicp_lib.detectors.runtime.results import Key, Timed, cache_folder, cached, detections_of, result_path
+from hicp_lib.detectors.runtime.pool import DetectorPool, naming_image
+from hicp_lib.detectors.runtime.results import (
+    Key,
+    Timed,
+    cache_folder,
+    detections_of,
+    identity,
+    read_result,
+    result_path,
+    write_result,
+)
 from hicp_lib.formats.annotations import Annotations, read_annotations
 
 
@@ -87,10 +97,9 @@ def detect_annotated(
 def detect_images(
     name: str,
     paths: Mapping[Key, str | Path],
-    workers: int | None = None,
+    workers: Workers = None,
     progress: bool = True,
     boxes_px: Mapping[Key, np.ndarray] | None = None,
-    dask: str | None = None,
     **options,
 ) -> dict[Key, Timed]:
     """People in every image file.
@@ -101,14 +110,12 @@ def detect_images(
         Detector, see `hicp_lib.detectors.registry`.
     paths : dict of object to path
         Image files by any key.
-    workers : int, optional
-        Threads (the cores this process may use, if None).
+    workers : int or str, optional
+        Threads, or the address of a Dask scheduler (`hicp_lib.core.executor.resolved`).
     progress : bool, default True
         Show a bar; only ever on a terminal.
     boxes_px : dict of object to array, optional
         Annotated boxes (n, 4: x, y, width, height) of each image, for detectors that take them.
-    dask : str, optional
-        Address of a Dask scheduler, whose workers do what threads do otherwise.
     **options : object
         Of the detector.
 
@@ -122,35 +129,59 @@ def detect_images(
     InputError
         If an image cannot be read, or the detector cannot be made.
     """
-    workers = max(1, min(workers or usable_cores(), len(paths) or 1))
-    pool = DetectorPool(name, options, workers)
+    workers = resolved(workers)
+    if isinstance(workers, int):
+        workers = max(1, min(workers, len(paths)))
+    pool = DetectorPool(name, options, workers if isinstance(workers, int) else 1)
     boxes_px = boxes_px if getattr(pool.first, "takes_boxes", False) else None
-    jobs = {key: (Path(path), None if boxes_px is None else boxes_px[key]) for key, path in paths.items()}
-    if dask is None:
-        results = _in_threads(pool, jobs, workers)
-    else:
-        from hicp_lib.detectors.runtime.cluster import detect_on_cluster  # the library is an extra
+    there = (name, tuple(sorted(options.items())))
+    detect = partial(_detect_there, there) if isinstance(workers, str) else partial(_detect, pool)
+    folder, kept, done = cache_folder(pool.first), {}, {}
 
-        results = detect_on_cluster(dask, name, options, pool.first, jobs)
+    def missing() -> Iterator[tuple[Key, Callable[[], Timed]]]:
+        for key, path in paths.items():
+            content, boxes = image_bytes(path), None if boxes_px is None else boxes_px[key]
+            sha256 = sha256_bytes(content)
+            kept[key] = result_path(folder, sha256, boxes)
+            result = read_result(kept[key])
+            if result is None:
+                yield key, partial(detect, content, str(path), boxes, sha256)
+            else:
+                done[key] = result
+
+    alike = identity(pool.first), partial(_identity_there, there)
+    found = run_jobs(missing(), workers, "threads", alike=alike, named=paths.__getitem__)
     # disable=None: no bar unless standard error is a terminal.
-    done = dict(tqdm(results, desc=name, total=len(jobs), disable=None if progress else True))
+    with tqdm(desc=name, total=len(paths), disable=None if progress else True) as bar:
+        for key, result in found:
+            write_result(kept[key], result)
+            done[key] = result
+            bar.update(len(done) - bar.n)
     return {key: done[key] for key in paths}
 
 
-def _in_threads(
-    pool: DetectorPool, jobs: dict[Key, tuple[Path, np.ndarray | None]], workers: int
-) -> Iterator[tuple[Key, Timed]]:
-    folder = cache_folder(pool.first)
-    with single_threaded_opencv, ThreadPoolExecutor(workers) as executor:
-        calls = executor.map(lambda job: _detect_one(pool, folder, *job), jobs.values())
-        yield from zip(jobs, calls, strict=True)
-
-
-def _detect_one(pool: DetectorPool, folder: Path, path: Path, boxes_px: np.ndarray | None) -> Timed:
-    content = image_bytes(path)
-    sha256 = sha256_bytes(content)
+def _detect(
+    pool: DetectorPool, content: bytes, path: str, boxes_px: np.ndarray | None, sha256: str | None
+) -> Timed:
     with naming_image(path):
-        return cached(
-            result_path(folder, sha256, boxes_px),
-            lambda: pool.detect(decode_image(content, path), boxes_px, sha256),
-        )
+        return pool.detect(decode_image(content, path), boxes_px, sha256)
+
+
+# What follows runs on a cluster's workers, where parts' results are not kept.
+
+
+def _detect_there(
+    detector: tuple, content: bytes, path: str, boxes_px: np.ndarray | None, sha256: str
+) -> Timed:
+    return _detect(_pool(*detector), content, path, boxes_px, None)
+
+
+def _identity_there(detector: tuple) -> dict:
+    return identity(_pool(*detector).first)
+
+
+@lru_cache(maxsize=2)
+def _pool(name: str, options: tuple[tuple[str, object], ...]) -> DetectorPool:
+    from distributed import get_worker
+
+    return DetectorPool(name, dict(options), get_worker().state.nthreads)

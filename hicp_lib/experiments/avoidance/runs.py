@@ -7,6 +7,7 @@ weights, and the code and data of simulation, lifting, robot and detectors.
 import math
 import multiprocessing
 from collections.abc import Iterable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -15,9 +16,10 @@ import cv2
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.cache import key
+from hicp_lib.core.cache import code_identity, key
 from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.executor import resolved, run_jobs
 from hicp_lib.core.files import atomic_path, cache_dir
 from hicp_lib.core.images import decode_image
 from hicp_lib.core.keypoints import N_KEYPOINTS
@@ -29,7 +31,6 @@ from hicp_lib.experiments.avoidance.reaching import script
 from hicp_lib.experiments.laboratory import COLOUR, in_root
 from hicp_lib.robot.controller import PUBLISHED
 from hicp_lib.simulation.body.model import PosedBody
-from hicp_lib.simulation.world.batch import run_jobs
 
 NO_AVOIDANCE, TRUE_KEYPOINTS = "no avoidance", "ground truth"
 PUBLISHED_GAINS = "ground truth, published gains"
@@ -95,17 +96,20 @@ class Run:
 
 def run_all(jobs: Iterable[Job]) -> list[Run]:
     """The runs of all jobs, in their order; what is not in the cache is simulated on all cores."""
-    jobs = list(jobs)
-    folders = {job: _folder(job) for job in jobs}
+    jobs, out = list(jobs), cache_dir() / "avoidance"
+    folders = {job: out / _run_key(job) for job in jobs}
     missing = [job for job, folder in folders.items() if not (folder / _TABLES[0]).is_file()]
     # The longest first, so that no core is left with one at the end: detectors, the fastest see most.
     missing.sort(key=lambda job: (job.condition in IDEAL, job.delay_s))
-    if len(missing) > 1:
-        with multiprocessing.get_context("spawn").Manager() as manager:
-            images = manager.dict()  # shared by the processes
-            list(run_jobs([partial(_simulate, job, folders[job], images) for job in missing]))
-    elif missing:
-        _simulate(missing[0], folders[missing[0]], {})
+    workers = resolved(None)
+    is_here = isinstance(workers, int)
+    is_shared = is_here and len(missing) > 1
+    with multiprocessing.get_context("spawn").Manager() if is_shared else nullcontext() as manager:
+        images = manager.dict() if manager else {}  # shared by the processes of this machine
+        todo = {job: partial(_simulate, run=folders[job].name, job=job, images=images) for job in missing}
+        named = [(f"{folders[job].name}/{_TABLES[0]}", call) for job, call in todo.items()]
+        known = partial(_known, *sorted({job.condition for job in missing}))
+        list(run_jobs(named, workers, folder=out, alike=(known(), known) if not is_here else None))
     return [Run(job, *(pd.read_parquet(folders[job] / name) for name in _TABLES)) for job in jobs]
 
 
@@ -155,7 +159,7 @@ def keypoints_m(frame: pd.Series) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return perceived_m, scores[..., 0], truth_m
 
 
-def _simulate(job: Job, folder: Path, images: ImageCache) -> None:
+def _simulate(out: Path, run: str, job: Job, images: ImageCache) -> None:
     """Simulate a run and write its tables; it counts as finished when the first of them is there."""
     observations: list[Observation] = []
     if job.condition in IDEAL:
@@ -167,7 +171,7 @@ def _simulate(job: Job, folder: Path, images: ImageCache) -> None:
     scene = script(job.trial.script, job.trial.subject)
     frames = pd.DataFrame([_frame(seen, scene.person_at(seen.perception.time_s)) for seen in observations])
     for name, table in zip(reversed(_TABLES), (frames, cycles), strict=True):
-        with atomic_path(folder / name) as temporary:
+        with atomic_path(out / run / name) as temporary:
             table.to_parquet(temporary, index=False)
 
 
@@ -189,11 +193,16 @@ def _array(flat: np.ndarray, width: int) -> np.ndarray:
     return np.asarray(flat, float).reshape(-1, N_KEYPOINTS, width)
 
 
-def _folder(job: Job) -> Path:
+def _run_key(job: Job) -> str:
     known = {} if job.condition in IDEAL else identity(_detector(job))
     # Of the detectors only the one that looks has a say, and its identity says which.
-    result_key = key([run_all], without=[make_detector.__module__], job=job, detector=known)
-    return cache_dir() / "avoidance" / result_key[:_KEY_LENGTH]
+    return key([run_all], without=[make_detector.__module__], job=job, detector=known)[:_KEY_LENGTH]
+
+
+def _known(*conditions: str) -> dict:
+    """What runs under some conditions follow from, here; a detector's tracking is in the code."""
+    names = {condition.removesuffix(TRACKING) for condition in conditions} - {*IDEAL}
+    return code_identity(__name__) | {name: identity(_kept_detector(name)) for name in sorted(names)}
 
 
 def _detector(job: Job) -> Detector:

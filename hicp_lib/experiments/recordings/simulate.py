@@ -4,6 +4,7 @@ Frame k depends on scenario, subject and k only, so the number of processes chan
 longer recording begins with the shorter one.
 """
 
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.core.cache import key
+from hicp_lib.core.executor import Workers, resolved, run_jobs
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.experiments.laboratory import T_WORLD_ROOT
 from hicp_lib.experiments.recordings.capture import LEAD_S
@@ -30,7 +32,7 @@ from hicp_lib.recordings.qualisys import write_c3d, write_tsv
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, MOCAP_FILE, RGB_LIST, Recording, open_recording
 from hicp_lib.recordings.writer import depth_name, write_depth, write_frame
 from hicp_lib.simulation.body.identities import Subject
-from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts, run_jobs
+from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts
 
 _MOCAP_FILES = (MOCAP_FILE, str(Path(MOCAP_FILE).with_suffix(".c3d")))
 
@@ -40,7 +42,7 @@ def simulate_recording(
     name: str,
     n_frames: int | None = None,
     subject: Subject = Subject(),
-    workers: int | None = None,
+    workers: Workers = None,
     progress: bool = True,
 ) -> Recording:
     """Simulate a recording into a folder; finished frames of an interrupted run are kept.
@@ -54,8 +56,8 @@ def simulate_recording(
         The scenario's own number when left out.
     subject : Subject, optional
         Who is there, in what room, how they move, and all noise.
-    workers : int, optional
-        Processes; as many as there are processors when left out.
+    workers : int or str, optional
+        Processes, or the address of a Dask scheduler (`hicp_lib.core.executor.resolved`).
     progress : bool, optional
         Whether a terminal is shown a bar.
 
@@ -70,17 +72,22 @@ def simulate_recording(
     """
     out, plan = Path(out), scenario(name)
     n = plan.n_frames if n_frames is None else n_frames
-    n_workers = 1 if workers is None else workers
-    check_numbers(n_frames=(n, 1, plan.max_frames), workers=(n_workers, 1, 1000))
+    workers = resolved(workers)
+    check_numbers(n_frames=(n, 1, plan.max_frames))
     check_output(out, PARTS_DIR, "for the recording", "simulated")
     (out / RGB_LIST).unlink(missing_ok=True)  # it is no recording until it is finished
     who = {"subject": asdict(subject), "identity": subject.identity.record()}
     stamp = {"scenario": name, **who, "version": key([simulate_recording])}
     keep_parts(out, PARTS_DIR, stamp, ["rgb/*", "depth/*", f"{EXACT_DEPTH_DIR}/*", *_MOCAP_FILES])
-    todo = [partial(record_one, out, name, subject, k) for k in range(n) if not part_path(out, k).exists()]
-    if plan.capture is not None:
-        todo.insert(0, partial(_capture_all, out, name, subject, int(n)))  # the longest first
-    for _ in tqdm(run_jobs(todo, workers), name, len(todo), unit="frame", disable=not progress or None):
+    missing = [k for k in range(n) if not part_path(out, k).exists()]
+    todo: list[tuple[str, Callable]] = [
+        (str(part_path(Path(), k)), partial(record_one, name=name, subject=subject, k=k)) for k in missing
+    ]
+    if plan.capture is not None and not _is_captured(out, n):  # the longest first
+        capture = partial(_capture_all, name=name, subject=subject, n=int(n))
+        todo.insert(0, (str(Path(PARTS_DIR, MOCAP_PART)), capture))
+    done = run_jobs(todo, workers, folder=out)
+    for _ in tqdm(done, name, len(todo), unit="frame", disable=not progress or None):
         pass
     finish_recording(out, plan, int(n), stamp)
     return open_recording(out)
@@ -105,10 +112,15 @@ def record_one(out: Path, name: str, subject: Subject, k: int) -> None:
     write_json(part_path(out, k), truth)
 
 
+def _is_captured(out: Path, n: int) -> bool:
+    part = out / PARTS_DIR / MOCAP_PART
+    return part.exists() and read_json(part)["n_frames"] == n
+
+
 def _capture_all(out: Path, name: str, subject: Subject, n: int) -> None:
-    """Write motion capture of `n` frames, unless it is there."""
+    """Write motion capture of `n` frames."""
     part, plan = out / PARTS_DIR / MOCAP_PART, scenario(name)
-    if plan.capture is None or (part.exists() and read_json(part)["n_frames"] == n):
+    if plan.capture is None:
         return
     T_world_camera = T_WORLD_ROOT @ camera_poses(plan, 1)[0]
     exported, T_mocap_world = plan.capture(subject, float(plan.times_s(n)[-1]), T_world_camera)

@@ -1,65 +1,12 @@
-"""Many results at once: processes that simulate, and the folders they write to."""
+"""Folders that many results at once are written to."""
 
-import multiprocessing
-import multiprocessing.pool
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from operator import call
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TypeVar
 
-import cv2
 import numpy as np
 
-from hicp_lib.core.environment import usable_cores, with_variables
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
-
-Result = TypeVar("Result")
-
-
-@contextmanager
-def worker_pool(workers: int) -> Iterator[multiprocessing.pool.Pool]:
-    """Processes that simulate, with one thread each: more threads than processors only wait for each other.
-
-    Each starts as a fresh interpreter, since Open3D's threads do not survive a fork; the
-    linear algebra library reads its number of threads when it is loaded.
-    """
-    names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-    context = multiprocessing.get_context("spawn")
-    with with_variables(**dict.fromkeys(names, "1")):
-        pool = context.Pool(workers, initializer=cv2.setNumThreads, initargs=(1,))
-    with pool:
-        yield pool
-
-
-def run_jobs(jobs: Sequence[Callable[[], Result]], workers: int | None = None) -> Iterator[Result]:
-    """Run jobs, several at a time.
-
-    Parameters
-    ----------
-    jobs : sequence of callable
-        Functions of modules, or partials of them, so that processes can be given them.
-    workers : int, optional
-        Processes; one for each core that this process may use when left out.
-
-    Yields
-    ------
-    object
-        What the jobs return, in their order.
-
-    Examples
-    --------
-    >>> from functools import partial
-    >>> list(run_jobs([partial(max, 1, 2), partial(max, 4, 3)], workers=1))
-    [2, 4]
-    """
-    n_workers = min(workers or usable_cores(), len(jobs))
-    if n_workers < 2:
-        yield from map(call, jobs)
-        return
-    with worker_pool(n_workers) as pool:
-        yield from pool.imap(call, jobs)
 
 
 def check_numbers(**limits: tuple[object, int, int]) -> None:

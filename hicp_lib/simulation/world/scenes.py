@@ -13,6 +13,7 @@ import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.core.cache import key
+from hicp_lib.core.executor import Workers, resolved, run_jobs
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
@@ -20,12 +21,12 @@ from hicp_lib.recordings.writer import write_rgb
 from hicp_lib.simulation.body.identities import HELD_OUT, split_members, stream
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import Frame, render
-from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts, run_jobs
+from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts
 from hicp_lib.simulation.world.staging import Stage, distance_m, random_stage
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
 MAX_SCENES = 1_000_000
-_MAX_NUMBER = 1_000_000_000  # of seeds and workers
+_MAX_NUMBER = 1_000_000_000  # of seeds
 _PARTS_DIR = ".scenes"  # the people of finished images, and what they were made with
 
 
@@ -33,7 +34,7 @@ def render_dataset(
     out: str | Path,
     n: int,
     seed: int,
-    workers: int | None = None,
+    workers: Workers = None,
     progress: bool = True,
     split: str = HELD_OUT,
 ) -> Annotations:
@@ -52,8 +53,8 @@ def render_dataset(
         How many images.
     seed : int
         Non-negative.
-    workers : int, optional
-        Processes; as many as there are processors when left out.
+    workers : int or str, optional
+        Processes, or the address of a Dask scheduler (`hicp_lib.core.executor.resolved`).
     progress : bool, optional
         Whether a terminal is shown a bar.
     split : str, optional
@@ -68,8 +69,8 @@ def render_dataset(
     InputError
         For an unknown split, numbers out of range, or a folder that holds something else.
     """
-    out, n_workers = Path(out), 1 if workers is None else workers
-    check_numbers(n=(n, 1, MAX_SCENES), seed=(seed, 0, _MAX_NUMBER), workers=(n_workers, 1, _MAX_NUMBER))
+    out, workers = Path(out), resolved(workers)
+    check_numbers(n=(n, 1, MAX_SCENES), seed=(seed, 0, _MAX_NUMBER))
     split_members(split)  # a wrong name is told before anything is written
     check_output(out, _PARTS_DIR, "to render into", "rendered")
     (out / "annotations.json").unlink(missing_ok=True)
@@ -77,7 +78,9 @@ def render_dataset(
     keep_parts(out, _PARTS_DIR, stamp, ["images/*.jpg"])
     # The people are written after the image.
     missing = [k for k in range(n) if not (_people_path(out, k).exists() and _image_path(out, k).exists())]
-    done = run_jobs([partial(_render_one, out, seed, index, split) for index in missing], workers)
+    one = partial(_render_one, seed=seed, split=split)
+    jobs = [(str(_people_path(Path(), k)), partial(one, index=k)) for k in missing]
+    done = run_jobs(jobs, workers, folder=out)
     for _ in tqdm(done, "rendering", n, initial=n - len(missing), unit="image", disable=not progress or None):
         pass
     annotations = _collect(out, n)

@@ -15,10 +15,11 @@ import pytest
 from distributed import Client
 from distributed.client import ClosedClientError
 
+from hicp_lib.core import cluster
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import write_png
 from hicp_lib.detectors import registry
-from hicp_lib.detectors.runtime import cluster, run
+from hicp_lib.detectors.runtime import run
 
 # No test hangs for ever; nothing that is expected is ever waited for so long.
 LONG_S = 120
@@ -70,7 +71,7 @@ def registered(slow, monkeypatch):
 def refusal(address, images, name="slow", **options) -> str:
     """The one line in which a run is refused."""
     with pytest.raises(InputError) as error:
-        run.detect_images(name, images, dask=address, **options)
+        run.detect_images(name, images, workers=address, **options)
     assert "\n" not in str(error.value)
     return str(error.value)
 
@@ -122,7 +123,7 @@ def test_a_real_detector_gives_the_same_numbers(slow, own_cache, photograph, tmp
     for i, path in paths.items():
         write_png(path, photograph[10 * i : 500 + 7 * i, 5 * i :])
     with dask_cluster(slow, ({}, {}), HICP_CACHE=str(own_cache)) as (address, _):
-        remote = run.detect_images("mediapipe", paths, dask=address)
+        remote = run.detect_images("mediapipe", paths, workers=address)
     own_cache.rename(tmp_path / "with results")
     os.makedirs(own_cache)
     (tmp_path / "with results" / "weights").rename(own_cache / "weights")
@@ -158,7 +159,7 @@ def test_what_workers_cannot_do_and_that_they_are_gone_is_said_in_one_line(slow,
         assert slow.n_kept() > 0
         assert refusal(address, {"x": absent}).startswith(f"{absent}: cannot be read")
 
-        write = cluster.write_result
+        write = run.write_result
 
         def write_and_lose(*arguments):
             write(*arguments)
@@ -166,7 +167,7 @@ def test_what_workers_cannot_do_and_that_they_are_gone_is_said_in_one_line(slow,
                 worker.kill()
                 monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
 
-        monkeypatch.setattr(cluster, "write_result", write_and_lose)
+        monkeypatch.setattr(run, "write_result", write_and_lose)
         line = refusal(address, registered)
         assert line.startswith(f"{address}: the Dask cluster is gone (it has lost its workers)")
         assert line.endswith("run the same command again to go on") and slow.n_kept() == 20
@@ -178,7 +179,7 @@ def test_a_fault_of_a_detector_is_told_as_what_it_is(slow, registered):
     write_png(faulty, np.full((8, 9, 3), 254, np.uint8))
     with dask_cluster(slow, ({},), *PRELOAD) as (address, _):
         with pytest.raises(AttributeError) as error:
-            run.detect_images("slow", {"faulty": faulty}, dask=address)
+            run.detect_images("slow", {"faulty": faulty}, workers=address)
     assert str(error.value) == "a fault of the detector's"
     assert "slow_detector.py" in error.value.__notes__[0]  # where it was on the worker
 
@@ -214,7 +215,7 @@ def test_other_errors_are_not_taken_for_a_lost_cluster():
 def test_what_dask_cannot_run_is_another_environment(error):
     told = cluster._not_run(error, "a.png")
     assert str(told) == (
-        "the Dask cluster cannot run this detector (no slow_detector); "
+        "the Dask cluster cannot run what it is asked to (no slow_detector); "
         "install the same environment and weights on scheduler and workers"
     )
 
@@ -225,7 +226,7 @@ def test_an_image_that_kills_its_workers_is_named(slow, registered):
     environment = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
     with dask_cluster(slow, ({},), *PRELOAD, **environment) as (address, _):
         line = refusal(address, {"deadly": deadly})
-    assert line.startswith(f"{deadly}: every worker that took this image died, lately tcp://127.0.0.1:")
+    assert line.startswith(f"{deadly}: every worker that took it died, lately tcp://127.0.0.1:")
 
 
 def test_the_command_line_tells_of_a_lost_scheduler_in_one_line(slow):

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
+from hicp_lib.core import cache as core_cache
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import write_png
@@ -124,11 +125,13 @@ def test_what_is_read_is_what_was_written(tmp_path, n):
 
 def test_the_key_knows_code_and_libraries(counting, monkeypatch):
     folders = {cache.cache_folder(Counting())}
-    known = cache.running_code
+    known = core_cache.running_code
     for part in ("modules", "data", "libraries"):
         with monkeypatch.context() as changed:
             other = {part: {"other": "1"}}
-            changed.setattr(cache, "running_code", lambda names, other=other: replace(known(names), **other))
+            changed.setattr(
+                core_cache, "running_code", lambda names, other=other: replace(known(names), **other)
+            )
             folders.add(cache.cache_folder(Counting()))
     folders.add(cache.cache_folder(Counting(version=2)))
     assert len(folders) == 5

@@ -1,0 +1,275 @@
+"""Jobs on an existing Dask cluster.
+
+Their inputs and the files they write travel, not paths, so no folder need be shared. Scheduler and workers
+need this package as it is installed here; a worker that would find something else (other code, libraries,
+weights, settings) refuses. A job whose worker dies goes to another; Dask gives up on it when it has outlived
+as many workers as Dask's setting `distributed.scheduler.allowed-failures` says.
+
+Dask's workers execute what its clients send them: connect only to a cluster you trust.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import re
+import tempfile
+import threading
+import traceback
+import warnings
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
+from functools import partial
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import cv2
+
+from hicp_lib.core.cache import code_identity
+from hicp_lib.core.errors import InputError, one_line
+from hicp_lib.core.executor import as_they_come
+from hicp_lib.core.extras import needs
+from hicp_lib.core.files import write_bytes
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+# Checked here, since Dask starts threads, and for an empty address a cluster, before it looks.
+_ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+:\d{1,5}")
+Key = TypeVar("Key", bound=Hashable)
+Answer = TypeVar("Answer")
+# How long to wait for the scheduler, and for workers where there are none.
+PATIENCE_S = 30.0
+_LOGGERS = ("distributed", "distributed.client", "tornado.application", "asyncio")
+
+
+def run_on_cluster(
+    address: str,
+    jobs: Iterable[tuple[Key, Callable]],
+    folder: Path | None,
+    alike: tuple[dict, Callable[[], dict]] | None,
+    named: Callable[[Key], object],
+) -> Iterator[tuple[Key, Any]]:
+    """As `hicp_lib.core.executor.run_jobs`, by the workers of a cluster; without jobs nobody is asked.
+
+    Parameters
+    ----------
+    address : str
+        Of Dask's scheduler, e.g. "tcp://127.0.0.1:8786".
+    jobs : iterable of (key, callable)
+    folder : Path or None
+    alike : (dict, callable) or None
+    named : callable
+
+    Yields
+    ------
+    (key, object)
+
+    Raises
+    ------
+    InputError
+        If the extra is not installed, the cluster cannot be reached, has no workers or loses them, a worker
+        would find something else, or a job kills its workers.
+    """
+    todo = iter(jobs)
+    first = next(todo, None)
+    if first is None:
+        return
+    if alike is None:
+        there = partial(code_identity, getattr(first[1], "func", first[1]).__module__)
+        alike = there(), there
+    with connected(address) as client:
+        for key, answer in _spread(client, address, chain([first], todo), alike, folder is not None, named):
+            if isinstance(answer, Exception):
+                raise answer
+            yield key, answer if folder is None else _written(answer, folder, str(key))
+
+
+def _written(answer: tuple[Any, dict[str, bytes]], folder: Path, last: str) -> Any:
+    """What a job returned, its files written."""
+    result, files = answer
+    for name in sorted(files, key=lambda name: name == last):
+        write_bytes(folder / name, files[name])
+    return result
+
+
+@contextmanager
+def connected(address: str) -> Iterator[Client]:
+    """A client of a cluster that has workers.
+
+    Parameters
+    ----------
+    address : str
+
+    Yields
+    ------
+    distributed.Client
+
+    Raises
+    ------
+    InputError
+        If the extra is not installed, nobody answers, or there are no workers.
+    """
+    with needs("dask"):
+        from distributed import Client
+    if not _ADDRESS.fullmatch(address):
+        raise InputError(f"{address}: no Dask scheduler answers (no address); give one's, tcp://HOST:PORT")
+    with _quiet():
+        try:
+            client = Client(address, timeout=PATIENCE_S)
+        except (OSError, ValueError, RuntimeError, AssertionError) as error:  # its thread is late
+            raise InputError(
+                f"{address}: no Dask scheduler answers ({one_line(error)}); "
+                "give one's address, tcp://HOST:PORT"
+            ) from None
+        try:
+            with _explained(address, client):
+                try:
+                    client.wait_for_workers(1, timeout=PATIENCE_S)
+                except TimeoutError:
+                    raise InputError(f"{address}: the Dask cluster has no workers; start some") from None
+            yield client
+        finally:
+            with suppress(OSError, RuntimeError):  # it may be gone; what was found is here
+                client.close()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep Dask from telling at length, while it reconnects and closes, what is told in one line.
+
+    Which of its parts notices first that a scheduler is gone depends on what was under way, so all are
+    kept quiet: its own loggers, of which some have a level to themselves, and those of the loop it runs in.
+    """
+    logs = [logging.getLogger(name) for name in _LOGGERS]
+    levels = [log.level for log in logs]
+    for log in logs:
+        log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for log, level in zip(logs, levels, strict=True):
+            log.setLevel(level)
+
+
+def _spread(
+    client: Client,
+    address: str,
+    jobs: Iterable[tuple[Key, Callable]],
+    alike: tuple[dict, Callable[[], dict]],
+    write: bool,
+    named: Callable[[Key], object],
+) -> Iterator[tuple[Key, Any]]:
+    """What jobs return, or what went wrong, as it comes in."""
+    from distributed import wait
+
+    def submit(job: Callable) -> Any:
+        with warnings.catch_warnings():
+            # Dask would have large arguments scattered; but scattered data is lost with its worker.
+            warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
+            return client.submit(_here, job, *alike, write, pure=False)
+
+    def first_ones(futures: Iterable) -> Iterable:
+        some = list(futures)
+        return _patiently(client, lambda s: wait(some, timeout=s, return_when="FIRST_COMPLETED").done)
+
+    def n_most() -> float:
+        return 2 * sum(client.nthreads().values()) or math.inf
+
+    with _explained(address, client):
+        for key, future in as_they_come(jobs, submit, first_ones, n_most):
+            if future.status == "error":
+                yield key, _not_run(future.exception(PATIENCE_S), named(key))
+            else:
+                yield key, _patiently(client, future.result)
+
+
+def _not_run(error: Exception, name: object) -> InputError:
+    """Why Dask could not run `_here`, in one line: what goes wrong within comes back as its result."""
+    from distributed import KilledWorker
+
+    if isinstance(error, KilledWorker):
+        last = getattr(error.last_worker, "address", "an unknown one")
+        return InputError(f"{name}: every worker that took it died, lately {last}")
+    return InputError(
+        f"the Dask cluster cannot run what it is asked to ({one_line(error)}); "
+        "install the same environment and weights on scheduler and workers"
+    )
+
+
+def _patiently(client: Client, ask: Callable[[float], Answer]) -> Answer:
+    """Ask until there is an answer, however long it takes, but only as long as there are workers."""
+    while True:
+        try:
+            return ask(PATIENCE_S)
+        except TimeoutError:
+            if not client.nthreads():
+                raise ConnectionError("it has lost its workers") from None
+
+
+@contextmanager
+def _explained(address: str, client: Client) -> Iterator[None]:
+    """Around calls of Dask's alone: tell in one line that the cluster is gone, however it shows."""
+    from distributed.client import ClosedClientError
+
+    try:
+        yield
+    except (CancelledError, OSError, ClosedClientError, AttributeError, RuntimeError) as error:
+        # A client that has closed has no scheduler or loop to ask; of one that runs it would be a fault.
+        if isinstance(error, (AttributeError, RuntimeError)) and client.status == "running":
+            raise
+        raise InputError(
+            f"{address}: the Dask cluster is gone ({one_line(error)}); run the same command again to go on"
+        ) from None
+
+
+# What follows runs on the workers.
+
+_checking, _writing = threading.Lock(), threading.Lock()  # one at a time
+
+
+def _here(*arguments: Any) -> Any:
+    """What `_run` returns or raises: an error that Dask raises in its place is then Dask's own."""
+    try:
+        return _run(*arguments)
+    except Exception as error:
+        error.add_note(traceback.format_exc())  # errors travel without
+        return error
+
+
+def _run(job: Callable, expected: dict, found_there: Callable[[], dict], write: bool) -> Any:
+    from distributed import get_worker
+
+    worker = get_worker().address
+    cv2.setNumThreads(1)
+    try:
+        with _checking:
+            differing = _differences(expected, found_there())
+    except (InputError, OSError) as error:
+        raise InputError(f"worker {worker}: {one_line(error)}") from None
+    if differing:
+        raise InputError(
+            f"worker {worker}: would find something else, for these differ from here: "
+            f"{', '.join(differing)}; install the same environment and weights, and start it anew"
+        )
+    if not write:
+        return job()
+    # Jobs that write were made for processes of their own.
+    with _writing, tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        result = job(folder)
+        files = sorted(path for path in folder.rglob("*") if path.is_file())
+        return result, {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def _differences(one: object, other: object, where: str = "") -> list[str]:
+    """The keys of nested dictionaries under which there is not the same."""
+    if not (isinstance(one, dict) and isinstance(other, dict)):
+        return [] if one == other else [where]
+    return [
+        difference
+        for key in sorted(one.keys() | other.keys())
+        for difference in _differences(one.get(key), other.get(key), f"{where}.{key}".lstrip("."))
+    ]

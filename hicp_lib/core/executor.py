@@ -1,0 +1,232 @@
+"""One way to spread work: threads or processes of this machine, or the workers of a Dask cluster.
+
+Whoever has jobs says which of the two they ask for here, and takes as `workers` what the user gave: a number,
+the address of a Dask scheduler, or nothing, which is what `HICP_DASK` names, else all cores. Neither the
+number nor the place is in any result.
+"""
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from functools import partial
+from operator import length_hint
+from pathlib import Path
+from typing import Any, TypeVar
+
+import cv2
+import numpy as np
+
+from hicp_lib.core.environment import usable_cores, with_variables
+from hicp_lib.core.errors import InputError
+
+CLUSTER_VARIABLE = "HICP_DASK"
+Key = TypeVar("Key", bound=Hashable)
+Workers = int | str | None
+_ONE_THREAD = dict.fromkeys(
+    ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
+)
+
+
+def resolved(workers: Workers) -> int | str:
+    """How many workers of this machine, or the address of the cluster whose workers are asked for.
+
+    Parameters
+    ----------
+    workers : int or str or None
+        None is the cluster that the variable `HICP_DASK` names; without it, all cores this process may use.
+
+    Raises
+    ------
+    InputError
+        If it is neither a whole number from 1 nor text.
+
+    Examples
+    --------
+    >>> resolved(3), resolved("tcp://127.0.0.1:8786")
+    (3, 'tcp://127.0.0.1:8786')
+    """
+    if workers is None:
+        return os.environ.get(CLUSTER_VARIABLE) or usable_cores()
+    if not isinstance(workers, str) and not (isinstance(workers, (int, np.integer)) and workers >= 1):
+        raise InputError(f"workers is {workers!r}; expected a whole number from 1")
+    return workers
+
+
+def run_jobs(
+    jobs: Iterable[tuple[Key, Callable]],
+    workers: Workers = None,
+    kind: str = "processes",
+    *,
+    folder: Path | None = None,
+    alike: tuple[dict, Callable[[], dict]] | None = None,
+    named: Callable[[Key], object] = str,
+) -> Iterator[tuple[Key, Any]]:
+    """Run jobs, several at a time; each one's key and what it returned, as they come in.
+
+    Parameters
+    ----------
+    jobs : iterable of (key, callable)
+        Drawn as workers get free. Processes and clusters are given functions of modules, or partials of
+        them; threads anything.
+    workers : int or str, optional
+        As of `resolved`. A single one, or a single job, is run by the caller itself.
+    kind : str
+        "threads" or "processes": what works where it is no cluster.
+    folder : Path, optional
+        Jobs are called with it and write files there. On a cluster, whose machines need not see it, they are
+        called with one of their own, and the files travel. Of a job's files, that which its key names, if it
+        names one (a path below `folder`), is there when all others are.
+    alike : (dict, callable), optional
+        What results depend on, JSON-able, and a function that says the same of where it is called: a
+        cluster's worker for which it differs is refused. The code of the first job where left out.
+    named : callable, optional
+        What a message calls a job, by its key.
+
+    Yields
+    ------
+    (key, object)
+
+    Raises
+    ------
+    InputError
+        If a process dies, or for all that can be amiss with a cluster (`hicp_lib.core.cluster`).
+
+    Examples
+    --------
+    >>> from functools import partial
+    >>> dict(run_jobs([("a", partial(max, 1, 2)), ("b", partial(max, 4, 3))], workers=1))
+    {'a': 2, 'b': 4}
+    """
+    workers = resolved(workers)
+    if isinstance(workers, str):
+        from hicp_lib.core.cluster import run_on_cluster  # the library is an extra
+
+        yield from run_on_cluster(workers, jobs, folder, alike, named)
+        return
+    n = min(workers, length_hint(jobs, workers))
+    todo = jobs if folder is None else ((key, partial(job, folder)) for key, job in jobs)
+    with single_threaded_opencv:
+        if n < 2:
+            yield from ((key, job()) for key, job in todo)
+            return
+        with (_Threads if kind == "threads" else Processes)(n) as executor:
+            try:
+                for key, future in as_they_come(todo, executor.submit, _first_ones, lambda: 2 * n):
+                    yield key, future.result()
+            except BrokenProcessPool:
+                raise InputError(
+                    "a process that worked was killed (is memory short?); run the same command again to go "
+                    "on, with fewer workers if it happens again"
+                ) from None
+
+
+def as_they_come(
+    jobs: Iterable[tuple[Key, Callable]],
+    submit: Callable[[Callable], Any],
+    first_ones: Callable[[Iterable], Iterable],
+    n_most: Callable[[], float],
+) -> Iterator[tuple[Key, Any]]:
+    """Keys and ended futures of jobs; no more are under way than keep all workers busy.
+
+    Parameters
+    ----------
+    jobs : iterable of (key, callable)
+    submit : callable
+        Gives a job away, for a future.
+    first_ones : callable
+        Waits for some of the futures it is given to end; those that did, at least one.
+    n_most : callable
+        How many may be under way.
+
+    Yields
+    ------
+    (key, future)
+    """
+    running: dict[Any, Key] = {}
+    for key, job in jobs:
+        running[submit(job)] = key
+        while len(running) >= n_most():
+            yield from [(running.pop(future), future) for future in first_ones(running)]
+    while running:
+        yield from [(running.pop(future), future) for future in first_ones(running)]
+
+
+def _first_ones(futures: Iterable) -> Iterable:
+    return wait(futures, return_when=FIRST_COMPLETED).done
+
+
+class _Threads(ThreadPoolExecutor):
+    """Threads; what is under way is waited for at the end, what is not is dropped."""
+
+    def __exit__(self, *_: object) -> None:
+        self.shutdown(cancel_futures=True)
+
+
+class Processes(ProcessPoolExecutor):
+    """Processes with one thread each: more threads than processors only wait for each other.
+
+    Each starts as a fresh interpreter, since Open3D's threads do not survive a fork; the linear algebra
+    library reads its number of threads when it is loaded. They end at once when this end of a pipe closes,
+    which it does at an error here, a stop from the keyboard, and however this process dies.
+    """
+
+    def __init__(self, n: int) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._theirs, self._ours = context.Pipe(duplex=False)
+        super().__init__(n, context, _begin, (self._theirs,))
+
+    def submit(self, *arguments: Any, **named: Any) -> Any:
+        """As any executor's; it may start a process."""
+        with with_variables(**_ONE_THREAD):
+            return super().submit(*arguments, **named)
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        if kind is not None:
+            self._ours.close()
+        self.shutdown(cancel_futures=True)
+        for end in (self._ours, self._theirs):
+            end.close()
+
+
+def _begin(pipe: Any) -> None:
+    """What a process does first."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the caller's, who ends this one
+    cv2.setNumThreads(1)
+    threading.Thread(target=_end_with, args=(pipe,), daemon=True).start()
+
+
+def _end_with(pipe: Any) -> None:
+    with suppress(EOFError, OSError):
+        pipe.recv_bytes()  # nothing is ever written: this ends when the other end closes
+    os._exit(1)
+
+
+class _OneThread:
+    """Holds OpenCV to one thread: the jobs are what is spread.
+
+    The number is the whole process's: the first of several who want it sets it, the last one restores it.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._depth, self._before = threading.Lock(), 0, 0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._depth == 0:
+                self._before = cv2.getNumThreads()
+                cv2.setNumThreads(1)
+            self._depth += 1
+
+    def __exit__(self, *_) -> None:
+        with self._lock:
+            self._depth -= 1
+            if self._depth == 0:
+                cv2.setNumThreads(self._before)
+
+
+single_threaded_opencv = _OneThread()

@@ -1,0 +1,131 @@
+"""Whether a run says what the reference run said: value by value, of what its pages show.
+
+The reference run of a profile lies in `data/reference/PROFILE/`, a folder per notebook: its `values.json`,
+the tables it shows, and its stamp; `tools/reference.py` writes it.
+"""
+
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import read_json
+
+REFERENCE_DIR = DATA_DIR / "reference"
+TOLERANCE = 1e-6  # relative: other processors round elsewhere
+WITHIN_TOLERANCE = ["same", "within 1e-6", "within the interval"]
+VERDICTS = [*WITHIN_TOLERANCE, "outside"]
+MEASURED_NAME = "time"
+"""Name of the one figure or table of a page that draws or lists times."""
+Output = tuple[Any, float, float]
+_BOUND = re.compile(r"(?:.*_)?(low|high)(?:_.*)?")
+
+
+def is_measured(name: str) -> bool:
+    """Whether a table, a column or a value holds times, which no other run can repeat.
+
+    Examples
+    --------
+    >>> [is_measured(name) for name in ("time", "median_time_ms", "times")]
+    [True, True, False]
+    """
+    return name == MEASURED_NAME or name.endswith("time_ms")
+
+
+def outputs(folder: Path, tables: list[str]) -> dict[str, Output]:
+    """What a notebook recorded and showed, by name: the value and the bounds of its interval, or NaN.
+
+    Bounds are the columns `low` and `high` (or `x_low`, `low_m` ...) that follow that of the value, and are
+    no outputs themselves.
+
+    Parameters
+    ----------
+    folder : Path
+        Of its results.
+    tables : list of str
+        File names of tables; those that are not there have no outputs.
+
+    Returns
+    -------
+    dict of str to (object, float, float)
+    """
+    found = {name: (value, math.nan, math.nan) for name, value in _leaves(read_json(folder / "values.json"))}
+    for file in tables:
+        table = pd.read_parquet(folder / file) if (folder / file).is_file() else pd.DataFrame()
+        columns = list(table)
+        for k, column in enumerate(columns):
+            if _BOUND.fullmatch(column) or is_measured(column):
+                continue
+            bounds = [match[1] for name in columns[k + 1 : k + 3] if (match := _BOUND.fullmatch(name))]
+            interval = table[columns[k + 1 : k + 3]] if bounds == ["low", "high"] else None
+            for row, value in enumerate(table[column].tolist()):
+                low, high = (math.nan, math.nan) if interval is None else interval.iloc[row]
+                found[f"{Path(file).stem}, {column}, row {row + 1}"] = value, low, high
+    return found
+
+
+def _leaves(value: Any, at: str = "") -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for key, item in value.items():
+            if not is_measured(key):
+                yield from _leaves(item, f"{at}.{key}".lstrip("."))
+    else:
+        yield at, value
+
+
+def verdict(reference: Output | None, own: Output | None) -> str:
+    """One of `VERDICTS`.
+
+    Examples
+    --------
+    >>> [verdict((0.5, 0.4, 0.6), (own, 0.0, 1.0)) for own in (0.5, 0.5 + 1e-8, 0.55, 0.7)]
+    ['same', 'within 1e-6', 'within the interval', 'outside']
+    """
+    if reference is None or own is None:
+        return VERDICTS[3]
+    (value, low, high), (mine, *_) = reference, own
+    if repr(value) == repr(mine):  # NaN is NaN
+        return VERDICTS[0]
+    if not (isinstance(value, int | float) and isinstance(mine, int | float)):
+        return VERDICTS[3]
+    if math.isclose(value, mine, rel_tol=TOLERANCE):
+        return VERDICTS[1]
+    return VERDICTS[2] if low <= mine <= high else VERDICTS[3]
+
+
+def compare(reference: Path, results: Path) -> tuple[pd.DataFrame, dict[str, str]]:
+    """Every output of the reference run, or of this one, beside the other's.
+
+    Parameters
+    ----------
+    reference, results : Path
+        A folder per notebook in each.
+
+    Returns
+    -------
+    pd.DataFrame
+        A row per output: `notebook`, `output`, `reference`, `own`, `verdict`.
+    dict of str to str
+        Why a notebook is not compared, by its name.
+    """
+    rows, left_out = [], {}
+    for folder in sorted(path.parent for path in reference.glob("*/provenance.json")):
+        own = results / folder.name
+        if not (own / "provenance.json").is_file():
+            left_out[folder.name] = "was not run"
+            continue
+        given = [read_json(path / "provenance.json")["parameters"] for path in (folder, own)]
+        if given[0] != given[1]:
+            left_out[folder.name] = "was run with other parameters"
+            continue
+        tables = [path.name for path in sorted(folder.glob("*.parquet"))]
+        one, other = outputs(folder, tables), outputs(own, tables)
+        for name in one | other:
+            pair = one.get(name), other.get(name)
+            shown = [None if output is None else output[0] for output in pair]
+            rows.append((folder.name, name, *shown, verdict(*pair)))
+    return pd.DataFrame(rows, columns=["notebook", "output", "reference", "own", "verdict"]), left_out
