@@ -29,8 +29,9 @@ class _Page(HTMLParser):
         self._inside = tag
         if tag == "img" and _says_nothing(given.get("alt", "")):
             self.problems.append(f"image without alt text: {given.get('src', '')[:60]}")
-        if "hicp-scene" in given.get("class", "") and not given.get("aria-label", "").strip():
-            self.problems.append("3D scene without a description")
+        is_moving = tag == "video" or "hicp-scene" in given.get("class", "")
+        if is_moving and not given.get("aria-label", "").strip():
+            self.problems.append("film or 3D scene without a description")
         is_harmless = set(given.get("rel", "").lower().split()) & _HARMLESS_LINKS
         loading = _LOADING if tag != "link" else () if is_harmless else ("href",)
         for name in loading:

@@ -1,6 +1,6 @@
-"""The robot's body as thick lines, for drawing it in 3D and for telling it from people.
+"""The robot's body as thick lines, and where its links are.
 
-Ends are origins of links; thicknesses are rough, to be looked at, not measured with.
+Ends are origins of links; thicknesses are rough. What the robot looks like: `hicp_lib.robot.shape`.
 """
 
 from typing import NamedTuple
@@ -10,7 +10,8 @@ import numpy as np
 from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
 
-_UPPER_ARM_M, _FOREARM_M, _HAND_M = 0.035, 0.03, 0.025
+_UPPER_ARM_M, _FOREARM_M, _HAND_M, _FINGERS_M = 0.035, 0.03, 0.025, 0.035
+_TIPS_M = 0.075  # from the origin of the hand's link along its x axis to the fingertips
 _CAPSULES = (
     ("torso", "root", "head torso", 0.07),
     ("shoulders", "left shoulder_pitch", "right shoulder_pitch", 0.05),
@@ -19,11 +20,13 @@ _CAPSULES = (
     ("left_upper_arm", "left shoulder_pitch", "left upper_arm", _UPPER_ARM_M),
     ("left_forearm", "left elbow", "left forearm", _FOREARM_M),
     ("left_hand", "left forearm", "left hand", _HAND_M),
+    ("left_fingers", "left hand", "left tips", _FINGERS_M),
     ("right_upper_arm", "right shoulder_pitch", "right upper_arm", _UPPER_ARM_M),
     ("right_forearm", "right elbow", "right forearm", _FOREARM_M),
     ("right_hand", "right forearm", "right hand", _HAND_M),
+    ("right_fingers", "right hand", "right tips", _FINGERS_M),
 )
-"""Part, chain and link where it begins and where it ends, radius in metres."""
+"""Part, chain and link where it begins and where it ends, radius in metres; fingers with the thumb."""
 
 
 class Segment(NamedTuple):
@@ -32,7 +35,8 @@ class Segment(NamedTuple):
     Attributes
     ----------
     part : str
-        "torso", "shoulders", "neck", "head", "left_upper_arm", "left_forearm", "left_hand", ...
+        "torso", "shoulders", "neck", "head", "left_upper_arm", "left_forearm", "left_hand",
+        "left_fingers", ...
     start_m, end_m : array, shape (3,)
     radius_m : float
     """
@@ -54,7 +58,7 @@ def body_segments(icub: ICub, posture: Posture) -> list[Segment]:
     Returns
     -------
     list of Segment
-        Ten, torso first.
+        Twelve, torso first.
 
     Examples
     --------
@@ -62,8 +66,30 @@ def body_segments(icub: ICub, posture: Posture) -> list[Segment]:
     >>> [segment.part for segment in body_segments(load_icub(), Posture())][:5]
     ['torso', 'shoulders', 'neck', 'head', 'left_upper_arm']
     """
-    origin_m = {"root": np.zeros(3)}
-    for chain in ("head", "left", "right"):
-        poses = icub.chains[chain].T_root_links(posture.angles(chain))
-        origin_m |= {f"{chain} {link}": T[:3, 3] for link, T in poses.items()}
+    poses = link_poses(icub, posture)
+    origin_m = {link: T[:3, 3] for link, T in poses.items()}
+    for side in ("left", "right"):
+        origin_m[f"{side} tips"] = origin_m[f"{side} hand"] + _TIPS_M * poses[f"{side} hand"][:3, 0]
     return [Segment(part, origin_m[start], origin_m[end], radius) for part, start, end, radius in _CAPSULES]
+
+
+def link_poses(icub: ICub, posture: Posture, mount: str = "tilted") -> dict[str, np.ndarray]:
+    """Poses of all links in the root frame.
+
+    Parameters
+    ----------
+    icub : ICub
+    posture : Posture
+    mount : str, optional
+        Holder of the camera on the head.
+
+    Returns
+    -------
+    dict of str to array, shape (4, 4)
+        By chain and link, such as "left forearm"; "root" and "camera" are their own.
+    """
+    poses = {"root": np.eye(4), "camera": icub.T_root_camera(posture.angles("head"), mount)}
+    for chain in ("head", "left", "right"):
+        links = icub.chains[chain].T_root_links(posture.angles(chain))
+        poses |= {f"{chain} {link}": T for link, T in links.items()}
+    return poses

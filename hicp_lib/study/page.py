@@ -113,18 +113,21 @@ class Study:
             downloads += ["svg", "parquet", "csv"]
         self._show_image(name, content, figure.alt, figure.caption, downloads)
 
-    def animation(self, name: str, webp: bytes, caption: str, alt: str) -> None:
-        """Save an animated WebP and show it; it plays offline, on its own.
+    def animation(self, name: str, film: bytes, caption: str, alt: str) -> None:
+        """Save a film and show it with the browser's controls; nothing moves before a reader starts it.
 
         Parameters
         ----------
         name : str
-        webp : bytes
-            The file's content.
+        film : bytes
+            Content of an MP4 file.
         caption, alt : str
         """
-        write_bytes(self.folder / f"{name}.webp", webp)
-        self._show_image(name, webp, alt, caption, ["webp"])
+        write_bytes(self.folder / f"{name}.mp4", film)
+        self._captions[name] = {"file": f"{name}.mp4", "caption": caption, "alt": alt}
+        words, source = html.escape(alt), _inline("video/mp4", film)
+        body = f'<video controls loop muted playsinline aria-label="{words}" src="{source}">{words}</video>'
+        self._show_figure(name, body, caption, ["mp4"])
 
     def scene(self, name: str, scene: go.Figure, caption: str, alt: str) -> None:
         """Save an interactive 3D scene (its data as JSON) and show it.
@@ -198,7 +201,7 @@ class Study:
         """Show the first of the downloads, an image."""
         kind = downloads[0]
         self._captions[name] = {"file": f"{name}.{kind}", "caption": caption, "alt": alt}
-        source = f"data:image/{kind};base64,{base64.b64encode(content).decode()}"
+        source = _inline(f"image/{kind}", content)
         self._show_figure(name, f'<img src="{source}" alt="{html.escape(alt)}">', caption, downloads)
 
     def _show_figure(self, name: str, body: str, caption: str, downloads: list[str]) -> None:
@@ -206,6 +209,10 @@ class Study:
         links = " ".join(link.format(kind, kind.upper()) for kind in downloads)
         caption = f'{html.escape(caption)} <span class="hicp-download">{links}</span>'
         display(HTML(f'<figure class="hicp" id="{name}">{body}<figcaption>{caption}</figcaption></figure>'))
+
+
+def _inline(kind: str, content: bytes) -> str:
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
 def _rendered(figure, kind: str) -> bytes:

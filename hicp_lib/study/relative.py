@@ -17,7 +17,7 @@ from hicp_lib.lifting.table import lift_found
 from hicp_lib.recordings.recording import Recording, read_joints, read_truth
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
 from hicp_lib.robot.posture import Posture
-from hicp_lib.robot.segments import Segment, body_segments
+from hicp_lib.robot.shape import Shape, robot_shape
 from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.study.mocap import detect_frames
 
@@ -115,11 +115,11 @@ def true_positions(views: Mapping[str, Recording]) -> dict[str, pd.DataFrame] | 
     return None if any(table is None for table in truth.values()) else truth
 
 
-def robot_body(views: Mapping[str, Recording]) -> list[Segment]:
-    """The robot's body in the first view's first frame (base frame); empty where joints are not known."""
+def robot_body(views: Mapping[str, Recording]) -> Shape | None:
+    """The robot in the first view's first frame (base frame); None where joints are not known."""
     recording = next(iter(views.values()))
     joints, columns = read_joints(recording), [f"{name}_rad" for name in HEAD_JOINTS]
     if joints is None or not set(columns) <= set(joints):
-        return []
+        return None
     head_rad = joints.set_index("frame").loc[0, columns].to_numpy(float)
-    return body_segments(load_icub(), Posture(head_rad[:3], head_rad[3:]))
+    return robot_shape(load_icub(), Posture(head_rad[:3], head_rad[3:]), "level")

@@ -36,7 +36,7 @@ def robot_spheres(icub: ICub, skin: Skin, posture: Posture) -> tuple[np.ndarray,
     taxels, _ = skin.in_root(icub, posture)
     places, radii = [taxels], [np.zeros(len(taxels))]
     for segment in body_segments(icub, posture):
-        if segment.part.startswith(("left", "right")):
+        if segment.part.endswith(("arm", "hand")):
             n = 2 + int(np.linalg.norm(segment.end_m - segment.start_m) / _STEP_M)
             places.append(np.linspace(segment.start_m, segment.end_m, n))
             radii.append(np.full(n, segment.radius_m))

@@ -1,42 +1,42 @@
-"""Pictures of a run: what the camera sees beside robot and person in space, as a strip and as an animation.
+"""Pictures of a run: what the camera sees beside what an onlooker sees, as a strip and as a film.
 
-Robot and person are drawn in parallel projection; a taxel is the darker red the more it is threatened.
+A taxel is the darker red and the larger the more it is threatened; those behind something shine through.
 """
 
-import io
+import tempfile
 from collections.abc import Sequence
+from pathlib import Path
 
+import cv2
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import LineCollection
-from PIL import Image
 
-from hicp_lib.core.keypoints import LIMBS
+from hicp_lib.core.camera import transform
+from hicp_lib.core.errors import InputError
 from hicp_lib.experiments.avoidance.closed_loop import start_posture
+from hicp_lib.experiments.avoidance.onlooker import CAMERA, onlooker_view
 from hicp_lib.experiments.avoidance.reaching import LEAVES_S, NEAR_S, script
+from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
 from hicp_lib.experiments.avoidance.runs import Run, image
-from hicp_lib.experiments.laboratory import in_root
+from hicp_lib.experiments.laboratory import T_WORLD_ROOT
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
-from hicp_lib.robot.posture import Posture
-from hicp_lib.robot.segments import body_segments
 from hicp_lib.robot.skin import read_skin
+from hicp_lib.simulation.rendering.camera import project_world
 from hicp_lib.study.avoidance import SURE, sure_keypoints
 from hicp_lib.study.plots.avoidance import condition_colour
 from hicp_lib.study.plots.people import draw_people, picture_grid
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 
-_TURN_RAD, _TILT_RAD = np.radians(35.0), np.radians(18.0)  # of the view: to the side, from above
-_LIMITS_M = ((-1.2, 0.3), (-0.48, 0.7))
-_PERSON_COLOUR = "#666666"
-_LOWERED_M = 0.1  # the picture's origin lies above the root
-_WEBP = {"quality": 55, "method": 4}
+_THREATENED = 0.05  # activation from which a taxel is drawn
+_MOST = 0.5  # activation of the darkest
+_VP9 = cv2.VideoWriter.fourcc(*"vp09")
 
 
 @in_style
 def filmstrip(run: Run, times_s: Sequence[float], note: str) -> Figure:
-    """Some moments of a run, one column each: the camera's picture, and robot and person in space.
+    """Some moments of a run, one column each: the camera's picture, and an onlooker's.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def filmstrip(run: Run, times_s: Sequence[float], note: str) -> Figure:
     return Figure(
         figure,
         f"{run.job.trial.script}, {run.job.condition}: the image the robot last took with what was found in "
-        f"it, and robot and person in space, threatened taxels red. Data: {note}.",
+        f"it, and what an onlooker sees: threatened taxels red, keypoints as dots. Data: {note}.",
         f"{len(times_s)} moments: the person comes near and the robot's arm gives way; never nearer than "
         f"{nearest:.1f} cm.",
     )
@@ -86,8 +86,8 @@ def nearest_views(runs: Sequence[Run], note: str) -> Figure:
     )
 
 
-def animation(run: Run, rate_hz: float = 6.0, dpi: int = 64) -> bytes:
-    """The same as an animated WebP in real time.
+def animation(run: Run, rate_hz: float = 5.0, dpi: int = 60) -> bytes:
+    """The same as a film in real time.
 
     Parameters
     ----------
@@ -99,26 +99,35 @@ def animation(run: Run, rate_hz: float = 6.0, dpi: int = 64) -> bytes:
     Returns
     -------
     bytes
-        The file's content.
+        Of an MP4 file (VP9), which browsers play.
+
+    Raises
+    ------
+    InputError
+        If OpenCV was built without VP9.
     """
-    pictures, times_s = [], np.arange(0, run.cycles["t_s"].iloc[-1], 1 / rate_hz).tolist()
-    with mpl.rc_context({"figure.constrained_layout.use": True, "font.size": 10}):
-        figure, (camera, space) = new_figure(1, 2, 10.4, 4.0, width_ratios=[1.15, 1])
-        canvas = FigureCanvasAgg(figure)
+    times_s = np.arange(0, run.cycles["t_s"].iloc[-1], 1 / rate_hz).tolist()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        mpl.rc_context({"figure.constrained_layout.use": True, "font.size": 10}),
+    ):
+        figure, (camera, space) = new_figure(1, 2, 10.0, 4.0, width_ratios=[0.8, 1])
+        canvas, path = FigureCanvasAgg(figure), Path(folder, "film.mp4")
         figure.set_dpi(dpi)
-        _draw_moment(camera, space, run, times_s[0])
-        canvas.draw()
-        figure.set_layout_engine("none")  # all pictures are laid out like the first
+        size_px = tuple(length // 2 * 2 for length in canvas.get_width_height())  # VP9 halves colours
+        film = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, _VP9, rate_hz, size_px)
+        if not film.isOpened():
+            raise InputError("this OpenCV writes no VP9 films; install opencv-python-headless of PyPI")
         for time_s in times_s:
             for drawn in [artist for axis in (camera, space) for artist in (*axis.images, *axis.collections)]:
                 drawn.remove()
             _draw_moment(camera, space, run, time_s)
             canvas.draw()
-            pictures.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]))
-    content, period_ms = io.BytesIO(), round(1000 / rate_hz)
-    sequence = {"save_all": True, "append_images": pictures[1:], "duration": period_ms, "loop": 0}
-    pictures[0].save(content, "webp", **sequence, **_WEBP)
-    return content.getvalue()
+            figure.set_layout_engine("none")  # all pictures are laid out like the first
+            rgb = np.asarray(canvas.buffer_rgba())[: size_px[1], : size_px[0], :3]
+            film.write(np.ascontiguousarray(rgb[..., ::-1]))
+        film.release()
+        return path.read_bytes()
 
 
 def _draw_moment(camera, space, run: Run, time_s: float) -> None:
@@ -143,35 +152,26 @@ def _drawn(run: Run, frame: pd.Series) -> np.ndarray:
 
 
 def _draw_space(axis, run: Run, cycle: pd.Series, frame: pd.Series | None) -> None:
-    trial = run.job.trial
-    truth_m = in_root(script(trial.script, trial.subject).person_at(cycle["t_s"]).keypoints_m)
     posture = start_posture().moved("left", np.array([cycle[f"{joint}_rad"] for joint in ARM_JOINTS]))
-    _draw_robot(axis, posture)
-    limbs = np.stack(_project(truth_m[np.array(LIMBS)]), axis=-1)
-    axis.add_collection(LineCollection(list(limbs), linewidths=1.2, colors=_PERSON_COLOUR, zorder=2))
-    positions, _ = read_skin().in_root(load_icub(), posture)
-    u, v = _project(positions)
-    axis.scatter(u, v, c=np.asarray(cycle["activations"]), s=9, cmap="Reds", vmin=0, vmax=0.5, lw=0, zorder=3)
+    robot = robot_surfaces(load_icub(), posture, with_head=True)
+    world, _ = script(run.job.trial.script, run.job.trial.subject).at(cycle["t_s"], [])
+    axis.imshow(onlooker_view(world, robot))
+    activations = np.asarray(cycle["activations"])
+    threatened = np.flatnonzero(activations > _THREATENED)
+    threatened = threatened[np.argsort(activations[threatened])]
+    shares = np.minimum(activations[threatened] / _MOST, 1)
+    places_m, _ = read_skin().in_root(load_icub(), posture)
+    style = {"cmap": "YlOrRd", "vmin": 0, "vmax": 1, "lw": 0.4, "edgecolors": "#3D0008"}
+    axis.scatter(*_seen_px(places_m[threatened]), c=shares, s=6 + 22 * shares, zorder=3, **style)
     if frame is not None:
         points_m, is_sure, _ = sure_keypoints(frame)
-        u, v = _project(points_m[is_sure])
-        axis.scatter(u, v, s=8, color=condition_colour(run.job.condition), zorder=4)
-    axis.set(xlim=_LIMITS_M[0], ylim=_LIMITS_M[1], aspect="equal")
+        colour = condition_colour(run.job.condition)
+        axis.scatter(*_seen_px(points_m[is_sure]), s=9, color=colour, lw=0.4, edgecolors="white", zorder=4)
+    axis.set(xlim=(-0.5, CAMERA.width_px - 0.5), ylim=(CAMERA.height_px - 0.5, -0.5))
     axis.axis("off")
 
 
-def _draw_robot(axis, posture: Posture) -> None:
-    points_per_m = 72 * axis.get_position().width * axis.figure.get_figwidth() / np.ptp(_LIMITS_M[0])
-    segments = body_segments(load_icub(), posture)
-    ends = np.stack(_project(np.stack([(s.start_m, s.end_m) for s in segments])), axis=-1)
-    widths = [2 * segment.radius_m * points_per_m for segment in segments]
-    bars = LineCollection(list(ends), linewidths=widths, colors="#C9CED6", capstyle="round", zorder=0)
-    axis.add_collection(bars)
-
-
-def _project(points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (..., 3) of the root frame as they lie in the picture: to the right, and up."""
-    x, y, z = np.moveaxis(np.asarray(points_m, float), -1, 0)
-    right = np.cos(_TURN_RAD) * x - np.sin(_TURN_RAD) * y
-    away = np.sin(_TURN_RAD) * x + np.cos(_TURN_RAD) * y
-    return right, np.cos(_TILT_RAD) * z - np.sin(_TILT_RAD) * away - _LOWERED_M
+def _seen_px(points_m: np.ndarray) -> np.ndarray:
+    """Points (n, 3) of the root frame in the onlooker's picture, (2, n)."""
+    pixels_px, _ = project_world(CAMERA, transform(T_WORLD_ROOT, points_m))
+    return pixels_px.T

@@ -5,7 +5,7 @@ one line or one cloud for Plotly, in single precision, so the page stays small.
 """
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -14,12 +14,11 @@ import plotly.graph_objects as go
 from hicp_lib.core.camera import Camera, deproject, transform
 from hicp_lib.evaluation.space.stability import POSITION
 from hicp_lib.recordings.recording import Recording, read_depth_m, read_rgb
-from hicp_lib.robot.segments import Segment
+from hicp_lib.robot.shape import Shape
 from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
 from hicp_lib.study.plots.skeleton import limb_lines
 from hicp_lib.study.plots.style import in_words
 
-ROBOT_COLOUR = "#5F6B7A"
 VIEW_STYLES = (("#E377C2", "solid"), ("#17BECF", "dash"))  # of its cameras, and of its skeletons' lines
 _FRUSTUM_DEPTH_M = 0.05
 _EYE = {"x": 0.6, "y": 1.4, "z": 0.6}  # from in front of the robot, to its right
@@ -29,7 +28,7 @@ _PEN_UP = np.full((1, 3), np.nan)
 def scene(
     recordings: Mapping[str, Recording],
     medians: pd.DataFrame,
-    robot: Sequence[Segment] = (),
+    robot: Shape | None = None,
     truth: Mapping[str, pd.DataFrame] | None = None,
 ) -> go.Figure:
     """The scene; every entry of its legend can be switched off.
@@ -41,8 +40,8 @@ def scene(
     medians : pd.DataFrame
         As from `hicp_lib.evaluation.space.stability.median_positions`, one method; one skeleton per view and
         detector.
-    robot : sequence of Segment
-        The robot's body in the base frame; empty where the joints are not known.
+    robot : Shape, optional
+        The robot in the base frame; None where the joints are not known.
     truth : mapping of str to pd.DataFrame, optional
         By view, columns `keypoint, x_m, y_m, z_m`, of which the first is drawn; None where not known.
 
@@ -52,9 +51,8 @@ def scene(
     """
     first = next(iter(recordings))
     traces = [point_cloud(recordings[first], 0)]
-    if robot:
-        ends = [np.concatenate([[segment.start_m, segment.end_m], _PEN_UP]) for segment in robot]
-        traces.append(_line(np.concatenate(ends), "robot", ROBOT_COLOUR, 14))
+    if robot is not None:
+        traces.append(_solid(robot, "robot"))
     styles = dict(zip(recordings, itertools.cycle(VIEW_STYLES), strict=False))
     for view, recording in recordings.items():
         lines = _frusta(recording.intrinsics, recording.T_base_cam)
@@ -103,6 +101,14 @@ def point_cloud(
     x, y, z = transform(recording.T_base_cam[frame], in_camera).astype(np.float32).T
     marker = {"size": 2, "color": [f"#{bytes(colour).hex()}" for colour in colours[near]]}
     return go.Scatter3d(x=x, y=y, z=z, mode="markers", marker=marker, name="point cloud", hoverinfo="skip")
+
+
+def _solid(shape: Shape, name: str) -> go.Mesh3d:
+    (x, y, z), (i, j, k) = shape.vertices_m.T, shape.triangles.astype(np.uint16).T
+    colours = np.round(255 * shape.colours ** (1 / 2.2)).astype(np.uint8)
+    painted = [f"#{bytes(colour).hex()}" for colour in colours]
+    said = {"name": name, "hoverinfo": "name", "showlegend": True}
+    return go.Mesh3d(x=x, y=y, z=z, i=i, j=j, k=k, vertexcolor=painted, **said)
 
 
 def _line(points_m: np.ndarray, name: str, colour: str, width: float, dash: str = "solid") -> go.Scatter3d:
