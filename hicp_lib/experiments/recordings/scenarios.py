@@ -98,7 +98,8 @@ def _capture_moving(
 ) -> tuple[MotionCapture, np.ndarray]:
     scene = moving_person(subject)
     vertices = marker_vertices(scene.appearance.shape)
-    return capture(scene.person_at, vertices, T_world_camera, (scene.table.mesh,), duration_s, subject)
+    obstacles = (scene.table.mesh,) if scene.table else ()
+    return capture(scene.person_at, vertices, T_world_camera, obstacles, duration_s, subject)
 
 
 SCENARIOS = {f"relative-{view}": _relative(view) for view in VIEWS} | {
