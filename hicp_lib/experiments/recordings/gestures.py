@@ -150,7 +150,7 @@ class Gestures:
         yield from self._walk(self.rng.uniform((-0.22, DISTANCE_M - 0.02), (0.22, DISTANCE_M + 0.2)))
 
     def _step_away(self, corners_m: tuple[tuple[float, float], tuple[float, float]]) -> Iterator[Move]:
-        """To a place in a rectangle, on the one side or the other; something with the arms there; and back."""
+        """To a place in a rectangle on either side; something with the arms there; and back."""
         home_m, side = np.array(self.place_m), self.rng.choice([-1, 1])
         yield from self._walk(self.rng.uniform(*corners_m) * (side, 1))
         yield from self._gesture(str(self.rng.choice(["hips", "crossed", "face"])))
@@ -165,7 +165,9 @@ class Gestures:
             side = ("left", "right")[(first + k) % 2]
             lifted = {f"{side}_hip_flexion": 0.5, f"{side}_knee_flexion": 0.7, f"{side}_hip_abduction": 0.12}
             middle_m, end_m = (start_m + (k + part) / n_steps * (to_m - start_m) for part in (0.5, 1))
-            yield Move(0.45, Posture(self.now.joints | self.legs | lifted, (float(middle_m[0]), float(middle_m[1]))))
+            yield Move(
+                0.45, Posture(self.now.joints | self.legs | lifted, (float(middle_m[0]), float(middle_m[1])))
+            )
             self.place_m = (float(end_m[0]), float(end_m[1]))
             self.now = self._standing(self.now.joints)
             yield Move(0.45, self.now)
