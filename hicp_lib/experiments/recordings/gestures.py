@@ -3,8 +3,9 @@ the table between them; and what takes parts of the body out of the image: raise
 it or close, bends down, puts the hands behind the back.
 """
 
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial, reduce
+from operator import or_
 
 import numpy as np
 
@@ -37,6 +38,7 @@ _HIGH_DEG: Ranges = {
 }  # fmt: skip
 _BENT_DEG: Ranges = {"spine_flexion": (60, 78), "neck_flexion": (-10, 30)}
 _HANGING_DOWN_DEG: Ranges = {"shoulder_flexion": (55, 85), "elbow_flexion": (0, 25)}  # of whoever bends down
+_AROUND_DEG = {"shoulder_flexion": -25.0, "shoulder_abduction": 35.0, "elbow_flexion": 25.0}
 _ASIDE_M = ((0.6, DISTANCE_M), (0.95, DISTANCE_M + 0.2))  # half out of the image; two corners, (x, y)
 _CLOSE_M = ((-0.15, 0.75), (0.15, 1.05))  # torso and arms are in it
 _STEP_M = 0.5  # the longest
@@ -84,12 +86,15 @@ class Gestures:
         return Posture({k: v for k, v in joints.items() if not k.endswith(_LEGS)} | self.legs, self.place_m)
 
     def _gesture(self, kind: str) -> Iterator[Move]:
+        yield from self._go(self._free(lambda: sample_joints(self.rng, self.body, kind, self.shape)))
+
+    def _free(self, draw: Callable[[], Joints]) -> Posture:
+        """The first posture drawn that the person can go to; at ease where there is none."""
         for _ in range(_N_TRIES):
-            posture = self._standing(sample_joints(self.rng, self.body, kind, self.shape))
+            posture = self._standing(draw())
             if self._is_free(posture):
-                yield from self._go(posture)
-                return
-        yield from self._go(self.at_ease())
+                return posture
+        return self.at_ease()
 
     def _touch_table(self) -> Iterator[Move]:
         """Lean forward, one or both hands onto the table."""
@@ -122,27 +127,31 @@ class Gestures:
 
     def _raise_high(self) -> Iterator[Move]:
         """One arm or both, beyond the upper edge of the image."""
-        joints = self.at_ease().joints
-        for side in self.rng.permutation(["left", "right"])[: self.rng.integers(1, 3)]:
-            joints = joints | uniform(self.rng, _HIGH_DEG, f"{side}_")
-        yield from self._go(self._standing(joints))
+        sides = self.rng.permutation(["left", "right"])[: self.rng.integers(1, 3)]
+        yield from self._go(self._free(lambda: self._at_ease_but(_HIGH_DEG, sides)))
+
+    def _at_ease_but(self, arms: Ranges, sides: Iterable[str] = ("left", "right")) -> Joints:
+        drawn = (uniform(self.rng, arms, f"{side}_") for side in sides)
+        return reduce(or_, drawn, self.at_ease().joints)
 
     def _behind_back(self) -> Iterator[Move]:
-        """Both hands behind the back, where the trunk hides them."""
+        """Both hands behind the back, where the trunk hides them; around the trunk there and back."""
         joints: Joints | None = self.at_ease().joints
         centre_m, half_m = self.collision_model.trunk_at(0.3)
         for side, outward in (("left", 1), ("right", -1)):
-            behind_m = centre_m + (-half_m[0] - 0.06, outward * self.rng.uniform(0.02, 0.1), 0.0)
-            joints = joints and reach(self.body, self.shape, joints, side, behind_m, (-0.5, 1, 0))
-        if joints and within_limits(joints):
-            yield from self._go(self._standing(joints))
+            behind_m = centre_m + (-half_m[0] - 0.1, outward * self.rng.uniform(0.02, 0.1), 0.0)
+            joints = joints and reach(self.body, self.shape, joints, side, behind_m, (-0.2, 1, 0.3))
+        if joints is None:
+            return
+        around = joints | radians(_AROUND_DEG, "left_") | radians(_AROUND_DEG, "right_")
+        for angles in (around, joints, around):
+            if self._is_free(self._standing(angles)):
+                yield from self._go(self._standing(angles))
 
     def _bend(self) -> Iterator[Move]:
         """Bend down, the hands beyond the lower edge of the image."""
-        joints = self.at_ease().joints | uniform(self.rng, _BENT_DEG)
-        for side in ("left", "right"):
-            joints = joints | uniform(self.rng, _HANGING_DOWN_DEG, f"{side}_")
-        yield from self._go(self._standing(joints))
+        down = self._free(lambda: self._at_ease_but(_HANGING_DOWN_DEG) | uniform(self.rng, _BENT_DEG))
+        yield from self._go(down)
         yield from self._go(self.at_ease())
 
     def _step(self) -> Iterator[Move]:
