@@ -4,7 +4,7 @@
 subset, a detector and a group of keypoints.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -60,6 +60,34 @@ def labelled(table: pd.DataFrame, **labels: object) -> pd.DataFrame:
     {'group': ['body'], 'oks': [0.5]}
     """
     return table.assign(**labels)[[*labels, *table.columns]]
+
+
+def over_people(tables: Sequence[pd.DataFrame], n_frames: Sequence[int]) -> pd.DataFrame:
+    """Tables of frames of several people as one.
+
+    Parameters
+    ----------
+    tables : sequence of DataFrame
+        One of each person, with a column `frame`.
+    n_frames : sequence of int
+        How many frames of each there are.
+
+    Returns
+    -------
+    DataFrame
+        A column `subject`, then theirs; frames are numbered on from person to person.
+
+    Examples
+    --------
+    >>> over_people([pd.DataFrame({"frame": [0, 1]})] * 2, [3, 3]).values.tolist()
+    [[0, 0], [0, 1], [1, 3], [1, 4]]
+    """
+    starts = np.cumsum([0, *n_frames])[:-1]
+    people = [
+        labelled(table.assign(frame=table["frame"] + start), subject=k)
+        for k, (table, start) in enumerate(zip(tables, starts, strict=True))
+    ]
+    return pd.concat(people, ignore_index=True)
 
 
 def per_case(

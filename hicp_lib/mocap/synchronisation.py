@@ -13,9 +13,9 @@ with needs("analysis"):
 # At 100 Hz: up to three frames missing in a row are bridged.
 MAX_GAP_S = 0.045
 _RATE_HZ = 100.0
-_SMOOTHING_S = 0.25
-# Between camera frames at 10 Hz or more, with one frame missing.
-_CAMERA_GAP_S = 0.25
+# Over how long speeds are smoothed, and over which gap they are known, at the least: at 10 Hz or more. In
+# periods of the slower clock below that.
+_LEAST_S, _SMOOTHED_PERIODS, _GAP_PERIODS = 0.25, 2.0, 2.5
 # No wrist of a person who is not throwing anything is faster: such speeds are wrong detections.
 _MAX_SPEED_M_S = 4.0
 _MIN_OVERLAP_S = 2.0
@@ -94,9 +94,9 @@ def clock_offset(
     """The offset of clock b, from the same points seen on both clocks.
 
     The *speeds* of the points do not depend on the frame they are given in. They are smoothed
-    (Savitzky-Golay over a quarter of a second), and the offset is where their normalised
-    cross-correlation is largest, refined by a parabola through its peak. All offsets are tried at which
-    half of what was seen of the points on the one clock was also seen on the other.
+    (Savitzky-Golay over a quarter of a second, or two periods of the slower clock), and the offset is where
+    their normalised cross-correlation is largest, refined by a parabola through its peak. All offsets are
+    tried at which half of what was seen of the points on the one clock was also seen on the other.
 
     Parameters
     ----------
@@ -125,7 +125,10 @@ def clock_offset(
     >>> round(clock_offset(times_s, points_m, times_s - 0.25, points_m).offset_s, 3)
     0.25
     """
-    speeds_a, speeds_b = _speeds(times_a_s, points_a_m), _speeds(times_b_s, points_b_m)
+    period_s = max(float(np.median(np.diff(t, prepend=t[0]))) for t in (times_a_s, times_b_s))
+    speeds_a, speeds_b = (
+        _speeds(*seen, period_s) for seen in ((times_a_s, points_a_m), (times_b_s, points_b_m))
+    )
     half = len(speeds_a) // 2
     early, late = speeds_a.copy(), speeds_a.copy()
     early[half:], late[:half] = np.nan, np.nan
@@ -139,11 +142,11 @@ def clock_offset(
     return ClockOffset(offset_s, correlation, (early_s, late_s))
 
 
-def _speeds(times_s: np.ndarray, points_m: np.ndarray) -> np.ndarray:
+def _speeds(times_s: np.ndarray, points_m: np.ndarray, period_s: float = 0.0) -> np.ndarray:
     """Smoothed speeds (n, m) [m/s] at an even rate from the first time on; NaN where not known."""
     grid_s = np.arange(times_s[0], times_s[-1], 1 / _RATE_HZ)
-    positions = interpolate_mocap(times_s, points_m, grid_s, _CAMERA_GAP_S)
-    window = int(_SMOOTHING_S * _RATE_HZ) | 1
+    positions = interpolate_mocap(times_s, points_m, grid_s, max(_LEAST_S, _GAP_PERIODS * period_s))
+    window = int(max(_LEAST_S, _SMOOTHED_PERIODS * period_s) * _RATE_HZ) | 1
     if len(positions) < window:
         return np.full(positions.shape[:2], np.nan)
     velocity = savgol_filter(

@@ -12,7 +12,7 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import BODY, N_KEYPOINTS, NAMES
-from hicp_lib.evaluation.cases import labelled
+from hicp_lib.evaluation.cases import labelled, over_people
 from hicp_lib.evaluation.space.mocap_error import MIN_SCORES, TABLE_JOINTS, median_errors, mocap_errors
 from hicp_lib.evaluation.space.stability import POSITION, position_array
 from hicp_lib.lifting.table import lift_pixels
@@ -44,15 +44,20 @@ def perfect_detections(recording: Recording) -> dict[str, list[Detections]]:
 
 
 def medians_by_radius(
-    registered: Registered, points: pd.DataFrame, radii_m: Sequence[float], n_resamples: int, seed: int
+    registered: Sequence[Registered],
+    points: Sequence[pd.DataFrame],
+    radii_m: Sequence[float],
+    n_resamples: int,
+    seed: int,
 ) -> pd.DataFrame:
     """Median errors of the paper's lifting by the size of the neighbourhood that it takes depth from.
 
     Parameters
     ----------
-    registered : Registered
-    points : pd.DataFrame
-        As from `hicp_lib.lifting.table.lift_found`; of some frames, to save time.
+    registered : sequence of Registered
+        Of each person.
+    points : sequence of pd.DataFrame
+        As from `hicp_lib.lifting.table.lift_found`, of each; of some frames, to save time.
     radii_m : sequence of float
         Half the sides of the neighbourhood.
     n_resamples, seed : int
@@ -63,12 +68,17 @@ def medians_by_radius(
     pd.DataFrame
         Column `radius_m`, then as from `median_errors`, score above 0.1.
     """
-    rows = points[(points["person"] == 0) & (points["method"] == "paper")]
-    rows = rows[rows["keypoint"].isin(TABLE_JOINTS)]
-    reference = registered.reference(joints=TABLE_JOINTS)
-    reference, tables = reference[reference["frame"].isin(points["frame"])], []
-    for radius_m, lifted_m in zip(radii_m, lift_pixels(registered.recording, rows, radii_m), strict=True):
-        lifted = rows.assign(**dict(zip(POSITION, lifted_m.T, strict=True)))
-        medians = median_errors(mocap_errors(lifted, reference), MIN_SCORES[-1:], n_resamples, seed)
+    by_radius: list[list[pd.DataFrame]] = [[] for _ in radii_m]
+    for one, lifted in zip(registered, points, strict=True):
+        rows = lifted[(lifted["person"] == 0) & (lifted["method"] == "paper")]
+        rows = rows[rows["keypoint"].isin(TABLE_JOINTS)]
+        reference = one.reference(joints=TABLE_JOINTS)
+        reference = reference[reference["frame"].isin(lifted["frame"])]
+        for errors, places_m in zip(by_radius, lift_pixels(one.recording, rows, radii_m), strict=True):
+            at = rows.assign(**dict(zip(POSITION, places_m.T, strict=True)))
+            errors.append(mocap_errors(at, reference))
+    n_frames, tables = [len(one.recording) for one in registered], []
+    for radius_m, errors in zip(radii_m, by_radius, strict=True):
+        medians = median_errors(over_people(errors, n_frames), MIN_SCORES[-1:], n_resamples, seed)
         tables.append(labelled(medians, radius_m=radius_m))
     return pd.concat(tables, ignore_index=True)

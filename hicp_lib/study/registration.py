@@ -152,19 +152,20 @@ def _given(recording: Recording) -> r.Registration:
 
 
 def registration_readings(
-    registered: Registered, n_images: int = 12, noise_px: float = 1.0, n_draws: int = 100, seed: int = 0
+    people: Sequence[Registered], n_images: int = 12, noise_px: float = 1.0, n_draws: int = 100, seed: int = 0
 ) -> pd.DataFrame | None:
     """Error of `hicp_lib.mocap.eight_clicks.register_by_camera_marker` under each reading of the paper.
 
     Parameters
     ----------
-    registered : Registered
+    people : sequence of Registered
         Of motion capture with a marker on the camera.
     n_images : int
     noise_px : float
         Of the simulated clicks, as of `register`.
     n_draws : int
-        How often two of the images, and eight markers clicked in them, are drawn; the same for every reading.
+        How often, of each person, two of the images and eight markers clicked in them are drawn; the same for
+        every reading.
     seed : int
         Of clicks and draws.
 
@@ -172,18 +173,34 @@ def registration_readings(
     -------
     pd.DataFrame or None
         Columns `reading, turned_rad` (median angle to the true rotation), `added_m, low_m, high_m` (median
-        displacement of the person's markers: median and 95 % range of the draws), `n_draws`; None where the
-        recording is not simulated.
+        displacement of the person's markers: median and 95 % range over people and draws), `n_people,
+        n_draws`; None where no recording is simulated.
 
     Raises
     ------
     InputError
         If fewer than three clicks have a depth, or the camera has no marker.
     """
+    tables = [
+        _drawn_readings(one, n_images, noise_px, n_draws, seed + number)
+        for number, one in enumerate(people)
+        if one.exact is not None
+    ]
+    if not tables:
+        return None
+    of_reading = pd.concat(tables).groupby("reading", sort=False)
+    low_m, high_m = (of_reading["added_m"].quantile(percent / 100) for percent in PERCENTILES)
+    medians = of_reading[["turned_rad", "added_m"]].median()
+    counts = {"n_people": len(tables), "n_draws": of_reading.size()}
+    return medians.assign(low_m=low_m, high_m=high_m, **counts).reset_index()
+
+
+def _drawn_readings(
+    registered: Registered, n_images: int, noise_px: float, n_draws: int, seed: int
+) -> pd.DataFrame:
+    """`compare_registrations` of every reading, in every draw."""
     recording, mocap, offset_s = registered.recording, registered.mocap, registered.offset_s
     clicks, exact = simulated_clicks(recording, mocap, n_images, noise_px, seed)
-    if exact is None:
-        return None
     base = r.lift_clicks(recording, clicks, mocap, offset_s)
     sharp, _ = simulated_clicks(recording, mocap, n_images, 0.0, seed)
     sharp = r.lift_clicks(recording, sharp, mocap, offset_s)
@@ -206,11 +223,7 @@ def registration_readings(
             fit = eight_clicks.register_by_camera_marker(table.iloc[eight], at_m, centre_m, about_camera)
             found.append(replace(fit, method=name))
     some = replace(mocap, times_s=mocap.times_s[::_EVERY], points_m=mocap.points_m[::_EVERY])
-    table = compare_registrations(found, some, exact).rename(columns={"method": "reading"})
-    of_reading = table.groupby("reading", sort=False)
-    low_m, high_m = (of_reading["added_m"].quantile(percent / 100) for percent in PERCENTILES)
-    medians = of_reading[["turned_rad", "added_m"]].median()
-    return medians.assign(low_m=low_m, high_m=high_m, n_draws=n_draws).reset_index()
+    return compare_registrations(found, some, exact).rename(columns={"method": "reading"})
 
 
 def _in_common(tables: list[pd.DataFrame]) -> list[pd.DataFrame]:

@@ -68,6 +68,18 @@ def test_the_offset_is_found_in_any_frame_with_noise_and_gaps(offset, seed):
     assert found.correlation > 0.8
 
 
+@settings(max_examples=10)
+@given(st.floats(-500, 500), st.integers(0, 1000))
+def test_five_frames_a_second_are_enough_with_a_frame_missing_now_and_then(offset, seed):
+    rng = np.random.default_rng(seed)
+    camera_s, mocap_s = np.arange(0, 9.6, 0.2), np.arange(-0.5, 10.1, 0.01)
+    seen = walk(camera_s) + rng.normal(0, 0.005, (len(camera_s), 2, 3))
+    seen[rng.random(seen.shape[:2]) < 0.1] = np.nan
+    assert clock_offset(camera_s, seen, mocap_s - offset, walk(mocap_s)).offset_s == pytest.approx(
+        offset, abs=0.03
+    )
+
+
 def test_exact_positions_give_the_offset_to_a_millisecond():
     times_s = np.arange(0, 20, 0.01)
     found = clock_offset(times_s, walk(times_s), times_s - 0.1234, walk(times_s))

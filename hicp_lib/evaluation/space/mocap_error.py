@@ -4,7 +4,9 @@ The reference of a joint is the mean of its two markers, as in the paper. Simula
 the joint's centre, which no marker can sit on; errors against it are reported beside.
 
 Throughout, `errors` is the table of `mocap_errors`: one row per detector, method, joint and *frame*, also
-where nothing was found, so that what is missing counts.
+where nothing was found, so that what is missing counts; those of several people as one, with a column
+`subject`, by `hicp_lib.evaluation.cases.over_people`. Intervals are 95 % ones of a bootstrap that draws people,
+and of each blocks of frames; of one person, blocks only.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,6 +18,7 @@ from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.cases import labelled
 from hicp_lib.evaluation.space.stability import POSITION, THRESHOLDS_M
+from hicp_lib.evaluation.statistics.design import smallest_difference
 from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
 from hicp_lib.evaluation.statistics.time_blocks import block_length
 from hicp_lib.mocap.synchronisation import interpolate_mocap
@@ -127,18 +130,29 @@ def median_errors(
     -------
     DataFrame
         Columns `detector, method, keypoint, min_score, count` (frames with the keypoint above the score,
-        lifted, and motion capture), `n_frames` (with motion capture), `median_m, low_m, high_m` (95 % moving
-        block bootstrap), `found, found_low, found_high` (count as a share of `n_frames`), `centre_median_m`
-        (against the joint's centre), `block_frames`.
+        lifted, and motion capture), `n_frames, n_people` (with motion capture), `median_m, low_m, high_m`,
+        `found, found_low, found_high` (count as a share of `n_frames`), `centre_median_m` (against the
+        joint's centre), `block_frames`.
     """
     rows, block_frames = [], _block_length(errors)
     for case, part, found_m, weights in _cases(errors, min_scores, n_resamples, seed):
         found, known = np.isfinite(found_m), part["reference_x_m"].notna().to_numpy()
-        medians = with_interval(weighted_median(found_m, weights))
-        shares = with_interval(_shares(weights, found, known))
+        n_people = len(set(_subjects(part)[known]))
+        medians = with_interval(weighted_median(found_m, weights), n_people)
+        shares = with_interval(_shares(weights, found, known), n_people)
         centre_m = part["centre_error_m"].where(part["score"] > case[-1]).median()
-        rows.append((*case, found.sum(), known.sum(), *medians, *shares, centre_m, block_frames))
-    numbers = ["count", "n_frames", "median_m", "low_m", "high_m", "found", "found_low", "found_high"]
+        rows.append((*case, found.sum(), known.sum(), n_people, *medians, *shares, centre_m, block_frames))
+    numbers = [
+        "count",
+        "n_frames",
+        "n_people",
+        "median_m",
+        "low_m",
+        "high_m",
+        "found",
+        "found_low",
+        "found_high",
+    ]
     return pd.DataFrame(rows, columns=[*_CASE, "min_score", *numbers, "centre_median_m", "block_frames"])
 
 
@@ -166,19 +180,22 @@ def median_differences(
     -------
     DataFrame
         Columns `detector, method, keypoint, min_score, other` (the label of the one that is taken away),
-        `value_m, low_m, high_m` (95 % moving block bootstrap); both directions are there.
+        `value_m, low_m, high_m, n_people` (with a median by both), `detectable_m` (`smallest_difference` of
+        people's own medians); both directions are there.
     """
     labels = [*_CASE, "min_score"]
-    k, rows = labels.index(between), []
-    drawn = {
-        case: weighted_median(found_m, weights)
-        for case, _, found_m, weights in _cases(errors, min_scores, n_resamples, seed)
-    }
+    k, rows, drawn, of_people = labels.index(between), [], {}, {}
+    for case, part, found_m, weights in _cases(errors, min_scores, n_resamples, seed):
+        drawn[case] = weighted_median(found_m, weights)
+        of_people[case] = pd.Series(found_m).groupby(_subjects(part)).median()
     for case, medians_m in drawn.items():
         for other in dict.fromkeys(one[k] for one in drawn if one[k] != case[k]):
-            its_m = drawn[*case[:k], other, *case[k + 1 :]]
-            rows.append((*case, other, *with_interval(medians_m - its_m)))
-    return pd.DataFrame(rows, columns=[*labels, "other", "value_m", "low_m", "high_m"])
+            its = (*case[:k], other, *case[k + 1 :])
+            apart_m = (of_people[case] - of_people[its]).dropna()
+            interval = with_interval(medians_m - drawn[its], len(apart_m))
+            rows.append((*case, other, *interval, len(apart_m), smallest_difference(apart_m)))
+    numbers = ["value_m", "low_m", "high_m", "n_people", "detectable_m"]
+    return pd.DataFrame(rows, columns=[*labels, "other", *numbers])
 
 
 def distance_shares(
@@ -207,23 +224,28 @@ def distance_shares(
     Returns
     -------
     DataFrame
-        Columns `detector, method, keypoint, min_score, threshold_m, value, low, high` (95 % moving block
-        bootstrap); NaN where none was found.
+        Columns `detector, method, keypoint, min_score, threshold_m, value, low, high, n_people`; NaN where none
+        was found.
     """
     rows = []
     for case, part, found_m, weights in _cases(errors, min_scores, n_resamples, seed):
         of = np.isfinite(found_m) if beyond else part["reference_x_m"].notna().to_numpy()
+        n_people = len(set(_subjects(part)[of]))
         for threshold_m in thresholds_m:
             hits = found_m > threshold_m if beyond else found_m <= threshold_m
-            rows.append((*case, threshold_m, *with_interval(_shares(weights, hits, of))))
-    return pd.DataFrame(rows, columns=[*_CASE, "min_score", "threshold_m", "value", "low", "high"])
+            interval = with_interval(_shares(weights, hits, of), n_people)
+            rows.append((*case, threshold_m, *interval, n_people))
+    return pd.DataFrame(
+        rows, columns=[*_CASE, "min_score", "threshold_m", "value", "low", "high", "n_people"]
+    )
 
 
 def _cases(
     errors: pd.DataFrame, min_scores: Sequence[float], n_resamples: int, seed: int
 ) -> Iterator[tuple[tuple, pd.DataFrame, np.ndarray, np.ndarray]]:
     """Labels, rows, errors of what was found (n_frames,) and weights of frames, the same for all cases."""
-    weights = draw_counts(errors["frame"].nunique(), n_resamples, seed, _block_length(errors))
+    whose, length = _subjects(errors.drop_duplicates("frame").sort_values("frame")), _block_length(errors)
+    weights = draw_counts(whose, n_resamples, seed, length)
     for case, part in errors.groupby(_CASE, sort=False):
         part = part.sort_values("frame")
         for min_score in min_scores:
@@ -237,7 +259,13 @@ def _shares(weights: np.ndarray, hits: np.ndarray, of: np.ndarray) -> np.ndarray
     return np.where(total > 0, (weights @ (hits & of)) / np.maximum(total, 1), np.nan)
 
 
+def _subjects(errors: pd.DataFrame) -> np.ndarray:
+    """Whose each row is; all of one person where it is not said."""
+    return errors.get("subject", pd.Series(0, errors.index)).to_numpy()
+
+
 def _block_length(errors: pd.DataFrame) -> int:
     """One length for the whole table, so that its rows are comparable."""
+    frames = errors.drop_duplicates("frame").sort_values("frame")
     series = errors.pivot_table(index="frame", columns=_CASE, values="error_m", dropna=False)
-    return block_length(series.to_numpy(float))
+    return block_length(series.to_numpy(float), _subjects(frames))

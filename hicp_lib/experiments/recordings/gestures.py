@@ -1,13 +1,17 @@
 """What a person does before the robot, one gesture after another: reaches, waves, crosses the arms, touches
-the table between them, steps aside.
+the table between them; and what takes parts of the body out of the image: raises the arms, steps half out of
+it or close, bends down, puts the hands behind the back.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial, reduce
+from operator import or_
 
 import numpy as np
 
 from hicp_lib.experiments.laboratory import posed
 from hicp_lib.experiments.minimum_jerk import Move, Posture, between
+from hicp_lib.simulation.body.arms import Ranges, uniform
 from hicp_lib.simulation.body.joints import Joints, pose_from_joints, radians, within_limits
 from hicp_lib.simulation.body.model import load_body
 from hicp_lib.simulation.body.poses import sample_joints
@@ -28,6 +32,16 @@ _WAVING_DEG = {
     "elbow_flexion": 100.0, "forearm_supination": -50.0, "wrist_flexion": 0.0,
 }  # fmt: skip
 _SWINGING = (("shoulder_abduction", 1), ("elbow_flexion", -1))  # how the joints go to and fro
+_HIGH_DEG: Ranges = {
+    "shoulder_flexion": (150, 178), "shoulder_abduction": (0, 15), "shoulder_rotation": (-10, 20),
+    "elbow_flexion": (0, 25), "forearm_supination": (-60, 60),
+}  # fmt: skip
+_BENT_DEG: Ranges = {"spine_flexion": (60, 78), "neck_flexion": (-10, 30)}
+_HANGING_DOWN_DEG: Ranges = {"shoulder_flexion": (55, 85), "elbow_flexion": (0, 25)}  # of whoever bends down
+_AROUND_DEG = {"shoulder_flexion": -25.0, "shoulder_abduction": 35.0, "elbow_flexion": 25.0}
+_ASIDE_M = ((0.6, DISTANCE_M), (0.95, DISTANCE_M + 0.2))  # half out of the image; two corners, (x, y)
+_CLOSE_M = ((-0.15, 0.75), (0.15, 1.05))  # torso and arms are in it
+_STEP_M = 0.5  # the longest
 _PENETRATION_M = 0.03  # skin and clothes give way this far on the way from one posture to the next
 _N_TRIES = 12
 
@@ -40,10 +54,12 @@ class Gestures:
     rng : numpy.random.Generator
     shape : array, shape (n_shapes,)
         The person's.
+    at_table : bool, optional
+        Whether there is a table before them, to be touched, or they can come near.
     """
 
-    def __init__(self, rng: Rng, shape: np.ndarray):
-        self.rng, self.body, self.shape = rng, load_body(), shape
+    def __init__(self, rng: Rng, shape: np.ndarray, at_table: bool = True):
+        self.rng, self.body, self.shape, self.at_table = rng, load_body(), shape, at_table
         self.collision_model = collision_model(self.body, shape)
         self.place_m = (0.0, DISTANCE_M)
         drawn = sample_joints(rng, self.body, "standing", shape)
@@ -55,32 +71,30 @@ class Gestures:
         return self._standing(sample_joints(self.rng, self.body, "standing", self.shape))
 
     def moves(self) -> Iterator[Move]:
-        """Movements without end, in rounds in which each kind of gesture comes once.
-
-        The first round has a fixed order, so that a short recording holds hands that reach out.
-        """
-        gestures: list[Callable[[], Iterator[Move]]] = [
-            lambda: self._gesture("reaching"), self._touch_table, lambda: self._gesture("hips"),
-            lambda: self._gesture("reaching_both"), self._wave, lambda: self._gesture("crossed"),
-            lambda: self._gesture("face"), self._step, lambda: self._gesture("pointing"),
-        ]  # fmt: skip
-        order = np.arange(len(gestures))
+        """Movements without end, in rounds in which each kind of gesture comes once, in any order."""
+        kinds = ("reaching", "reaching_both", "hips", "crossed", "face", "pointing")
+        gestures: list[Callable[[], Iterator[Move]]] = [partial(self._gesture, kind) for kind in kinds]
+        gestures += [self._wave, self._step, self._raise_high, self._behind_back]
+        gestures += [partial(self._step_away, _ASIDE_M)]
+        gestures += [self._touch_table] if self.at_table else [partial(self._step_away, _CLOSE_M), self._bend]
         while True:
-            for k in order:
+            for k in self.rng.permutation(len(gestures)):
                 yield from gestures[k]()
-            order = self.rng.permutation(order)
 
     def _standing(self, joints: Joints) -> Posture:
         """A posture with the arms and trunk of some joints, on this person's own legs and place."""
         return Posture({k: v for k, v in joints.items() if not k.endswith(_LEGS)} | self.legs, self.place_m)
 
     def _gesture(self, kind: str) -> Iterator[Move]:
+        yield from self._go(self._free(lambda: sample_joints(self.rng, self.body, kind, self.shape)))
+
+    def _free(self, draw: Callable[[], Joints]) -> Posture:
+        """The first posture drawn that the person can go to; at ease where there is none."""
         for _ in range(_N_TRIES):
-            posture = self._standing(sample_joints(self.rng, self.body, kind, self.shape))
+            posture = self._standing(draw())
             if self._is_free(posture):
-                yield from self._go(posture)
-                return
-        yield from self._go(self.at_ease())
+                return posture
+        return self.at_ease()
 
     def _touch_table(self) -> Iterator[Move]:
         """Lean forward, one or both hands onto the table."""
@@ -111,16 +125,61 @@ class Gestures:
             self.now = self._standing(joints | radians(turned_deg, f"{side}_"))
             yield Move(0.35, self.now)
 
+    def _raise_high(self) -> Iterator[Move]:
+        """One arm or both, beyond the upper edge of the image."""
+        sides = self.rng.permutation(["left", "right"])[: self.rng.integers(1, 3)]
+        yield from self._go(self._free(lambda: self._at_ease_but(_HIGH_DEG, sides)))
+
+    def _at_ease_but(self, arms: Ranges, sides: Iterable[str] = ("left", "right")) -> Joints:
+        drawn = (uniform(self.rng, arms, f"{side}_") for side in sides)
+        return reduce(or_, drawn, self.at_ease().joints)
+
+    def _behind_back(self) -> Iterator[Move]:
+        """Both hands behind the back, where the trunk hides them; around the trunk there and back."""
+        joints: Joints | None = self.at_ease().joints
+        centre_m, half_m = self.collision_model.trunk_at(0.3)
+        for side, outward in (("left", 1), ("right", -1)):
+            behind_m = centre_m + (-half_m[0] - 0.1, outward * self.rng.uniform(0.02, 0.1), 0.0)
+            joints = joints and reach(self.body, self.shape, joints, side, behind_m, (-0.2, 1, 0.3))
+        if joints is None:
+            return
+        around = joints | radians(_AROUND_DEG, "left_") | radians(_AROUND_DEG, "right_")
+        for angles in (around, joints, around):
+            if self._is_free(self._standing(angles)):
+                yield from self._go(self._standing(angles))
+
+    def _bend(self) -> Iterator[Move]:
+        """Bend down, the hands beyond the lower edge of the image."""
+        down = self._free(lambda: self._at_ease_but(_HANGING_DOWN_DEG) | uniform(self.rng, _BENT_DEG))
+        yield from self._go(down)
+        yield from self._go(self.at_ease())
+
     def _step(self) -> Iterator[Move]:
-        """A step to the side, and perhaps nearer or further, with a knee lifted on the way."""
-        x, y = self.rng.uniform((-0.22, DISTANCE_M - 0.02), (0.22, DISTANCE_M + 0.2))
-        side = "left" if x < self.place_m[0] else "right"  # the person faces the robot: their left is -x
-        lifted = {f"{side}_hip_flexion": 0.5, f"{side}_knee_flexion": 0.7, f"{side}_hip_abduction": 0.12}
-        middle = ((self.place_m[0] + x) / 2, (self.place_m[1] + y) / 2)
-        self.place_m = (float(x), float(y))
-        yield Move(0.45, Posture(self.now.joints | self.legs | lifted, middle))
-        self.now = self._standing(self.now.joints)
-        yield Move(0.45, self.now)
+        """A step to the side, and perhaps nearer or further."""
+        yield from self._walk(self.rng.uniform((-0.22, DISTANCE_M - 0.02), (0.22, DISTANCE_M + 0.2)))
+
+    def _step_away(self, corners_m: tuple[tuple[float, float], tuple[float, float]]) -> Iterator[Move]:
+        """To a place in a rectangle on either side; something with the arms there; and back."""
+        home_m, side = np.array(self.place_m), self.rng.choice([-1, 1])
+        yield from self._walk(self.rng.uniform(*corners_m) * (side, 1))
+        yield from self._gesture(str(self.rng.choice(["hips", "crossed", "face"])))
+        yield from self._walk(home_m)
+
+    def _walk(self, to_m: np.ndarray) -> Iterator[Move]:
+        """Steps to a place, each with a knee lifted on the way."""
+        start_m = np.array(self.place_m)
+        n_steps = int(np.ceil(np.linalg.norm(to_m - start_m) / _STEP_M))
+        first = int(to_m[0] >= start_m[0])  # the person faces the robot: their left is -x
+        for k in range(n_steps):
+            side = ("left", "right")[(first + k) % 2]
+            lifted = {f"{side}_hip_flexion": 0.5, f"{side}_knee_flexion": 0.7, f"{side}_hip_abduction": 0.12}
+            middle_m, end_m = (start_m + (k + part) / n_steps * (to_m - start_m) for part in (0.5, 1))
+            yield Move(
+                0.45, Posture(self.now.joints | self.legs | lifted, (float(middle_m[0]), float(middle_m[1])))
+            )
+            self.place_m = (float(end_m[0]), float(end_m[1]))
+            self.now = self._standing(self.now.joints)
+            yield Move(0.45, self.now)
 
     def _go(self, posture: Posture) -> Iterator[Move]:
         """A movement as fast as people make it, then a pause."""

@@ -19,6 +19,8 @@ from hicp_lib.simulation.sensors.markers import marker_vertices
 HEAD_RAD = np.radians([0.0, 0.0, 0.0, 9.0, 0.0, 0.0])
 """Where the robot holds its head: a little up, so that the person is seen from the thighs to the hair."""
 
+_AT_TABLE = 0.5  # of the people; the others can step close
+
 
 @dataclass(frozen=True, eq=False)
 class MovingPerson:
@@ -28,14 +30,14 @@ class MovingPerson:
     ----------
     room : World
         Without the person.
-    table : Surface
-        In the room.
+    table : Surface or None
+        In the room, if it has one between person and robot.
     appearance : Appearance
     motion : Motion
     """
 
     room: World
-    table: Surface
+    table: Surface | None
     appearance: Appearance
     motion: Motion
 
@@ -65,7 +67,7 @@ def _staged(scene: MovingPerson, motion_s: float) -> tuple[World, PosedBody]:
 def moving_person(subject: Subject) -> MovingPerson:
     """A subject's scene: who moves how, in what room. The same in every process."""
     appearance, rng = appearance_of(subject.identity, skirts=False), subject.identity.draw("room")
-    top = table(rng, *TABLE_M, TABLE_HEIGHT_M)
-    room = furnished(rng, [top], [(0.0, DISTANCE_M, 0.8), (0.0, 0.9, 0.8)])
-    gestures = Gestures(subject.identity.draw("poses"), appearance.shape)
+    top = table(rng, *TABLE_M, TABLE_HEIGHT_M) if rng.random() < _AT_TABLE else None
+    room = furnished(rng, [top] if top else [], [(0.0, DISTANCE_M, 1.3), (0.0, 0.9, 0.8)])
+    gestures = Gestures(subject.identity.draw("poses"), appearance.shape, at_table=top is not None)
     return MovingPerson(room, top, appearance, Motion(gestures.now, gestures.moves()))

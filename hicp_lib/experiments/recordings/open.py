@@ -1,7 +1,8 @@
 """The recordings the study's notebooks look at: a lab's own, or simulated once and kept in the cache."""
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 from hicp_lib.core.cache import key
@@ -41,16 +42,70 @@ def open_experiment(
     if recording:
         opened = open_recording(recording)
         return opened if n_frames is None else first_frames(opened, n_frames)
-    # Open3D takes a second to load.
+    from hicp_lib.experiments.recordings.simulate import simulate_recording  # Open3D takes a second to load
+
+    folder, n = _kept(scenario, n_frames, subject)
+    if (folder / RGB_LIST).is_file():
+        return open_recording(folder)
+    return simulate_recording(folder, scenario, n_frames=n, subject=subject, progress=sys.stderr.isatty())
+
+
+def _kept(scenario: str, n_frames: int | None, subject: Subject) -> tuple[Path, int]:
+    """Where a simulated recording is kept, and how many frames it has."""
     from hicp_lib.experiments.recordings.scenarios import scenario as known
     from hicp_lib.experiments.recordings.simulate import simulate_recording
 
     n = known(scenario).n_frames if n_frames is None else n_frames
     result_key = key([simulate_recording], scenario=scenario, n_frames=n, subject=subject)
-    folder = cache_dir() / "recordings" / result_key[:16]
-    if (folder / RGB_LIST).is_file():
-        return open_recording(folder)
-    return simulate_recording(folder, scenario, n_frames=n, subject=subject, progress=sys.stderr.isatty())
+    return cache_dir() / "recordings" / result_key[:16], n
+
+
+def open_people(
+    scenario: str,
+    recording: str | Path | Sequence[str | Path] = "",
+    n_frames: int | None = None,
+    n_people: int = 1,
+    seed: int = 0,
+) -> list[Recording]:
+    """Open the recordings of several people, in each of which one is seen.
+
+    Parameters
+    ----------
+    scenario : str
+        As of `open_experiment`.
+    recording : str, Path or sequence of them, optional
+        Folders of a lab's own recordings, one of each person.
+    n_frames : int, optional
+        How many frames of each, from the first; all of them when left out.
+    n_people : int, optional
+        How many are simulated.
+    seed : int, optional
+        Of the simulation.
+
+    Returns
+    -------
+    list of Recording
+
+    Raises
+    ------
+    InputError
+        As of `open_experiment`, or if there is to be no one.
+    """
+    if recording:
+        folders = [recording] if isinstance(recording, str | Path) else recording
+        return [open_experiment(scenario, folder, n_frames) for folder in folders]
+    from hicp_lib.experiments.recordings.simulate import simulate_recording
+    from hicp_lib.simulation.world.batch import check_numbers, run_jobs
+
+    check_numbers(n_people=(n_people, 1, 1000))
+    people = [Subject(seed, number) for number in range(n_people)]
+    kept = [(*_kept(scenario, n_frames, who), who) for who in people]
+    missing = [one for one in kept if not (one[0] / RGB_LIST).is_file()]
+    if len(missing) > 1:  # a person to a process: who is there in what room is made once
+        jobs = [partial(simulate_recording, out, scenario, n, who, 1, False) for out, n, who in missing]
+        for _ in run_jobs(jobs):
+            pass
+    return [open_experiment(scenario, "", n_frames, who) for who in people]
 
 
 def data_note(recordings: Mapping[str, Recording]) -> str:

@@ -66,7 +66,7 @@ def scenario(name: str) -> Scenario:
     Examples
     --------
     >>> scenario("mocap").rate_hz, scenario("relative-upper").n_frames
-    (12.0, 100)
+    (5.0, 100)
     """
     if name not in SCENARIOS:
         raise InputError(f"no scenario {name!r}; choose one of {', '.join(SCENARIOS)}")
@@ -98,14 +98,15 @@ def _capture_moving(
 ) -> tuple[MotionCapture, np.ndarray]:
     scene = moving_person(subject)
     vertices = marker_vertices(scene.appearance.shape)
-    return capture(scene.person_at, vertices, T_world_camera, (scene.table.mesh,), duration_s, subject)
+    obstacles = (scene.table.mesh,) if scene.table else ()
+    return capture(scene.person_at, vertices, T_world_camera, obstacles, duration_s, subject)
 
 
 SCENARIOS = {f"relative-{view}": _relative(view) for view in VIEWS} | {
     "mocap": Scenario(
-        n_frames=480,
+        n_frames=48,
         max_frames=100_000,
-        rate_hz=12.0,
+        rate_hz=5.0,  # frames further apart say more of a person, and the clock needs seconds
         mount="level",
         head_rad=lambda n: np.tile(HEAD_RAD, (n, 1)),
         stage=lambda subject, time_s: moving_person(subject).at(time_s),

@@ -12,7 +12,7 @@ from hicp_lib.core.camera import deproject, project, transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import read_image
 from hicp_lib.experiments.recordings import simulate
-from hicp_lib.experiments.recordings.open import open_experiment
+from hicp_lib.experiments.recordings.open import open_experiment, open_people
 from hicp_lib.experiments.recordings.simulate import simulate_recording
 from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.check import check_recording
@@ -204,3 +204,20 @@ def test_a_given_recording_is_opened_instead(lower):
         open_experiment("relative-lower", recording="/no/recording")
     with pytest.raises(InputError, match="no scenario"):
         open_experiment("sideways")
+
+
+def test_several_people_are_simulated_a_person_to_a_process_and_opened_in_their_order(tmp_path, monkeypatch):
+    monkeypatch.setenv("HICP_CACHE", str(tmp_path))
+    people = open_people("relative-lower", n_frames=1, n_people=2)
+    assert [read_simulation(one)["seed"] for one in people] == [0, 1]
+    monkeypatch.setattr(simulate, "simulate_recording", None)  # what is kept is not simulated again
+    again = open_people("relative-lower", n_frames=1, n_people=2)
+    assert [one.folder for one in again] == [one.folder for one in people]
+    with pytest.raises(InputError, match="n_people is 0"):
+        open_people("relative-lower", n_people=0)
+
+
+def test_a_labs_people_are_its_folders(lower):
+    (one,) = open_people("relative-lower", lower.folder, n_frames=1, n_people=5)
+    two = open_people("relative-lower", [lower.folder, str(lower.folder)])
+    assert len(one) == 1 and [len(person) for person in two] == [2, 2]
