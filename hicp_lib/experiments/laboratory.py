@@ -20,7 +20,8 @@ from hicp_lib.simulation.rendering.camera import PlacedCamera
 from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
 from hicp_lib.simulation.rendering.render import Frame, World
 from hicp_lib.simulation.rendering.surfaces import Surface
-from hicp_lib.simulation.sensors.depth_camera import D435, simulate_depth
+from hicp_lib.simulation.sensors.depth_camera import simulate_depth
+from hicp_lib.simulation.sensors.stereo_camera import D435
 from hicp_lib.simulation.world.furniture import legs
 from hicp_lib.simulation.world.room import make_room
 

@@ -15,7 +15,7 @@ from hicp_lib.experiments.recordings.scenarios import Scenario
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, JOINTS_FILE, SIMULATION_FILE, TRUTH_FILE
 from hicp_lib.recordings.writer import write_index
 from hicp_lib.robot.kinematics import HEAD_JOINTS
-from hicp_lib.simulation.sensors.depth_camera import D435
+from hicp_lib.simulation.sensors.stereo_camera import D435
 
 PARTS_DIR = ".frames"  # truth of finished frames, and what they were made with
 MOCAP_PART = "mocap.json"
