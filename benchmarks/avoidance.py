@@ -28,7 +28,8 @@ from hicp_lib.robot.peripersonal_space import ReceptiveField, gains, response
 from hicp_lib.simulation.rendering.camera import project_world
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import render
-from hicp_lib.simulation.sensors.depth_camera import D435, simulate_depth
+from hicp_lib.simulation.sensors.depth_camera import simulate_depth
+from hicp_lib.simulation.sensors.stereo_camera import D435
 from hicp_lib.simulation.world.staging import random_stage
 
 SEED = 20220

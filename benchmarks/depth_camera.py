@@ -18,13 +18,8 @@ from timing import Comparison, best_seconds, run
 
 from hicp_lib.simulation.rendering.camera import pixel_rays
 from hicp_lib.simulation.rendering.render import render
-from hicp_lib.simulation.sensors.depth_camera import (
-    D435,
-    left_imager,
-    simulate_depth,
-    simulate_raw_depth,
-    without_errors,
-)
+from hicp_lib.simulation.sensors.depth_camera import depth_imager, simulate_depth, simulate_raw_depth
+from hicp_lib.simulation.sensors.stereo_camera import D435, without_errors
 from hicp_lib.simulation.world.staging import random_stage
 
 SEED = 20220
@@ -38,7 +33,7 @@ def frame_cost(index: int, turns: int) -> list[float]:
     frame = render(stage.world, stage.camera, rng)
     rendered_s = time.process_time() - start
     scene, camera = frame.rays, stage.camera
-    rays = pixel_rays(left_imager(camera, D435))
+    rays = pixel_rays(depth_imager(camera, D435))
     return [rendered_s] + best_seconds(
         lambda: scene.trace(rays),
         lambda: simulate_depth(scene, camera, D435, rng),

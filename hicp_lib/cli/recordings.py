@@ -20,9 +20,10 @@ def record() -> None:
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0))
 @click.option("--subject", "number", default=0, show_default=True, type=click.IntRange(min=0), help="Who.")
 @people_option
+@click.option("--depth-camera", "camera", default="d435", show_default=True, help="Or azure-kinect.")
 @worker_options("Processes")
 def simulate(
-    scenario: str, out: Path, n_frames: int | None, seed: int, number: int, people: str, workers
+    scenario: str, out: Path, n_frames: int | None, seed: int, number: int, people: str, camera: str, workers
 ) -> None:
     """Simulate a recording into the folder OUT.
 
@@ -33,7 +34,8 @@ def simulate(
     from hicp_lib.simulation.body.identities import Subject
 
     subject = Subject(seed, number, people.replace("-", " "))
-    recording = simulate_recording(out, scenario, n_frames, subject, workers, progress=sys.stderr.isatty())
+    name = scenario if camera == "d435" else f"{scenario}@{camera}"
+    recording = simulate_recording(out, name, n_frames, subject, workers, progress=sys.stderr.isatty())
     click.echo(f"{out}: {len(recording)} frames")
 
 

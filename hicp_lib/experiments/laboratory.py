@@ -20,7 +20,8 @@ from hicp_lib.simulation.rendering.camera import PlacedCamera
 from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
 from hicp_lib.simulation.rendering.render import Frame, World
 from hicp_lib.simulation.rendering.surfaces import Surface
-from hicp_lib.simulation.sensors.depth_camera import D435, simulate_depth
+from hicp_lib.simulation.sensors.depth_camera import DepthCamera, simulate_depth
+from hicp_lib.simulation.sensors.stereo_camera import D435
 from hicp_lib.simulation.world.furniture import legs
 from hicp_lib.simulation.world.room import make_room
 
@@ -48,7 +49,9 @@ def robot_camera(T_root_camera: np.ndarray) -> PlacedCamera:
     return PlacedCamera(**vars(COLOUR), T_world_camera=T_WORLD_ROOT @ T_root_camera)
 
 
-def colour_and_depth(frame: Frame, camera: PlacedCamera, rng: Rng) -> tuple[np.ndarray, np.ndarray]:
+def colour_and_depth(
+    frame: Frame, camera: PlacedCamera, rng: Rng, depth_camera: DepthCamera = D435
+) -> tuple[np.ndarray, np.ndarray]:
     """What the depth camera on the robot's head takes of a frame.
 
     Parameters
@@ -58,6 +61,8 @@ def colour_and_depth(frame: Frame, camera: PlacedCamera, rng: Rng) -> tuple[np.n
         That the frame was rendered for.
     rng : numpy.random.Generator
         Of the noise of both sensors.
+    depth_camera : DepthCamera, optional
+        Changes nothing in the colour image.
 
     Returns
     -------
@@ -66,7 +71,7 @@ def colour_and_depth(frame: Frame, camera: PlacedCamera, rng: Rng) -> tuple[np.n
         Aligned to the colour image; NaN for none.
     """
     rgb = expose(frame.radiance, PHOTOGRAPHIC, rng, frame.person >= 0)
-    return rgb, simulate_depth(frame.rays, camera, D435, rng)
+    return rgb, simulate_depth(frame.rays, camera, depth_camera, rng)
 
 
 def in_root(points_m: np.ndarray) -> np.ndarray:

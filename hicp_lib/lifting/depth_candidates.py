@@ -17,7 +17,10 @@ _SIGMA_M = np.where(_IS_BODY, 0.012, 0.010)  # depths that differ so much cost 1
 _SAMPLES = 7  # per side of the neighbourhood
 _STEEP_M = 0.03  # a larger difference between the pixels on both sides is a depth step
 _ON_STEP = 1.0  # cost of a surface there
-_HIDDEN, _IN_FRONT = 6.0, 20.0  # cost of lying behind the nearest surface, and in front of it
+_HIDDEN, _IN_FRONT = (
+    np.where(_IS_BODY, 6.0, 3.0),
+    20.0,
+)  # cost of lying behind the nearest surface, in front of it
 
 
 @dataclass(frozen=True)
@@ -32,14 +35,19 @@ class Candidates:
         The keypoint's below each surface sampled; NaN where none was.
     cost : array, shape (m, k)
         0 at the keypoint, 1 at the neighbourhood's edge, more on depth steps.
-    sigma_m : array, shape (m,)
-        Depths that differ so much cost 1.
+    keypoints : array of int, shape (m,)
+        Which they are, Halpe order.
     """
 
     rays: np.ndarray
     depth_m: np.ndarray
     cost: np.ndarray
-    sigma_m: np.ndarray
+    keypoints: np.ndarray
+
+    @property
+    def sigma_m(self) -> np.ndarray:
+        """Depths that differ so much cost 1, shape (m,)."""
+        return _SIGMA_M[self.keypoints]
 
     def take(self, rows: np.ndarray) -> Candidates:
         """Those of some keypoints.
@@ -52,7 +60,7 @@ class Candidates:
         -------
         Candidates
         """
-        return Candidates(self.rays[rows], self.depth_m[rows], self.cost[rows], self.sigma_m[rows])
+        return Candidates(self.rays[rows], self.depth_m[rows], self.cost[rows], self.keypoints[rows])
 
 
 def depth_candidates(
@@ -106,7 +114,7 @@ def depth_candidates(
         rays=rays,
         depth_m=surface_m + deeper_m[:, None],
         cost=away / radius_px[:, None] ** 2 + _ON_STEP * is_steep,
-        sigma_m=_SIGMA_M[keypoints],
+        keypoints=keypoints,
     )
 
 
@@ -129,7 +137,7 @@ def depth_costs(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
     """
     nearest_m = np.nanmin(candidates.depth_m, axis=1)
     beyond_m = np.concatenate([[np.inf], grid_m, [np.inf]])  # what is not on the grid ends up at its ends
-    costs = np.where(beyond_m > nearest_m[:, None], _HIDDEN, _IN_FRONT)
+    costs = np.where(beyond_m > nearest_m[:, None], _HIDDEN[candidates.keypoints, None], _IN_FRONT)
     keypoint, sample = np.nonzero(np.isfinite(candidates.depth_m))
     depth_m, cost = candidates.depth_m[keypoint, sample], candidates.cost[keypoint, sample]
     # A surface explains only depths near it for less than `_IN_FRONT`.
@@ -142,10 +150,12 @@ def depth_costs(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
     return costs[:, 1:-1]
 
 
-def refine_depths(candidates: Candidates, chosen_m: np.ndarray, grid_step_m: float) -> np.ndarray:
+def refine_depths(
+    candidates: Candidates, chosen_m: np.ndarray, grid_step_m: float
+) -> tuple[np.ndarray, np.ndarray]:
     """The weighted mean of the candidates that agree with depths chosen on a grid.
 
-    Without any, the keypoint is hidden, and the grid's depth remains.
+    Without any, the keypoint is not seen, and the grid's depth remains.
 
     Parameters
     ----------
@@ -156,15 +166,16 @@ def refine_depths(candidates: Candidates, chosen_m: np.ndarray, grid_step_m: flo
 
     Returns
     -------
-    array, shape (m,)
-        Metres.
+    depth_m : array, shape (m,)
+    is_seen : array of bool, shape (m,)
+        Whether any agrees.
     """
     within_m = np.maximum(2 * candidates.sigma_m, grid_step_m)[:, None]
     agree = abs(candidates.depth_m - chosen_m[:, None]) < within_m
     weights = np.where(agree, np.exp(-2 * candidates.cost), 0)
     total = weights.sum(axis=1)
     mean_m = (weights * np.nan_to_num(candidates.depth_m)).sum(axis=1) / np.where(total > 0, total, 1)
-    return np.where(total > 0, mean_m, chosen_m)
+    return np.where(total > 0, mean_m, chosen_m), total > 0
 
 
 def _sample(depth_m: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

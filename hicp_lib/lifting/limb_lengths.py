@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from operator import itemgetter
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
+from numpy.lib.stride_tricks import as_strided, sliding_window_view
 
 from hicp_lib.core.keypoints import LEFT_HAND
 from hicp_lib.lifting.body_measures import LEVELS, BodyMeasures, found_parents
@@ -75,8 +75,8 @@ def limbs_outwards(
     return [of_level for _, of_level in sorted(limbs, key=itemgetter(0))]
 
 
-def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> np.ndarray:
-    """The depths that cost least in all.
+def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> tuple[np.ndarray, np.ndarray]:
+    """The depths that cost least in all, and what any other depth of a keypoint costs at least.
 
     The sum over keypoints and limbs is minimised exactly along the tree of limbs, from their ends to the
     root and back (dynamic programming, as in Felzenszwalb and Huttenlocher, "Pictorial Structures for
@@ -91,16 +91,18 @@ def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> np.ndarray:
 
     Returns
     -------
-    array of int, shape (m,)
+    chosen : array of int, shape (m,)
         Index into the grid.
+    in_all : array, shape (m, g)
+        The least sum with that keypoint at that depth (min-marginals).
 
     Examples
     --------
     >>> costs = np.array([[0.0, 1.0, 5.0], [4.0, 0.0, 4.0]])
-    >>> choose_along_limbs(costs, [])
+    >>> choose_along_limbs(costs, [])[0]
     array([0, 1])
     >>> one_step_only = Limbs(np.array([0]), np.array([1]), np.full((1, 3, 3), [9.0, 0.0, 9.0]))
-    >>> choose_along_limbs(costs, [one_step_only])
+    >>> choose_along_limbs(costs, [one_step_only])[0]
     array([1, 1])
     """
     g = costs.shape[1]
@@ -114,12 +116,21 @@ def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> np.ndarray:
         total = sliding_window_view(within, width, axis=1)[some.end] + some.costs
         near, far = total.argmin(axis=2), costs[some.end].argmin(axis=1)[:, None]
         near_cost, far_cost = total.min(axis=2), costs[some.end].min(axis=1)[:, None] + _MOST_LONG
-        answers.append(np.where(near_cost <= far_cost, near + np.arange(g) - width // 2, far))
-        np.add.at(costs, some.begin, np.minimum(near_cost, far_cost))
+        told = np.minimum(near_cost, far_cost)
+        answers.append((np.where(near_cost <= far_cost, near + np.arange(g) - width // 2, far), told))
+        np.add.at(costs, some.begin, told)
     chosen = costs.argmin(axis=1)  # which counts for those that hang on none
-    for some, answer in zip(limbs, answers[::-1], strict=True):
+    for some, (answer, told) in zip(limbs, answers[::-1], strict=True):
         chosen[some.end] = np.take_along_axis(answer, chosen[some.begin, None], axis=1)[:, 0]
-    return chosen
+        rest = costs[some.begin] - told
+        n, _, width = some.costs.shape
+        # Sums by depth of the beginning and of the end: each row starts one to the right of the last.
+        total = np.full((n, g, g + width - 1), np.inf, np.float32)
+        along = total.strides[0], total.strides[1] + total.strides[2], total.strides[2]
+        as_strided(total, some.costs.shape, along)[:] = rest[:, :, None] + some.costs
+        near_cost = total.min(axis=1)[:, width // 2 :][:, :g]
+        costs[some.end] += np.minimum(near_cost, rest.min(axis=1)[:, None] + _MOST_LONG)
+    return chosen, costs
 
 
 class _Limits:

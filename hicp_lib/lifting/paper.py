@@ -30,9 +30,9 @@ BODY_RADIUS_M = 0.020
 RADIUS_M = np.full(N_KEYPOINTS, 0.003)
 RADIUS_M[BODY] = BODY_RADIUS_M
 
-REASONS = ("lifted", "not_detected", "outside_image", "no_depth")
-"""What `Lifted.reason` counts: lifted, or why not."""
-LIFTED, NOT_DETECTED, OUTSIDE_IMAGE, NO_DEPTH = range(4)
+REASONS = ("lifted", "not_detected", "outside_image", "no_depth", "guessed")
+"""What `Lifted.reason` counts: lifted to a depth that is seen, or why not; guessed has a depth not seen."""
+LIFTED, NOT_DETECTED, OUTSIDE_IMAGE, NO_DEPTH, GUESSED = range(5)
 
 MIN_DEPTH_M = 0.1  # nearer than depth cameras measure; bounds the neighbourhood
 
@@ -50,10 +50,13 @@ class Lifted:
         In the camera frame; NaN where not lifted.
     reason : array, shape (n_people, 136), dtype int8
         Index into `REASONS`.
+    sigma_m : array, shape (n_people, 136)
+        Standard deviation of the depth; NaN where not lifted, and everywhere by the paper's method.
     """
 
     points_m: np.ndarray
     reason: np.ndarray
+    sigma_m: np.ndarray
 
 
 def lift(
@@ -110,7 +113,7 @@ def lift(
     reason[is_inside] = np.where(np.isnan(lifted[:, 2]), NO_DEPTH, LIFTED)
     points_m = np.full((*reason.shape, 3), np.nan)
     points_m[is_inside] = lifted
-    return Lifted(points_m, reason)
+    return Lifted(points_m, reason, np.full(reason.shape, np.nan))
 
 
 def _windows(depth_m: np.ndarray, at: np.ndarray, half_px: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

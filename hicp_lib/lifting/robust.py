@@ -26,6 +26,7 @@ study.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -35,7 +36,7 @@ from hicp_lib.lifting.body_measures import load_measures
 from hicp_lib.lifting.depth_candidates import Candidates, depth_candidates, depth_costs, refine_depths
 from hicp_lib.lifting.hand_shapes import with_hand_shapes
 from hicp_lib.lifting.limb_lengths import choose_along_limbs, limbs_outwards
-from hicp_lib.lifting.paper import LIFTED, MIN_DEPTH_M, NO_DEPTH, Lifted, lift
+from hicp_lib.lifting.paper import GUESSED, LIFTED, MIN_DEPTH_M, NO_DEPTH, Lifted, lift
 
 STEPS = ("below_surface", "near_surfaces", "limb_lengths", "hand_shapes")
 """What goes beyond the paper; limb lengths choose among near surfaces, hand shapes are chosen with them."""
@@ -44,6 +45,7 @@ METHODS = {"robust": len(STEPS), "paper": 0}
 """Ways of lifting, by how many of `STEPS` they take."""
 
 _REACH_M, _GRID_M = 0.90, 0.02  # grid of depths around the person's middle
+TEMP, S0 = 2.0, 0.01
 _IN_BODY, _IN_FACE = (np.isin(np.arange(N_KEYPOINTS), part) for part in (BODY, FACE))
 
 
@@ -113,20 +115,22 @@ def lift_in_steps(
     paper = lift(keypoints_px, depth_m, intrinsics)
     below_m = load_measures().below_skin_m
     away_m = np.linalg.norm(paper.points_m, axis=2)
-    lifted = {0: paper, 1: Lifted(paper.points_m * (1 + below_m / away_m)[..., None], paper.reason)}
-    beyond = sorted(set(n_steps) - lifted.keys())
-    points_m = np.full((len(beyond), *paper.points_m.shape), np.nan)
+    lifted = {0: paper, 1: replace(paper, points_m=paper.points_m * (1 + below_m / away_m)[..., None])}
+    for n in set(n_steps) - lifted.keys():
+        points_m, sigma_m = (np.full(array.shape, np.nan) for array in (paper.points_m, paper.sigma_m))
+        lifted[n] = Lifted(points_m, np.where(paper.reason == LIFTED, NO_DEPTH, paper.reason), sigma_m)
+    beyond = sorted(set(n_steps) - {0, 1})
     for person, pixels_px in enumerate(np.asarray(keypoints_px, float) if beyond else ()):
         found = np.flatnonzero(np.isin(paper.reason[person], (LIFTED, NO_DEPTH)))
         first_m = paper.points_m[person, found, 2]
         if np.isfinite(first_m).any():
             grid_m, candidates = _depths(found, first_m, pixels_px[found], depth_m, intrinsics)
             seen = np.flatnonzero(np.isfinite(candidates.depth_m).any(axis=1))
-            chosen_m = _choose(found[seen], grid_m, candidates.take(seen), beyond)
-            points_m[:, person, found[seen]] = list(chosen_m)
-    for n, points in zip(beyond, points_m, strict=True):
-        reason = np.where(paper.reason == LIFTED, NO_DEPTH, paper.reason)
-        lifted[n] = Lifted(points, np.where(np.isfinite(points[..., 2]), LIFTED, reason).astype(np.int8))
+            chosen = _choose(found[seen], grid_m, candidates.take(seen), beyond)
+            for n, (points, is_seen, sigma) in zip(beyond, chosen, strict=True):
+                lifted[n].points_m[person, found[seen]] = points
+                lifted[n].reason[person, found[seen]] = np.where(is_seen, LIFTED, GUESSED)
+                lifted[n].sigma_m[person, found[seen]] = sigma
     return [lifted[n] for n in n_steps]
 
 
@@ -147,19 +151,26 @@ def _depths(
 
 def _choose(
     found: np.ndarray, grid_m: np.ndarray, candidates: Candidates, n_steps: Sequence[int]
-) -> Iterator[np.ndarray]:
-    """Points (m, 3) of one person's keypoints after two steps or more, for each number of them."""
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """After each number of steps, two or more: points (m, 3), whether their depths are seen, and sigmas (m,)."""
     of_surfaces = depth_costs(candidates, grid_m)
     on = np.flatnonzero(~_IN_FACE[found])  # what hangs on limbs
     limbs = limbs_outwards(grid_m, candidates.rays[on], found[on], load_measures())
     for n in n_steps:
-        costs, steps = of_surfaces, STEPS[:n]
+        costs, steps = of_surfaces.copy(), STEPS[:n]
         if "hand_shapes" in steps:
             costs = with_hand_shapes(costs, grid_m, candidates.rays, found)
         chosen = costs.argmin(axis=1)
         if "limb_lengths" in steps:
-            chosen[on] = choose_along_limbs(costs[on], limbs)
-        yield candidates.rays * refine_depths(candidates, grid_m[chosen], _GRID_M)[:, None]
+            chosen[on], costs[on] = choose_along_limbs(costs[on], limbs)
+        depth_m, is_seen = refine_depths(candidates, grid_m[chosen], _GRID_M)
+        yield candidates.rays * depth_m[:, None], is_seen, _sigmas_m(costs, grid_m, depth_m)
+
+
+def _sigmas_m(costs: np.ndarray, grid_m: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
+    weights = np.exp((costs.min(axis=1, keepdims=True) - costs) / TEMP)
+    away_m2 = (grid_m - depth_m[:, None]) ** 2
+    return np.sqrt(S0**2 + (weights * away_m2).sum(axis=1) / weights.sum(axis=1))
 
 
 def _middle_m(found: np.ndarray, first_m: np.ndarray) -> float:

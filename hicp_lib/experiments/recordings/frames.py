@@ -17,7 +17,7 @@ def record_frame(name: str, subject: Subject, k: int) -> tuple[np.ndarray, np.nd
     Parameters
     ----------
     name : str
-        Of the scenario.
+        Of the scenario; with another depth camera the colour image is the same.
     subject : Subject
     k : int
         The frame's number is `k`.
@@ -30,11 +30,11 @@ def record_frame(name: str, subject: Subject, k: int) -> tuple[np.ndarray, np.nd
     truth : dict of str to list
         `keypoints_m` (136, 3) in the base frame and `visible` (136,).
     """
-    plan, rng = scenario(name), subject.stream(name, k)
+    plan, rng = scenario(name), subject.stream(name.partition("@")[0], k)
     world, person = plan.stage(subject, float(plan.times_s(k + 1)[k]))
     camera = camera_at(plan, k)
     frame = render(world, camera, rng)
-    rgb, depth_m = colour_and_depth(frame, camera, rng)
+    rgb, depth_m = colour_and_depth(frame, camera, rng, plan.depth_camera)
     _, visible = keypoint_visibility(frame.rays, camera, person.keypoints_m, 0)
     truth = {"keypoints_m": in_root(person.keypoints_m).round(6).tolist(), "visible": visible.tolist()}
     return rgb, depth_m, frame.depth_m, truth

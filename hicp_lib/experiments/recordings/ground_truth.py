@@ -15,7 +15,6 @@ from hicp_lib.experiments.recordings.scenarios import Scenario
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, JOINTS_FILE, SIMULATION_FILE, TRUTH_FILE
 from hicp_lib.recordings.writer import write_index
 from hicp_lib.robot.kinematics import HEAD_JOINTS
-from hicp_lib.simulation.sensors.depth_camera import D435
 
 PARTS_DIR = ".frames"  # truth of finished frames, and what they were made with
 MOCAP_PART = "mocap.json"
@@ -49,7 +48,7 @@ def finish_recording(out: Path, plan: Scenario, n: int, stamp: dict) -> None:
                 path.unlink()
     _write_table(out / TRUTH_FILE, _truth(out, times_s, T_base_cam))
     _write_table(out / JOINTS_FILE, _joints(plan, times_s))
-    settings = {"n_frames": n, "rate_hz": plan.rate_hz, "mount": plan.mount, "depth_camera": asdict(D435)}
+    settings = {"n_frames": n, "rate_hz": plan.rate_hz, "mount": plan.mount, "depth_camera": asdict(plan.depth_camera)}
     mocap = out / PARTS_DIR / MOCAP_PART
     settings |= read_json(mocap) if mocap.exists() else {}
     write_json(out / SIMULATION_FILE, stamp | settings, indent=1)

@@ -113,6 +113,8 @@ def data_note(recordings: Mapping[str, Recording]) -> str:
     plural = "s" if len(recordings) > 1 else ""
     if not all(read_simulation(recording) for recording in recordings.values()):
         return f"recording{plural} {' and '.join(recordings)}"
-    has_mocap = any(recording.mocap_path for recording in recordings.values())
-    sensors = "D435 and motion capture" if has_mocap else "D435"
+    scenarios = [read_simulation(recording)["scenario"] for recording in recordings.values()]
+    sensors = " or ".join(dict.fromkeys(name.partition("@")[2] or "D435" for name in scenarios))
+    if any(recording.mocap_path for recording in recordings.values()):
+        sensors += " and motion capture"
     return f"simulated recording{plural} (rendered person, simulated {sensors})"

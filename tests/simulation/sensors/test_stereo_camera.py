@@ -12,14 +12,8 @@ from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at, pixel_ra
 from hicp_lib.simulation.rendering.raycast import RayScene
 from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.sensors.depth_alignment import align_to_colour
-from hicp_lib.simulation.sensors.depth_camera import (
-    D435,
-    D435_VGA,
-    left_imager,
-    simulate_depth,
-    simulate_raw_depth,
-    without_errors,
-)
+from hicp_lib.simulation.sensors.depth_camera import depth_imager, simulate_depth, simulate_raw_depth
+from hicp_lib.simulation.sensors.stereo_camera import D435, D435_VGA, without_errors
 
 GREY = materials.plain(np.full(3, 0.5))
 # In the world as in the camera: x right, y down, z forward.
@@ -96,7 +90,7 @@ def test_shadow_lies_left_of_a_box_only_and_is_as_wide_as_disparities_differ():
     surfaces = [Surface(g.box([-0.1, -0.1, near_m], [0.1, 0.1, near_m + 0.05]), GREY), _wall(far_m)]
     missing = np.isnan(_raw(surfaces, replace(EXACT, shadow=True)))
     rows, columns = np.nonzero(missing)
-    left = left_imager(COLOUR, EXACT)
+    left = depth_imager(COLOUR, EXACT)
     edge_px = left.cx_px + left.fx_px * (-0.1 - EXACT.colour_offset_m) / near_m
     expected_px = EXACT.focal_baseline * (1 / near_m - 1 / far_m)
     widths = missing.sum(axis=1)
@@ -112,7 +106,7 @@ def test_a_shadow_beside_a_thin_thing_ends_where_the_right_imager_sees_past_it()
     missing = np.isnan(_raw([finger, _wall(far_m)], replace(EXACT, shadow=True)))
     # It hides a strip of its own width, beside it by the difference of disparities.
     width_px = 0.02 * EXACT.focal_px / near_m
-    edge_px = left_imager(COLOUR, EXACT).cx_px + EXACT.focal_px * (-0.01 - EXACT.colour_offset_m) / near_m
+    edge_px = depth_imager(COLOUR, EXACT).cx_px + EXACT.focal_px * (-0.01 - EXACT.colour_offset_m) / near_m
     start_px = edge_px - EXACT.focal_baseline * (1 / near_m - 1 / far_m)
     columns = np.flatnonzero(missing[240])
     assert abs(len(columns) - width_px) <= 1.5
@@ -140,7 +134,7 @@ def test_disparity_and_depth_are_multiples_of_their_steps():
 def test_flying_pixels_lie_between_two_depths_near_the_step_and_nowhere_else():
     surfaces = [_wall(1.0, x=(-30, 0)), _wall(2.0)]
     depth_m = _raw(surfaces, replace(EXACT, edge_px=2.5, window_px=7))
-    column = left_imager(COLOUR, EXACT).cx_px - EXACT.focal_px * EXACT.colour_offset_m
+    column = depth_imager(COLOUR, EXACT).cx_px - EXACT.focal_px * EXACT.colour_offset_m
     flying = (depth_m > 1.01) & (depth_m < 1.99)
     where = np.nonzero(flying)[1]
     assert 0.2 < flying.sum() / len(depth_m) < 4  # per row
@@ -188,14 +182,14 @@ def test_alignment_moves_near_things_further_and_keeps_the_nearer():
         # The middle stays that of the colour camera, wherever the left imager sees it.
         assert columns.mean() == pytest.approx(COLOUR.cx_px, abs=0.8)
         assert rows.mean() == pytest.approx(COLOUR.cy_px, abs=0.8)
-        shift_px = np.nonzero(np.isfinite(_raw([patch], EXACT)))[1].mean() - left_imager(COLOUR, EXACT).cx_px
+        shift_px = np.nonzero(np.isfinite(_raw([patch], EXACT)))[1].mean() - depth_imager(COLOUR, EXACT).cx_px
         assert shift_px == pytest.approx(-EXACT.focal_px * 0.015 / z_m, abs=0.8)
     both = _aligned([_wall(0.5, x=(-0.1, 0.1), y=(-0.1, 0.1)), _wall(2.0)], EXACT)
     assert both[240, 320] == pytest.approx(0.5) and not np.isnan(both[100:380, 100:540]).all(axis=0).any()
 
 
 def test_alignment_opens_a_gap_left_of_near_things_only_and_knows_no_other_depths():
-    left = left_imager(COLOUR, D435)
+    left = depth_imager(COLOUR, D435)
     near_left, near_right = (np.full((480, 848), z, np.float32) for z in (0.9, 1.5))
     near_left[:, 420:], near_right[:, 420:] = 1.5, 0.9
     covered, opened = (align_to_colour(depth_m, left, COLOUR) for depth_m in (near_left, near_right))
@@ -217,5 +211,5 @@ def test_the_same_generator_gives_the_same_depth_and_another_another():
 def test_the_aligned_image_is_that_of_the_whole_raw_one_where_errors_are_off():
     surfaces = [_wall(0.6, x=(-0.2, -0.05), y=(-0.2, 0.1)), _wall(1.5, x=(0, 3)), _wall(2.5)]
     settings = replace(EXACT, shadow=True, left_band=True, searched_px=126.0)
-    whole = align_to_colour(_raw(surfaces, settings), left_imager(COLOUR, settings), COLOUR)
+    whole = align_to_colour(_raw(surfaces, settings), depth_imager(COLOUR, settings), COLOUR)
     assert np.allclose(whole, _aligned(surfaces, settings), equal_nan=True)
