@@ -47,7 +47,7 @@ def run_on_cluster(
     jobs: Iterable[tuple[Key, Callable]],
     kind: str,
     folder: Path | None,
-    alike: tuple[dict, Callable[[], dict]] | None,
+    alike: Callable[[], dict] | None,
     named: Callable[[Key], object],
 ) -> Iterator[tuple[Key, Any]]:
     """As `hicp_lib.core.executor.run_jobs`, by the workers of a cluster; without jobs nobody is asked.
@@ -59,7 +59,7 @@ def run_on_cluster(
     jobs : iterable of (key, callable)
     kind : str
     folder : Path or None
-    alike : (dict, callable) or None
+    alike : callable or None
     named : callable
 
     Yields
@@ -76,10 +76,8 @@ def run_on_cluster(
     first = next(todo, None)
     if first is None:
         return
-    if alike is None:
-        there = partial(code_identity, getattr(first[1], "func", first[1]).__module__)
-        alike = there(), there
-    how = (*alike, folder is not None, kind == "processes")
+    alike = alike or partial(code_identity, getattr(first[1], "func", first[1]).__module__)
+    how = alike(), alike, folder is not None, kind == "processes"
     with connected(address) as client:
         for key, answer in _spread(client, address, chain([first], todo), how, named):
             if isinstance(answer, Exception):

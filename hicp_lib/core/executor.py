@@ -69,7 +69,7 @@ def run_jobs(
     kind: str = "processes",
     *,
     folder: Path | None = None,
-    alike: tuple[dict, Callable[[], dict]] | None = None,
+    alike: Callable[[], dict] | None = None,
     named: Callable[[Key], object] = str,
 ) -> Iterator[tuple[Key, Any]]:
     """Run jobs, several at a time; each one's key and what it returned, as they come in.
@@ -87,9 +87,9 @@ def run_jobs(
         Jobs are called with it and write files there. On a cluster, whose machines need not see it, they are
         called with one of their own, and the files travel. Of a job's files, that which its key names, if it
         names one (a path below `folder`), is there when all others are.
-    alike : (dict, callable), optional
-        What results depend on, JSON-able, and a function that says the same of where it is called: a
-        cluster's worker for which it differs is refused. The code of the first job where left out.
+    alike : callable, optional
+        Says what results depend on where it is called, JSON-able; a cluster's worker where it is not what it
+        is here is refused. The code of the first job where left out.
     named : callable, optional
         What a message calls a job, by its key.
 
@@ -129,6 +129,16 @@ def run_jobs(
                     "a process that worked was killed (is memory short?); run the same command again to go "
                     "on, with fewer workers if it happens again"
                 ) from None
+
+
+def threads_beside() -> int:
+    """How many threads of a cluster's worker do jobs, this one among them; 1 elsewhere."""
+    from distributed import get_worker
+
+    try:
+        return get_worker().state.nthreads
+    except ValueError:
+        return 1
 
 
 def as_they_come(

@@ -1,5 +1,6 @@
 """What is rendered and simulated on a Dask cluster is the same, to the byte, as what is made here."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -72,15 +73,15 @@ def test_a_fault_of_a_job_comes_back_as_it_is(address, tmp_path):
     assert "test_executor.py" in error.value.__notes__[0]
 
 
-def test_workers_that_would_make_something_else_are_refused(address, tmp_path):
-    alike = {"libraries": {"numpy": "1"}, "code": "a"}, _of_the_worker
+def test_workers_that_would_make_something_else_are_refused(address, tmp_path, monkeypatch):
+    monkeypatch.setenv("HICP_HERE", "1")
     with pytest.raises(InputError, match=r"^worker tcp://.* differ from here: libraries.numpy;"):
-        list(run_jobs([("a", write_pid)], address, folder=tmp_path, alike=alike))
+        list(run_jobs([("a", write_pid)], address, folder=tmp_path, alike=_of_here))
     assert contents(tmp_path) == {}
 
 
-def _of_the_worker() -> dict:
-    return {"libraries": {"numpy": "2"}, "code": "a"}
+def _of_here() -> dict:
+    return {"libraries": {"numpy": os.environ.get("HICP_HERE")}, "code": "a"}
 
 
 def test_a_cluster_that_answers_is_found_before_work_begins(address):
