@@ -64,7 +64,7 @@ def run_on_cluster(
 
     Yields
     ------
-    (key, object)
+    (object, object)
 
     Raises
     ------

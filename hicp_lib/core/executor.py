@@ -95,7 +95,7 @@ def run_jobs(
 
     Yields
     ------
-    (key, object)
+    (object, object)
 
     Raises
     ------
@@ -161,7 +161,7 @@ def as_they_come(
 
     Yields
     ------
-    (key, future)
+    (object, Future)
     """
     running: dict[Any, Key] = {}
     for key, job in jobs:

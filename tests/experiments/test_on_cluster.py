@@ -22,7 +22,7 @@ from tests.core.test_executor import fail, write_pid
 @pytest.fixture(scope="module")
 def address():
     """Of a scheduler with two workers, processes of this machine that share no folder with the caller."""
-    with LocalCluster(2, processes=True, threads_per_worker=1, dashboard_address=None) as local:
+    with LocalCluster(2, processes=True, threads_per_worker=1, dashboard_address=":0") as local:
         yield local.scheduler_address
 
 
