@@ -161,7 +161,8 @@ def as_they_come(
 
     Yields
     ------
-    (object, Future)
+    (object, object)
+        Key and future.
     """
     running: dict[Any, Key] = {}
     for key, job in jobs:
