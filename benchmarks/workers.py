@@ -33,7 +33,7 @@ folder, name, workers, *paths = sys.argv[1:]
 sys.path.insert(0, folder)
 from timing import processor_s
 from hicp_lib.detectors.runtime import run
-run.DetectorPool(name, {}, int(workers))  # loads its libraries
+run.make_detector(name)  # loads its libraries
 print("ready", flush=True)
 input()
 wall, cpu = time.perf_counter(), processor_s()

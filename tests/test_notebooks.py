@@ -117,6 +117,12 @@ def test_every_parameter_says_its_unit_or_values_and_what_to_try(path):
         assert tried != notebook.defaults[name]
 
 
+@pytest.mark.parametrize("profile", ["quick", "full", "deep"])
+def test_profiles_name_what_there_is(profile):
+    notebooks = CHECKOUT / "notebooks"
+    assert read_profile(notebooks / "profiles.toml", profile, read_notebooks(notebooks)).after
+
+
 def test_every_line_of_a_profile_says_what_it_asks_for():
     lines = (CHECKOUT / "notebooks" / "profiles.toml").read_text().split("[after]")[0].splitlines()
     assert [line for line in lines if "=" in line and not re.search(r"  # \S", line)] == []

@@ -12,10 +12,8 @@ from typing import Any
 
 import pandas as pd
 
-from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.files import read_json
 
-REFERENCE_DIR = DATA_DIR / "reference"
 TOLERANCE = 1e-6  # relative: other processors round elsewhere
 WITHIN_TOLERANCE = ["same", "within 1e-6", "within the interval"]
 VERDICTS = [*WITHIN_TOLERANCE, "outside"]
@@ -37,7 +35,7 @@ def is_measured(name: str) -> bool:
 
 
 def outputs(folder: Path, tables: list[str]) -> dict[str, Output]:
-    """What a notebook recorded and showed, by name: the value and the bounds of its interval, or NaN.
+    """What a notebook recorded, and the numbers it showed, by name: value and bounds of the interval, or NaN.
 
     Bounds are the columns `low` and `high` (or `x_low`, `low_m` ...) that follow that of the value, and are
     no outputs themselves.
@@ -60,11 +58,15 @@ def outputs(folder: Path, tables: list[str]) -> dict[str, Output]:
         for k, column in enumerate(columns):
             if _BOUND.fullmatch(column) or is_measured(column):
                 continue
-            bounds = [match[1] for name in columns[k + 1 : k + 3] if (match := _BOUND.fullmatch(name))]
-            interval = table[columns[k + 1 : k + 3]] if bounds == ["low", "high"] else None
-            for row, value in enumerate(table[column].tolist()):
-                low, high = (math.nan, math.nan) if interval is None else interval.iloc[row]
-                found[f"{Path(file).stem}, {column}, row {row + 1}"] = value, low, high
+            bounds = columns[k + 1 : k + 3]
+            if [match[1] for name in bounds if (match := _BOUND.fullmatch(name))] != ["low", "high"]:
+                bounds = []
+            for row, cells in enumerate(
+                zip(*(table[name].tolist() for name in (column, *bounds)), strict=True)
+            ):
+                if isinstance(cells[0], int | float):
+                    value, low, high = cells if bounds else (cells[0], math.nan, math.nan)
+                    found[f"{Path(file).stem}, {column}, row {row + 1}"] = value, low, high
     return found
 
 

@@ -1,17 +1,19 @@
 """What is rendered and simulated on a Dask cluster is the same, to the byte, as what is made here."""
 
+import os
 from pathlib import Path
 
 import pytest
 from distributed import LocalCluster
 
 from hicp_lib.core import cluster
-from hicp_lib.core.cluster import connected, run_on_cluster
+from hicp_lib.core.cluster import connected
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.executor import CLUSTER_VARIABLE
+from hicp_lib.core.executor import CLUSTER_VARIABLE, run_jobs
 from hicp_lib.experiments import doses
 from hicp_lib.experiments.avoidance.closed_loop import Trial
 from hicp_lib.experiments.avoidance.runs import TRUE_KEYPOINTS, Job, run_all
+from hicp_lib.experiments.recordings.open import open_people
 from hicp_lib.experiments.recordings.simulate import simulate_recording
 from hicp_lib.simulation.world.scenes import render_dataset
 from tests.core.test_executor import fail, write_pid
@@ -20,7 +22,7 @@ from tests.core.test_executor import fail, write_pid
 @pytest.fixture(scope="module")
 def address():
     """Of a scheduler with two workers, processes of this machine that share no folder with the caller."""
-    with LocalCluster(2, processes=True, threads_per_worker=1, dashboard_address=None) as local:
+    with LocalCluster(2, processes=True, threads_per_worker=1, dashboard_address=":0") as local:
         yield local.scheduler_address
 
 
@@ -44,8 +46,9 @@ def test_the_study_s_caches_are_the_same_files(address, tmp_path, monkeypatch):
         monkeypatch.setenv("HICP_CACHE", str(tmp_path / where))
         monkeypatch.setenv(CLUSTER_VARIABLE, address if where == "there" else "")
         run_all(jobs)
+        assert [len(one) for one in open_people("relative-lower", n_frames=1, n_people=2)] == [1, 1]
     here = contents(tmp_path / "here")
-    assert here == contents(tmp_path / "there") and len(here) == 2
+    assert here == contents(tmp_path / "there") and len(here) > 20
 
 
 def test_files_travel_and_the_one_that_is_named_comes_last(address, tmp_path, monkeypatch):
@@ -53,7 +56,7 @@ def test_files_travel_and_the_one_that_is_named_comes_last(address, tmp_path, mo
     write = cluster.write_bytes
     monkeypatch.setattr(cluster, "write_bytes", lambda path, of: written.append(path.name) or write(path, of))
     jobs = [("b", _write_both)]
-    ((key, result),) = run_on_cluster(address, jobs, tmp_path, None, str)
+    ((key, result),) = run_jobs(jobs, address, folder=tmp_path)
     assert (key, result, written) == ("b", "done", ["a", "c", "b"])
     assert contents(tmp_path) == {"a": b"1", "b": b"2", "c": b"3"}
 
@@ -66,19 +69,19 @@ def _write_both(folder: Path) -> str:
 
 def test_a_fault_of_a_job_comes_back_as_it_is(address, tmp_path):
     with pytest.raises(KeyError, match="a fault") as error:
-        list(run_on_cluster(address, [("a", fail)], tmp_path, None, str))
+        list(run_jobs([("a", fail)], address, folder=tmp_path))
     assert "test_executor.py" in error.value.__notes__[0]
 
 
-def test_workers_that_would_make_something_else_are_refused(address, tmp_path):
-    alike = {"libraries": {"numpy": "1"}, "code": "a"}, _of_the_worker
+def test_workers_that_would_make_something_else_are_refused(address, tmp_path, monkeypatch):
+    monkeypatch.setenv("HICP_HERE", "1")
     with pytest.raises(InputError, match=r"^worker tcp://.* differ from here: libraries.numpy;"):
-        list(run_on_cluster(address, [("a", write_pid)], tmp_path, alike, str))
+        list(run_jobs([("a", write_pid)], address, folder=tmp_path, alike=_of_here))
     assert contents(tmp_path) == {}
 
 
-def _of_the_worker() -> dict:
-    return {"libraries": {"numpy": "2"}, "code": "a"}
+def _of_here() -> dict:
+    return {"libraries": {"numpy": os.environ.get("HICP_HERE")}, "code": "a"}
 
 
 def test_a_cluster_that_answers_is_found_before_work_begins(address):

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from hicp_lib.core.files import read_json
-from hicp_lib.report import repetition
+from hicp_lib.report import prose
 from hicp_lib.report.prose import Results
 from hicp_lib.report.repetition import VERDICTS, compare
 
@@ -50,7 +50,7 @@ def reference(tmp_path, monkeypatch):
     import reference as tool
 
     page(tmp_path / "made" / "full" / "02_x")
-    for module in (repetition, tool):
+    for module in (prose, tool):
         monkeypatch.setattr(module, "REFERENCE_DIR", tmp_path / "reference")
     monkeypatch.setattr(sys, "argv", ["reference", str(tmp_path / "made" / "full")])
     tool.main()
@@ -86,19 +86,19 @@ def test_what_is_kept_is_what_pages_show_of_one_commit(reference, tmp_path):
 
 def test_the_same_run_is_the_same_whatever_its_times(reference, tmp_path):
     page(tmp_path / "own" / "02_x", time=7.0)
-    # Three values, and of four rows the name, the estimate and the count; bounds and times are no outputs.
-    assert counts(reference, tmp_path / "own") == [15, 0, 0, 0]
+    # Three values, and of four rows the estimate and the count; names, bounds and times are no outputs.
+    assert counts(reference, tmp_path / "own") == [11, 0, 0, 0]
 
 
 @pytest.mark.parametrize(
     ("column", "own", "expected"),
     [
-        ("ap", [0.5 + 1e-9, 0.4, np.nan, 0.8], [14, 1, 0, 0]),
-        ("ap", [0.53, 0.36, np.nan, 0.8], [13, 0, 2, 0]),
-        ("ap", [0.56, 0.4, 0.1, np.nan], [12, 0, 0, 3]),
-        ("n", [3, 4, 5, 7], [14, 0, 0, 1]),  # without an interval
-        ("detector", ["a", "b", "c", "e"], [14, 0, 0, 1]),
-        ("ap_low", [0.1, 0.1, np.nan, 0.1], [15, 0, 0, 0]),
+        ("ap", [0.5 + 1e-9, 0.4, np.nan, 0.8], [10, 1, 0, 0]),
+        ("ap", [0.53, 0.36, np.nan, 0.8], [9, 0, 2, 0]),
+        ("ap", [0.56, 0.4, 0.1, np.nan], [8, 0, 0, 3]),
+        ("n", [3, 4, 5, 7], [10, 0, 0, 1]),  # without an interval
+        ("n", ["3", "4", "5", "6"], [7, 0, 0, 4]),
+        ("ap_low", [0.1, 0.1, np.nan, 0.1], [11, 0, 0, 0]),
     ],
 )
 def test_how_nearly_an_output_agrees(reference, tmp_path, column, own, expected):
@@ -108,9 +108,9 @@ def test_how_nearly_an_output_agrees(reference, tmp_path, column, own, expected)
 
 def test_what_only_one_run_has_is_outside(reference, tmp_path):
     page(tmp_path / "own" / "02_x", TABLE.iloc[:3], new=1)
-    assert counts(reference, tmp_path / "own") == [12, 0, 0, 4]
+    assert counts(reference, tmp_path / "own") == [9, 0, 0, 3]
     (tmp_path / "own" / "02_x" / "metrics.parquet").unlink()
-    assert counts(reference, tmp_path / "own") == [3, 0, 0, 13]
+    assert counts(reference, tmp_path / "own") == [3, 0, 0, 9]
 
 
 def test_other_parameters_are_not_compared(reference, tmp_path):
@@ -124,8 +124,8 @@ def test_the_page_s_figures(reference, tmp_path):
     own = tmp_path / "own"
     page(own / "02_x", TABLE.assign(ap=[0.53, 0.4, np.nan, 0.1]))
     found = Results(own, "full").repetition()
-    assert (found["n"], found["n_outside"], found["stamp"]["git"]["commit"]) == (15, 1, "c0ffee")
-    assert found["counts"].splitlines()[2] == "| 02_x | 15 | 13 | 0 | 1 | 1 |"
+    assert (found["n"], found["n_outside"], found["stamp"]["git"]["commit"]) == (11, 1, "c0ffee")
+    assert found["counts"].splitlines()[2] == "| 02_x | 11 | 9 | 0 | 1 | 1 |"
     assert found["outside"].splitlines()[2:] == ["| 02_x | metrics, ap, row 4 | 0.8000 | 0.1000 |"]
     assert Results(own, "quick").repetition() is None
     page(tmp_path / "other" / "02_x", n=4)

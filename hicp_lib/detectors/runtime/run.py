@@ -8,18 +8,21 @@ and threads need no start-up. Every thread has its own detector, and OpenCV is h
 thread in each, so the results do not depend on how many there are.
 """
 
+import threading
 from collections.abc import Callable, Iterator, Mapping
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.executor import Workers, resolved, run_jobs
+from hicp_lib.core.executor import Workers, resolved, run_jobs, threads_beside
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.core.images import decode_image, image_bytes
-from hicp_lib.detectors.runtime.pool import DetectorPool, naming_image
+from hicp_lib.detectors.registry import make_detector
+from hicp_lib.detectors.runtime.cached_parts import Runner
+from hicp_lib.detectors.runtime.isolation import IsolationError
 from hicp_lib.detectors.runtime.results import (
     Key,
     Timed,
@@ -130,13 +133,13 @@ def detect_images(
         If an image cannot be read, or the detector cannot be made.
     """
     workers = resolved(workers)
-    if isinstance(workers, int):
+    if not isinstance(workers, str):
         workers = max(1, min(workers, len(paths)))
-    pool = DetectorPool(name, options, workers if isinstance(workers, int) else 1)
-    boxes_px = boxes_px if getattr(pool.first, "takes_boxes", False) else None
-    there = (name, tuple(sorted(options.items())))
-    detect = partial(_detect_there, there) if isinstance(workers, str) else partial(_detect, pool)
-    folder, kept, done = cache_folder(pool.first), {}, {}
+    n_here = None if isinstance(workers, str) else workers
+    asked = name, options, n_here
+    detector = make_detector(name, **options)
+    boxes_px = boxes_px if getattr(detector, "takes_boxes", False) else None
+    folder, kept, done = cache_folder(detector), {}, {}
 
     def missing() -> Iterator[tuple[Key, Callable[[], Timed]]]:
         for key, path in paths.items():
@@ -145,11 +148,12 @@ def detect_images(
             kept[key] = result_path(folder, sha256, boxes)
             result = read_result(kept[key])
             if result is None:
-                yield key, partial(detect, content, str(path), boxes, sha256)
+                # Of a combination's parts, only what is found here is kept.
+                yield key, partial(_detect, asked, content, str(path), boxes, sha256 if n_here else None)
             else:
                 done[key] = result
 
-    alike = identity(pool.first), partial(_identity_there, there)
+    alike = partial(_identity, asked)
     found = run_jobs(missing(), workers, "threads", alike=alike, named=paths.__getitem__)
     # disable=None: no bar unless standard error is a terminal.
     with tqdm(desc=name, total=len(paths), disable=None if progress else True) as bar:
@@ -157,31 +161,29 @@ def detect_images(
             write_result(kept[key], result)
             done[key] = result
             bar.update(len(done) - bar.n)
+    _made.__dict__.clear()
     return {key: done[key] for key in paths}
 
 
+_made = threading.local()  # each thread's own detector, the one that was asked for last
+
+
+def _runner(name: str, options: dict, workers: int | None) -> Runner:
+    asked = name, options, workers
+    if getattr(_made, "asked", None) != asked:
+        _made.runner = Runner(make_detector(name, **options), workers or threads_beside())
+        _made.asked = asked
+    return _made.runner
+
+
+def _identity(asked: tuple) -> dict:
+    return identity(_runner(*asked).detector)
+
+
 def _detect(
-    pool: DetectorPool, content: bytes, path: str, boxes_px: np.ndarray | None, sha256: str | None
+    asked: tuple, content: bytes, path: str, boxes_px: np.ndarray | None, sha256: str | None
 ) -> Timed:
-    with naming_image(path):
-        return pool.detect(decode_image(content, path), boxes_px, sha256)
-
-
-# What follows runs on a cluster's workers, where parts' results are not kept.
-
-
-def _detect_there(
-    detector: tuple, content: bytes, path: str, boxes_px: np.ndarray | None, sha256: str
-) -> Timed:
-    return _detect(_pool(*detector), content, path, boxes_px, None)
-
-
-def _identity_there(detector: tuple) -> dict:
-    return identity(_pool(*detector).first)
-
-
-@lru_cache(maxsize=2)
-def _pool(name: str, options: tuple[tuple[str, object], ...]) -> DetectorPool:
-    from distributed import get_worker
-
-    return DetectorPool(name, dict(options), get_worker().state.nthreads)
+    try:
+        return _runner(*asked).detect(decode_image(content, path), boxes_px, sha256)
+    except IsolationError as error:
+        raise IsolationError(f"{path}: {error}") from None

@@ -102,14 +102,13 @@ def run_all(jobs: Iterable[Job]) -> list[Run]:
     # The longest first, so that no core is left with one at the end: detectors, the fastest see most.
     missing.sort(key=lambda job: (job.condition in IDEAL, job.delay_s))
     workers = resolved(None)
-    is_here = isinstance(workers, int)
-    is_shared = is_here and len(missing) > 1
+    is_shared = isinstance(workers, int) and len(missing) > 1
     with multiprocessing.get_context("spawn").Manager() if is_shared else nullcontext() as manager:
         images = manager.dict() if manager else {}  # shared by the processes of this machine
         todo = {job: partial(_simulate, run=folders[job].name, job=job, images=images) for job in missing}
         named = [(f"{folders[job].name}/{_TABLES[0]}", call) for job, call in todo.items()]
         known = partial(_known, *sorted({job.condition for job in missing}))
-        list(run_jobs(named, workers, folder=out, alike=(known(), known) if not is_here else None))
+        list(run_jobs(named, workers, folder=out, alike=known))
     return [Run(job, *(pd.read_parquet(folders[job] / name) for name in _TABLES)) for job in jobs]
 
 

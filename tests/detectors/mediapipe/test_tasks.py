@@ -15,8 +15,8 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 from hicp_lib.detectors.registry import make_detector
+from hicp_lib.detectors.runtime.cached_parts import Runner
 from hicp_lib.detectors.runtime.isolation import child_environment
-from hicp_lib.detectors.runtime.pool import DetectorPool
 from tests.detectors.conftest import N_PEOPLE
 
 
@@ -154,7 +154,7 @@ def test_what_tracks_is_another_detector_and_not_run_over_sets_of_images(weights
     assert video == still | {"tracking_hz": 5.0}
     for name in ("mediapipe-pose", "mediapipe", "combined:mediapipe-pose+mediapipe-hands"):
         with pytest.raises(InputError, match="tracking_hz is for a video"):
-            DetectorPool(name, {"tracking_hz": 5.0}, 1)
+            Runner(make_detector(name, tracking_hz=5.0), 1)
 
 
 def test_an_empty_image_has_nobody(weights):

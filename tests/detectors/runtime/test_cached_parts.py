@@ -9,7 +9,7 @@ from hicp_lib.core.images import read_image, write_png
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.detectors.combined.detector import Combined
 from hicp_lib.detectors.registry import make_detector
-from hicp_lib.detectors.runtime import cached_parts, pool, run
+from hicp_lib.detectors.runtime import cached_parts, run
 from hicp_lib.detectors.runtime.results import _modules, cache_folder
 
 PART_S, OWN_S, START_S = 0.03, 0.005, 1.0
@@ -87,7 +87,7 @@ class Detectors:
 def detectors(tmp_path, monkeypatch):
     monkeypatch.setenv("HICP_CACHE", str(tmp_path / "cache"))
     made = Detectors()
-    monkeypatch.setattr(pool, "make_detector", made.make)
+    monkeypatch.setattr(run, "make_detector", made.make)
     monkeypatch.setattr(cached_parts, "time", made.clock)
     return made
 
@@ -200,8 +200,8 @@ def test_the_detector_that_a_runner_is_given_stays_as_it_is(detectors):
 
 
 def test_the_key_of_a_combination_names_the_code_of_its_parts(weights):
-    first = pool.DetectorPool("combined:openpose-mobilenet+mediapipe-hands", {}, workers=1).first
-    assert set(_modules(first)) == {
+    combined = make_detector("combined:openpose-mobilenet+mediapipe-hands")
+    assert set(_modules(combined)) == {
         "hicp_lib.detectors.combined.detector",
         "hicp_lib.detectors.mediapipe.tasks",
         "hicp_lib.detectors.openpose.mobilenet",

@@ -14,8 +14,8 @@ from hicp_lib.core import cache as core_cache
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import write_png
-from hicp_lib.detectors.runtime import pool, run
 from hicp_lib.detectors.runtime import results as cache
+from hicp_lib.detectors.runtime import run
 
 
 class Counting:
@@ -38,7 +38,7 @@ class Counting:
 @pytest.fixture
 def counting(monkeypatch, tmp_path):
     monkeypatch.setenv("HICP_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(pool, "make_detector", lambda name, **options: Counting(**options))
+    monkeypatch.setattr(run, "make_detector", lambda name, **options: Counting(**options))
     Counting.calls = 0
     return Counting
 
