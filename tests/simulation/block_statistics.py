@@ -44,7 +44,7 @@ from hicp_lib.simulation.world import furniture, room, staging
 
 EXPECTED_FILE = Path(__file__).with_suffix(".json")
 N_BLOCKS = 4
-SHAPE = "woman_25_slim"
+SHAPE = "woman_25_09"
 BODY = load_body()
 PARTS = ("albedo", "height_m", "gloss", "roughness", "softness", "glow")
 
