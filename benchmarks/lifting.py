@@ -28,7 +28,7 @@ HOLES = 0.02  # share of pixels without depth
 
 def make_frame(middle: str, distance_m: float) -> tuple[np.ndarray, np.ndarray]:
     """Keypoints (1, 136, 2) and depth (480, 640) float32 of a person before a wall."""
-    person = pose_body(load_body(), "woman_35_average", {})
+    person = pose_body(load_body(), "woman_35_06", {})
     target_m = person.keypoints_m[INDEX[middle]] + [0, 0, -0.05]
     pose = look_at(target_m + [distance_m, 0, 0], target_m)
     camera = PlacedCamera(640, 480, 615.0, 615.0, 319.5, 239.5, pose)

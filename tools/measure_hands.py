@@ -2,9 +2,10 @@
 
     python tools/measure_hands.py [--out data/hand_shapes.npz]
 
-What lifting beyond the paper knows of hands. Every finger bends on its own and evenly between the limits of
-its joints, its end joint with the one before; the poses of rendered people have no part in it. Seeds are
-fixed: the same body model gives the same shapes.
+What lifting beyond the paper knows of hands: of the body for development whose palm is of middle size, none
+that is held out. Every finger bends on its own and evenly between the limits of its joints, its end joint
+with the one before; the poses of rendered people have no part in it. Seeds are fixed: the same body model
+gives the same shapes.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from scipy.spatial.transform import Rotation
 from hicp_lib.core.files import atomic_path
 from hicp_lib.core.keypoints import RIGHT_HAND
 from hicp_lib.lifting.hand_shapes import PALM
+from hicp_lib.simulation.body.identities import split_members
 from hicp_lib.simulation.body.joints import FINGERS, LIMITS_DEG, pose_from_joints
 from hicp_lib.simulation.body.model import Body, load_body, pose_body
 
 N_SHAPES = 60
-BODY_SHAPE = "woman_35_average"  # the middle of the grown-up shapes in the size of the palm
 THUMB = ("thumb_base", "thumb_spread", "thumb_knuckle", "thumb_end")
 END_FOLLOWS, END_JITTER_DEG = 0.6, 8.0  # the end joint bends by this share of the middle one
 DEFAULT_OUT = Path(__file__).parents[1] / "data" / "hand_shapes.npz"
@@ -41,12 +42,21 @@ def bent_at_random(rng: np.random.Generator) -> dict[str, float]:
     return {f"right_{joint}": float(np.radians(angle)) for joint, angle in angles.items()}
 
 
+def middle_hand(body: Body) -> str:
+    """The development shape whose right palm is of middle size."""
+    palms = {}
+    for name in split_members("development")["bodies"]:
+        palm_m = pose_body(body, name, {}).keypoints_m[RIGHT_HAND][PALM]
+        palms[name] = np.linalg.norm(palm_m - palm_m.mean(axis=0), axis=1).mean()
+    return sorted(palms, key=palms.__getitem__)[len(palms) // 2]
+
+
 def hand_shapes_m(body: Body, rng: np.random.Generator) -> np.ndarray:
     """Right hands, (N_SHAPES, 21, 3), about the middle of the palm, palms turned alike."""
-    shapes = []
+    name, shapes = middle_hand(body), []
     for _ in range(N_SHAPES):
         pose = pose_from_joints(bent_at_random(rng))
-        hand_m = pose_body(body, BODY_SHAPE, pose).keypoints_m[RIGHT_HAND]
+        hand_m = pose_body(body, name, pose).keypoints_m[RIGHT_HAND]
         hand_m = hand_m - hand_m[PALM].mean(axis=0)
         turn, _ = Rotation.align_vectors((shapes or [hand_m])[0][PALM], hand_m[PALM])
         shapes.append(turn.apply(hand_m))

@@ -120,7 +120,7 @@ def _stage(subject: Subject) -> tuple[PosedBody, World]:
     pose = sample_pose(rng, body, str(rng.choice(_POSES)), appearance.shape)
     person = pose_body(body, appearance.shape, pose, facing_robot(_PERSON_Y_M))
     free = [(0.0, y, 0.7) for y in np.linspace(_PERSON_Y_M - LEVELS["distance"][-1], _PERSON_Y_M, 8)]
-    return person, furnished(subject.identity.draw("room"), dress(appearance, person, 0), free)
+    return person, furnished(subject.identity, dress(appearance, person, 0), free)
 
 
 def _camera(distance_m: float) -> PlacedCamera:

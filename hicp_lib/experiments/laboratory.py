@@ -12,6 +12,7 @@ import numpy as np
 from hicp_lib.core.camera import Camera, transform
 from hicp_lib.experiments.minimum_jerk import Posture
 from hicp_lib.simulation.appearance import materials as m
+from hicp_lib.simulation.body.identities import Identity
 from hicp_lib.simulation.body.joints import pose_from_joints
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.simulation.rendering import lights
@@ -98,12 +99,15 @@ def posed(shape: np.ndarray, posture: Posture) -> PosedBody:
     return pose_body(load_body(), shape, pose, facing_robot(y, x))
 
 
-def furnished(rng: Rng, surfaces: list[Surface], clear_m: list[tuple[float, float, float]]) -> World:
+def furnished(
+    identity: Identity, surfaces: list[Surface], clear_m: list[tuple[float, float, float]]
+) -> World:
     """A lit room around surfaces.
 
     Parameters
     ----------
-    rng : numpy.random.Generator
+    identity : Identity
+        Whose room and lights they are.
     surfaces : list of Surface
     clear_m : list of tuple of float
         Discs (x, y, radius) without furniture.
@@ -112,8 +116,9 @@ def furnished(rng: Rng, surfaces: list[Surface], clear_m: list[tuple[float, floa
     -------
     World
     """
-    room = make_room(rng, np.array([(0.0, 0.0, 0.6), *clear_m]))
-    return World([*room.surfaces, *surfaces], *_lighting(room.height_m), backdrop=np.zeros(3))
+    room = make_room(identity.draw("room"), np.array([(0.0, 0.0, 0.6), *clear_m]))
+    lit = _lighting(identity.draw("lights"), room.height_m)
+    return World([*room.surfaces, *surfaces], *lit, backdrop=np.zeros(3))
 
 
 def table(rng: Rng, low_m: tuple[float, float], high_m: tuple[float, float], height_m: float) -> Surface:
@@ -170,10 +175,10 @@ def chair(rng: Rng, middle_m: tuple[float, float], seat_m: float) -> list[Surfac
     ]
 
 
-def _lighting(height_m: float) -> tuple[list[lights.Light], lights.Ambient]:
-    """Two rows of tubes at the ceiling, and what walls and floor return of it."""
-    half_u, half_v, power = np.array([0.1, 0, 0]), np.array([0, 0.75, 0]), np.full(3, 3.2)
+def _lighting(rng: Rng, height_m: float) -> tuple[list[lights.Light], lights.Ambient]:
+    """Two rows of tubes at the ceiling, warm or cool, and what walls and floor return of it."""
+    half_u, half_v, cool = np.array([0.1, 0, 0]), np.array([0, 0.75, 0]), rng.uniform(-0.12, 0.12)
+    white = rng.uniform(0.85, 1.15) * np.array([1 - cool, 1.0, 1 + cool])
     middles = (np.array([x, 0.3, height_m - 0.1]) for x in (-0.9, 0.9))
-    tubes = [lights.Light(middle, half_u, half_v, power) for middle in middles]
-    grey = np.ones(3)
-    return tubes, lights.Ambient(0.42 * grey, 0.3 * grey, 0.25 * grey, np.array([0, -1.0, 0]))
+    tubes = [lights.Light(middle, half_u, half_v, 3.2 * white) for middle in middles]
+    return tubes, lights.Ambient(0.42 * white, 0.3 * white, 0.25 * white, np.array([0, -1.0, 0]))

@@ -1,7 +1,7 @@
 """What is known of people before they are seen: how keypoints hang together, how far apart they can be.
 
-Measured on the body model by `tools/measure_body.py`, over people of 18 shapes in many poses. No
-recording had a part in it.
+Measured on the body model by `tools/measure_body.py`, over the bodies for development in many poses. No
+recording and nobody who is held out had a part in it.
 """
 
 import zipfile

@@ -31,6 +31,7 @@ from hicp_lib.simulation.appearance import (
     skin,
 )
 from hicp_lib.simulation.body import arms, poses
+from hicp_lib.simulation.body.identities import HELD_OUT, Subject, draw_identity
 from hicp_lib.simulation.body.joints import LIMITS_DEG
 from hicp_lib.simulation.body.model import load_body, pose_body, rest_shape, shape_weights
 from hicp_lib.simulation.body.self_collision import collision_model
@@ -44,7 +45,7 @@ from hicp_lib.simulation.world import furniture, room, staging
 
 EXPECTED_FILE = Path(__file__).with_suffix(".json")
 N_BLOCKS = 4
-SHAPE = "woman_25_slim"
+SHAPE = "woman_25_09"
 BODY = load_body()
 PARTS = ("albedo", "height_m", "gloss", "roughness", "softness", "glow")
 
@@ -246,7 +247,7 @@ def skins() -> list[np.ndarray]:
 
 
 def outfits() -> list[np.ndarray]:
-    drawn = [people.random_appearance(rng) for rng in rngs(40)]
+    drawn = [people.appearance_of(draw_identity(rng, HELD_OUT)) for rng in rngs(40)]
     worn = [
         [*astuple(w.garment)[1:], *(w.trim.hem, w.trim.band, len(w.trim.line), w.collar)]
         for a in drawn
@@ -300,8 +301,9 @@ def stages() -> list[np.ndarray]:
                 ]
             )
         )
-    yaws = [staging._person(rng, (0.1, 0.2), 0)[0].keypoints_m[[0, 9, 18]].ravel() for rng in rngs(8)]
-    return [np.array(rows), np.array(yaws)]
+    who = [draw_identity(rng, HELD_OUT) for rng in rngs(8)]
+    stands = [staging._person(identity, (0.1, 0.2), 0)[0].keypoints_m[[0, 9, 18]].ravel() for identity in who]
+    return [np.array(rows), np.array(stands)]
 
 
 def arms_placed() -> list[np.ndarray]:
@@ -342,7 +344,7 @@ def postures() -> list[np.ndarray]:
 
 def rendered() -> list[np.ndarray]:
     """A person in a bare room, 64 x 48 pixels, and what a sensor makes of them."""
-    appearance = people.random_appearance(np.random.default_rng(8))
+    appearance = people.appearance_of(Subject(8).identity)
     posed = pose_body(BODY, appearance.shape, {})
     lamp = lights.Light(
         np.array([1.5, 1, 2.4]), np.array([0.3, 0, 0]), np.array([0, 0.3, 0]), np.full(3, 5.0)
@@ -361,7 +363,7 @@ def experiments() -> list[np.ndarray]:
     rng = np.random.default_rng(6)
     table = laboratory.table(rng, (-0.6, 0.7), (0.6, 1.3), 0.72)
     chair = laboratory.chair(rng, (0.1, 1.2), 0.45)
-    tubes, ambient = laboratory._lighting(2.5)
+    tubes, ambient = laboratory._lighting(rng, 2.5)
     robot = vertices(robot_surfaces(load_icub(), home_posture(load_icub())))
     lit = np.array([[*t.centre_m, *t.half_u_m, *t.half_v_m, *t.power] for t in tubes])
     return [vertices([table]), vertices(chair), lit, np.array(astuple(ambient)), robot]

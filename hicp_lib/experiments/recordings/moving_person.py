@@ -66,8 +66,9 @@ def _staged(scene: MovingPerson, motion_s: float) -> tuple[World, PosedBody]:
 @memoised(1)
 def moving_person(subject: Subject) -> MovingPerson:
     """A subject's scene: who moves how, in what room. The same in every process."""
-    appearance, rng = appearance_of(subject.identity, skirts=False), subject.identity.draw("room")
+    identity = subject.identity
+    appearance, rng = appearance_of(identity, skirts=False), identity.draw("room", "table")
     top = table(rng, *TABLE_M, TABLE_HEIGHT_M) if rng.random() < _AT_TABLE else None
-    room = furnished(rng, [top] if top else [], [(0.0, DISTANCE_M, 1.3), (0.0, 0.9, 0.8)])
-    gestures = Gestures(subject.identity.draw("poses"), appearance.shape, at_table=top is not None)
+    room = furnished(identity, [top] if top else [], [(0.0, DISTANCE_M, 1.3), (0.0, 0.9, 0.8)])
+    gestures = Gestures(identity.draw("poses"), appearance.shape, at_table=top is not None)
     return MovingPerson(room, top, appearance, Motion(gestures.now, gestures.moves()))

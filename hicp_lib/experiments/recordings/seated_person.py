@@ -40,14 +40,14 @@ _N_ROUNDS = 6
 def seated_person(subject: Subject) -> tuple[World, PosedBody]:
     """A subject's scene: the person at the table in a furnished room. The same in every process."""
     identity = subject.identity
-    body, appearance, rng = load_body(), appearance_of(identity, skirts=False), identity.draw("room")
+    body, appearance, rng = load_body(), appearance_of(identity, skirts=False), identity.draw("room", "table")
     person = _sit_down(body, appearance.shape, identity.draw("poses"))
     edge_m = DISTANCE_M - _TABLE_EDGE_M
     top = table(rng, (-0.65, edge_m - _TABLE_DEPTH_M), (0.65, edge_m), TABLE_HEIGHT_M)
     seat = chair(rng, _PLACE_M, _seat_height_m(body, person))
     surfaces = [top, *seat, *dress(appearance, person, 0)]
     clear = [(0.0, DISTANCE_M - 0.2, 0.9), (0.0, DISTANCE_M + 0.4, 0.7)]
-    return furnished(rng, surfaces, clear), person
+    return furnished(identity, surfaces, clear), person
 
 
 def _sit_down(body: Body, shape: np.ndarray, rng: np.random.Generator) -> PosedBody:

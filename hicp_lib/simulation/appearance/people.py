@@ -98,7 +98,8 @@ def appearance_of(identity: Identity, skirts: bool = True) -> Appearance:
     (1.0, ['top', 'bottom'])
     """
     rng, (name, _) = identity.draw("clothes"), identity.bodies[0]
-    woman, origin, age = is_woman(name), traits(name), float(name.split("_")[1])
+    woman, origin = is_woman(name), traits(name)
+    age = origin["age_years"]
     tone = np.clip(0.12 + 0.24 * origin["asian"] + 0.62 * origin["african"] + rng.normal(0, 0.09), 0, 1)
     complexion = skin.random_complexion(rng, float(tone), woman, age)
     style = hair_styles.random_style(rng, woman, age)

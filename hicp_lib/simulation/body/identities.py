@@ -58,9 +58,9 @@ class Identity:
             weights[names.index(name)] += share
         return weights
 
-    def draw(self, kind: str) -> np.random.Generator:
-        """The generator of "clothes", "room", "lights", "poses" or "camera", from its beginning."""
-        return stream(kind, getattr(self, kind))
+    def draw(self, kind: str, *more: int | str) -> np.random.Generator:
+        """A generator of one of `KINDS`, from its beginning; `more` make it one of its own, see `stream`."""
+        return stream(kind, getattr(self, kind), *more)
 
     def record(self) -> dict[str, Any]:
         """All of it, JSON-able."""

@@ -53,7 +53,7 @@ iris_rad : angle from the line of sight, seen from the eye's middle (pupil to ab
 lips, eyelid, mouth, ear, nail : 1 inside, 0 outside, smooth at the border
 """
 
-STORED_STEP_M = 5e-5  # vertices are stored as whole multiples of this
+STORED_STEP_M = 5e-5  # vertices are stored as whole multiples of this, as differences, see tools/bake_body.py
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ class Body:
     Attributes
     ----------
     shape_names : tuple of str
-        Names of the shapes, such as "woman_25_slim".
+        Names of the shapes, such as "woman_25_09": a woman of 25, the ninth.
     vertices_m : array, shape (n_shapes, n_v, 3), dtype float32
         At rest.
     heads_m : array, shape (n_shapes, n_bones, 3)
@@ -208,7 +208,7 @@ def pose_body(body: Body, shape: Shape, pose: Pose, T_world_body: np.ndarray | N
     Examples
     --------
     >>> body = load_body()
-    >>> person = pose_body(body, "man_35_average", {"lowerarm01.L": np.array([0, -1.57, 0])})
+    >>> person = pose_body(body, "man_38_07", {"lowerarm01.L": np.array([0, -1.57, 0])})
     >>> person.keypoints_m.shape, float(person.vertices_m[:, 2].min().round(3))
     ((136, 3), 0.0)
     """
@@ -328,7 +328,8 @@ def _skin(body: Body, vertices, rotations, translations) -> np.ndarray:
 
 
 def _unpack(stored) -> Body:
-    vertices = stored["vertices_50um"].astype(np.float32) * np.float32(STORED_STEP_M)
+    steps = stored["mean_50um"].T + np.cumsum(stored["differences_50um"], axis=2, dtype=np.int32)
+    vertices = np.ascontiguousarray(steps.transpose(0, 2, 1), np.float32) * np.float32(STORED_STEP_M)
     n_v, n_bones = vertices.shape[1], len(stored["bone_names"])
     skin = np.zeros((n_v, n_bones), np.float32)
     bones, weights = stored["skin_bones"].astype(int), stored["skin_weights"].astype(np.float32)

@@ -49,7 +49,7 @@ def reach(
     Examples
     --------
     >>> from hicp_lib.simulation.body.model import load_body
-    >>> joints = reach(load_body(), "woman_25_slim", {}, "left", np.array([0.4, 0.2, 0.3]))
+    >>> joints = reach(load_body(), "woman_25_09", {}, "left", np.array([0.4, 0.2, 0.3]))
     >>> sorted(joints)[0], 0 < joints["left_elbow_flexion"] < np.pi
     ('left_elbow_flexion', True)
     """

@@ -81,8 +81,8 @@ def marker_vertices(shape: Shape) -> np.ndarray:
 
     Examples
     --------
-    >>> person = pose_body(load_body(), "man_35_average", {})
-    >>> front, back = markers_m(person, marker_vertices("man_35_average"))[:2]  # of the left shoulder
+    >>> person = pose_body(load_body(), "man_38_07", {})
+    >>> front, back = markers_m(person, marker_vertices("man_38_07"))[:2]  # of the left shoulder
     >>> bool(front[0] > back[0] + 0.05)
     True
     """

@@ -67,8 +67,9 @@ def random_stage(rng: Rng, split: str = HELD_OUT) -> Stage:
     first = draw_identity(rng, split)
     taken = first.draw("camera")
     places = _places(taken, int(taken.choice([1, 2, 3], p=[0.68, 0.24, 0.08])))
-    shared = {"room": first.room, "lights": first.lights, "camera": first.camera}
-    everyone = [first, *(replace(draw_identity(rng, split), **shared) for _ in places[1:])]
+    everyone = [first]
+    for one in [draw_identity(rng, split) for _ in places[1:]]:
+        everyone.append(replace(one, room=first.room, lights=first.lights, camera=first.camera))
     people, dressed = zip(*map(_person, everyone, places, range(len(places))), strict=True)
     camera = _camera(taken, people[0])
     centre = camera.centre_m

@@ -24,7 +24,7 @@ _ARMS_DEG = {"shoulder_abduction": 25, "forearm_supination": 80, "index_spread":
 def layouts() -> Figure:
     """Layouts of keypoints, as in the paper's Fig. 2, and a hand enlarged; the person faces the reader."""
     pose = pose_from_joints(radians(_ARMS_DEG, "left_") | radians(_ARMS_DEG, "right_"))
-    points_m = pose_body(load_body(), "man_35_average", pose).keypoints_m[:, 1:]
+    points_m = pose_body(load_body(), "man_38_07", pose).keypoints_m[:, 1:]
     figure, axes = new_figure(2, 3, 6.4, 7.2)
     rows, made_of = [], read_json(DATA_DIR / "survey.json")["layouts"]
     for axis, (name, conventions) in zip(axes.flat, made_of.items(), strict=False):

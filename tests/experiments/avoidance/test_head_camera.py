@@ -30,7 +30,7 @@ class Table:
     def at(self, time_s, robot):
         high = ROOT_HEIGHT_M + TABLE_M
         top = Surface(g.box([-1, 0.05, high - 0.02], [1, 1.2, high]), m.plain(np.array([0.6, 0.02, 0.02])))
-        return furnished(np.random.default_rng(0), [top, *robot], []), None
+        return furnished(Subject().identity, [top, *robot], []), None
 
 
 @dataclass

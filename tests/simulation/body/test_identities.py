@@ -12,6 +12,7 @@ from hicp_lib.simulation.body.identities import (
     is_woman,
     split_members,
     stream,
+    traits,
 )
 from hicp_lib.simulation.body.model import load_body
 
@@ -19,11 +20,21 @@ MEMBERS = [split_members(split) for split in SPLITS]
 
 
 def test_nothing_belongs_to_both_splits_and_every_body_to_one():
-    grown_up = [name for name in load_body().shape_names if not name.startswith(("girl", "boy"))]
-    assert sorted(MEMBERS[0]["bodies"] + MEMBERS[1]["bodies"]) == sorted(grown_up)
+    bodies, shapes = [members["bodies"] for members in MEMBERS], load_body().shape_names
+    assert sorted(bodies[0] + bodies[1]) == sorted(shapes) and len(set(shapes)) == len(shapes)
     for kind in KINDS:
         ranges = sorted(members[kind] for members in MEMBERS)
         assert ranges[0][0] <= ranges[0][1] < ranges[1][0] <= ranges[1][1]
+
+
+def test_both_splits_span_ages_and_heights_of_both_sexes():
+    for woman in (True, False):
+        people = [[traits(name) for name in m["bodies"] if is_woman(name) == woman] for m in MEMBERS]
+        assert [len(some) for some in people] == [12, 20]
+        for name, wide, apart in (("age_years", 45, 5), ("height_m", 0.2, 0.02)):
+            values = [[person[name] for person in some] for some in people]
+            assert all(np.ptp(some) > wide for some in values)
+            assert abs(np.mean(values[0]) - np.mean(values[1])) < apart
 
 
 @pytest.mark.parametrize("split", SPLITS)

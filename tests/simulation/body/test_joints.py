@@ -28,7 +28,7 @@ DIRECTIONS = [
 ]  # fmt: skip
 
 
-def keypoints(joints: dict, shape="man_35_average") -> np.ndarray:
+def keypoints(joints: dict, shape="man_38_07") -> np.ndarray:
     """Keypoints from the pelvis."""
     posed = pose_body(BODY, shape, pose_from_joints(joints))
     return posed.keypoints_m - posed.heads_m[0]

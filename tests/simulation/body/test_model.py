@@ -10,6 +10,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_file
 from hicp_lib.core.keypoints import FACE, INDEX, LEFT_HAND, NAMES
 from hicp_lib.core.rotations import rotation
+from hicp_lib.simulation.body.identities import traits
 from hicp_lib.simulation.body.model import BODY_FILE, REGIONS, load_body, pose_body, pose_bones, shape_weights
 
 BODY = load_body()
@@ -76,7 +77,8 @@ def test_keypoints_are_symmetric_in_the_reference_stance():
     mirror[26:94] = [26 + i for i in face]
     for shape in BODY.shape_names:
         k = pose_body(BODY, shape, {}).keypoints_m
-        assert np.abs(k[mirror] * (1, -1, 1) - k).max() < 1e-3
+        # Both hands of some of MakeHuman's shapes are not quite alike.
+        assert np.abs(k[mirror] * (1, -1, 1) - k).max() < 2.5e-3
 
 
 # Ending of a keypoint's name: regions whose skin is nearest, and how deep (m) below it the point may lie.
@@ -174,12 +176,12 @@ def test_blends_lie_between_their_shapes(seed):
 
 def test_shapes_have_the_size_of_people():
     for i, name in enumerate(BODY.shape_names):
-        stature = pose_body(BODY, i, {}).keypoints_m[INDEX["head_top"], 2]
-        low, high = (1.3, 1.5) if name.endswith("_10") else (1.5, 1.95)
-        assert low < stature < high, name
+        stature_m = pose_body(BODY, i, {}).keypoints_m[INDEX["head_top"], 2]
+        assert 1.48 < stature_m < 1.95 and abs(stature_m - traits(name)["height_m"]) < 0.025, name
+        assert name.split("_")[1] == str(traits(name)["age_years"]) and 18 <= traits(name)["age_years"] < 80
         a, b, c = (BODY.vertices_m[i][BODY.triangles[:, k]].astype(float) for k in range(3))
         litres = 1000 * np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
-        assert (25 if name.endswith("_10") else 38) < litres < 130, (name, litres)
+        assert 38 < litres < 130, (name, litres)
 
 
 def test_the_mesh_is_sound():

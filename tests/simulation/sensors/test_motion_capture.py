@@ -30,7 +30,7 @@ from hicp_lib.simulation.sensors.motion_capture import (
 )
 
 BODY = load_body()
-SHAPE = "man_35_average"
+SHAPE = "man_38_07"
 EXACT = MocapSystem(noise_m=0, shortest_s=0)
 JOINTS = [INDEX[f"{side}_{joint}"] for joint in ("shoulder", "elbow", "wrist") for side in ("left", "right")]
 
@@ -67,9 +67,8 @@ def test_both_markers_of_a_shoulder_are_on_its_outer_side(shape):
     ]  # the right one mirrored; axis 1: towards the front, towards the back
     assert (from_joint[:, :, 1] > 0.025).all() and (np.abs(from_joint[:, :, 2]) < 0.02).all()
     assert (from_joint[:, 0, 0] > 0.015).all() and (from_joint[:, 1, 0] < -0.015).all()
-    is_adult = not shape.startswith(("girl", "boy"))
     mean_m = np.linalg.norm(from_joint.mean(axis=1), axis=1)  # as the page on simulated sensors says
-    assert not is_adult or ((mean_m > 0.035) & (mean_m < 0.065)).all()
+    assert ((mean_m > 0.035) & (mean_m < 0.065)).all()
 
 
 def test_markers_lie_off_the_skin_and_follow_the_limb():
@@ -78,7 +77,7 @@ def test_markers_lie_off_the_skin_and_follow_the_limb():
     person, moved = _markers(SHAPE, bent)
     for body, markers in ((straight, at_rest), (person, moved)):
         gaps_m = np.linalg.norm(body.vertices_m[:, None] - markers[None], axis=2).min(axis=0)
-        assert np.abs(gaps_m - STANDOFF_M).max() < 0.004
+        assert np.abs(gaps_m - STANDOFF_M).max() < 0.005
     wrist = [JOINT_MARKERS.index("wrist_left_1"), JOINT_MARKERS.index("wrist_left_2")]
     assert np.linalg.norm(moved[wrist].mean(axis=0) - person.keypoints_m[INDEX["left_wrist"]]) < 0.02
     assert moved[wrist].mean(axis=0)[0] > at_rest[wrist].mean(axis=0)[0] + 0.15  # brought forward
