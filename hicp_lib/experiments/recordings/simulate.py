@@ -70,7 +70,7 @@ def simulate_recording(
     InputError
         For an unknown scenario, numbers out of range, or a folder that holds something else.
     """
-    out, plan = Path(out), scenario(name)
+    out, plan = Path(out), scenario(name, subject.number)
     n = plan.n_frames if n_frames is None else n_frames
     workers = resolved(workers)
     check_numbers(n_frames=(n, 1, plan.max_frames))
