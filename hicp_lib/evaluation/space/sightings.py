@@ -46,8 +46,8 @@ def sightings(
     DataFrame
         Columns `view, detector, method, part, measure, subject, source_image` (the frame), `value`. `FOUND`
         is 1 where any of the part's keypoints is found; `NEAR_MEDIAN` and, with truth, `NEAR_TRUTH` are the
-        share of them within `WITHIN_M` of the detector's median position over all the subject's images, and of the
-        truth.
+        share of them within `WITHIN_M` of the detector's median position over the subject's images, and of
+        the truth.
     """
     tables = []
     for case, part, found_m, true_m in cases(points, subjects, truth, min_score, ALL_PARTS):
