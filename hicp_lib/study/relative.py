@@ -30,8 +30,8 @@ Folders = str | Sequence[str]
 def open_views(
     recording: Folders = "",
     recording_lower: Folders = "",
-    n_frames: int = 100,
-    n_people: int = 1,
+    n_frames: int = 10,
+    n_people: int = 12,
     seed: int = 0,
 ) -> dict[str, list[Recording]]:
     """The recordings given by their views, or two simulated ones of each person where none is.
@@ -54,9 +54,8 @@ def open_views(
     """
     given = [open_people("relative-upper", folders) for folders in (recording, recording_lower) if folders]
     if not given:
-        return {
-            view: open_people(f"relative-{view}", "", n_frames, n_people, seed) for view in ("upper", "lower")
-        }
+        scenarios = {view: f"relative-{view}" for view in ("upper", "lower")}
+        return {view: open_people(name, "", n_frames, n_people, seed) for view, name in scenarios.items()}
     counts = [len(people) for people in given]
     if len(set(counts)) > 1:
         said = f"{counts[0]} and {counts[1]} folders; give both views of the same people, in the same order"
@@ -99,12 +98,8 @@ def detect_views(views: Views, detectors: Sequence[str]) -> dict[tuple[str, str]
     dict of (str, str) to list of list of Detections
         By view and detector: of each person, in the order of the frames.
     """
-    found: dict[tuple[str, str], list[list[Detections]]] = {}
-    for view, people in views.items():
-        for recording in people:
-            for detector, detections in detect_frames(recording, detectors).items():
-                found.setdefault((view, detector), []).append(detections)
-    return found
+    found = {view: [detect_frames(one, detectors) for one in people] for view, people in views.items()}
+    return {(view, name): [of[name] for of in found[view]] for view in views for name in detectors}
 
 
 def lift_views(views: Views, found: Found) -> pd.DataFrame:
@@ -128,18 +123,16 @@ def lift_views(views: Views, found: Found) -> pd.DataFrame:
     """
     tables = []
     for view, people in views.items():
-        of_view = {detector: of_people for (seen, detector), of_people in found.items() if seen == view}
+        there = {name: of_people for (seen, name), of_people in found.items() if seen == view}
         lifted = [
-            lift_found(recording, {detector: of_people[k] for detector, of_people in of_view.items()})
-            for k, recording in enumerate(people)
+            lift_found(one, {name: of[k] for name, of in there.items()}) for k, one in enumerate(people)
         ]
         tables.append(labelled(over_people(lifted, [*map(len, people)]), view=view))
     points = pd.concat(tables, ignore_index=True)
     if points["x_m"].isna().all():
-        folders = ", ".join(str(recording.folder) for people in views.values() for recording in people)
-        raise InputError(
-            f"{folders}: nobody was found and lifted in any image; record people in view, with depth"
-        )
+        folders = ", ".join(str(one.folder) for people in views.values() for one in people)
+        said = "nobody was found and lifted in any image; record people in view, with depth"
+        raise InputError(f"{folders}: {said}")
     return points
 
 

@@ -72,9 +72,9 @@ def similar_views(
     -------
     DataFrame
         Columns `view, detector, method, part, measure, value, low, high, n` (pairs that count), `n_people`
-        (with one that does). "flicker
-        rate": of the pairs in which any keypoint of the part is found in either view, the share in which none
-        is in the other. "moves [m]": median over pairs of how far a keypoint moves; of several, their median.
+        (with one that does). "flicker rate": of the pairs in which any keypoint of the part is found in
+        either view, the share in which none is in the other. "moves [m]": median over pairs of how far a
+        keypoint moves; of several, their median.
     """
     rows: list[tuple] = []
     pairs = {view: similar_pairs(poses).T for view, poses in T_base_cam.items()}
