@@ -30,7 +30,7 @@ Folders = str | Sequence[str]
 def open_views(
     recording: Folders = "",
     recording_lower: Folders = "",
-    n_frames: int = 10,
+    n_frames: int = 8,
     n_people: int = 12,
     seed: int = 0,
 ) -> dict[str, list[Recording]]:

@@ -3,7 +3,7 @@
 Beside the shares of `hicp_lib.evaluation.space.stability`, over the same `points` and views.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -13,10 +13,11 @@ from hicp_lib.evaluation.space.stability import (
     MIN_SCORE,
     cases,
     distances,
-    median_position,
-    of_each,
+    medians_of_each,
 )
 from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
+
+_LEAST_IMAGES = 3  # of a person: of one, the distance to their median is 0
 
 
 def spread_and_bias(
@@ -49,8 +50,9 @@ def spread_and_bias(
         each with `_low` and `_high` beside it: `spread_m`, the median distance to the subject's median
         position; with `truth` also `bias_m`, how far a subject's median position is from the true one, mean
         over subjects, and `error_m`, the median distance to the truth. For a hand, the mean of each over its
-        keypoints; NaN where nothing was found. Of n images, the spread comes out a share of about 1 / n too
-        small: the median lies between them.
+        keypoints; NaN where nothing was found. Spread and bias are of those subjects in at least three of
+        whose images the keypoint was found; of n images the spread comes out a share of about 1 / n too small, as the
+        median lies between them.
     """
     rows = []
     for case, part, found_m, true_m in cases(points, subjects, truth, min_score):
@@ -69,23 +71,26 @@ def _distances_drawn(
 ) -> dict[str, np.ndarray]:
     """Spread, bias and error in every draw, shape (draws,), mean over the keypoints found."""
     draws: dict[str, list[np.ndarray]] = {"spread_m": [], "bias_m": [], "error_m": []}
-    for k in np.flatnonzero(np.isfinite(found_m[..., 0]).any(axis=0)):
-        found = found_m[:, k]
-        draws["spread_m"].append(weighted_median(distances(found, None, weights, subjects), weights))
+    for k, found in enumerate(found_m.swapaxes(0, 1)):
+        medians = medians_of_each(found, weights, subjects, _LEAST_IMAGES)
+        if not medians:
+            continue
+        draws["spread_m"].append(weighted_median(distances(found, weights, medians), weights))
         if true_m is not None:
             true = true_m[:, k]
-            draws["bias_m"].append(_mean_bias_m(found - true, weights, subjects))
-            draws["error_m"].append(weighted_median(distances(found, true, weights, subjects), weights))
+            draws["bias_m"].append(_mean_bias_m(true, weights, medians))
+            draws["error_m"].append(weighted_median(np.linalg.norm(found - true, axis=1), weights))
     names = ("spread_m",) if true_m is None else tuple(draws)
     nothing = [np.full(len(weights), np.nan)]
     return {name: np.mean(draws[name] or nothing, axis=0) for name in names}
 
 
-def _mean_bias_m(off_m: np.ndarray, weights: np.ndarray, subjects: np.ndarray) -> np.ndarray:
-    """Length of the median of each subject's offsets (n, 3), mean over those drawn, shape (draws,)."""
-    people = [images for images in of_each(subjects) if np.isfinite(off_m[images]).any()]
-    biases_m = [np.linalg.norm(median_position(off_m[of], weights[:, of]), axis=1) for of in people]
-    times = [weights[:, of].mean(axis=1) for of in people]  # how often each was drawn
+def _mean_bias_m(
+    true_m: np.ndarray, weights: np.ndarray, medians: Sequence[tuple[np.ndarray, np.ndarray]]
+) -> np.ndarray:
+    """How far medians are from the true place (n, 3) of a person who keeps still, mean over people drawn."""
+    biases_m = np.array([np.linalg.norm(at_m - true_m[of].mean(axis=0), axis=1) for of, at_m in medians])
+    times = np.array([weights[:, of].mean(axis=1) for of, _ in medians])  # how often each was drawn
     known = np.where(np.isfinite(biases_m), times, 0.0)
     with np.errstate(invalid="ignore"):
         return (known * np.nan_to_num(biases_m)).sum(axis=0) / known.sum(axis=0)

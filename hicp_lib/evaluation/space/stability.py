@@ -125,7 +125,11 @@ def within_distance(
         weights, n_people = draw_counts(whose, n_resamples, seed), len(set(whose))
         fractions = np.zeros((len(weights), len(thresholds_m)))
         for k in range(found_m.shape[1]):
-            off_m = distances(found_m[:, k], None if true_m is None else true_m[:, k], weights, whose)
+            if true_m is None:
+                medians = medians_of_each(found_m[:, k], weights, whose)
+                off_m = distances(found_m[:, k], weights, medians)
+            else:
+                off_m = np.linalg.norm(found_m[:, k] - true_m[:, k], axis=1)[None]
             for j, threshold_m in enumerate(thresholds_m):
                 fractions[:, j] += np.einsum("dn,dn->d", weights, off_m <= threshold_m) / found_m.size * 3
         found = np.isfinite(found_m[..., 0]).mean()
@@ -226,34 +230,39 @@ def median_position(found_m: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return np.stack([weighted_median(found_m[:, i], weights) for i in range(3)], axis=1)
 
 
+def medians_of_each(
+    found_m: np.ndarray, weights: np.ndarray, subjects: np.ndarray, least: int = 1
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Which images (n,) are of a subject, and its median position in every draw (draws, 3).
+
+    Of every subject in at least so many of whose images the keypoint is found; arguments as of `distances`.
+    """
+    people = [of for of in of_each(subjects) if np.isfinite(found_m[of, 0]).sum() >= least]
+    return [(of, median_position(found_m[of], weights[:, of])) for of in people]
+
+
 def distances(
-    found_m: np.ndarray, true_m: np.ndarray | None, weights: np.ndarray, subjects: np.ndarray
+    found_m: np.ndarray, weights: np.ndarray, medians: Sequence[tuple[np.ndarray, np.ndarray]]
 ) -> np.ndarray:
-    """How far one keypoint is from where it should be, image by image.
+    """How far one keypoint is from the subject's median position.
 
     Parameters
     ----------
     found_m : array, shape (n, 3)
         Positions; NaN where not found.
-    true_m : array or None, shape (n, 3)
-        Where it should be. None: at the subject's median position of each draw.
     weights : array of int, shape (draws, n)
         How often each image counts.
-    subjects : array, shape (n,)
-        Whose each image is.
+    medians : sequence of (array, array)
+        As from `medians_of_each`.
 
     Returns
     -------
-    array, shape (1, n) or (draws, n)
-        The first with `true_m`.
+    array, shape (draws, n)
+        NaN of subjects without a median.
     """
-    if true_m is not None:
-        return np.linalg.norm(found_m - true_m, axis=1)[None]
     off_m = np.full(weights.shape, np.nan)
-    for images in of_each(subjects):
-        if np.isfinite(found_m[images]).any():
-            median_m = median_position(found_m[images], weights[:, images])
-            off_m[:, images] = np.linalg.norm(found_m[images] - median_m[:, None], axis=-1)
+    for of, median_m in medians:
+        off_m[:, of] = np.linalg.norm(found_m[of] - median_m[:, None], axis=-1)
     return off_m
 
 

@@ -25,7 +25,7 @@ from hicp_lib.simulation.sensors.time_of_flight import AZURE_KINECT
 POSES_FILE = DATA_DIR / "relative_poses.csv"
 DEPTH_CAMERAS = {"d435": D435, "azure-kinect": AZURE_KINECT}
 """What a scenario may be recorded with, by name; nothing in this study is tuned on the second."""
-_POSES_APART = 10  # of the robot, from where one person's begin to where the next one's do
+_POSES_APART = 8  # of the robot, from where one person's begin to where the next one's do
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
         What the data are, for the caption.
     """
     table = table[table["method"] == method]
-    table = table[table["n_images"] >= min(MIN_IMAGES, table["n_images"].max())]
+    table = table[(table["n_images"] >= min(MIN_IMAGES, table["n_images"].max())) & table["spread_m"].notna()]
     n_views = table["view"].nunique()
     size = max(4.6 * n_views, 6), 4.9
     figure, axes = new_figure(1, n_views, *size, sharex=True, sharey=True, squeeze=False)

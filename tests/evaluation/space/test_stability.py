@@ -192,3 +192,14 @@ def test_somebody_who_is_never_found_counts_as_not_within_and_has_no_bias():
     )
     assert row["bias_m"] == without.set_index("part").loc["left wrist", "bias_m"]
     assert row["bias_m_low"] < row["bias_m"] < row["bias_m_high"]
+
+
+def test_a_person_found_once_has_no_spread():
+    """One of two people is found once: a distance of 0 to a median of one would pull the spread down."""
+    people = {"upper": np.repeat([0, 1], 6)}
+    offsets = [*along_x(0, 0.02, 0.04, 0.06, 0.08, 0.1), [0.5, 0, 0], *[NONE] * 5]
+    points = make_points(offsets, ["left_wrist"], subjects=people["upper"])
+    row = spread_and_bias(points, people, {"upper": make_truth(12)}, n_resamples=0).set_index("part")
+    alone_m = [0.05, 0.03, 0.01, 0.01, 0.03, 0.05]
+    assert row.loc["left wrist", "spread_m"] == pytest.approx(np.median(alone_m))
+    assert row.loc["left wrist", "bias_m"] == pytest.approx(0.05)
