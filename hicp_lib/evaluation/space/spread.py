@@ -51,8 +51,8 @@ def spread_and_bias(
         position; with `truth` also `bias_m`, how far a subject's median position is from the true one, mean
         over subjects, and `error_m`, the median distance to the truth. For a hand, the mean of each over its
         keypoints; NaN where nothing was found. Spread and bias are of those subjects in at least three of
-        whose images the keypoint was found; of n images the spread comes out a share of about 1 / n too small, as the
-        median lies between them.
+        whose images the keypoint was found; of n images the spread comes out a share of about 1 / n too small,
+        as the median lies between them.
     """
     rows = []
     for case, part, found_m, true_m in cases(points, subjects, truth, min_score):
