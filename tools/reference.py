@@ -15,8 +15,9 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 
+from hicp_lib.core.datafiles import REFERENCE_DIR
 from hicp_lib.core.files import read_json
-from hicp_lib.report.repetition import REFERENCE_DIR, is_measured
+from hicp_lib.report.repetition import is_measured
 
 MAX_ROWS = 1000  # of a table that is read; what is longer was drawn
 MAX_BYTES = 2_000_000

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.datafiles import DATA_DIR, REFERENCE_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_bytes, sha256_file
 
@@ -299,7 +299,7 @@ def _imported(statement: ast.Import | ast.ImportFrom) -> Iterator[str]:
 def _data_sha256(patterns: Iterable[str], data: Path) -> dict[str, str]:
     paths: set[Path] = set()
     for pattern in patterns:
-        found = [path for path in data.glob(pattern) if path.is_file()]
+        found = [p for p in data.glob(pattern) if p.is_file() and data / REFERENCE_DIR.name not in p.parents]
         if not found:
             raise InputError(f"{data / pattern}: is not there, and a result follows from it; reinstall hicp")
         paths.update(found)

@@ -12,14 +12,13 @@ from __future__ import annotations
 
 import logging
 import math
-import re
 import tempfile
 import threading
 import traceback
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -29,15 +28,13 @@ import cv2
 
 from hicp_lib.core.cache import code_identity
 from hicp_lib.core.errors import InputError, one_line
-from hicp_lib.core.executor import as_they_come
+from hicp_lib.core.executor import as_they_come, resolved
 from hicp_lib.core.extras import needs
 from hicp_lib.core.files import write_bytes
 
 if TYPE_CHECKING:
     from distributed import Client
 
-# Checked here, since Dask starts threads, and for an empty address a cluster, before it looks.
-_ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+:\d{1,5}")
 Key = TypeVar("Key", bound=Hashable)
 Answer = TypeVar("Answer")
 # How long to wait for the scheduler, and for workers where there are none.
@@ -48,6 +45,7 @@ _LOGGERS = ("distributed", "distributed.client", "tornado.application", "asyncio
 def run_on_cluster(
     address: str,
     jobs: Iterable[tuple[Key, Callable]],
+    kind: str,
     folder: Path | None,
     alike: tuple[dict, Callable[[], dict]] | None,
     named: Callable[[Key], object],
@@ -59,6 +57,7 @@ def run_on_cluster(
     address : str
         Of Dask's scheduler, e.g. "tcp://127.0.0.1:8786".
     jobs : iterable of (key, callable)
+    kind : str
     folder : Path or None
     alike : (dict, callable) or None
     named : callable
@@ -80,8 +79,9 @@ def run_on_cluster(
     if alike is None:
         there = partial(code_identity, getattr(first[1], "func", first[1]).__module__)
         alike = there(), there
+    how = (*alike, folder is not None, kind == "processes")
     with connected(address) as client:
-        for key, answer in _spread(client, address, chain([first], todo), alike, folder is not None, named):
+        for key, answer in _spread(client, address, chain([first], todo), how, named):
             if isinstance(answer, Exception):
                 raise answer
             yield key, answer if folder is None else _written(answer, folder, str(key))
@@ -114,15 +114,13 @@ def connected(address: str) -> Iterator[Client]:
     """
     with needs("dask"):
         from distributed import Client
-    if not _ADDRESS.fullmatch(address):
-        raise InputError(f"{address}: no Dask scheduler answers (no address); give one's, tcp://HOST:PORT")
+    resolved(address)
     with _quiet():
         try:
             client = Client(address, timeout=PATIENCE_S)
         except (OSError, ValueError, RuntimeError, AssertionError) as error:  # its thread is late
             raise InputError(
-                f"{address}: no Dask scheduler answers ({one_line(error)}); "
-                "give one's address, tcp://HOST:PORT"
+                f"{address}: no Dask scheduler answers ({one_line(error)}); give tcp://HOST:PORT"
             ) from None
         try:
             with _explained(address, client):
@@ -158,8 +156,7 @@ def _spread(
     client: Client,
     address: str,
     jobs: Iterable[tuple[Key, Callable]],
-    alike: tuple[dict, Callable[[], dict]],
-    write: bool,
+    how: tuple,
     named: Callable[[Key], object],
 ) -> Iterator[tuple[Key, Any]]:
     """What jobs return, or what went wrong, as it comes in."""
@@ -169,7 +166,7 @@ def _spread(
         with warnings.catch_warnings():
             # Dask would have large arguments scattered; but scattered data is lost with its worker.
             warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
-            return client.submit(_here, job, *alike, write, pure=False)
+            return client.submit(_here, job, *how, pure=False)
 
     def first_ones(futures: Iterable) -> Iterable:
         some = list(futures)
@@ -227,7 +224,7 @@ def _explained(address: str, client: Client) -> Iterator[None]:
 
 # What follows runs on the workers.
 
-_checking, _writing = threading.Lock(), threading.Lock()  # one at a time
+_checking, _alone = threading.Lock(), threading.Lock()
 
 
 def _here(*arguments: Any) -> Any:
@@ -239,7 +236,7 @@ def _here(*arguments: Any) -> Any:
         return error
 
 
-def _run(job: Callable, expected: dict, found_there: Callable[[], dict], write: bool) -> Any:
+def _run(job: Callable, expected: dict, found_there: Callable[[], dict], write: bool, alone: bool) -> Any:
     from distributed import get_worker
 
     worker = get_worker().address
@@ -254,10 +251,13 @@ def _run(job: Callable, expected: dict, found_there: Callable[[], dict], write: 
             f"worker {worker}: would find something else, for these differ from here: "
             f"{', '.join(differing)}; install the same environment and weights, and start it anew"
         )
-    if not write:
-        return job()
-    # Jobs that write were made for processes of their own.
-    with _writing, tempfile.TemporaryDirectory() as temporary:
+    with _alone if alone else nullcontext():
+        return _with_files(job) if write else job()
+
+
+def _with_files(job: Callable[[Path], Any]) -> tuple[Any, dict[str, bytes]]:
+    """What a job returns, and what it wrote."""
+    with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         result = job(folder)
         files = sorted(path for path in folder.rglob("*") if path.is_file())

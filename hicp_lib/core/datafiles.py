@@ -15,3 +15,5 @@ def data_dir(package: Path = _PACKAGE) -> Path:
 
 
 DATA_DIR = data_dir()
+REFERENCE_DIR = DATA_DIR / "reference"
+"""Results of runs that others are compared with: no result follows from them, and so no key."""

@@ -7,6 +7,7 @@ number nor the place is in any result.
 
 import multiprocessing
 import os
+import re
 import signal
 import threading
 from collections.abc import Callable, Hashable, Iterable, Iterator
@@ -27,6 +28,8 @@ from hicp_lib.core.errors import InputError
 CLUSTER_VARIABLE = "HICP_DASK"
 Key = TypeVar("Key", bound=Hashable)
 Workers = int | str | None
+# Checked here, since Dask starts threads, and for an empty address a cluster, before it looks.
+_ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+:\d{1,5}")
 _ONE_THREAD = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
@@ -43,7 +46,7 @@ def resolved(workers: Workers) -> int | str:
     Raises
     ------
     InputError
-        If it is neither a whole number from 1 nor text.
+        If it is neither a whole number from 1 nor an address.
 
     Examples
     --------
@@ -51,8 +54,11 @@ def resolved(workers: Workers) -> int | str:
     (3, 'tcp://127.0.0.1:8786')
     """
     if workers is None:
-        return os.environ.get(CLUSTER_VARIABLE) or usable_cores()
-    if not isinstance(workers, str) and not (isinstance(workers, (int, np.integer)) and workers >= 1):
+        workers = os.environ.get(CLUSTER_VARIABLE) or usable_cores()
+    if isinstance(workers, str):
+        if not _ADDRESS.fullmatch(workers):
+            raise InputError(f"{workers}: no Dask scheduler answers (no address); give tcp://HOST:PORT")
+    elif not (isinstance(workers, (int, np.integer)) and workers >= 1):
         raise InputError(f"workers is {workers!r}; expected a whole number from 1")
     return workers
 
@@ -76,7 +82,7 @@ def run_jobs(
     workers : int or str, optional
         As of `resolved`. A single one, or a single job, is run by the caller itself.
     kind : str
-        "threads" or "processes": what works where it is no cluster.
+        "threads" or "processes": what works here. A cluster's worker runs those for processes one at a time.
     folder : Path, optional
         Jobs are called with it and write files there. On a cluster, whose machines need not see it, they are
         called with one of their own, and the files travel. Of a job's files, that which its key names, if it
@@ -106,7 +112,7 @@ def run_jobs(
     if isinstance(workers, str):
         from hicp_lib.core.cluster import run_on_cluster  # the library is an extra
 
-        yield from run_on_cluster(workers, jobs, folder, alike, named)
+        yield from run_on_cluster(workers, jobs, kind, folder, alike, named)
         return
     n = min(workers, length_hint(jobs, workers))
     todo = jobs if folder is None else ((key, partial(job, folder)) for key, job in jobs)

@@ -13,10 +13,10 @@ from typing import Any
 
 import nbformat
 
+from hicp_lib.core.datafiles import REFERENCE_DIR
 from hicp_lib.core.files import sha256_file, write_json
 from hicp_lib.report.checks import book_problems
 from hicp_lib.report.prose import Results, render_page
-from hicp_lib.report.repetition import REFERENCE_DIR
 from hicp_lib.report.run import Folders, RunError
 from hicp_lib.report.runs import read_stamp
 from hicp_lib.report.sphinx_extension import PLOTLY_PATH, SCRIPTS_DIR

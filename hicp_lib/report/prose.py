@@ -23,7 +23,7 @@ from typing import Any
 import jinja2
 import pandas as pd
 
-from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.datafiles import DATA_DIR, REFERENCE_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
 from hicp_lib.report import repetition
@@ -120,7 +120,7 @@ class Results:
             agree (`counts`) and of those outside tolerance (`outside`, the first ones), how many there are
             in all (`n`) and outside (`n_outside`), and why notebooks are not compared (`left_out`).
         """
-        reference = repetition.REFERENCE_DIR / self.profile
+        reference = REFERENCE_DIR / self.profile
         stamps = sorted(reference.glob("*/provenance.json"))
         if not stamps:
             return None

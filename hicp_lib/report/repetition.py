@@ -12,10 +12,8 @@ from typing import Any
 
 import pandas as pd
 
-from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.files import read_json
 
-REFERENCE_DIR = DATA_DIR / "reference"
 TOLERANCE = 1e-6  # relative: other processors round elsewhere
 WITHIN_TOLERANCE = ["same", "within 1e-6", "within the interval"]
 VERDICTS = [*WITHIN_TOLERANCE, "outside"]

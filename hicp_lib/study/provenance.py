@@ -19,7 +19,7 @@ from typing import Any
 
 from hicp_lib.core.cache import LIBRARY_DIR, digest, files_sha256
 from hicp_lib.core.checkout import CHECKOUT
-from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.datafiles import DATA_DIR, REFERENCE_DIR
 from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.files import read_json, sha256_file
 from hicp_lib.detectors.weights.user import user_weights_sha256
@@ -44,7 +44,7 @@ def data_sha256() -> str:
     Not of the reference runs: they follow from the rest.
     """
     files = (path for path in DATA_DIR.rglob("*") if path.is_file())
-    return files_sha256((path for path in files if DATA_DIR / "reference" not in path.parents), DATA_DIR)
+    return files_sha256((path for path in files if REFERENCE_DIR not in path.parents), DATA_DIR)
 
 
 def lock_sha256() -> str:

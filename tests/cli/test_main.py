@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -29,6 +31,9 @@ def mistake(capsys, *arguments: str) -> str:
         (["report", "--nonsense"], "No such option"),
         (["report", "-p", "seed"], "requires 2 arguments"),
         (["report", "--profile", "slow"], "has no profile 'slow'; choose one of"),
+        (["report", "--dask", "somewhere"], "somewhere: no Dask scheduler answers"),
+        (["scenes", "render", "out", "--workers", "2", "--dask", ""], "Give either --workers N or --dask"),
+        (["scenes", "render", "out", "--dask", ""], ": no Dask scheduler answers (no address)"),
         (["report", "-p", "sed", "1"], "-p sed: no notebook has such a parameter; known are"),
         (["detect", "--out", "x.json"], "Missing option '--detector'"),
         (["detect", "--detector", "x", "--out", "x.json"], "Give either --dataset DIR or --images DIR"),
@@ -69,6 +74,22 @@ def test_a_failed_notebook_is_another_exit_code(capsys, monkeypatch):
     monkeypatch.setattr(hicp_lib.report.build, "make_report", fail)
     assert cli.run(["report"]) == 1
     assert capsys.readouterr().err == "hicp: 05_tiny: In [3] failed\n"
+
+
+def test_a_cluster_is_where_notebooks_look_for_it(monkeypatch):
+    import hicp_lib.core.cluster
+    import hicp_lib.report.build
+
+    asked: list = []
+    monkeypatch.setenv("HICP_DASK", "")  # as it was, afterwards
+    monkeypatch.setattr(hicp_lib.core.cluster, "connected", lambda at: nullcontext(asked.append(at)))
+    monkeypatch.setattr(
+        hicp_lib.report.build, "make_report", lambda *_: asked.append(os.environ["HICP_DASK"])
+    )
+    assert cli.run(["report", "--dask", "tcp://a:1"]) == 0
+    monkeypatch.setenv("HICP_DASK", "tcp://b:2")
+    assert cli.run(["report"]) == 0
+    assert asked == ["tcp://a:1", "tcp://a:1", "tcp://b:2", "tcp://b:2"]
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["report", "--help"], ["models", "--help"]])

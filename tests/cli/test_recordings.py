@@ -21,6 +21,7 @@ def small(tmp_path):
             ["simulate", "relative-upper", "out", "--n-frames", "101"],
             "n_frames is 101; expected a whole number from 1 to 100",
         ),
+        (["simulate", "mocap", "out", "--dask", "x"], "x: no Dask scheduler answers"),
         (["import", "out"], "Give either --bag FILE or --open3d DIR"),
         (["import", "out", "--bag", "/no.bag"], "/no.bag: is not there"),
         (["import", "out", "--open3d", "/no"], "/no/intrinsic.json: cannot be read"),

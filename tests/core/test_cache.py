@@ -90,6 +90,15 @@ def test_data_that_are_named_and_not_there_are_told(copy):
         code(["hicp_lib.robot.tables"], library=copy / "hicp_lib", data=copy / "data")
 
 
+def test_no_result_follows_from_a_reference_run(copy):
+    names = ["hicp_lib.study.provenance", "hicp_lib.report.build"]
+    before = code(names, library=copy / "hicp_lib", data=copy / "data")
+    assert "identities.json" in before.data
+    (copy / "data" / "reference" / "full" / "02_x").mkdir(parents=True)
+    (copy / "data" / "reference" / "full" / "02_x" / "values.json").write_text("{}")
+    assert code(names, library=copy / "hicp_lib", data=copy / "data") == before
+
+
 def test_another_detector_makes_nobody_look_again():
     of_mediapipe = code(["hicp_lib.detectors.mediapipe.tasks"]).modules
     of_mmpose = code(["hicp_lib.detectors.onnx.mmpose"]).modules

@@ -6,9 +6,9 @@ import pytest
 from distributed import LocalCluster
 
 from hicp_lib.core import cluster
-from hicp_lib.core.cluster import connected, run_on_cluster
+from hicp_lib.core.cluster import connected
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.executor import CLUSTER_VARIABLE
+from hicp_lib.core.executor import CLUSTER_VARIABLE, run_jobs
 from hicp_lib.experiments import doses
 from hicp_lib.experiments.avoidance.closed_loop import Trial
 from hicp_lib.experiments.avoidance.runs import TRUE_KEYPOINTS, Job, run_all
@@ -53,7 +53,7 @@ def test_files_travel_and_the_one_that_is_named_comes_last(address, tmp_path, mo
     write = cluster.write_bytes
     monkeypatch.setattr(cluster, "write_bytes", lambda path, of: written.append(path.name) or write(path, of))
     jobs = [("b", _write_both)]
-    ((key, result),) = run_on_cluster(address, jobs, tmp_path, None, str)
+    ((key, result),) = run_jobs(jobs, address, folder=tmp_path)
     assert (key, result, written) == ("b", "done", ["a", "c", "b"])
     assert contents(tmp_path) == {"a": b"1", "b": b"2", "c": b"3"}
 
@@ -66,14 +66,14 @@ def _write_both(folder: Path) -> str:
 
 def test_a_fault_of_a_job_comes_back_as_it_is(address, tmp_path):
     with pytest.raises(KeyError, match="a fault") as error:
-        list(run_on_cluster(address, [("a", fail)], tmp_path, None, str))
+        list(run_jobs([("a", fail)], address, folder=tmp_path))
     assert "test_executor.py" in error.value.__notes__[0]
 
 
 def test_workers_that_would_make_something_else_are_refused(address, tmp_path):
     alike = {"libraries": {"numpy": "1"}, "code": "a"}, _of_the_worker
     with pytest.raises(InputError, match=r"^worker tcp://.* differ from here: libraries.numpy;"):
-        list(run_on_cluster(address, [("a", write_pid)], tmp_path, alike, str))
+        list(run_jobs([("a", write_pid)], address, folder=tmp_path, alike=alike))
     assert contents(tmp_path) == {}
 
 

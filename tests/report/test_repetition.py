@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from hicp_lib.core.files import read_json
-from hicp_lib.report import repetition
+from hicp_lib.report import prose
 from hicp_lib.report.prose import Results
 from hicp_lib.report.repetition import VERDICTS, compare
 
@@ -50,7 +50,7 @@ def reference(tmp_path, monkeypatch):
     import reference as tool
 
     page(tmp_path / "made" / "full" / "02_x")
-    for module in (repetition, tool):
+    for module in (prose, tool):
         monkeypatch.setattr(module, "REFERENCE_DIR", tmp_path / "reference")
     monkeypatch.setattr(sys, "argv", ["reference", str(tmp_path / "made" / "full")])
     tool.main()
