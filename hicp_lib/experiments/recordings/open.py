@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from hicp_lib.core.cache import key
+from hicp_lib.core.executor import run_jobs
 from hicp_lib.core.files import cache_dir
 from hicp_lib.recordings.recording import RGB_LIST, Recording, first_frames, open_recording, read_simulation
 from hicp_lib.simulation.body.identities import Subject
@@ -94,18 +95,28 @@ def open_people(
     if recording:
         folders = [recording] if isinstance(recording, str | Path) else recording
         return [open_experiment(scenario, folder, n_frames) for folder in folders]
-    from hicp_lib.experiments.recordings.simulate import simulate_recording
-    from hicp_lib.simulation.world.batch import check_numbers, run_jobs
+    from hicp_lib.simulation.world.batch import check_numbers
 
     check_numbers(n_people=(n_people, 1, 1000))
     people = [Subject(seed, number) for number in range(n_people)]
     kept = [(*_kept(scenario, n_frames, who), who) for who in people]
-    missing = [one for one in kept if not (one[0] / RGB_LIST).is_file()]
-    if len(missing) > 1:  # a person to a process: who is there in what room is made once
-        jobs = [partial(simulate_recording, out, scenario, n, who, 1, False) for out, n, who in missing]
-        for _ in run_jobs(jobs):
-            pass
+    jobs = [
+        (
+            f"{out.name}/{RGB_LIST}",
+            partial(_simulate, name=out.name, scenario=scenario, n_frames=n, subject=who),
+        )
+        for out, n, who in kept
+        if not (out / RGB_LIST).is_file()
+    ]
+    if len(jobs) > 1:  # a person to a process: who is there in what room is made once
+        list(run_jobs(jobs, folder=kept[0][0].parent))
     return [open_experiment(scenario, "", n_frames, who) for who in people]
+
+
+def _simulate(folder: Path, name: str, scenario: str, n_frames: int, subject: Subject) -> None:
+    from hicp_lib.experiments.recordings.simulate import simulate_recording
+
+    simulate_recording(folder / name, scenario, n_frames, subject, workers=1, progress=False)
 
 
 def data_note(recordings: Mapping[str, Recording]) -> str:

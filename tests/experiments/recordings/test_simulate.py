@@ -209,7 +209,7 @@ def test_a_given_recording_is_opened_instead(lower):
 def test_several_people_are_simulated_a_person_to_a_process_and_opened_in_their_order(tmp_path, monkeypatch):
     monkeypatch.setenv("HICP_CACHE", str(tmp_path))
     people = open_people("relative-lower", n_frames=1, n_people=2)
-    assert [read_simulation(one)["seed"] for one in people] == [0, 1]
+    assert [read_simulation(one)["subject"]["number"] for one in people] == [0, 1]
     monkeypatch.setattr(simulate, "simulate_recording", None)  # what is kept is not simulated again
     again = open_people("relative-lower", n_frames=1, n_people=2)
     assert [one.folder for one in again] == [one.folder for one in people]
