@@ -55,7 +55,7 @@ class Scenario:
     mount: str
     head_rad: Callable[[int], np.ndarray]
     stage: Callable[[Subject, float], tuple[World, PosedBody]]
-    capture: Callable[[Subject, float, np.ndarray], tuple[MotionCapture, np.ndarray]] | None = None
+    capture: Callable[[Subject, float, np.ndarray], tuple[MotionCapture, np.ndarray, float]] | None = None
     depth_camera: DepthCamera = D435
 
     def times_s(self, n: int) -> np.ndarray:
@@ -120,7 +120,7 @@ def _relative(view: str) -> Scenario:
 
 def _capture_moving(
     subject: Subject, duration_s: float, T_world_camera: np.ndarray
-) -> tuple[MotionCapture, np.ndarray]:
+) -> tuple[MotionCapture, np.ndarray, float]:
     scene = moving_person(subject)
     vertices = marker_vertices(scene.appearance.shape)
     obstacles = (scene.table.mesh,) if scene.table else ()
