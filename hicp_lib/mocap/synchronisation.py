@@ -96,8 +96,9 @@ def clock_offset(
 
     The *speeds* of the points do not depend on the frame they are given in. They are smoothed
     (Savitzky-Golay over a quarter of a second, or two periods of the slower clock), and the offset is where
-    their normalised cross-correlation, times how much both saw there, is largest, refined by a parabola. All
-    offsets are tried at which half of what was seen of the points on the one clock was also seen on the other.
+    their normalised cross-correlation, times how much both saw there, is largest, refined by a parabola
+    through its peak. All offsets are tried at which half of what was seen of the points on the one clock was
+    also seen on the other.
 
     Parameters
     ----------
