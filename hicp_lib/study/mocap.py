@@ -18,8 +18,7 @@ from hicp_lib.evaluation.cases import labelled, over_people
 from hicp_lib.evaluation.space import mocap_error
 from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_errors, summary
 from hicp_lib.evaluation.space.occlusion import joint_occlusion
-from hicp_lib.evaluation.space.stability import POSITION, THRESHOLDS_M, position_array
-from hicp_lib.evaluation.statistics.design import variance_components
+from hicp_lib.evaluation.space.stability import POSITION, position_array
 from hicp_lib.lifting.robust import METHODS
 from hicp_lib.lifting.table import lift_found
 from hicp_lib.mocap.registration import Registration
@@ -39,7 +38,6 @@ _CLOCKS = [
     "off_s",
     "left_out",
 ]
-N_PEOPLE = (1, 5, 10, 20, 40)  # of the designs that are compared
 
 
 @dataclass(frozen=True)
@@ -251,40 +249,7 @@ def errors_at_joints(registered: Sequence[Registered], points: Sequence[pd.DataF
     return over_people(tables, [len(one.recording) for one in registered])
 
 
-def points_of(people: Sequence[Person]) -> pd.DataFrame:
-    """What was lifted of all people (`over_people`)."""
-    return over_people([one.points for one in people], [len(one.recording) for one in people])
-
-
 def ablation(people: Sequence[Person]) -> pd.DataFrame | None:
     """`lifting_ablation` of all people's `stepwise`; None where no true positions are known."""
     known = [(one.stepwise, truth) for one in people if (truth := read_truth(one.recording)) is not None]
     return summary(pd.concat([lifting_errors(*one) for one in known])) if known else None
-
-
-def error_components(errors: pd.DataFrame, min_score: float) -> pd.DataFrame:
-    """How much people differ beside how much their frames do, and what more of either would bring.
-
-    Parameters
-    ----------
-    errors : pd.DataFrame
-        As from `errors_at_joints`.
-    min_score : float
-        Keypoints above it count, within the last of `THRESHOLDS_M`: a few errors beyond would be all the
-        variance.
-
-    Returns
-    -------
-    pd.DataFrame
-        Columns `detector, method, keypoint, between_m, within_m` (standard deviations between people, and
-        between frames of one), and for each number of `N_PEOPLE` the standard error of the mean had as many
-        frames been taken of so many people, as if frames were independent: `10_people_m` and so on.
-    """
-    near = errors[(errors["score"] > min_score) & (errors["error_m"] <= THRESHOLDS_M[-1])]
-    n_frames, rows = errors["frame"].nunique(), []
-    for case, part in near.groupby(["detector", "method", "keypoint"], sort=False):
-        between, within = variance_components(part["error_m"], part["subject"])
-        errors_m = [np.sqrt(between / n + within / n_frames) for n in N_PEOPLE]
-        rows.append((*case, np.sqrt(between), np.sqrt(within), *errors_m))
-    names = [f"{n}_people_m" for n in N_PEOPLE]
-    return pd.DataFrame(rows, columns=["detector", "method", "keypoint", "between_m", "within_m", *names])

@@ -20,14 +20,12 @@ from hicp_lib.study import mocap as study_mocap
 from hicp_lib.study.mocap import (
     Person,
     ablation,
-    error_components,
     errors_at_joints,
     find_clock,
     follow_people,
     lift_frames,
     medians_under,
     open_mocap,
-    points_of,
 )
 from hicp_lib.study.registration import Registered, register
 from tests.study.marked_wall import CAMERA, OFFSET_S, T_BASE_CAM, T_BASE_MOCAP, laboratory_in, markers_cam
@@ -64,8 +62,6 @@ def test_every_step_is_lifted_where_it_can_be_judged(laboratory):
     assert set(stepwise["detector"]) == {"one"} and set(stepwise["method"]) == set(N_STEPS)
     table = ablation([replace(person, stepwise=stepwise)] * 3)
     assert table["method"].tolist() == list(N_STEPS) and (table["n_compared"] == 6).all()
-    both = points_of([person, person])
-    assert both["subject"].unique().tolist() == [0, 1] and both["frame"].unique().tolist() == [0, 1, 2, 3]
 
 
 def moving_points(times_s: np.ndarray) -> np.ndarray:
@@ -151,21 +147,3 @@ def test_errors_of_all_people_are_one_table_with_frames_numbered_on(registered):
     means_m = errors.groupby("subject")["error_m"].mean()
     assert means_m[0] < 0.005 and means_m[1] == pytest.approx(0.05, abs=0.005)
     assert {"sight", "distance_m"} <= set(errors.columns)
-
-
-def test_where_people_differ_more_of_them_help_and_where_frames_do_it_is_the_same():
-    rng = np.random.default_rng(0)
-    subject, frame = np.repeat(np.arange(50), 20), np.arange(1000)
-    of_person, of_frame = rng.normal(0, 0.01, 50)[subject], rng.normal(0, 0.01, 1000)
-    labels = {"method": "paper", "keypoint": "left_wrist", "score": 0.9, "subject": subject, "frame": frame}
-    errors = [
-        pd.DataFrame(labels | {"detector": name, "error_m": 0.05 + of})
-        for name, of in (("people", of_person), ("frames", of_frame))
-    ]
-    far = errors[0].assign(error_m=5.0, score=np.where(frame % 2, 0.9, 0.0))  # beyond 10 cm
-    table = error_components(pd.concat([*errors, far]), 0.1).set_index("detector")
-    assert table.loc["people", "between_m"] == pytest.approx(0.01, rel=0.25)
-    assert table.loc["frames", "within_m"] == pytest.approx(0.01, rel=0.1)
-    assert table.loc["people", "within_m"] < 1e-9 and table.loc["frames", "between_m"] < 0.003
-    assert table.loc["people", "40_people_m"] < 0.2 * table.loc["people", "1_people_m"]
-    assert table.loc["frames", "40_people_m"] == pytest.approx(0.01 / np.sqrt(1000), rel=0.4)
