@@ -3,8 +3,10 @@
     python tools/draw_relative_poses.py
 
 Torso and neck are drawn evenly within the ranges below, which lie within the software limits of the
-robot; a pose is kept if a development person (seed 0) is framed as the view asks. Run once: results refer to
-the file as it is.
+robot; a pose is kept if the camera has before it what the view asks of anybody in the chair, whoever it
+is: arms and hands are not looked at, and may leave the image. The poses are then put in pairs, each followed
+by the one left whose camera is nearest, so that the few that one person is seen from hold nearly equal
+ones. Run once: results refer to the file as it is.
 """
 
 from __future__ import annotations
@@ -14,11 +16,10 @@ import pandas as pd
 
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.files import write_bytes
-from hicp_lib.core.keypoints import HANDS, INDEX
+from hicp_lib.evaluation.space.similar_views import NEAR_M, NEAR_RAD
 from hicp_lib.experiments.laboratory import robot_camera
-from hicp_lib.experiments.recordings.seated_person import VIEWS, seated_person
+from hicp_lib.experiments.recordings.seated_person import VIEWS
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
-from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.rendering.camera import project_world
 
 N_POSES = 100
@@ -29,18 +30,17 @@ RANGES_DEG = {
     "upper": _TORSO_DEG | {"neck_pitch": (-16, 4), "neck_roll": (-12, 12), "neck_yaw": (-18, 18)},
     "lower": _TORSO_DEG | {"neck_pitch": (4, 22), "neck_roll": (-12, 12), "neck_yaw": (-18, 18)},
 }
-_ARMS = [INDEX[f"{side}_{joint}"] for side in ("left", "right") for joint in ("elbow", "wrist")]
-_HEAD = [INDEX[name] for name in ("nose", "left_eye", "right_eye")]
-# Which keypoints have to be in the image, and which must not.
-FRAMING = {
-    "upper": ([*_HEAD, *_ARMS, INDEX["left_shoulder"], INDEX["right_shoulder"]], []),
-    "lower": ([*_ARMS, *HANDS], _HEAD),
-}
+_HEAD_M = [(0.0, 0.95, 1.2)]
+_SHOULDERS_M = [(-0.2, 1.1, 1.0), (0.2, 1.1, 1.0)]
+_WAIST_M = [(-0.2, 1.05, 0.75), (0.2, 1.05, 0.75)]
+# Points of the room, metres, that have to be in the image, and that must not: where the head and the trunk of
+# somebody in the chair are.
+FRAMING = {"upper": ([*_HEAD_M, *_SHOULDERS_M, *_WAIST_M], []), "lower": (_WAIST_M, _HEAD_M)}
 
 
 def main() -> None:
     icub, rng = load_icub(limits="software"), np.random.default_rng(SEED)
-    rows = [(view, *pose) for view in VIEWS for pose in draw(icub, view, rng)]
+    rows = [(view, *pose) for view in VIEWS for pose in in_pairs(icub, view, draw(icub, view, rng))]
     table = pd.DataFrame(rows, columns=["view", *(f"{joint}_deg" for joint in HEAD_JOINTS)])
     table.insert(1, "number", table.groupby("view").cumcount())
     write_bytes(DATA_DIR / "relative_poses.csv", table.to_csv(index=False).encode())
@@ -48,7 +48,6 @@ def main() -> None:
 
 def draw(icub, view: str, rng: np.random.Generator) -> list[np.ndarray]:
     """Poses of a view, degrees, to a tenth."""
-    points_m = seated_person(Subject(split="development"))[1].keypoints_m
     low, high = np.array([RANGES_DEG[view][joint] for joint in HEAD_JOINTS], float).T
     limits_deg = np.degrees(icub.chains["head"].limits_rad)
     assert (low >= limits_deg[:, 0] - 1e-9).all() and (high <= limits_deg[:, 1] + 1e-9).all(), limits_deg
@@ -56,21 +55,33 @@ def draw(icub, view: str, rng: np.random.Generator) -> list[np.ndarray]:
     while len(poses) < N_POSES:
         n_drawn += 1
         pose = rng.uniform(low, high).round(1)
-        if is_framed(icub.T_root_camera(np.radians(pose), VIEWS[view]), points_m, *FRAMING[view]):
+        if is_framed(icub.T_root_camera(np.radians(pose), VIEWS[view]), *FRAMING[view]):
             poses.append(pose)
-    print(f"{view}: {N_POSES} of {n_drawn} drawn poses frame the person")
+    print(f"{view}: {N_POSES} of {n_drawn} drawn poses are framed")
     return poses
 
 
-def is_framed(
-    T_root_camera: np.ndarray, points_m: np.ndarray, wanted: list[int], unwanted: list[int]
-) -> bool:
-    """Whether the wanted keypoints are well inside the image, and the unwanted ones outside."""
+def is_framed(T_root_camera: np.ndarray, wanted_m: list, unwanted_m: list) -> bool:
+    """Whether the wanted points are well inside the image, and the unwanted ones outside."""
     camera = robot_camera(T_root_camera)
-    pixels_px = project_world(camera, points_m)[0]
-    size = np.array([camera.width_px, camera.height_px])
+    pixels_px = project_world(camera, np.array([*wanted_m, *unwanted_m]))[0]
+    size, n = np.array([camera.width_px, camera.height_px]), len(wanted_m)
     well_inside = ((pixels_px > MARGIN_PX) & (pixels_px < size - MARGIN_PX)).all(axis=1)
-    return bool(well_inside[wanted].all() and not camera.contains(pixels_px[unwanted]).any())
+    return bool(well_inside[:n].all() and not camera.contains(pixels_px[n:]).any())
+
+
+def in_pairs(icub, view: str, poses: list[np.ndarray]) -> list[np.ndarray]:
+    """The same poses, the nearest to each of every second behind it."""
+    T_root_camera = icub.T_root_camera(np.radians(poses), VIEWS[view])
+    left, ordered = list(range(len(poses))), []
+    while left:
+        first = left.pop(0)
+        turns = T_root_camera[left, :3, :3]
+        cosines = (np.einsum("ab,iab->i", T_root_camera[first, :3, :3], turns) - 1) / 2
+        apart_m = np.linalg.norm(T_root_camera[left, :3, 3] - T_root_camera[first, :3, 3], axis=1)
+        apart = np.maximum(apart_m / NEAR_M, np.arccos(np.clip(cosines, -1, 1)) / NEAR_RAD)
+        ordered += [first, left.pop(int(apart.argmin()))]
+    return [poses[k] for k in ordered]
 
 
 if __name__ == "__main__":

@@ -18,8 +18,7 @@ from hicp_lib.evaluation.cases import labelled, over_people
 from hicp_lib.evaluation.space import mocap_error
 from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_errors, summary
 from hicp_lib.evaluation.space.occlusion import joint_occlusion
-from hicp_lib.evaluation.space.stability import POSITION, THRESHOLDS_M, position_array
-from hicp_lib.evaluation.statistics.design import variance_components
+from hicp_lib.evaluation.space.stability import POSITION, position_array
 from hicp_lib.lifting.robust import METHODS
 from hicp_lib.lifting.table import lift_found
 from hicp_lib.mocap.registration import Registration
@@ -27,9 +26,18 @@ from hicp_lib.mocap.synchronisation import ClockOffset, clock_offset
 from hicp_lib.recordings.qualisys import MotionCapture, read_mocap
 from hicp_lib.recordings.recording import MOCAP_FILE, Recording, read_simulation, read_truth
 from hicp_lib.study.mocap_floor import perfect_detections
-from hicp_lib.study.registration import Registered, register
+from hicp_lib.study.registration import Registered
 
-N_PEOPLE = (1, 5, 10, 20, 40)  # of the designs that are compared
+_CLOCKS = [
+    "person",
+    "n_frames",
+    "offset_s",
+    "first_half_s",
+    "second_half_s",
+    "correlation",
+    "off_s",
+    "left_out",
+]
 
 
 @dataclass(frozen=True)
@@ -38,46 +46,41 @@ class Person:
 
     Attributes
     ----------
+    recording : Recording
+    mocap : MotionCapture
     found : dict of str to list of Detections
         By detector, in every frame.
     points, stepwise : pd.DataFrame
         As from `lift_frames`; the perfect detector is among them where the truth is known.
     clock : ClockOffset
-    registered : Registered
     """
 
+    recording: Recording
+    mocap: MotionCapture
     found: dict[str, list[Detections]]
     points: pd.DataFrame
     stepwise: pd.DataFrame
     clock: ClockOffset
-    registered: Registered
-
-    @property
-    def recording(self) -> Recording:
-        """Their recording."""
-        return self.registered.recording
 
 
 def follow_people(
-    recordings: Sequence[Recording], detectors: Sequence[str], n_images: int, noise_px: float, seed: int
+    recordings: Sequence[Recording], detectors: Sequence[str]
 ) -> tuple[list[Person], pd.DataFrame]:
-    """All people whose clock and registration can be found.
+    """All people whose motion capture can be brought to the camera's clock.
 
     Parameters
     ----------
     recordings : sequence of Recording
         One of each person, with motion capture.
     detectors : sequence of str
-    n_images, noise_px, seed : int, float, int
-        Of clicks, as of `hicp_lib.study.registration.register`.
 
     Returns
     -------
     list of Person
     pd.DataFrame
-        A row for each recording: columns `recording` (its folder's name), `n_frames, offset_s, first_half_s,
-        second_half_s, correlation` (`ClockOffset`), `off_s` (less the true offset; NaN where that is not
-        known), `left_out` (why the person is; "" otherwise).
+        A row for each recording: columns `person` (from 0 on), `n_frames, offset_s, first_half_s,
+        second_half_s, correlation` (as of `ClockOffset`), `off_s` (less the true offset), NaN where they are
+        not known; `left_out` (why the person is, else "").
 
     Raises
     ------
@@ -88,25 +91,18 @@ def follow_people(
     for number, recording in enumerate(recordings):
         mocap, found = open_mocap(recording), detect_frames(recording, detectors)
         points, stepwise = lift_frames(recording, found | perfect_detections(recording))
-        row: dict[str, object] = {
-            "recording": recording.folder.name,
-            "n_frames": len(recording),
-            "left_out": "",
-        }
+        told = (number, len(recording))
         try:
             clock = find_clock(recording, mocap, points[points["detector"].isin(found)])
-            registered = register(recording, mocap, clock.offset_s, n_images, noise_px, seed + number)
         except InputError as error:
-            row["left_out"] = failed = str(error)
-        else:
-            people.append(Person(found, points, stepwise, clock, registered))
-            halves_s = dict(zip(("first_half_s", "second_half_s"), clock.halves_s, strict=True))
-            row |= {"offset_s": clock.offset_s, **halves_s, "correlation": clock.correlation}
-            row["off_s"] = clock.offset_s - (read_simulation(recording) or {}).get("mocap_offset_s", np.nan)
-        rows.append(row)
+            rows.append((*told, *[np.nan] * 5, str(error)))
+            continue
+        off_s = clock.offset_s - (read_simulation(recording) or {}).get("mocap_offset_s", np.nan)
+        rows.append((*told, clock.offset_s, *clock.halves_s, clock.correlation, off_s, ""))
+        people.append(Person(recording, mocap, found, points, stepwise, clock))
     if not people:
-        raise InputError(failed)
-    return people, pd.DataFrame(rows)
+        raise InputError(f"{recordings[0].folder}: {rows[0][-1]}")
+    return people, pd.DataFrame(rows, columns=_CLOCKS)
 
 
 def open_mocap(recording: Recording) -> MotionCapture:
@@ -195,12 +191,17 @@ def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame)
     )
 
 
-def medians_under(people: Sequence[Person], n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+def medians_under(
+    registered: Sequence[Registered], points: Sequence[pd.DataFrame], n_resamples: int = 1000, seed: int = 0
+) -> pd.DataFrame:
     """What the choice of the registration does to the median errors of elbows and wrists.
 
     Parameters
     ----------
-    people : sequence of Person
+    registered : sequence of Registered
+        Of each person.
+    points : sequence of pd.DataFrame
+        The first of `lift_frames`, of each.
     n_resamples, seed : int
         Number of bootstrap draws, and what they are drawn with.
 
@@ -210,79 +211,45 @@ def medians_under(people: Sequence[Person], n_resamples: int = 1000, seed: int =
         Column `registration`, then as from `median_errors`, score above 0.1; the exact transform, where it is
         known, comes last.
     """
-    errors: dict[str, dict[int, pd.DataFrame]] = {}
-    for number, person in enumerate(people):
-        registered, fits = person.registered, list(person.registered.fits)
-        fits += [] if registered.exact is None else [Registration("exact", registered.exact)]
-        for fit in fits:
-            reference = registered.reference(fit, mocap_error.TABLE_JOINTS)
-            errors.setdefault(fit.method, {})[number] = mocap_error.mocap_errors(person.points, reference)
-    tables = []
-    for method, of in errors.items():
-        of_people = over_people(list(of.values()), [len(people[number].recording) for number in of])
-        medians = mocap_error.median_errors(of_people, mocap_error.MIN_SCORES[-1:], n_resamples, seed)
-        tables.append(labelled(medians, registration=method))
-    return pd.concat(tables, ignore_index=True)
+    errors: dict[str, tuple[list, list]] = {}
+    for one, lifted in zip(registered, points, strict=True):
+        exact = [] if one.exact is None else [Registration("exact", one.exact)]
+        for fit in [*one.fits, *exact]:
+            tables, n_frames = errors.setdefault(fit.method, ([], []))
+            tables.append(mocap_error.mocap_errors(lifted, one.reference(fit, mocap_error.TABLE_JOINTS)))
+            n_frames.append(len(one.recording))
+    draws = (mocap_error.MIN_SCORES[-1:], n_resamples, seed)
+    medians = [
+        labelled(mocap_error.median_errors(over_people(*of), *draws), registration=method)
+        for method, of in errors.items()
+    ]
+    return pd.concat(medians, ignore_index=True)
 
 
-def errors_at_joints(people: Sequence[Person]) -> pd.DataFrame:
+def errors_at_joints(registered: Sequence[Registered], points: Sequence[pd.DataFrame]) -> pd.DataFrame:
     """`mocap_errors` under the best registration, with the lines of sight: columns `distance_m, sight`.
 
     Parameters
     ----------
-    people : sequence of Person
+    registered : sequence of Registered
+        Of each person.
+    points : sequence of pd.DataFrame
+        The first of `lift_frames`, of each.
 
     Returns
     -------
     pd.DataFrame
-        Frames are numbered on over people: `hicp_lib.evaluation.cases.over_people`.
+        Of all people (`over_people`).
     """
     tables = []
-    for person in people:
-        reference, recording = person.registered.reference(), person.recording
-        errors = mocap_error.mocap_errors(person.points, reference, read_truth(recording))
-        tables.append(errors.merge(joint_occlusion(recording, reference), on=["frame", "keypoint"]))
-    return over_people(tables, [len(person.recording) for person in people])
-
-
-def points_of(people: Sequence[Person]) -> pd.DataFrame:
-    """What was lifted of all people, frames numbered on as in `errors_at_joints`."""
-    return over_people([person.points for person in people], [len(person.recording) for person in people])
+    for one, lifted in zip(registered, points, strict=True):
+        reference = one.reference()
+        errors = mocap_error.mocap_errors(lifted, reference, read_truth(one.recording))
+        tables.append(errors.merge(joint_occlusion(one.recording, reference), on=["frame", "keypoint"]))
+    return over_people(tables, [len(one.recording) for one in registered])
 
 
 def ablation(people: Sequence[Person]) -> pd.DataFrame | None:
-    """`lifting_ablation` of all people's `stepwise`; None where true positions are not known."""
-    errors = [
-        lifting_errors(person.stepwise, truth)
-        for person in people
-        if (truth := read_truth(person.recording)) is not None
-    ]
-    return summary(pd.concat(errors)) if errors else None
-
-
-def error_components(errors: pd.DataFrame, min_score: float) -> pd.DataFrame:
-    """How much people differ beside how much their frames do, and what more of either would bring.
-
-    Parameters
-    ----------
-    errors : pd.DataFrame
-        As from `errors_at_joints`.
-    min_score : float
-        Keypoints above it count, within the last of `THRESHOLDS_M`: a few errors beyond would be all the
-        variance.
-
-    Returns
-    -------
-    pd.DataFrame
-        Columns `detector, method, keypoint, between_m, within_m` (standard deviations between people, and
-        between frames of one), and for each number of `N_PEOPLE` the standard error of the mean had as many
-        frames been taken of so many people, as if frames were independent: `10_people_m` and so on.
-    """
-    near = errors[(errors["score"] > min_score) & (errors["error_m"] <= THRESHOLDS_M[-1])]
-    n_frames, rows = errors["frame"].nunique(), []
-    for case, part in near.groupby(["detector", "method", "keypoint"], sort=False):
-        between, within = variance_components(part["error_m"], part["subject"])
-        errors_m = [np.sqrt(between / n + within / n_frames) for n in N_PEOPLE]
-        rows.append((*case, np.sqrt(between), np.sqrt(within), *errors_m))
-    names = [f"{n}_people_m" for n in N_PEOPLE]
-    return pd.DataFrame(rows, columns=["detector", "method", "keypoint", "between_m", "within_m", *names])
+    """`lifting_ablation` of all people's `stepwise`; None where no true positions are known."""
+    known = [(one.stepwise, truth) for one in people if (truth := read_truth(one.recording)) is not None]
+    return summary(pd.concat([lifting_errors(*one) for one in known])) if known else None

@@ -10,10 +10,12 @@ from hicp_lib.study.table_format import bounds_of, wide
 
 
 def paper_medians() -> pd.DataFrame:
-    """The paper's Tables III and IV: columns `detector, keypoint, min_score, count, median_m`."""
+    """The paper's Tables III and IV: columns `detector, keypoint, min_score, count, median_m, found`, the
+    last the count as a share of its frames, about 480.
+    """
     table = read_json(DATA_DIR / "paper.json")["mocap"]
     frame = pd.DataFrame(table["rows"], columns=table["columns"])
-    return frame.assign(median_m=frame.pop("median_cm") / 100)
+    return frame.assign(median_m=frame.pop("median_cm") / 100, found=frame["count"] / table["n_frames"])
 
 
 def beside_paper(medians: pd.DataFrame, paper: pd.DataFrame, min_score: float) -> pd.DataFrame:

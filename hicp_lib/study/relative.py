@@ -1,95 +1,120 @@
-"""The data of the relative 3D test: recordings of a still person, detected and lifted, view by view.
+"""The data of the relative 3D test: recordings of people who sit still, detected and lifted, view by view.
 
-A *view* is one recording: "upper" and "lower" when simulated, as the paper's two holders of the camera; a
-lab's own are called after their folders.
+A *view* is one recording of each person: "upper" and "lower" when simulated, as the paper's two holders of
+the camera; a lab's own are called after the folder of the first person. Frames of a view are numbered on from
+person to person.
 """
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.evaluation.space.spread_causes import found_in
-from hicp_lib.experiments.recordings.open import open_experiment
+from hicp_lib.evaluation.cases import labelled, over_people
+from hicp_lib.evaluation.space.stability import PARTS, PIXEL, Parts
+from hicp_lib.experiments.recordings.open import open_people
 from hicp_lib.lifting.table import lift_found
 from hicp_lib.recordings.recording import Recording, read_joints, read_truth
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.shape import Shape, robot_shape
-from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.study.mocap import detect_frames
 
-Found = Mapping[tuple[str, str], Sequence[Detections]]
+Views = Mapping[str, Sequence[Recording]]
+Found = Mapping[tuple[str, str], Sequence[Sequence[Detections]]]
+Folders = str | Sequence[str]
 
 
 def open_views(
-    recording: str = "", recording_lower: str = "", n_frames: int = 100, seed: int = 0
-) -> dict[str, Recording]:
-    """The recordings given by their views, or two simulated ones where none is.
+    recording: Folders = "",
+    recording_lower: Folders = "",
+    n_frames: int = 8,
+    n_people: int = 12,
+    seed: int = 0,
+) -> dict[str, list[Recording]]:
+    """The recordings given by their views, or two simulated ones of each person where none is.
 
     Parameters
     ----------
-    recording, recording_lower : str
-        Folders of a lab's own recordings of a person who sits still; the second is optional.
-    n_frames, seed : int
-        Of the simulated ones.
+    recording, recording_lower : str or sequence of str
+        Folders of a lab's own recordings of people who sit still, one of each person; the second is optional.
+    n_frames, n_people, seed : int
+        Of the simulated ones: frames of each person and view, and how many people.
 
     Returns
     -------
-    dict of str to Recording
+    dict of str to list of Recording
 
     Raises
     ------
     InputError
-        If a folder is not a recording.
+        If a folder is not a recording, or the two views are of different numbers of people.
     """
-    given = [folder for folder in (recording, recording_lower) if folder]
+    given = [open_people("relative-upper", folders) for folders in (recording, recording_lower) if folders]
     if not given:
-        who = Subject(seed)
-        return {view: open_experiment(f"relative-{view}", "", n_frames, who) for view in ("upper", "lower")}
-    names = [Path(folder).name for folder in given]
-    views = names if len(set(names)) == len(names) else given
-    folders = zip(views, given, strict=True)
-    return {view: open_experiment("relative-upper", folder) for view, folder in folders}
+        scenarios = {view: f"relative-{view}" for view in ("upper", "lower")}
+        return {view: open_people(name, "", n_frames, n_people, seed) for view, name in scenarios.items()}
+    counts = [len(people) for people in given]
+    if len(set(counts)) > 1:
+        said = f"{counts[0]} and {counts[1]} folders; give both views of the same people, in the same order"
+        raise InputError(f"recording and recording_lower: {said}")
+    names = [people[0].folder.name for people in given]
+    views = names if len(set(names)) == len(names) else [str(people[0].folder) for people in given]
+    return dict(zip(views, given, strict=True))
 
 
-def detect_views(
-    views: Mapping[str, Recording], detectors: Sequence[str]
-) -> dict[tuple[str, str], list[Detections]]:
-    """What detectors find in every frame of every view; kept on disk.
+def subjects_of(views: Views) -> dict[str, np.ndarray]:
+    """Whose each image of a view is, shape (n_frames,)."""
+    return {view: np.repeat(np.arange(len(people)), [*map(len, people)]) for view, people in views.items()}
+
+
+def of_person(views: Views, found: Found, number: int) -> tuple[dict[str, Recording], dict]:
+    """One person's recordings by view, and what was found in them by view and detector.
+
+    Raises
+    ------
+    InputError
+        If there are not so many people.
+    """
+    n_people = min(map(len, views.values()))
+    if not 0 <= number < n_people:
+        raise InputError(f"no person {number}; there are {n_people}, from 0 on")
+    seen = {view: people[number] for view, people in views.items()}
+    return seen, {case: of_people[number] for case, of_people in found.items()}
+
+
+def detect_views(views: Views, detectors: Sequence[str]) -> dict[tuple[str, str], list[list[Detections]]]:
+    """What detectors find in every frame of everybody in every view; kept on disk.
 
     Parameters
     ----------
-    views : mapping of str to Recording
+    views : mapping of str to sequence of Recording
     detectors : sequence of str
 
     Returns
     -------
-    dict of (str, str) to list of Detections
-        By view and detector, in the order of the frames.
+    dict of (str, str) to list of list of Detections
+        By view and detector: of each person, in the order of the frames.
     """
-    return {
-        (view, detector): detections
-        for view, recording in views.items()
-        for detector, detections in detect_frames(recording, detectors).items()
-    }
+    found = {view: [detect_frames(one, detectors) for one in people] for view, people in views.items()}
+    return {(view, name): [of[name] for of in found[view]] for view in views for name in detectors}
 
 
-def lift_views(views: Mapping[str, Recording], found: Found) -> pd.DataFrame:
+def lift_views(views: Views, found: Found) -> pd.DataFrame:
     """Everything lifted by every method.
 
     Parameters
     ----------
-    views : mapping of str to Recording
-    found : mapping of (str, str) to sequence of Detections
+    views : mapping of str to sequence of Recording
+    found : mapping of (str, str) to sequence of sequence of Detections
         As from `detect_views`.
 
     Returns
     -------
     pd.DataFrame
-        Columns `view` and those of `hicp_lib.lifting.table.lift_found`.
+        Columns `view, subject` and those of `hicp_lib.lifting.table.lift_found`.
 
     Raises
     ------
@@ -97,22 +122,53 @@ def lift_views(views: Mapping[str, Recording], found: Found) -> pd.DataFrame:
         If no keypoint was found and lifted in any view, or a depth image cannot be read.
     """
     tables = []
-    for view, recording in views.items():
-        table = lift_found(recording, found_in(found, view))
-        tables.append(table.assign(view=view)[["view", *table.columns]])
+    for view, people in views.items():
+        there = {name: of_people for (seen, name), of_people in found.items() if seen == view}
+        lifted = [
+            lift_found(one, {name: of[k] for name, of in there.items()}) for k, one in enumerate(people)
+        ]
+        tables.append(labelled(over_people(lifted, [*map(len, people)]), view=view))
     points = pd.concat(tables, ignore_index=True)
     if points["x_m"].isna().all():
-        folders = ", ".join(str(recording.folder) for recording in views.values())
-        raise InputError(
-            f"{folders}: nobody was found and lifted in any image; record people in view, with depth"
-        )
+        folders = ", ".join(str(one.folder) for people in views.values() for one in people)
+        said = "nobody was found and lifted in any image; record people in view, with depth"
+        raise InputError(f"{folders}: {said}")
     return points
 
 
-def true_positions(views: Mapping[str, Recording]) -> dict[str, pd.DataFrame] | None:
-    """View -> table of `read_truth`; None when a view has none."""
-    truth = {view: read_truth(recording) for view, recording in views.items()}
-    return None if any(table is None for table in truth.values()) else truth
+def true_positions(views: Views) -> dict[str, pd.DataFrame] | None:
+    """View -> table of `read_truth` with `subject`, frames numbered on; None when a recording has none."""
+    truth = {view: [read_truth(recording) for recording in people] for view, people in views.items()}
+    if any(table is None for tables in truth.values() for table in tables):
+        return None
+    return {view: over_people(tables, [*map(len, views[view])]) for view, tables in truth.items()}
+
+
+def parts_in_image(views: Views, truth: Mapping[str, pd.DataFrame], parts: Parts = PARTS) -> pd.DataFrame:
+    """In what share of a view's images parts of the body are, in the field of view if perhaps hidden.
+
+    Parameters
+    ----------
+    views : mapping of str to sequence of Recording
+    truth : mapping of str to pd.DataFrame
+        As from `true_positions`.
+    parts : mapping of str to sequence of str, optional
+        Keypoints by part.
+
+    Returns
+    -------
+    pd.DataFrame
+        Columns `view, part, whole, partly`: shares of images with all of a part's keypoints, and with some
+        only.
+    """
+    rows = []
+    for view, table in truth.items():
+        camera = views[view][0].intrinsics
+        inside = table.assign(inside=camera.contains(table[PIXEL].to_numpy()))
+        for part, keypoints in parts.items():
+            shares = inside[inside["keypoint"].isin(keypoints)].groupby("frame")["inside"].mean()
+            rows.append((view, part, (shares == 1).mean(), shares.between(0, 1, "neither").mean()))
+    return pd.DataFrame(rows, columns=["view", "part", "whole", "partly"])
 
 
 def robot_body(views: Mapping[str, Recording]) -> Shape | None:

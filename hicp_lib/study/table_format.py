@@ -6,12 +6,30 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN
+
 # (suffix of a column, unit in its title) -> factor; unit -> decimals as text
 _FACTORS = {
     ("m", "cm"): 100.0, ("m", "mm"): 1000.0, ("s", "s"): 1.0, ("s", "ms"): 1000.0, ("ms", "ms"): 1.0,
     ("share", "%"): 100.0, ("rad", "°"): float(np.degrees(1.0)),
 }  # fmt: skip
 _DECIMALS = {"cm": 1, "mm": 0, "s": 2, "ms": 0, "%": 0, "°": 1}
+
+
+def intervals_over(table: pd.DataFrame) -> str:
+    """What the intervals of a table with a column `n_people` are of, in the words of captions.
+
+    Examples
+    --------
+    >>> intervals_over(pd.DataFrame({"n_people": [12]}))
+    '95 % bootstrap intervals over 12 people and their images'
+    >>> intervals_over(pd.DataFrame({"n_people": [2]}))
+    'no intervals, from only 2 people'
+    """
+    n_people = 1 if "n_people" not in table else int(table["n_people"].max())
+    if 1 < n_people < MIN_DRAWN:
+        return f"no intervals, from only {n_people} people"
+    return f"95 % bootstrap intervals over {f'{n_people} people and their ' if n_people > 1 else ''}images"
 
 
 def in_units(table: pd.DataFrame, titles: Mapping[str, str], text: bool = False) -> pd.DataFrame:

@@ -138,7 +138,7 @@ def test_two_seconds_must_be_seen_of_all_points_together(seconds, is_enough):
 
 def test_speeds_are_of_the_smoothed_positions_and_at_most_those_of_people():
     times_s = np.arange(0, 3, 0.01)
-    for speed_m_s, expected_m_s in ((1.5, 1.5), (3.9, 3.9), (4.5, 4.0)):
+    for speed_m_s, expected_m_s in ((0.2, 0.2), (0.49, 0.49), (4.5, 0.5)):
         speeds = _speeds(times_s, times_s[:, None, None] * [0, speed_m_s, 0])
         inner = speeds[np.isfinite(speeds)]
         assert len(inner) == len(speeds) - 24 and inner == pytest.approx(expected_m_s)
@@ -166,13 +166,13 @@ def test_half_of_what_one_clock_saw_is_enough_on_the_other(later_s, is_enough):
 def test_what_hardly_moves_stands(variance, moves):
     speeds = np.random.default_rng(0).normal(size=(400, 1))
     speeds *= np.sqrt(variance / ((speeds - speeds.mean()) ** 2).sum())
-    assert np.isfinite(_correlations(speeds, speeds)).any() == moves
+    assert np.isfinite(_correlations(speeds, speeds)[0]).any() == moves
 
 
 def test_at_its_peak_a_parabola_through_three_lags_gives_the_offset():
     rng = np.random.default_rng(1)
     a = rng.normal(size=(600, 1))
-    values = _correlations(a, np.roll(a, -3, axis=0) + np.roll(a, -2, axis=0))
+    values, _ = _correlations(a, np.roll(a, -3, axis=0) + np.roll(a, -2, axis=0))
     peak = int(np.nanargmax(values))
     lag, top = _best_lag(a, np.roll(a, -3, axis=0) + np.roll(a, -2, axis=0))
     curve = np.polynomial.Polynomial.fit([-1, 0, 1], values[peak - 1 : peak + 2], 2)

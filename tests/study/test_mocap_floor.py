@@ -54,8 +54,9 @@ def test_a_neighbourhood_wider_than_the_limb_takes_the_wall(recording):
     times_s, markers_m = np.arange(-0.1, 0.3, 0.01), np.array([0.0, 0.0, 1.0])
     mocap = MotionCapture(times_s, names, np.broadcast_to(markers_m, (len(times_s), 8, 3)), 100.0)
     registered = Registered(recording, mocap, 0.0, [Registration("given", np.eye(4))], None, pd.DataFrame())
-    table = medians_by_radius(registered, points, (0.010, 0.040), n_resamples=10, seed=0)
+    people = [registered, registered], [points, points[points["frame"] == 0]]
+    table = medians_by_radius(*people, (0.010, 0.040), n_resamples=10, seed=0)
     table = table[table["keypoint"] == "left_wrist"]
     assert table["radius_m"].tolist() == [0.010, 0.040] and set(table["method"]) == {"paper"}
     assert table["median_m"].tolist() == pytest.approx([0.0, 1.0], abs=0.01)
-    assert (table["count"] == 2).all() and (table["n_frames"] == 2).all()
+    assert (table["count"] == 3).all() and (table["n_frames"] == 3).all() and (table["n_people"] == 2).all()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from hicp_lib.evaluation.space.mocap_error import JOINTS, MIN_SCORES, TABLE_JOINTS
 from hicp_lib.study.paper_tables import above_floor, beside_paper, paper_medians
@@ -50,4 +51,5 @@ def test_the_papers_tables_are_whole():
     assert len(paper) == 4 * 4 * 2 and paper["median_m"].between(0.02, 0.2).all()
     first = paper.query("detector == 'mmpose' and keypoint == 'left_elbow' and min_score == 0.3").iloc[0]
     assert (first["count"], first["median_m"]) == (419, 0.034)
+    assert first["found"] == pytest.approx(419 / 480) and paper["found"].max() < 1
     assert not paper.duplicated(["detector", "keypoint", "min_score"]).any()

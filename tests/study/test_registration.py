@@ -81,7 +81,9 @@ def simulated(laboratory):
 
 
 def test_where_depth_is_that_of_the_markers_the_camera_marker_costs_its_own_offset(simulated):
-    table = registration_readings(register(*simulated, OFFSET_S, 2), n_images=2, noise_px=2.0, n_draws=20)
+    table = registration_readings(
+        [register(*simulated, OFFSET_S, 2)] * 2, n_images=2, noise_px=2.0, n_draws=20
+    )
     table = table.set_index("reading")
     offset_m = np.linalg.norm(CAMERA_MARKER_CAM)
     assert table.loc["depth of the marker itself", "added_m"] == pytest.approx(offset_m, abs=1e-3)
@@ -91,9 +93,9 @@ def test_where_depth_is_that_of_the_markers_the_camera_marker_costs_its_own_offs
     centred, turned = "turned about the camera, its marker at the optical centre", "turned about the camera"
     assert table.loc[centred, "added_m"] < table.loc[turned, "added_m"] < offset_m
     assert (table["low_m"] <= table["added_m"]).all() and (table["added_m"] <= table["high_m"]).all()
-    assert (table["n_draws"] == 20).all()
+    assert (table["n_draws"] == 40).all() and (table["n_people"] == 2).all()
 
 
 def test_a_laboratorys_recording_cannot_tell(laboratory):
     (laboratory[0].folder / "clicks.csv").write_text(clicks_csv())
-    assert registration_readings(register(*laboratory, OFFSET_S)) is None
+    assert registration_readings([register(*laboratory, OFFSET_S)]) is None

@@ -5,8 +5,8 @@ the joint's centre, which no marker can sit on; errors against it are reported b
 
 Throughout, `errors` is the table of `mocap_errors`: one row per detector, method, joint and *frame*, also
 where nothing was found, so that what is missing counts; those of several people as one, with a column
-`subject`, by `hicp_lib.evaluation.cases.over_people`. Intervals are 95 % ones of a bootstrap that draws people,
-and of each blocks of frames; of one person, blocks only.
+`subject`, by `hicp_lib.evaluation.cases.over_people`. Intervals are 95 % ones of a bootstrap that draws
+people, and of each blocks of frames; of one person, blocks only.
 """
 
 from collections.abc import Iterator, Sequence
@@ -224,8 +224,8 @@ def distance_shares(
     Returns
     -------
     DataFrame
-        Columns `detector, method, keypoint, min_score, threshold_m, value, low, high, n_people`; NaN where none
-        was found.
+        Columns `detector, method, keypoint, min_score, threshold_m, value, low, high, n_people`; NaN where
+        none was found.
     """
     rows = []
     for case, part, found_m, weights in _cases(errors, min_scores, n_resamples, seed):

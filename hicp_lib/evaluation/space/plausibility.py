@@ -31,7 +31,7 @@ _FINGERS = np.arange(5, 21).reshape(4, 4)
 
 def implausible(
     points: pd.DataFrame,
-    n_frames: Mapping[str, int],
+    subjects: Mapping[str, np.ndarray],
     truth: Mapping[str, pd.DataFrame] | None = None,
     min_score: float = MIN_SCORE,
     n_resamples: int = 1000,
@@ -43,8 +43,8 @@ def implausible(
     ----------
     points : DataFrame
         What was lifted, as `hicp_lib.evaluation.space.stability` says, with its pixels.
-    n_frames : mapping of str to int
-        Number of images, by view.
+    subjects : mapping of str to array, shape (n_frames,)
+        Whose each image is, by view.
     truth : mapping of str to DataFrame, optional
         By view, a table with `frame, keypoint` and the same coordinates.
     min_score : float, optional
@@ -55,19 +55,20 @@ def implausible(
     Returns
     -------
     DataFrame
-        Columns `view, detector, method, part, measure`; `value` with `low, high` (95 %, over images), the
-        share of the `n_images` in which the part is found, of the shoulder line the mean angle in radians;
+        Columns `view, detector, method, part, measure`; `value` with `low, high` (95 %), the share of the
+        `n_images` of `n_people` in which the part is found, of the shoulder line the mean angle in radians;
         `of_truth`, the same of the true keypoints (NaN where they are not known).
     """
     rows = []
     for measure, (values_of, parts, columns) in _MEASURES.items():
-        for case, part, found, true in cases(points, n_frames, truth, min_score, parts, columns):
+        for case, part, found, true in cases(points, subjects, truth, min_score, parts, columns):
             values = values_of(found)
             seen = np.flatnonzero(np.isfinite(values))
-            interval = mean_with_interval(values[seen], seen, n_resamples, seed)
+            whose = subjects[case[0]][seen]
+            interval = mean_with_interval(values[seen], seen, n_resamples, seed, whose)
             of_truth = np.nan if true is None else np.nanmean(values_of(true))
-            rows.append((*case, part, measure, *interval, len(seen), of_truth))
-    return pd.DataFrame(rows, columns=[*ROW, "value", "low", "high", "n_images", "of_truth"])
+            rows.append((*case, part, measure, *interval, len(seen), len(set(whose)), of_truth))
+    return pd.DataFrame(rows, columns=[*ROW, "value", "low", "high", "n_images", "n_people", "of_truth"])
 
 
 def backwards(hands_px: np.ndarray) -> np.ndarray:

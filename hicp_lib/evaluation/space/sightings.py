@@ -1,4 +1,4 @@
-"""In which images a part of a still person is found, and found near: what detectors are compared by.
+"""In which images a part of a person is found, and found near: what detectors are compared by.
 
 Parts are more than in `hicp_lib.evaluation.space.stability`: an arm is found with any of its joints.
 Rows are per image, for `hicp_lib.evaluation.statistics.proportions`: shares with intervals, and differences
@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from hicp_lib.evaluation.space.stability import CASE, MIN_SCORE, PARTS, Parts, cases
+from hicp_lib.evaluation.space.stability import CASE, MIN_SCORE, PARTS, Parts, cases, of_each
 
 WITHIN_M = 0.05
 FOUND, NEAR_MEDIAN, NEAR_TRUTH = "found", "within 5 cm of the median", "within 5 cm of the truth"
@@ -24,7 +24,7 @@ ALL_PARTS: Parts = {**PARTS, **_ARMS, **_ANY}
 
 def sightings(
     points: pd.DataFrame,
-    n_frames: Mapping[str, int],
+    subjects: Mapping[str, np.ndarray],
     truth: Mapping[str, pd.DataFrame] | None = None,
     min_score: float = MIN_SCORE,
 ) -> pd.DataFrame:
@@ -34,8 +34,8 @@ def sightings(
     ----------
     points : DataFrame
         What was lifted, as `hicp_lib.evaluation.space.stability` says.
-    n_frames : mapping of str to int
-        Number of images, by view.
+    subjects : mapping of str to array, shape (n_frames,)
+        Whose each image is, by view.
     truth : mapping of str to DataFrame, optional
         By view, a table with `frame, keypoint` and `x_m, y_m, z_m`.
     min_score : float, optional
@@ -44,18 +44,22 @@ def sightings(
     Returns
     -------
     DataFrame
-        Columns `view, detector, method, part, measure, source_image` (the frame), `value`. `FOUND` is 1 where
-        any of the part's keypoints is found; `NEAR_MEDIAN` and, with truth, `NEAR_TRUTH` are the share of
-        them within `WITHIN_M` of the detector's median position over all images, and of the truth.
+        Columns `view, detector, method, part, measure, subject, source_image` (the frame), `value`. `FOUND`
+        is 1 where any of the part's keypoints is found; `NEAR_MEDIAN` and, with truth, `NEAR_TRUTH` are the
+        share of them within `WITHIN_M` of the detector's median position over the subject's images, and of
+        the truth.
     """
     tables = []
-    for case, part, found_m, true_m in cases(points, n_frames, truth, min_score, ALL_PARTS):
+    for case, part, found_m, true_m in cases(points, subjects, truth, min_score, ALL_PARTS):
         seen = np.isfinite(found_m[..., 0])
         values = {FOUND: seen.any(axis=1).astype(float)}
-        median_m = np.nanmedian(np.where(seen.any(axis=0)[:, None], found_m, 0.0), axis=0)
+        median_m = np.zeros_like(found_m)
+        for of in of_each(subjects[case[0]]):
+            median_m[of] = np.nanmedian(np.where(seen[of].any(axis=0)[:, None], found_m[of], 0.0), axis=0)
         references = {NEAR_MEDIAN: median_m} | ({} if true_m is None else {NEAR_TRUTH: true_m})
         for name, reference_m in references.items():
             values[name] = (np.linalg.norm(found_m - reference_m, axis=-1) <= WITHIN_M).mean(axis=1)
-        labels = dict(zip([*CASE, "part", "source_image"], (*case, part, np.arange(len(seen))), strict=True))
+        labels = dict(zip([*CASE, "part"], (*case, part), strict=True))
+        labels |= {"subject": subjects[case[0]], "source_image": np.arange(len(seen))}
         tables += [pd.DataFrame(labels | {"measure": name, "value": of}) for name, of in values.items()]
-    return pd.concat(tables, ignore_index=True)[[*ROW, "source_image", "value"]]
+    return pd.concat(tables, ignore_index=True)[[*ROW, "subject", "source_image", "value"]]

@@ -1,8 +1,8 @@
-"""What changes between nearly equal views of a still person: keypoints that come and go, and move.
+"""What changes between nearly equal views of still people: keypoints that come and go, and move.
 
 Nothing but the camera's pose differs, and that by little, so an answer that follows what is seen stays. It is
-`hicp_lib.evaluation.space.flicker` for views that are no sequence. Views are drawn in the bootstrap, and with
-them the pairs they make.
+`hicp_lib.evaluation.space.flicker` for views that are no sequence. In the bootstrap people are drawn, and
+views of each, and with them the pairs they make.
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.evaluation.space.sightings import ALL_PARTS, ROW
-from hicp_lib.evaluation.space.stability import MIN_SCORE, cases
+from hicp_lib.evaluation.space.stability import MIN_SCORE, cases, of_each
 from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
 
 NEAR_M, NEAR_RAD = 0.05, float(np.radians(5))
@@ -48,6 +48,7 @@ def similar_pairs(T_base_cam: np.ndarray) -> np.ndarray:
 def similar_views(
     points: pd.DataFrame,
     T_base_cam: Mapping[str, np.ndarray],
+    subjects: Mapping[str, np.ndarray],
     min_score: float = MIN_SCORE,
     n_resamples: int = 1000,
     seed: int = 0,
@@ -60,6 +61,8 @@ def similar_views(
         As of `hicp_lib.evaluation.space.stability`.
     T_base_cam : mapping of str to array, shape (n, 4, 4)
         Camera poses, by view.
+    subjects : mapping of str to array, shape (n,)
+        Whose each image is, by view; views of one subject make pairs.
     min_score : float, optional
         Keypoints above it count.
     n_resamples, seed : int, optional
@@ -68,23 +71,37 @@ def similar_views(
     Returns
     -------
     DataFrame
-        Columns `view, detector, method, part, measure, value, low, high, n` (pairs that count). "flicker
-        rate": of the pairs in which any keypoint of the part is found in either view, the share in which none
-        is in the other. "moves [m]": median over pairs of how far a keypoint moves; of several, their median.
+        Columns `view, detector, method, part, measure, value, low, high, n` (pairs that count), `n_people`
+        (with one that does). "flicker rate": of the pairs in which any keypoint of the part is found in
+        either view, the share in which none is in the other. "moves [m]": median over pairs of how far a
+        keypoint moves; of several, their median.
     """
     rows: list[tuple] = []
-    n_frames = {view: len(poses) for view, poses in T_base_cam.items()}
     pairs = {view: similar_pairs(poses).T for view, poses in T_base_cam.items()}
-    for case, part, found_m, _ in cases(points, n_frames, None, min_score, ALL_PARTS):
-        a, b = pairs[case[0]]
-        times = draw_counts(len(found_m), n_resamples, seed)
-        together = times[:, a] * times[:, b]
+    for case, part, found_m, _ in cases(points, subjects, None, min_score, ALL_PARTS):
+        whose, (a, b) = subjects[case[0]], pairs[case[0]]
+        a, b = a[whose[a] == whose[b]], b[whose[a] == whose[b]]
+        together = _drawn_together(draw_counts(whose, n_resamples, seed), whose, a, b)
         seen = np.isfinite(found_m[..., 0]).any(axis=1)
         either = seen[a] | seen[b]
         with np.errstate(invalid="ignore"):
             rate = together @ (seen[a] != seen[b]) / (together @ either)
         moves_m = pd.DataFrame(np.linalg.norm(found_m[a] - found_m[b], axis=-1)).median(axis=1).to_numpy()
-        rows.append((*case, part, "flicker rate", *with_interval(rate), either.sum()))
-        moved_m = weighted_median(moves_m, together)
-        rows.append((*case, part, "moves [m]", *with_interval(moved_m), np.isfinite(moves_m).sum()))
-    return pd.DataFrame(rows, columns=[*ROW, "value", "low", "high", "n"])
+        moved, moved_m = np.isfinite(moves_m), weighted_median(moves_m, together)
+        for measure, draws, count in (("flicker rate", rate, either), ("moves [m]", moved_m, moved)):
+            n_people = len(set(whose[a[count]]))
+            interval = with_interval(draws, len(set(whose)))
+            rows.append((*case, part, measure, *interval, count.sum(), n_people))
+    return pd.DataFrame(rows, columns=[*ROW, "value", "low", "high", "n", "n_people"])
+
+
+def _drawn_together(times: np.ndarray, subjects: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """How often each pair of one subject's images is drawn, (draws, n_pairs), from how often each image is.
+
+    A subject that is drawn twice makes pairs within each time, not between them: on average half of those
+    that its images make.
+    """
+    drawn = np.ones(times.shape)
+    for of in of_each(subjects):
+        drawn[:, of] = np.maximum(times[:, of].mean(axis=1, keepdims=True), 1)
+    return times[:, a] * times[:, b] / drawn[:, a]

@@ -1,14 +1,15 @@
-"""How steadily, and how truly, 3D keypoints of a still person are found from many views (paper section IV-B).
+"""How steadily, and how truly, 3D keypoints of still people are found from many views (paper section IV-B).
 
-The person sits still and the robot looks from many poses, so every view should give the same position in
-the robot's base frame. *Stability* is how close views come to the detector's own median position; it needs no
-truth, and a detector that is always wrong in the same way is stable. *Accuracy* is the same against the true
-position, which simulated recordings have.
+A person sits still and the robot looks from many poses, so every view should give the same position in
+the robot's base frame. *Stability* is how close views come to the detector's own median position of that
+person; it needs no truth, and a detector that is always wrong in the same way is stable. *Accuracy* is the
+same against the true position, which simulated recordings have.
 
 Throughout, `points` is the table of `hicp_lib.lifting.table.lift_recording` with the columns `view`,
-`detector` and `method` before its own, and `n_frames` maps every view to its number of images. The person
-with the best score of each image counts; a keypoint counts as found when its score is above `min_score`
-and it could be lifted.
+`subject`, `detector` and `method` before its own, frames of a view numbered on from subject to subject, and
+`subjects` maps every view to whose each of its images is. The person with the best score of each image
+counts; a keypoint counts as found when its score is above `min_score` and it could be lifted. Intervals are
+95 % percentile ones from drawing subjects, and images of each.
 """
 
 import itertools
@@ -68,21 +69,22 @@ def counted(
 
 
 def median_positions(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
-    """Coordinate-wise median over the views of every keypoint, in the base frame.
+    """Coordinate-wise median over the views of every subject's keypoints, in the base frame.
 
     Returns
     -------
     DataFrame
-        Columns `view, detector, method, keypoint, n, x_m, y_m, z_m`; `n` is the number of images.
+        Columns `view, detector, method, subject, keypoint, n, x_m, y_m, z_m`; `n` is the number of images.
     """
-    groups = counted(points, min_score).groupby([*CASE, "keypoint"], sort=False)
+    labels = [*CASE, "subject", "keypoint"]
+    groups = counted(points, min_score).groupby(labels, sort=False)
     table = groups[POSITION].median().assign(n=groups.size()).reset_index()
-    return table[[*CASE, "keypoint", "n", *POSITION]]
+    return table[[*labels, "n", *POSITION]]
 
 
 def within_distance(
     points: pd.DataFrame,
-    n_frames: Mapping[str, int],
+    subjects: Mapping[str, np.ndarray],
     truth: _Truth | None = None,
     thresholds_m: Sequence[float] = THRESHOLDS_M,
     min_score: float = MIN_SCORE,
@@ -98,11 +100,11 @@ def within_distance(
     ----------
     points : DataFrame
         What was lifted, as the module says.
-    n_frames : mapping of str to int
-        Number of images, by view.
+    subjects : mapping of str to array, shape (n_frames,)
+        Whose each image is, by view.
     truth : mapping of str to DataFrame, optional
         By view, a table with `frame, keypoint, x_m, y_m, z_m`. Given, distances are to the true positions;
-        None, to the median over the images, taken anew in every draw of the bootstrap.
+        None, to the median over a subject's images, taken anew in every draw of the bootstrap.
     thresholds_m : sequence of float, optional
         The distances.
     min_score : float, optional
@@ -114,21 +116,26 @@ def within_distance(
     -------
     DataFrame
         Columns `view, detector, method, part, reference` ("median" or "truth"), `threshold_m, value, low,
-        high` (95 % percentile bootstrap over images), `found` (fraction of images, at any distance).
+        high`, `found` (fraction of images, at any distance), `n_people`.
     """
     rows: list[tuple] = []
     reference = "median" if truth is None else "truth"
-    for case, part, found_m, true_m in cases(points, n_frames, truth, min_score):
-        weights = draw_counts(len(found_m), n_resamples, seed)
+    for case, part, found_m, true_m in cases(points, subjects, truth, min_score):
+        whose = subjects[case[0]]
+        weights, n_people = draw_counts(whose, n_resamples, seed), len(set(whose))
         fractions = np.zeros((len(weights), len(thresholds_m)))
         for k in range(found_m.shape[1]):
-            off_m = distances(found_m[:, k], None if true_m is None else true_m[:, k], weights)
+            if true_m is None:
+                medians = medians_of_each(found_m[:, k], weights, whose)
+                off_m = distances(found_m[:, k], weights, medians)
+            else:
+                off_m = np.linalg.norm(found_m[:, k] - true_m[:, k], axis=1)[None]
             for j, threshold_m in enumerate(thresholds_m):
                 fractions[:, j] += np.einsum("dn,dn->d", weights, off_m <= threshold_m) / found_m.size * 3
         found = np.isfinite(found_m[..., 0]).mean()
-        bounds = zip(thresholds_m, *with_interval(fractions), strict=True)
-        rows += [(*case, part, reference, *numbers, found) for numbers in bounds]
-    columns = [*CASE, "part", "reference", "threshold_m", "value", "low", "high", "found"]
+        bounds = zip(thresholds_m, *with_interval(fractions, n_people), strict=True)
+        rows += [(*case, part, reference, *numbers, found, n_people) for numbers in bounds]
+    columns = [*CASE, "part", "reference", "threshold_m", "value", "low", "high", "found", "n_people"]
     return pd.DataFrame(rows, columns=columns)
 
 
@@ -162,7 +169,7 @@ def position_array(
 
 def cases(
     points: pd.DataFrame,
-    n_frames: Mapping[str, int],
+    subjects: Mapping[str, np.ndarray],
     truth: _Truth | None = None,
     min_score: float = MIN_SCORE,
     parts: Parts = PARTS,
@@ -177,8 +184,8 @@ def cases(
     ----------
     points : DataFrame
         What was lifted, as the module says.
-    n_frames : mapping of str to int
-        Number of images, by view.
+    subjects : mapping of str to array, shape (n_frames,)
+        Whose each image is, by view.
     truth : mapping of str to DataFrame, optional
         By view, a table with `frame, keypoint` and `columns`.
     min_score : float, optional
@@ -199,7 +206,7 @@ def cases(
     runs = list(points[["detector", "method"]].drop_duplicates().itertuples(index=False, name=None))
     names = list(dict.fromkeys(itertools.chain(*parts.values())))
     places = {part: [names.index(name) for name in keypoints] for part, keypoints in parts.items()}
-    for view, n in n_frames.items():
+    for view, n in ((view, len(whose)) for view, whose in subjects.items()):
         true = None if truth is None else position_array(truth[view], names, n, columns)
         for detector, method in runs:
             # A detector that finds nobody in a view has no rows there, and is counted all the same.
@@ -223,24 +230,42 @@ def median_position(found_m: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return np.stack([weighted_median(found_m[:, i], weights) for i in range(3)], axis=1)
 
 
-def distances(found_m: np.ndarray, true_m: np.ndarray | None, weights: np.ndarray) -> np.ndarray:
-    """How far one keypoint is from where it should be, image by image.
+def medians_of_each(
+    found_m: np.ndarray, weights: np.ndarray, subjects: np.ndarray, least: int = 1
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Which images (n,) are of a subject, and its median position in every draw (draws, 3).
+
+    Of every subject in at least so many of whose images the keypoint is found; arguments as of `distances`.
+    """
+    people = [of for of in of_each(subjects) if np.isfinite(found_m[of, 0]).sum() >= least]
+    return [(of, median_position(found_m[of], weights[:, of])) for of in people]
+
+
+def distances(
+    found_m: np.ndarray, weights: np.ndarray, medians: Sequence[tuple[np.ndarray, np.ndarray]]
+) -> np.ndarray:
+    """How far one keypoint is from the subject's median position.
 
     Parameters
     ----------
     found_m : array, shape (n, 3)
         Positions; NaN where not found.
-    true_m : array or None, shape (n, 3)
-        Where it should be. None: at the median position of each draw.
     weights : array of int, shape (draws, n)
         How often each image counts.
+    medians : sequence of (array, array)
+        As from `medians_of_each`.
 
     Returns
     -------
-    array, shape (1, n) or (draws, n)
-        The first with `true_m`.
+    array, shape (draws, n)
+        NaN of subjects without a median.
     """
-    if true_m is not None:
-        return np.linalg.norm(found_m - true_m, axis=1)[None]
-    median_m = median_position(found_m, weights)
-    return np.sqrt(sum((found_m[:, i] - median_m[:, i, None]) ** 2 for i in range(3)))
+    off_m = np.full(weights.shape, np.nan)
+    for of, median_m in medians:
+        off_m[:, of] = np.linalg.norm(found_m[of] - median_m[:, None], axis=-1)
+    return off_m
+
+
+def of_each(subjects: np.ndarray) -> list[np.ndarray]:
+    """Which images (n_frames,) are of each subject, in the order in which they first occur."""
+    return [np.equal(subjects, subject) for subject in dict.fromkeys(subjects)]

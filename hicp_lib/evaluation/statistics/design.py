@@ -1,5 +1,7 @@
 """What a design can tell: how much people differ beside their frames, and the least difference it detects."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
@@ -41,6 +43,32 @@ def variance_components(values: ArrayLike, subjects: ArrayLike) -> tuple[float, 
     between = (of["size"] * (of["mean"] - table["value"].mean()) ** 2).sum() / (k - 1)
     frames = (n - (of["size"] ** 2).sum() / n) / (k - 1)  # of each, if all have as many
     return max((between - within) / frames, 0.0), within
+
+
+def component_table(rows: pd.DataFrame, by: Sequence[str], of: str) -> pd.DataFrame:
+    """Variances between views, between people within a view, and between images of one, of groups of rows.
+
+    Parameters
+    ----------
+    rows : DataFrame
+        With columns `view, subject`, a row per image.
+    by : sequence of str
+        Columns that make the groups.
+    of : str
+        Column of numbers or flags.
+
+    Returns
+    -------
+    DataFrame
+        Columns `by, views, people, images` (`variance_components`), `n_people`.
+    """
+    table = []
+    for group, part in rows.groupby(list(by), sort=False, observed=True):
+        apart = part[of] - part.groupby("view")[of].transform("mean")
+        people = part.groupby(["view", "subject"]).ngroup()
+        views, _ = variance_components(part[of], part["view"])
+        table.append((*group, views, *variance_components(apart, people), part["subject"].nunique()))
+    return pd.DataFrame(table, columns=[*by, "views", "people", "images", "n_people"])
 
 
 def smallest_difference(differences_by_subject: ArrayLike, power: float = POWER) -> float:

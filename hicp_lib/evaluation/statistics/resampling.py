@@ -128,7 +128,7 @@ def weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     ----------
     values : array, shape (n,) or (draws, n)
         One row per draw when every draw has its own.
-    weights : array of int, shape (draws, n)
+    weights : array, shape (draws, n)
         How often each counts.
 
     Returns
@@ -155,7 +155,8 @@ def weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     counts = np.cumsum(drawn, axis=1)
     total = counts[:, -1]
     row = np.arange(len(weights)) if len(rows) > 1 else 0
-    # The first that reach the ranks in the middle; with an odd number it is one rank twice.
-    places = [(counts >= rank[:, None]).argmax(axis=1) for rank in ((total + 1) // 2, total // 2 + 1)]
+    # The first that reach half of the weight, and go beyond; of an odd number it is one twice.
+    half = total[:, None] / 2
+    places = [reached.argmax(axis=1) for reached in (counts >= half, counts > half)]
     lower, upper = (rows[row, order[row, place]] for place in places)
     return np.where(total > 0, (lower + upper) / 2, np.nan)

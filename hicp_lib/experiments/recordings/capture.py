@@ -25,7 +25,7 @@ from hicp_lib.simulation.sensors.motion_capture import (
     track_markers,
 )
 
-LEAD_S = 0.5  # motion capture starts this long before the first frame, and ends as long after the last
+_LEAD_S = (0.3, 0.9)  # how long before the first frame motion capture starts; as long after the last it ends
 _BALL_M = 0.006  # radius of a marker
 
 
@@ -36,8 +36,8 @@ def capture(
     obstacles: tuple[g.Mesh, ...],
     duration_s: float,
     subject: Subject,
-) -> tuple[MotionCapture, np.ndarray]:
-    """Motion capture of a person, from `LEAD_S` before the first frame on.
+) -> tuple[MotionCapture, np.ndarray, float]:
+    """Motion capture of a person, from before the first frame on.
 
     Parameters
     ----------
@@ -52,25 +52,27 @@ def capture(
     duration_s : float
         From the first frame to the last.
     subject : Subject
-        Who it is; draws the noise.
+        Who it is; draws frame, clock and noise.
 
     Returns
     -------
     exported : MotionCapture
-        What the system exports; its clock shows zero `LEAD_S` before the first frame.
+        What the system exports.
     T_mocap_world : array, shape (4, 4)
+    lead_s : float
+        Its clock shows zero so long before the first frame.
     """
     rng = subject.stream("motion capture")
-    T_mocap_world = mocap_frame(rng)
-    n = int(round((duration_s + 2 * LEAD_S) * QUALISYS.rate_hz)) + 1
+    T_mocap_world, lead_s = mocap_frame(rng), float(rng.uniform(*_LEAD_S))
+    n = int(round((duration_s + 2 * lead_s) * QUALISYS.rate_hz)) + 1
     clock_s = np.arange(n) / QUALISYS.rate_hz
     cameras_m = room_cameras_m(QUALISYS, person_at(0.0).keypoints_m[INDEX["mid_hip"], :2])
     fixed_m = camera_marker_m(T_world_camera)[None]
-    times_s = clock_s - LEAD_S
+    times_s = clock_s - lead_s
     points_m, n_seeing = track_markers(person_at, vertices, fixed_m, times_s, cameras_m, obstacles=obstacles)
     names = (*JOINT_MARKERS, CAMERA_MARKER)
     exported = measure(clock_s, names, points_m, n_seeing, T_mocap_world, QUALISYS, rng)
-    return exported, T_mocap_world
+    return exported, T_mocap_world, lead_s
 
 
 def marker_balls(person: PosedBody, vertices: np.ndarray, number: int) -> list[Surface]:

@@ -30,7 +30,7 @@ def record_frame(name: str, subject: Subject, k: int) -> tuple[np.ndarray, np.nd
     truth : dict of str to list
         `keypoints_m` (136, 3) in the base frame and `visible` (136,).
     """
-    plan, rng = scenario(name), subject.stream(name.partition("@")[0], k)
+    plan, rng = scenario(name, subject.number), subject.stream(name.partition("@")[0], k)
     world, person = plan.stage(subject, float(plan.times_s(k + 1)[k]))
     camera = camera_at(plan, k)
     frame = render(world, camera, rng)

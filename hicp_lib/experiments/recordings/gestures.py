@@ -97,14 +97,16 @@ class Gestures:
         return self.at_ease()
 
     def _touch_table(self) -> Iterator[Move]:
-        """Lean forward, one or both hands onto the table."""
-        joints = self.now.joints | radians(_LEANING_DEG)
+        """Come to the table, lean forward, one or both hands onto it."""
+        yield from self._walk(np.array([self.place_m[0], DISTANCE_M]))
+        yield from self._go(self._free(self._over_table))
+
+    def _over_table(self) -> Joints:
+        joints = self.at_ease().joints | radians(_LEANING_DEG)
         pelvis_m = posed(self.shape, self._standing(joints)).heads_m[0]
         for side in self.rng.permutation(["left", "right"])[: self.rng.integers(1, 3)]:
             joints = self._with_hand_on_table(joints, str(side), pelvis_m)
-        posture = self._standing(joints)
-        if self._is_free(posture):
-            yield from self._go(posture)
+        return joints
 
     def _with_hand_on_table(self, joints: Joints, side: str, pelvis_m: np.ndarray) -> Joints:
         """A wrist a little beyond the table's edge, the palm down."""
@@ -172,7 +174,7 @@ class Gestures:
         first = int(to_m[0] >= start_m[0])  # the person faces the robot: their left is -x
         for k in range(n_steps):
             side = ("left", "right")[(first + k) % 2]
-            lifted = {f"{side}_hip_flexion": 0.5, f"{side}_knee_flexion": 0.7, f"{side}_hip_abduction": 0.12}
+            lifted = {f"{side}_hip_flexion": 0.3, f"{side}_knee_flexion": 0.5, f"{side}_hip_abduction": 0.12}
             middle_m, end_m = (start_m + (k + part) / n_steps * (to_m - start_m) for part in (0.5, 1))
             yield Move(
                 0.45, Posture(self.now.joints | self.legs | lifted, (float(middle_m[0]), float(middle_m[1])))

@@ -25,6 +25,7 @@ from hicp_lib.simulation.sensors.time_of_flight import AZURE_KINECT
 POSES_FILE = DATA_DIR / "relative_poses.csv"
 DEPTH_CAMERAS = {"d435": D435, "azure-kinect": AZURE_KINECT}
 """What a scenario may be recorded with, by name; nothing in this study is tuned on the second."""
+_POSES_APART = 8  # of the robot, from where one person's begin to where the next one's do
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class Scenario:
     mount: str
     head_rad: Callable[[int], np.ndarray]
     stage: Callable[[Subject, float], tuple[World, PosedBody]]
-    capture: Callable[[Subject, float, np.ndarray], tuple[MotionCapture, np.ndarray]] | None = None
+    capture: Callable[[Subject, float, np.ndarray], tuple[MotionCapture, np.ndarray, float]] | None = None
     depth_camera: DepthCamera = D435
 
     def times_s(self, n: int) -> np.ndarray:
@@ -62,8 +63,18 @@ class Scenario:
         return np.arange(n) / self.rate_hz
 
 
-def scenario(name: str) -> Scenario:
+def scenario(name: str, number: int = 0) -> Scenario:
     """A scenario by its name, or by NAME@CAMERA with another of `DEPTH_CAMERAS` than the D435.
+
+    Parameters
+    ----------
+    name : str
+    number : int, optional
+        Of the person: where in the list of the robot's poses theirs begin.
+
+    Returns
+    -------
+    Scenario
 
     Raises
     ------
@@ -81,7 +92,10 @@ def scenario(name: str) -> Scenario:
     ):  # fmt: skip
         if chosen not in known:
             raise InputError(f"no {kind} {chosen!r}; choose one of {', '.join(known)}")
-    return replace(SCENARIOS[base], depth_camera=DEPTH_CAMERAS[camera or "d435"])
+    plan = SCENARIOS[base]
+    first = _POSES_APART * number % plan.n_frames
+    depth_camera = DEPTH_CAMERAS[camera or "d435"]
+    return replace(plan, depth_camera=depth_camera, head_rad=lambda n: plan.head_rad(first + n)[first:])
 
 
 @memoised()
@@ -99,14 +113,14 @@ def _relative(view: str) -> Scenario:
         max_frames=len(poses_rad),
         rate_hz=0.5,  # the robot moves and settles between two frames
         mount=VIEWS[view],
-        head_rad=lambda n: poses_rad[:n],
+        head_rad=lambda n: poses_rad[np.arange(n) % len(poses_rad)],
         stage=lambda subject, time_s: seated_person(subject),
     )
 
 
 def _capture_moving(
     subject: Subject, duration_s: float, T_world_camera: np.ndarray
-) -> tuple[MotionCapture, np.ndarray]:
+) -> tuple[MotionCapture, np.ndarray, float]:
     scene = moving_person(subject)
     vertices = marker_vertices(scene.appearance.shape)
     obstacles = (scene.table.mesh,) if scene.table else ()

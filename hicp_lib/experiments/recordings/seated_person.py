@@ -24,6 +24,8 @@ TABLE_HEIGHT_M = 0.72
 _TABLE_EDGE_M = 0.20  # the table's edge before the pelvis
 _TABLE_DEPTH_M = 0.55
 _WRISTS_M = {"left": (0.40, 0.12), "right": (0.36, -0.18)}  # before the pelvis, to the person's left
+_WRISTS_APART_M = 0.05  # at most, a person's from these in either direction
+_POSTURE_SD_DEG = 4.0  # of how people hold spine and neck
 _POSTURE_DEG = {
     "spine_flexion": 9.0, "spine_turn": 2.0, "neck_flexion": -2.0, "neck_turn": 3.0,
     "left_hip_flexion": 86.0, "right_hip_flexion": 87.0,
@@ -52,13 +54,19 @@ def seated_person(subject: Subject) -> tuple[World, PosedBody]:
 
 def _sit_down(body: Body, shape: np.ndarray, rng: np.random.Generator) -> PosedBody:
     """The posture, with the arms brought down until the hands lie on the table."""
-    joints = radians(_POSTURE_DEG)
+    upright = [name for name in _POSTURE_DEG if name.startswith(("spine", "neck"))]
+    joints = radians(
+        _POSTURE_DEG | {name: rng.normal(_POSTURE_DEG[name], _POSTURE_SD_DEG) for name in upright}
+    )
+    wrists_m = {
+        side: rng.uniform(-_WRISTS_APART_M, _WRISTS_APART_M, 2) + at for side, at in _WRISTS_M.items()
+    }
     for side in _WRISTS_M:
         joints |= sample_hand(rng, "open", f"{side}_") | radians(_HAND_DEG, f"{side}_")
     wrist_heights_m = dict.fromkeys(_WRISTS_M, TABLE_HEIGHT_M + 0.05)
     for _ in range(_N_ROUNDS):
         pelvis_m = posed(shape, Posture(joints, _PLACE_M)).heads_m[0, 2]
-        for side, (ahead_m, left_m) in _WRISTS_M.items():
+        for side, (ahead_m, left_m) in wrists_m.items():
             target_m = np.array([ahead_m, left_m, wrist_heights_m[side] - pelvis_m])
             joints = _with_arm(body, shape, joints, side, target_m)
         person = posed(shape, Posture(joints, _PLACE_M))

@@ -16,7 +16,6 @@ from hicp_lib.core.cache import key
 from hicp_lib.core.executor import Workers, resolved, run_jobs
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.experiments.laboratory import T_WORLD_ROOT
-from hicp_lib.experiments.recordings.capture import LEAD_S
 from hicp_lib.experiments.recordings.frames import camera_poses, record_frame
 from hicp_lib.experiments.recordings.ground_truth import (
     DEPTH_UNITS_PER_M,
@@ -70,7 +69,7 @@ def simulate_recording(
     InputError
         For an unknown scenario, numbers out of range, or a folder that holds something else.
     """
-    out, plan = Path(out), scenario(name)
+    out, plan = Path(out), scenario(name, subject.number)
     n = plan.n_frames if n_frames is None else n_frames
     workers = resolved(workers)
     check_numbers(n_frames=(n, 1, plan.max_frames))
@@ -123,10 +122,10 @@ def _capture_all(out: Path, name: str, subject: Subject, n: int) -> None:
     if plan.capture is None:
         return
     T_world_camera = T_WORLD_ROOT @ camera_poses(plan, 1)[0]
-    exported, T_mocap_world = plan.capture(subject, float(plan.times_s(n)[-1]), T_world_camera)
+    exported, T_mocap_world, lead_s = plan.capture(subject, float(plan.times_s(n)[-1]), T_world_camera)
     tsv, c3d = (out / name for name in _MOCAP_FILES)
     write_tsv(tsv, exported)
     if len(exported.times_s) < MAX_C3D_FRAMES:  # a longer one is in the TSV file alone
         write_c3d(c3d, exported)
     T_base_mocap = np.linalg.inv(T_mocap_world @ T_WORLD_ROOT).tolist()
-    write_json(part, {"n_frames": n, "T_base_mocap": T_base_mocap, "mocap_offset_s": START_S - LEAD_S})
+    write_json(part, {"n_frames": n, "T_base_mocap": T_base_mocap, "mocap_offset_s": START_S - lead_s})

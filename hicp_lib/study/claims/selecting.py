@@ -112,7 +112,7 @@ def is_rendered(results: Path, notebook: str) -> bool:
     recordings = [value for name, value in parameters.items() if name.startswith("recording")]
     made = [parameters["source"] == "rendered"] if "source" in parameters else []
     if recordings:
-        given = [Path(folder) for folder in recordings if folder]
+        given = [Path(folder) for folders in recordings for folder in _listed(folders) if folder]
         made.append(not given or any((folder / SIMULATION_FILE).is_file() for folder in given))
     return any(made) or not made  # a notebook that takes neither makes all it looks at
 

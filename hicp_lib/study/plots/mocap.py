@@ -1,4 +1,4 @@
-"""Figures of the test against motion capture: distributions, trajectories, what errors depend on.
+"""Figures of the test against motion capture: distributions and trajectories.
 
 Tables are those of `hicp_lib.evaluation.space.mocap_error`. A detector called `palette.PERFECT` among them
 is the floor: what the true keypoints in the image come to.
@@ -9,15 +9,13 @@ import pandas as pd
 
 from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import PERFECT, TRUTH_COLOUR, detector_colour, detector_marker
+from hicp_lib.study.plots.palette import PERFECT, TRUTH_COLOUR, detector_colour
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
-_MIN_N = 5  # fewer say little of a median
 _OUT_OF_RANGE_M = 0.15  # beyond the reference's range by more is not drawn
-_BOX_CM, _ERROR_CM = (1, 3, 10, 30, 100), (0.5, 1, 2, 5, 10, 20, 50)  # ticks of logarithmic axes
+_BOX_CM = (1, 3, 10, 30, 100)  # ticks of a logarithmic axis
 _LINE = ["detector", "method", "keypoint"]
 _AXES = {"x_m": "x (backward) [m]", "y_m": "y (right) [m]", "z_m": "z (up) [m]"}
-_BY = {"distance_m": "distance from the camera [m]", "score": "score", "sight": "line of sight"}
 
 
 @in_style
@@ -147,48 +145,3 @@ def trajectories(
     alt = f"Three curves over time. The {name} was found by {series_text(counts, '{} in {} frames')}."
     columns = ["detector", "frame", *_AXES, *(f"reference_{c}" for c in _AXES), "score", "error_m"]
     return Figure(figure, caption, alt, errors[columns])
-
-
-@in_style
-def error_dependence(table: pd.DataFrame, note: str) -> Figure:
-    """Median error of elbows and wrists by distance, score and line of sight.
-
-    `table` from `hicp_lib.evaluation.space.error_dependence.errors_by`, one after the other for every column.
-    """
-    table = table[table["part"].isin(["elbow", "wrist"]) & (table["n"] >= _MIN_N)]
-    shape = table["part"].nunique(), table["by"].nunique()
-    size = 3.7 * shape[1], 2.9 * shape[0]
-    figure, axes = new_figure(*shape, *size, squeeze=False, sharey=True)
-    for axis, rows, part, by in marks.facets(axes, table, "part", "by"):
-        _draw_dependence(axis, rows)
-        axis.set(yscale="log", title=f"{part}s", xlabel=_BY.get(by, by))
-        axis.set(yticks=_ERROR_CM, yticklabels=map(str, _ERROR_CM), ylim=(0.3, 80))
-        axis.minorticks_off()
-    for axis in axes[:, 0]:
-        axis.set(ylabel="distance from the markers [cm]")
-    marks.legend_below(figure, axes, ncols=5)
-    caption = (
-        "Distance from the markers by distance from the camera, by score, and by whether something is in "
-        "front of the joint (lines and dots the median, bands and whiskers the quartiles; bins of at least "
-        f"{_MIN_N}{_floor(table)}): {_lifting(table)}, {note}."
-    )
-    wrists = table[(table["by"] == "sight") & (table["part"] == "wrist")]
-    said = series_text(100 * wrists.set_index(["detector", "bin"])["median_m"], "{0} {2:.1f} cm when {1}")
-    by_sight = f" Median at the wrists: {said}." if len(wrists) else ""
-    return Figure(figure, caption, f"Curves per detector.{by_sight}", table)
-
-
-def _draw_dependence(axis, rows: pd.DataFrame) -> None:
-    labels = list(rows["bin"].unique())
-    for k, (detector, part) in enumerate(rows.groupby("detector", sort=False)):
-        pen = {"color": detector_colour(detector), "label": detector}
-        median, lower, upper = (100 * part[name] for name in ("median_m", "lower_m", "upper_m"))
-        if part["middle"].notna().all():
-            axis.plot(part["middle"], median, marker=detector_marker(detector), markersize=4, **pen)
-            axis.fill_between(part["middle"], lower, upper, color=pen["color"], alpha=0.18, lw=0)
-        else:
-            x = part["bin"].map(labels.index) + marks.offset(k, rows["detector"].nunique(), 0.16)
-            axis.errorbar(
-                x, median, [median - lower, upper - median], fmt=detector_marker(detector), capsize=3, **pen
-            )
-            axis.set(xticks=range(len(labels)), xticklabels=labels, xlim=(-0.5, len(labels) - 0.5))

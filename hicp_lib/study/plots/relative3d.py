@@ -14,6 +14,7 @@ from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
 from hicp_lib.study.plots.people import detections_grid, draw_rings
 from hicp_lib.study.plots.skeleton import BODY_LIMBS, HAND_LIMBS, limb_lines
 from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
+from hicp_lib.study.table_format import intervals_over
 
 _AXES = ("x_m", "y_m", "z_m")
 # Seen by the robot, which looks along -x; the axis that is not drawn is the one looked along.
@@ -126,7 +127,7 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
         What the data are, for the caption.
     """
     table = table[table["method"] == method]
-    table = table[table["n_images"] >= min(MIN_IMAGES, table["n_images"].max())]
+    table = table[(table["n_images"] >= min(MIN_IMAGES, table["n_images"].max())) & table["spread_m"].notna()]
     n_views = table["view"].nunique()
     size = max(4.6 * n_views, 6), 4.9
     figure, axes = new_figure(1, n_views, *size, sharex=True, sharey=True, squeeze=False)
@@ -145,7 +146,7 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
     caption = (
         "Stability against accuracy: median distance of the images to their median position, and how far "
         "that position is from the true one; above the dashed line a keypoint is more off than unsteady. "
-        f"Whiskers are 95 % bootstrap intervals over images: {note}."
+        f"Whiskers: {intervals_over(table)}: {note}."
     )
     return Figure(figure, caption, f"Scatter of spread and bias on logarithmic axes. Parts: {said}.", table)
 

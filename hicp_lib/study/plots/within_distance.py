@@ -10,6 +10,7 @@ import pandas as pd
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
+from hicp_lib.study.table_format import intervals_over
 
 _REFERENCES = {
     "median": "its median position",
@@ -77,8 +78,7 @@ def within_bars(table: pd.DataFrame, note: str) -> Figure:
     caption = (
         f"Share of images in which a keypoint was found within {_in_cm(limits_m)} of "
         f"{_REFERENCES[table['reference'].iloc[0]]} (a hand: mean over its 21 keypoints; lifting: "
-        f"{in_words(table['method'].unique())}); whiskers are 95 % bootstrap intervals over "
-        f"images: {note}."
+        f"{in_words(table['method'].unique())}); whiskers: {intervals_over(table)}: {note}."
     )
     return Figure(figure, caption, f"Bars per keypoint and detector. {_shares_text(table, limits_m)}", table)
 

@@ -7,7 +7,9 @@ import pytest
 from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import NAMES
+from hicp_lib.evaluation.cases import over_people
 from hicp_lib.evaluation.space import mocap_error as me
+from hicp_lib.evaluation.statistics.design import smallest_difference
 from hicp_lib.recordings.qualisys import MotionCapture
 
 N = 60
@@ -165,3 +167,31 @@ def test_scores_must_be_above_and_distances_at_most_the_limit(reference):
     within = me.distance_shares(errors, (0.1,), (np.nextafter(0.05, 0), 0.05), n_resamples=5)
     assert within.groupby("threshold_m")["value"].max().tolist() == [0, 1]
     assert me.distance_shares(errors, (0.3,), (0.05,), n_resamples=5)["value"].eq(0).all()
+
+
+def test_people_are_drawn_and_a_comparison_says_what_it_could_detect(reference):
+    """Twelve people; in each one detector is worse than another, by .5 to 1.5 cm."""
+    worse_m = np.linspace(0.005, 0.015, 12)
+    rng = np.random.default_rng(0)
+    people = []
+    for more_m in worse_m:
+        noise_m = rng.uniform(0.02, 0.03, len(reference))
+        both = [
+            lifted(reference, noise_m, detector="one"), lifted(reference, noise_m + more_m, detector="other"),
+        ]  # fmt: skip
+        people.append(me.mocap_errors(pd.concat(both), reference))
+    errors = over_people(people, [N] * 12)
+    medians = me.median_errors(errors, n_resamples=200)
+    assert (medians["n_people"] == 12).all() and (medians["n_frames"] == 12 * N).all()
+    pairs = (
+        me.median_differences(errors, n_resamples=200).set_index(["detector", "other"]).loc[("other", "one")]
+    )
+    assert (pairs["n_people"] == 12).all()
+    assert pairs["value_m"].to_numpy() == pytest.approx(0.01, abs=0.002)
+    least_m = smallest_difference(worse_m)
+    assert pairs["detectable_m"].to_numpy() == pytest.approx(least_m, rel=1e-6)
+    assert (pairs["low_m"] > 0.005).all() and (pairs["high_m"] - pairs["low_m"] > least_m / 2).all()
+    shares = me.distance_shares(errors, n_resamples=20)
+    assert (shares["n_people"] == 12).all()
+    few = me.median_errors(errors[errors["subject"] < 5], n_resamples=20)
+    assert few["low_m"].isna().all() and (few["n_people"] == 5).all()

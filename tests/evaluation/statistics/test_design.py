@@ -1,10 +1,11 @@
 """What a design can tell, on data whose variances are known."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import ttest_1samp
 
-from hicp_lib.evaluation.statistics.design import smallest_difference, variance_components
+from hicp_lib.evaluation.statistics.design import component_table, smallest_difference, variance_components
 
 
 @pytest.mark.parametrize("between, within", [(2.0, 1.0), (0.5, 3.0), (0.0, 1.0)])
@@ -44,3 +45,20 @@ def test_the_smallest_difference_is_found_in_four_samples_of_five():
 
 def test_nothing_is_detectable_in_one_person_or_where_all_are_alike():
     assert np.isnan([smallest_difference(of) for of in ([1.0], [np.nan, 1.0], [2.0, 2.0, 2.0], [])]).all()
+
+
+def test_views_people_and_images_have_variances_of_their_own():
+    rng = np.random.default_rng(0)
+    rows = pd.MultiIndex.from_product(
+        [("upper", "lower"), range(200), range(5)], names=["view", "subject", "image"]
+    ).to_frame(index=False)
+    of_view, of_person = {"upper": 0.0, "lower": 2.0}, 0.5 * rng.normal(size=(2, 200))
+    person = of_person[(rows["view"] == "lower").astype(int), rows["subject"]]
+    rows["value"] = rows["view"].map(of_view) + person + 0.1 * rng.normal(size=len(rows))
+    rows["part"] = "wrist"
+    row = component_table(rows, ["part"], "value").iloc[0]
+    assert row["views"] == pytest.approx(2.0, rel=0.1)  # the variance of 0 and 2
+    assert np.sqrt(row[["people", "images"]].to_list()) == pytest.approx([0.5, 0.1], rel=0.1)
+    assert (row["part"], row["n_people"]) == ("wrist", 200)
+    one_view = component_table(rows[rows["view"] == "upper"], ["part"], "value").iloc[0]
+    assert np.isnan(one_view["views"]) and one_view["people"] == pytest.approx(0.25, rel=0.2)

@@ -12,7 +12,7 @@ from hicp_lib.core.camera import deproject, project, transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import read_image
 from hicp_lib.experiments.recordings import simulate
-from hicp_lib.experiments.recordings.open import open_experiment, open_people
+from hicp_lib.experiments.recordings.open import open_people
 from hicp_lib.experiments.recordings.simulate import simulate_recording
 from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.check import check_recording
@@ -183,35 +183,30 @@ def test_an_experiment_is_simulated_once_into_the_cache(tmp_path, monkeypatch, l
     monkeypatch.setenv("HICP_CACHE", str(tmp_path))
     calls = []
 
-    def copied(folder, scenario, **keywords):
-        calls.append((scenario, keywords["n_frames"], keywords["subject"]))
+    def copied(folder, scenario, n_frames, subject, **_):
+        calls.append((scenario, n_frames, subject.seed))
         shutil.copytree(lower.folder, folder)
-        return lower
 
     monkeypatch.setattr(simulate, "simulate_recording", copied)
-    open_experiment("relative-lower", n_frames=2)
-    assert len(open_experiment("relative-lower", n_frames=2)) == 2
-    assert calls == [("relative-lower", 2, Subject())]
-    open_experiment("relative-lower", n_frames=2, subject=Subject(1))
-    assert calls[1:] == [("relative-lower", 2, Subject(1))]
+    open_people("relative-lower", n_frames=2)
+    assert [len(one) for one in open_people("relative-lower", n_frames=2)] == [2]
+    assert calls == [("relative-lower", 2, 0)]
+    open_people("relative-lower", n_frames=2, seed=1)
+    assert calls[1:] == [("relative-lower", 2, 1)]
 
 
-def test_a_given_recording_is_opened_instead(lower):
-    assert len(open_experiment("relative-lower", recording=lower.folder)) == 2
-    shorter = open_experiment("relative-lower", recording=lower.folder, n_frames=1)
-    assert len(shorter) == 1 and read_truth(shorter)["frame"].max() == 0
+def test_what_cannot_be_opened_is_told():
     with pytest.raises(InputError, match="is not a folder"):
-        open_experiment("relative-lower", recording="/no/recording")
+        open_people("relative-lower", recording="/no/recording")
     with pytest.raises(InputError, match="no scenario"):
-        open_experiment("sideways")
+        open_people("sideways")
 
 
 def test_several_people_are_simulated_a_person_to_a_process_and_opened_in_their_order(tmp_path, monkeypatch):
     monkeypatch.setenv("HICP_CACHE", str(tmp_path))
     people = open_people("relative-lower", n_frames=1, n_people=2)
     assert [read_simulation(one)["subject"]["number"] for one in people] == [0, 1]
-    for module in ("open", "simulate"):  # what is kept is not simulated again
-        monkeypatch.setattr(f"hicp_lib.experiments.recordings.{module}.run_jobs", None)
+    monkeypatch.setattr(simulate, "simulate_recording", None)  # what is kept is not simulated again
     again = open_people("relative-lower", n_frames=1, n_people=2)
     assert [one.folder for one in again] == [one.folder for one in people]
     with pytest.raises(InputError, match="n_people is 0"):
@@ -222,3 +217,4 @@ def test_a_labs_people_are_its_folders(lower):
     (one,) = open_people("relative-lower", lower.folder, n_frames=1, n_people=5)
     two = open_people("relative-lower", [lower.folder, str(lower.folder)])
     assert len(one) == 1 and [len(person) for person in two] == [2, 2]
+    assert read_truth(one)["frame"].max() == 0

@@ -104,6 +104,9 @@ def test_a_simulated_recording_is_no_recording_of_a_lab(write, tmp_path):
     assert not is_rendered(results, "02")
     (recordings[1] / "simulation.json").write_text("{}")
     assert is_rendered(results, "02")
+    several = {"recording": [str(recordings[0])] * 2, "recording_lower": ""}
+    assert not is_rendered(write(rows(a=(1, 1, 1)), several), "02")
+    assert is_rendered(write(rows(a=(1, 1, 1)), several | {"recording_lower": [str(recordings[1])]}), "02")
 
 
 def test_labels_are_shown_for_reading():

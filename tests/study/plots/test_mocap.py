@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.evaluation.space.error_dependence import error_dependence
 from hicp_lib.evaluation.space.mocap_error import JOINTS, TABLE_JOINTS
 from hicp_lib.study.paper_tables import paper_medians
 from hicp_lib.study.plots import mocap as draw
@@ -87,15 +86,3 @@ def test_trajectories_show_gaps_of_the_motion_capture(errors):
 def test_a_joint_motion_capture_never_saw_can_still_be_drawn(errors):
     unseen = errors.assign(**{f"reference_{axis}_m": np.nan for axis in "xyz"}, error_m=np.nan)
     assert draw.trajectories(unseen, TIMES_S, "left_wrist", 0.1, "made up").figure.axes
-
-
-def test_dependence_is_drawn_for_numbers_and_labels(errors):
-    figure = draw.error_dependence(error_dependence(errors), "made up")
-    axes = np.array(figure.figure.axes).reshape(2, 3)
-    assert [axis.get_xlabel() for axis in axes[1]] == [
-        "distance from the camera [m]",
-        "score",
-        "line of sight",
-    ]
-    assert {label.get_text() for label in axes[0, 2].get_xticklabels()} == {"clear", "hidden"}
-    assert "mediapipe 3." in figure.alt and "when hidden" in figure.alt
