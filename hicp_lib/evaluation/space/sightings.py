@@ -58,7 +58,7 @@ def sightings(
         )
         for name, reference_m in references.items():
             values[name] = (np.linalg.norm(found_m - reference_m, axis=-1) <= WITHIN_M).mean(axis=1)
-        labels = dict(zip([*CASE, "part"], (*case, part), strict=True))
-        labels |= {"subject": subjects[case[0]], "source_image": np.arange(len(seen))}
+        of_rows = (*case, part, subjects[case[0]], np.arange(len(seen)))
+        labels = dict(zip([*CASE, "part", "subject", "source_image"], of_rows, strict=True))
         tables += [pd.DataFrame(labels | {"measure": name, "value": of}) for name, of in values.items()]
     return pd.concat(tables, ignore_index=True)[[*ROW, "subject", "source_image", "value"]]
