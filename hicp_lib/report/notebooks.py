@@ -167,7 +167,7 @@ def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
 
 
 def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> dict[str, Any]:
-    """`given` if the notebook declares every name with that type; int counts as float.
+    """`given` if the notebook declares every name with that type; int counts as float, paths as a path.
 
     Parameters
     ----------
@@ -196,11 +196,12 @@ def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> 
         if name not in notebook.defaults:
             known = ", ".join(notebook.defaults) or "none"
             raise InputError(f"{origin}: {notebook.name} has no parameter '{name}'; known are {known}")
-        expected = type(notebook.defaults[name])
-        if not _fits(value, expected):
+        default = notebook.defaults[name]
+        expected, several = type(default), isinstance(value, list) and is_path(name, default)
+        if not all(_fits(one, expected) for one in (value if several else [value])):
             raise InputError(
                 f"{origin}: {notebook.name}: '{name}' is {json.dumps(value, default=str)}; "
-                f"expected {_article(expected)} such as {notebook.defaults[name]!r}"
+                f"expected {_article(expected)} such as {default!r}"
             )
     return given
 
@@ -233,7 +234,7 @@ def parse_overrides(pairs: list[tuple[str, str]], notebooks: list[Notebook]) -> 
     """Turn `-p NAME VALUE` pairs into parameters of every notebook that declares NAME.
 
     A value is read by the type of the notebook's default: `true`/`false`, numbers, lists as
-    `a,b` or JSON. Paths are made absolute, since notebooks run in their own folder.
+    `a,b` or JSON; several paths as JSON. Paths are made absolute, since notebooks run in their own folder.
 
     Parameters
     ----------
@@ -270,12 +271,15 @@ def parse_overrides(pairs: list[tuple[str, str]], notebooks: list[Notebook]) -> 
 
 def _parse(name: str, text: str, default: Any) -> Any:
     """`text` as a value of the type of `default`; unchanged text when it is not one."""
-    if isinstance(default, str):
-        return str(Path(text).resolve()) if text and is_path(name, default) else text
+    try:
+        value = json.loads(text)
+    except json.JSONDecodeError:
+        value = text
+    if text and is_path(name, default):
+        several = isinstance(value, list)
+        paths = [str(Path(str(one)).resolve()) for one in (value if several else [text])]
+        return paths if several else paths[0]
     if isinstance(default, list) and not text.startswith("["):
         first = default[0] if default else ""
         return [_parse("", item, first) for item in text.split(",") if item]
-    try:
-        return json.loads(text)
-    except json.JSONDecodeError:
-        return text
+    return text if isinstance(default, str) else value

@@ -141,9 +141,10 @@ def _made_by(run: Run) -> Code:
 
 def _input_paths(run: Run) -> dict[str, Path]:
     paths = {
-        name: run.notebook.path.parent / value
+        f"{name} {k}" if k else name: run.notebook.path.parent / one
         for name, value in run.parameters.items()
         if is_path(name, run.notebook.defaults[name]) and value
+        for k, one in enumerate(value if isinstance(value, list) else [value])
     }
     for name, path in paths.items():
         if not path.exists():

@@ -107,6 +107,8 @@ def test_relative_paths_are_those_of_the_caller(study, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     overrides = parse_overrides([("images", "here")], read_notebooks(study / "notebooks"))
     assert overrides["00_first"]["images"] == str(tmp_path / "here")
+    overrides = parse_overrides([("images", '["here", "there"]')], read_notebooks(study / "notebooks"))
+    assert overrides["00_first"]["images"] == [str(tmp_path / "here"), str(tmp_path / "there")]
 
 
 @pytest.mark.parametrize(

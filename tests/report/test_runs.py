@@ -153,6 +153,9 @@ def test_an_input_that_is_not_there_is_told_before_anything_runs(tmp_path, monke
     monkeypatch.setattr(Children, "execute", pretend_to_execute)
     first, folders = tiny_run(tmp_path / "first", START, FINISH)
     run, _ = tiny_run(tmp_path / "second", START, FINISH, images="/nowhere/images")
+    several, _ = tiny_run(tmp_path / "third", START, FINISH, images=[str(tmp_path), "/nowhere/too"])
+    with pytest.raises(InputError, match="/nowhere/too: does not exist; parameter 'images 1'"):
+        run_all([first, several], folders, print)
     with pytest.raises(InputError, match="/nowhere/images: does not exist; parameter 'images'"):
         run_all([first, run], folders, print)
     assert not list(folders.executed.glob("*"))

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from hicp_lib.evaluation.space.stability import CASE, MIN_SCORE, PARTS, Parts, cases, of_each
+from hicp_lib.evaluation.space.stability import CASE, MIN_SCORE, PARTS, Parts, cases, own_medians
 
 WITHIN_M = 0.05
 FOUND, NEAR_MEDIAN, NEAR_TRUTH = "found", "within 5 cm of the median", "within 5 cm of the truth"
@@ -53,13 +53,12 @@ def sightings(
     for case, part, found_m, true_m in cases(points, subjects, truth, min_score, ALL_PARTS):
         seen = np.isfinite(found_m[..., 0])
         values = {FOUND: seen.any(axis=1).astype(float)}
-        median_m = np.zeros_like(found_m)
-        for of in of_each(subjects[case[0]]):
-            median_m[of] = np.nanmedian(np.where(seen[of].any(axis=0)[:, None], found_m[of], 0.0), axis=0)
-        references = {NEAR_MEDIAN: median_m} | ({} if true_m is None else {NEAR_TRUTH: true_m})
+        references = {NEAR_MEDIAN: own_medians(found_m, subjects[case[0]])} | (
+            {} if true_m is None else {NEAR_TRUTH: true_m}
+        )
         for name, reference_m in references.items():
             values[name] = (np.linalg.norm(found_m - reference_m, axis=-1) <= WITHIN_M).mean(axis=1)
-        labels = dict(zip([*CASE, "part"], (*case, part), strict=True))
-        labels |= {"subject": subjects[case[0]], "source_image": np.arange(len(seen))}
+        of_rows = (*case, part, subjects[case[0]], np.arange(len(seen)))
+        labels = dict(zip([*CASE, "part", "subject", "source_image"], of_rows, strict=True))
         tables += [pd.DataFrame(labels | {"measure": name, "value": of}) for name, of in values.items()]
     return pd.concat(tables, ignore_index=True)[[*ROW, "subject", "source_image", "value"]]

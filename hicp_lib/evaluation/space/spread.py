@@ -3,18 +3,12 @@
 Beside the shares of `hicp_lib.evaluation.space.stability`, over the same `points` and views.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
 
-from hicp_lib.evaluation.space.stability import (
-    CASE,
-    MIN_SCORE,
-    cases,
-    distances,
-    medians_of_each,
-)
+from hicp_lib.evaluation.space.stability import CASE, MIN_SCORE, cases, of_each
 from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
 
 _LEAST_IMAGES = 3  # of a person: of one, the distance to their median is 0
@@ -51,8 +45,8 @@ def spread_and_bias(
         position; with `truth` also `bias_m`, how far a subject's median position is from the true one, mean
         over subjects, and `error_m`, the median distance to the truth. For a hand, the mean of each over its
         keypoints; NaN where nothing was found. Spread and bias are of those subjects in at least three of
-        whose images the keypoint was found; of n images the spread comes out a share of about 1 / n too small,
-        as the median lies between them.
+        whose images the keypoint was found; of n images the spread comes out a share of about 1 / n too
+        small, as the median lies between them.
     """
     rows = []
     for case, part, found_m, true_m in cases(points, subjects, truth, min_score):
@@ -69,28 +63,28 @@ def spread_and_bias(
 def _distances_drawn(
     found_m: np.ndarray, true_m: np.ndarray | None, weights: np.ndarray, subjects: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Spread, bias and error in every draw, shape (draws,), mean over the keypoints found."""
+    """Spread, bias and error in every draw, shape (draws,), mean over the keypoints found.
+
+    Medians are taken anew in every draw.
+    """
     draws: dict[str, list[np.ndarray]] = {"spread_m": [], "bias_m": [], "error_m": []}
     for k, found in enumerate(found_m.swapaxes(0, 1)):
-        medians = medians_of_each(found, weights, subjects, _LEAST_IMAGES)
-        if not medians:
+        people = [of for of in of_each(subjects) if np.isfinite(found[of, 0]).sum() >= _LEAST_IMAGES]
+        if not people:
             continue
-        draws["spread_m"].append(weighted_median(distances(found, weights, medians), weights))
+        off_m, biases_m = np.full(weights.shape, np.nan), np.full((len(people), len(weights)), np.nan)
+        for of, bias_m in zip(people, biases_m, strict=True):
+            medians = [weighted_median(found[of, i], weights[:, of]) for i in range(3)]
+            median_m = np.stack(medians, axis=1)
+            off_m[:, of] = np.linalg.norm(found[of] - median_m[:, None], axis=-1)
+            if true_m is not None:  # the same in all images of somebody who keeps still
+                bias_m[:] = np.linalg.norm(median_m - true_m[of, k].mean(axis=0), axis=1)
+        draws["spread_m"].append(weighted_median(off_m, weights))
         if true_m is not None:
-            true = true_m[:, k]
-            draws["bias_m"].append(_mean_bias_m(true, weights, medians))
-            draws["error_m"].append(weighted_median(np.linalg.norm(found - true, axis=1), weights))
+            times = np.where(np.isfinite(biases_m), [weights[:, of].mean(axis=1) for of in people], 0.0)
+            with np.errstate(invalid="ignore"):
+                draws["bias_m"].append((times * np.nan_to_num(biases_m)).sum(axis=0) / times.sum(axis=0))
+            draws["error_m"].append(weighted_median(np.linalg.norm(found - true_m[:, k], axis=1), weights))
     names = ("spread_m",) if true_m is None else tuple(draws)
     nothing = [np.full(len(weights), np.nan)]
     return {name: np.mean(draws[name] or nothing, axis=0) for name in names}
-
-
-def _mean_bias_m(
-    true_m: np.ndarray, weights: np.ndarray, medians: Sequence[tuple[np.ndarray, np.ndarray]]
-) -> np.ndarray:
-    """How far medians are from the true place (n, 3) of a person who keeps still, mean over people drawn."""
-    biases_m = np.array([np.linalg.norm(at_m - true_m[of].mean(axis=0), axis=1) for of, at_m in medians])
-    times = np.array([weights[:, of].mean(axis=1) for of, _ in medians])  # how often each was drawn
-    known = np.where(np.isfinite(biases_m), times, 0.0)
-    with np.errstate(invalid="ignore"):
-        return (known * np.nan_to_num(biases_m)).sum(axis=0) / known.sum(axis=0)

@@ -20,7 +20,7 @@ import pandas as pd
 
 from hicp_lib.core.keypoints import GROUPS, LEFT_HAND, NAMES, RIGHT_HAND
 from hicp_lib.evaluation.cases import groups_of
-from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
+from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
 
 CASE = ["view", "detector", "method"]
 POSITION = ["x_m", "y_m", "z_m"]
@@ -104,7 +104,7 @@ def within_distance(
         Whose each image is, by view.
     truth : mapping of str to DataFrame, optional
         By view, a table with `frame, keypoint, x_m, y_m, z_m`. Given, distances are to the true positions;
-        None, to the median over a subject's images, taken anew in every draw of the bootstrap.
+        None, to the median over the subject's images.
     thresholds_m : sequence of float, optional
         The distances.
     min_score : float, optional
@@ -123,17 +123,11 @@ def within_distance(
     for case, part, found_m, true_m in cases(points, subjects, truth, min_score):
         whose = subjects[case[0]]
         weights, n_people = draw_counts(whose, n_resamples, seed), len(set(whose))
-        fractions = np.zeros((len(weights), len(thresholds_m)))
-        for k in range(found_m.shape[1]):
-            if true_m is None:
-                medians = medians_of_each(found_m[:, k], weights, whose)
-                off_m = distances(found_m[:, k], weights, medians)
-            else:
-                off_m = np.linalg.norm(found_m[:, k] - true_m[:, k], axis=1)[None]
-            for j, threshold_m in enumerate(thresholds_m):
-                fractions[:, j] += np.einsum("dn,dn->d", weights, off_m <= threshold_m) / found_m.size * 3
-        found = np.isfinite(found_m[..., 0]).mean()
-        bounds = zip(thresholds_m, *with_interval(fractions, n_people), strict=True)
+        off_m = np.linalg.norm(found_m - (own_medians(found_m, whose) if true_m is None else true_m), axis=-1)
+        within = (off_m[..., None] <= np.asarray(thresholds_m)).mean(axis=1)
+        shares = weights @ within / weights.sum(axis=1, keepdims=True)
+        bounds = zip(thresholds_m, *with_interval(shares, n_people), strict=True)
+        found = np.isfinite(off_m).mean()
         rows += [(*case, part, reference, *numbers, found, n_people) for numbers in bounds]
     columns = [*CASE, "part", "reference", "threshold_m", "value", "low", "high", "found", "n_people"]
     return pd.DataFrame(rows, columns=columns)
@@ -225,45 +219,16 @@ def _gives(detector: str, found: set[str]) -> set[str]:
     return set().union(*(names[group] for group in groups))
 
 
-def median_position(found_m: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Coordinate-wise median of one keypoint's positions (n, 3) in every draw, shape (draws, 3)."""
-    return np.stack([weighted_median(found_m[:, i], weights) for i in range(3)], axis=1)
+def own_medians(found_m: np.ndarray, subjects: np.ndarray) -> np.ndarray:
+    """Coordinate-wise medians over the images of the subject of each image, shape as `found_m` (n, k, 3).
 
-
-def medians_of_each(
-    found_m: np.ndarray, weights: np.ndarray, subjects: np.ndarray, least: int = 1
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Which images (n,) are of a subject, and its median position in every draw (draws, 3).
-
-    Of every subject in at least so many of whose images the keypoint is found; arguments as of `distances`.
+    Of what was never found of a subject they are 0.
     """
-    people = [of for of in of_each(subjects) if np.isfinite(found_m[of, 0]).sum() >= least]
-    return [(of, median_position(found_m[of], weights[:, of])) for of in people]
-
-
-def distances(
-    found_m: np.ndarray, weights: np.ndarray, medians: Sequence[tuple[np.ndarray, np.ndarray]]
-) -> np.ndarray:
-    """How far one keypoint is from the subject's median position.
-
-    Parameters
-    ----------
-    found_m : array, shape (n, 3)
-        Positions; NaN where not found.
-    weights : array of int, shape (draws, n)
-        How often each image counts.
-    medians : sequence of (array, array)
-        As from `medians_of_each`.
-
-    Returns
-    -------
-    array, shape (draws, n)
-        NaN of subjects without a median.
-    """
-    off_m = np.full(weights.shape, np.nan)
-    for of, median_m in medians:
-        off_m[:, of] = np.linalg.norm(found_m[of] - median_m[:, None], axis=-1)
-    return off_m
+    medians_m = np.zeros_like(found_m)
+    for of in of_each(subjects):
+        seen = np.isfinite(found_m[of]).any(axis=0)
+        medians_m[of] = np.nanmedian(np.where(seen, found_m[of], 0.0), axis=0)
+    return medians_m
 
 
 def of_each(subjects: np.ndarray) -> list[np.ndarray]:
