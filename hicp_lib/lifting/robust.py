@@ -11,18 +11,23 @@ neighbourhood. What exact truth shows to go wrong with it, and the steps here th
 - It takes what hides a joint, and what is beside a limb that the detector missed. *limb_lengths*: depths
   of all keypoints are chosen together, so that they cost least while limbs have lengths that people have.
   Then a joint may also lie behind what is seen, at a cost.
+  A joint whose limb comes towards the camera is hidden by it, and lies deeper than below the skin alone.
 - It takes the front of a hand for the fingers behind it. *hand_shapes*: of the hand that fits best, palm and
   bent fingers, what lies behind another part of it is drawn to the depth it has there.
 
 Tried as well and left out, as they brought nothing: the mode of depth around the keypoint instead of the
 cheapest candidate, scores of the detector as weights of limbs, the person's true size for the limbs'
 lengths instead of everybody's, knuckles that hang on each other instead of on the hand's root, a finer grid
-of depths, more turns of the hand, and a lower cost of being hidden. Keypoints of the face need no limbs:
-they are taken at the cheapest of the surfaces near them.
+of depths, and more turns of the hand. Keypoints of the face need no limbs: they are taken at the cheapest of
+the surfaces near them.
+
+A depth that no surface seen near the keypoint agrees with, or that no limb reaches, is *guessed*. What other
+depths would cost, taken for how unlikely they are, gives each depth its standard deviation.
 
 Measures of people come from the body model (`body_measures`, `hand_shapes`). The costs (there, and in
-`depth_candidates` and `limb_lengths`) were chosen by hand on rendered people who are in no recording of the
-study.
+`depth_candidates` and `limb_lengths`) and what they say of likelihood were chosen on development people
+before the D435, ten in 28 frames each, for the 95th percentile of errors first and medians second. No one
+held out and no other sensor had a part in it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -47,7 +52,7 @@ METHODS = {"robust": len(STEPS), "paper": 0}
 _REACH_M, _GRID_M = 0.90, 0.02  # grid of depths around the person's middle
 _END_ON = 0.6  # a joint is deeper by so much of its depth below the skin when its limb points at the camera
 _SEEN_SIGMA_M = 0.010  # of depths that are seen, beyond what their costs tell
-_COST_SEEN, _COST_GUESSED = 0.7, 3.0  # a depth that costs so much more is 1/e as likely
+_COST_SEEN, _COST_GUESSED = 0.5, 3.0  # a depth that costs so much more is 1/e as likely
 _IN_BODY, _IN_FACE = (np.isin(np.arange(N_KEYPOINTS), part) for part in (BODY, FACE))
 _HANDS = {"left": LEFT_HAND, "right": RIGHT_HAND}
 _WRISTS = [INDEX[f"{side}_wrist"] for side in _HANDS]

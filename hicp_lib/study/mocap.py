@@ -251,9 +251,9 @@ def points_of(people: Sequence[Person]) -> pd.DataFrame:
 
 
 def ablation(people: Sequence[Person]) -> pd.DataFrame | None:
-    """`lifting_ablation` of all people's `stepwise`; None where true positions are not known."""
+    """Each step of lifting on all people's `stepwise`; None where true positions are not known."""
     errors = [
-        lifting_errors(person.stepwise, truth)
+        lifting_errors(person.stepwise, truth, person.recording.T_base_cam)
         for person in people
         if (truth := read_truth(person.recording)) is not None
     ]

@@ -57,13 +57,15 @@ def test_depths_are_refined_by_candidates_that_agree():
         assert found_m == (1.0 if is_near else chosen_m)
 
 
-@pytest.mark.parametrize(("keypoint", "sigma_m"), [(WRIST, 0.010), (FINGER, 0.008)])
-def test_candidates_lie_around_the_keypoint(keypoint, sigma_m):
+@pytest.mark.parametrize(
+    ("keypoint", "sigma_m", "farthest"), [(WRIST, 0.010, (2 / 2.2) ** 2), (FINGER, 0.008, 1)]
+)
+def test_candidates_lie_around_the_keypoint(keypoint, sigma_m, farthest):
     """2.2 cm at a metre are 2.2 pixels; a finger's 1.3 cm are fewer, but no less than 2 are looked at."""
     assert RADIUS_M[[WRIST, FINGER]].tolist() == [0.022, 0.013]
     found = around(keypoint, (30.0, 20.0), np.full((48, 64), 1.0))
     assert found.cost.shape == (1, 49) and found.sigma_m.tolist() == [sigma_m]
-    assert found.cost.min() == 0 and found.cost.max() == pytest.approx(2)
+    assert found.cost.min() == 0 and found.cost.max() == pytest.approx(2 * farthest)
     np.testing.assert_allclose(found.rays, [[-0.015, -0.035, 1.0]])
 
 
@@ -80,7 +82,7 @@ def test_surfaces_on_depth_steps_cost_more(step_m, is_steep, turned):
     depth_m = depth_m.T if turned else depth_m
     place = (20.0, 30.0) if turned else (30.0, 20.0)
     found = around(WRIST, place, depth_m[:48])
-    assert (found.cost.max() > 2.05) == is_steep  # 2 at the corners, 1 more on the step
+    assert (found.cost.max() > 1.7) == is_steep  # 1.65 at the corners, 1 more on the step
 
 
 def test_beyond_the_image_and_in_holes_there_is_no_surface():
@@ -114,9 +116,9 @@ def test_a_depth_step_costs_one(axis):
     depth_m[(slice(None), slice(31, None)) if axis else slice(31, None)] += 0.05
     dearer = around(WRIST, (30.0, 30.0), depth_m).cost - flat
     assert np.unique(dearer.round(9)).tolist() == [0, 1]
-    # Lines 30 and 31 of 28 to 32 (28 and 32 seen twice) have pixels of both depths beside them.
+    # Lines 30 and 31 of 28, 29, 29, 30, 31, 31, 32 have pixels of both depths beside them.
     is_dearer = (dearer > 0.5).reshape(7, 7)
-    assert is_dearer.any(axis=1 - axis).tolist() == [False] * 3 + [True] * 2 + [False] * 2
+    assert is_dearer.any(axis=1 - axis).tolist() == [False] * 3 + [True] * 3 + [False]
 
 
 def test_at_the_border_the_line_next_to_it_is_sampled():

@@ -61,7 +61,7 @@ def test_a_limb_may_reach_from_one_end_of_the_grid_to_the_other():
     (limbs,) = limbs_outwards(np.array([1.0, 1.1, 1.2]), rays, found, load_measures())
     assert limbs.costs.shape == (1, 3, 5)
     costs = np.array([[0.0, 1e3, 1e3], [1e3, 1e3, 0.0]])
-    assert choose_along_limbs(costs, [limbs]).tolist() == [0, 2]
+    assert choose_along_limbs(costs, [limbs])[0].tolist() == [0, 2]
 
 
 @pytest.mark.parametrize("widths", [(3, 7), (7, 3)])

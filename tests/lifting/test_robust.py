@@ -92,27 +92,29 @@ def test_an_elbow_behind_something_is_put_behind_it():
     lifted, wrist = lift_robust(arm, depth_m, CAMERA), INDEX["left_wrist"]
     assert 1.3 < lifted.points_m[0, elbow, 2] < 1.75
     assert lifted.reason[0, [elbow, wrist]].tolist() == [GUESSED, LIFTED]
-    assert lifted.sigma_m[0, wrist] < 0.02 < lifted.sigma_m[0, elbow] < 0.3
+    assert lifted.sigma_m[0, wrist] < 0.03 < lifted.sigma_m[0, elbow] < 0.3
 
 
-def test_what_no_arm_reaches_is_guessed_though_it_is_seen():
+def test_an_arm_far_in_front_of_its_body_is_guessed_though_it_is_seen():
     depth_m = np.full((240, 320), 1.5)
-    depth_m[100:, :] = 0.8  # the wrist and the whole hand are somebody else's
-    arm = keypoints(left_shoulder=(160, 60), left_elbow=(160, 85))
-    arm[0, [INDEX["left_wrist"], *HANDS[:21]]] = (160, 150) + np.random.default_rng(0).uniform(
-        -12, 12, (22, 2)
-    )
-    lifted, wrist = lift_robust(arm, depth_m, CAMERA), INDEX["left_wrist"]
-    assert lifted.points_m[0, wrist, 2] < 0.9 and lifted.reason[0, wrist] == GUESSED
+    depth_m[80:, :] = 0.8
+    arm, elbow = keypoints(left_shoulder=(160, 60), left_elbow=(160, 105)), INDEX["left_elbow"]
+    hand = [INDEX["left_wrist"], *HANDS[:21]]
+    arm[0, hand] = (160, 150) + np.random.default_rng(0).uniform(-12, 12, (22, 2))
+    lifted = lift_robust(arm, depth_m, CAMERA)
+    assert lifted.points_m[0, elbow, 2] < 0.9 and lifted.reason[0, elbow] == GUESSED
 
 
 def test_a_joint_whose_limb_comes_towards_the_camera_lies_deeper():
-    depth_m = np.full((240, 320), 1.2)
-    depth_m[110:, :] = 0.95
-    arms = {end_px: keypoints(left_elbow=(160, 105), left_wrist=(160, end_px)) for end_px in (100, 125)}
-    elbow = INDEX["left_elbow"]
-    beside, ahead = (lift_robust(arm, depth_m, CAMERA).points_m[0, elbow, 2] for arm in arms.values())
-    assert 0.3 < (ahead - beside) / load_measures().below_skin_m[elbow] < 0.6
+    depth_m, elbow = np.full((240, 320), 1.2), INDEX["left_elbow"]
+    depth_m[116:, :] = 0.97
+    beside, ahead = (
+        lift_robust(keypoints(left_elbow=(160, 105), left_wrist=wrist_px), depth_m, CAMERA).points_m[
+            0, elbow, 2
+        ]
+        for wrist_px in ((220, 105), (160, 125))
+    )
+    assert 0.4 < (ahead - beside) / load_measures().below_skin_m[elbow] < 0.6
 
 
 def test_reasons_are_the_papers():
