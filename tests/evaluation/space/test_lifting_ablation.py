@@ -82,12 +82,12 @@ def test_only_what_both_lift_is_compared():
 
 def test_coverage_is_of_depth_along_the_cameras_axis_and_by_reason(points, truth):
     errors = lifting_errors(points, truth, POSES)
-    assert (errors["off_m"] < 0.005).all() and set(errors["reason"]) == {"lifted"}
-    truth["x_m"] += 1.0  # across the axis: off by nothing; along it by a metre
-    across, along = (
-        lifting_errors(points, truth, T) for T in (POSES, POSES[:, [2, 1, 0, 3]][..., [2, 1, 0, 3]])
-    )
-    assert (across["off_m"] < 0.005).all() and (abs(along["off_m"] - 1) < 0.005).all()
+    assert errors["off_m"].max() < 0.1 and set(errors["reason"]) == {"lifted"}
+    truth["x_m"] += 1.0
+    turned = POSES[:, [2, 1, 0, 3]]  # the camera's axis is the base's x axis
+    across, along = (lifting_errors(points, truth, T) for T in (POSES, turned))
+    np.testing.assert_allclose(across["off_m"], errors["off_m"])
+    np.testing.assert_allclose(along["off_m"], 1.0)
     some = pd.concat([errors.assign(off_m=k * 0.01, sigma_m=0.011) for k in range(4)])
     some = pd.concat([some, errors.assign(off_m=0.5, sigma_m=0.3, reason="guessed")])
     table = sigma_coverage(some).set_index(["group", "reason"])
