@@ -12,15 +12,14 @@ from hicp_lib.core.keypoints import BODY, N_KEYPOINTS
 from hicp_lib.lifting.paper import has_depth
 
 _IS_BODY = np.isin(np.arange(N_KEYPOINTS), BODY)
-RADIUS_M = np.where(_IS_BODY, 0.030, 0.010)  # how far around a keypoint surfaces are looked at
-_SIGMA_M = np.where(_IS_BODY, 0.012, 0.010)  # depths that differ so much cost 1
+# Chosen on development people, as the costs in `limb_lengths` and `hand_shapes`: see `robust`.
+RADIUS_M = np.where(_IS_BODY, 0.022, 0.013)  # how far around a keypoint surfaces are looked at
+_SIGMA_M = np.where(_IS_BODY, 0.010, 0.008)  # depths that differ so much cost 1
 _SAMPLES = 7  # per side of the neighbourhood
 _STEEP_M = 0.03  # a larger difference between the pixels on both sides is a depth step
 _ON_STEP = 1.0  # cost of a surface there
-_HIDDEN, _IN_FRONT = (
-    np.where(_IS_BODY, 6.0, 3.0),
-    20.0,
-)  # cost of lying behind the nearest surface, in front of it
+_HIDDEN = np.where(_IS_BODY, 5.0, 2.0)  # cost of lying behind the nearest surface
+_IN_FRONT = 20.0  # and in front of it
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from hicp_lib.lifting.body_measures import LEVELS, BodyMeasures, found_parents
 # A limb longer or shorter than people's by a share of its length and some more costs 1, and so on with the
 # square up to a most. Limbs of the body seen too short are often the detector's fault; hands are rigid.
 _MOST_LONG = 40.0
-_BODY = {"share": 0.05, "more_m": 0.010, "most_short": 4.0}
-_HAND = {"share": 0.03, "more_m": 0.003, "most_short": 20.0}
+_BODY = {"share": 0.02, "more_m": 0.005, "most_short": 4.0}
+_HAND = {"share": 0.03, "more_m": 0.006, "most_short": 20.0}
 
 
 @dataclass(frozen=True)
@@ -131,6 +131,28 @@ def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> tuple[np.nd
         near_cost = total.min(axis=1)[:, width // 2 :][:, :g]
         costs[some.end] += np.minimum(near_cost, rest.min(axis=1)[:, None] + _MOST_LONG)
     return chosen, costs
+
+
+def out_of_reach(chosen: np.ndarray, limbs: Sequence[Limbs]) -> np.ndarray:
+    """Which ends of limbs are so far from their beginnings that nobody's limb reaches.
+
+    Parameters
+    ----------
+    chosen : array of int, shape (m,)
+        Index into the limbs' grid.
+    limbs : sequence of Limbs
+
+    Returns
+    -------
+    array of bool, shape (m,)
+    """
+    is_out = np.zeros(len(chosen), bool)
+    for some in limbs:
+        begin, last = chosen[some.begin], some.costs.shape[2] - 1
+        step = chosen[some.end] - begin + last // 2
+        cost = some.costs[np.arange(len(begin)), begin, np.clip(step, 0, last)]
+        is_out[some.end] = (step < 0) | (step > last) | (cost >= _MOST_LONG)
+    return is_out
 
 
 class _Limits:

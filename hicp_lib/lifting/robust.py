@@ -11,18 +11,23 @@ neighbourhood. What exact truth shows to go wrong with it, and the steps here th
 - It takes what hides a joint, and what is beside a limb that the detector missed. *limb_lengths*: depths
   of all keypoints are chosen together, so that they cost least while limbs have lengths that people have.
   Then a joint may also lie behind what is seen, at a cost.
+  A joint whose limb comes towards the camera is hidden by it, and lies deeper than below the skin alone.
 - It takes the front of a hand for the fingers behind it. *hand_shapes*: of the hand that fits best, palm and
   bent fingers, what lies behind another part of it is drawn to the depth it has there.
 
 Tried as well and left out, as they brought nothing: the mode of depth around the keypoint instead of the
 cheapest candidate, scores of the detector as weights of limbs, the person's true size for the limbs'
 lengths instead of everybody's, knuckles that hang on each other instead of on the hand's root, a finer grid
-of depths, more turns of the hand, and a lower cost of being hidden. Keypoints of the face need no limbs:
-they are taken at the cheapest of the surfaces near them.
+of depths, and more turns of the hand. Keypoints of the face need no limbs: they are taken at the cheapest of
+the surfaces near them.
+
+A depth that no surface seen near the keypoint agrees with, or that no limb reaches, is *guessed*. What other
+depths would cost, taken for how unlikely they are, gives each depth its standard deviation.
 
 Measures of people come from the body model (`body_measures`, `hand_shapes`). The costs (there, and in
-`depth_candidates` and `limb_lengths`) were chosen by hand on rendered people who are in no recording of the
-study.
+`depth_candidates` and `limb_lengths`) and what they say of likelihood were chosen on development people
+before the D435, ten in 28 frames each, for the 95th percentile of errors first and medians second. No one
+held out and no other sensor had a part in it.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,11 +36,11 @@ from dataclasses import replace
 import numpy as np
 
 from hicp_lib.core.camera import Camera
-from hicp_lib.core.keypoints import BODY, FACE, N_KEYPOINTS
+from hicp_lib.core.keypoints import BODY, FACE, INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 from hicp_lib.lifting.body_measures import load_measures
 from hicp_lib.lifting.depth_candidates import Candidates, depth_candidates, depth_costs, refine_depths
 from hicp_lib.lifting.hand_shapes import with_hand_shapes
-from hicp_lib.lifting.limb_lengths import choose_along_limbs, limbs_outwards
+from hicp_lib.lifting.limb_lengths import choose_along_limbs, limbs_outwards, out_of_reach
 from hicp_lib.lifting.paper import GUESSED, LIFTED, MIN_DEPTH_M, NO_DEPTH, Lifted, lift
 
 STEPS = ("below_surface", "near_surfaces", "limb_lengths", "hand_shapes")
@@ -45,8 +50,16 @@ METHODS = {"robust": len(STEPS), "paper": 0}
 """Ways of lifting, by how many of `STEPS` they take."""
 
 _REACH_M, _GRID_M = 0.90, 0.02  # grid of depths around the person's middle
-TEMP, S0 = 2.0, 0.01
+_END_ON = 0.6  # a joint is deeper by so much of its depth below the skin when its limb points at the camera
+_SEEN_SIGMA_M = 0.010  # of depths that are seen, beyond what their costs tell
+_COST_SEEN, _COST_GUESSED = 0.5, 3.0  # a depth that costs so much more is 1/e as likely
 _IN_BODY, _IN_FACE = (np.isin(np.arange(N_KEYPOINTS), part) for part in (BODY, FACE))
+_HANDS = {"left": LEFT_HAND, "right": RIGHT_HAND}
+_WRISTS = [INDEX[f"{side}_wrist"] for side in _HANDS]
+# Elbows with their wrists, wrists with their middle knuckles.
+_AHEAD = np.array(
+    [[INDEX[f"{side}_elbow"] for side in _HANDS] + _WRISTS, _WRISTS + [hand[9] for hand in _HANDS.values()]]
+)
 
 
 def lift_robust(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera) -> Lifted:
@@ -152,7 +165,7 @@ def _depths(
 def _choose(
     found: np.ndarray, grid_m: np.ndarray, candidates: Candidates, n_steps: Sequence[int]
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """After each number of steps, two or more: points (m, 3), whether their depths are seen, and sigmas (m,)."""
+    """After each number of steps, two or more: points (m, 3), whether depths are seen, and sigmas (m,)."""
     of_surfaces = depth_costs(candidates, grid_m)
     on = np.flatnonzero(~_IN_FACE[found])  # what hangs on limbs
     limbs = limbs_outwards(grid_m, candidates.rays[on], found[on], load_measures())
@@ -164,13 +177,30 @@ def _choose(
         if "limb_lengths" in steps:
             chosen[on], costs[on] = choose_along_limbs(costs[on], limbs)
         depth_m, is_seen = refine_depths(candidates, grid_m[chosen], _GRID_M)
-        yield candidates.rays * depth_m[:, None], is_seen, _sigmas_m(costs, grid_m, depth_m)
+        points_m = candidates.rays * depth_m[:, None]
+        if "limb_lengths" in steps:
+            is_seen[on] &= ~out_of_reach(chosen[on], limbs)
+            points_m *= 1 + _deeper_end_on(points_m, found)[:, None]
+        yield points_m, is_seen, _sigmas_m(costs, grid_m, depth_m, is_seen)
 
 
-def _sigmas_m(costs: np.ndarray, grid_m: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
-    weights = np.exp((costs.min(axis=1, keepdims=True) - costs) / TEMP)
+def _deeper_end_on(points_m: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """By what share joints (m,) are farther away, as their limb comes towards the camera and hides them."""
+    rows, ahead = np.searchsorted(found, _AHEAD[:, np.isin(_AHEAD, found).all(axis=0)])
+    joints_m, limbs_m = points_m[rows], points_m[rows] - points_m[ahead]
+    away_m, length_m = (np.linalg.norm(vectors, axis=1) for vectors in (joints_m, limbs_m))
+    cosine = np.maximum((limbs_m * joints_m).sum(axis=1) / (length_m * away_m), 0)
+    share = np.zeros(len(found))
+    share[rows] = _END_ON * cosine**4 * load_measures().below_skin_m[found[rows]] / away_m
+    return share
+
+
+def _sigmas_m(costs: np.ndarray, grid_m: np.ndarray, depth_m: np.ndarray, is_seen: np.ndarray) -> np.ndarray:
+    """Standard deviation of depths (m,), what each costs (m, g) taken for how unlikely it is."""
+    unlikely = np.where(is_seen, _COST_SEEN, _COST_GUESSED)[:, None]
+    weights = np.exp((costs.min(axis=1, keepdims=True) - costs) / unlikely)
     away_m2 = (grid_m - depth_m[:, None]) ** 2
-    return np.sqrt(S0**2 + (weights * away_m2).sum(axis=1) / weights.sum(axis=1))
+    return np.sqrt(_SEEN_SIGMA_M**2 + (weights * away_m2).sum(axis=1) / weights.sum(axis=1))
 
 
 def _middle_m(found: np.ndarray, first_m: np.ndarray) -> float:

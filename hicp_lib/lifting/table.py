@@ -37,8 +37,8 @@ def lift_recording(
     pd.DataFrame
         One row per frame x person x keypoint detected, columns frame (row of the recording), t_s, person
         (0 has the best score), keypoint (Halpe name), u_px, v_px, score, x_m, y_m, z_m (robot's base frame),
-        x_cam_m, y_cam_m, z_cam_m (camera frame), reason (one of `hicp_lib.lifting.paper.REASONS`);
-        coordinates are NaN where the reason is not "lifted".
+        x_cam_m, y_cam_m, z_cam_m (camera frame), sigma_m (of the depth; NaN by the paper's method), reason
+        (one of `hicp_lib.lifting.paper.REASONS`); coordinates are NaN unless it is "lifted" or "guessed".
 
     Raises
     ------
@@ -162,7 +162,8 @@ def _lift_frame(
         seen_m = lifted.points_m[person, keypoint]
         base_m = transform(recording.T_base_cam[k], seen_m)
         columns = dict(zip(_COORDINATES, [*base_m.T, *seen_m.T], strict=True))
-        in_space.append(columns | {"reason": lifted.reason[person, keypoint]})
+        columns |= {"sigma_m": lifted.sigma_m[person, keypoint], "reason": lifted.reason[person, keypoint]}
+        in_space.append(columns)
     return detected, in_space
 
 

@@ -250,6 +250,10 @@ def errors_at_joints(registered: Sequence[Registered], points: Sequence[pd.DataF
 
 
 def ablation(people: Sequence[Person]) -> pd.DataFrame | None:
-    """`lifting_ablation` of all people's `stepwise`; None where no true positions are known."""
-    known = [(one.stepwise, truth) for one in people if (truth := read_truth(one.recording)) is not None]
-    return summary(pd.concat([lifting_errors(*one) for one in known])) if known else None
+    """Each step of lifting on all people's `stepwise`; None where true positions are not known."""
+    errors = [
+        lifting_errors(person.stepwise, truth, person.recording.T_base_cam)
+        for person in people
+        if (truth := read_truth(person.recording)) is not None
+    ]
+    return summary(pd.concat(errors)) if errors else None

@@ -107,7 +107,7 @@ def test_what_is_hidden_costs_by_how_far_it_is_from_the_hands_shape():
     mean_m, spread_m = fit_hand(costs, GRID_M, rays, np.arange(21), True)
     hidden = hidden_by_limbs(rays[:, :2], mean_m, np.arange(21))
     more = with_hand_shapes(costs, GRID_M, rays, RIGHT_HAND) - costs
-    square = (GRID_M - mean_m[:, None]) ** 2 / (0.010**2 + spread_m[:, None] ** 2)
+    square = (GRID_M - mean_m[:, None]) ** 2 / (0.006**2 + spread_m[:, None] ** 2)
     np.testing.assert_allclose(more[hidden], np.minimum(square, 20)[hidden], atol=1e-9)
     assert hidden.any() and not more[~hidden].any()
 
@@ -148,7 +148,7 @@ def test_palms_cost_their_size_and_their_misfit():
     assert np.unique(palms.z_m.round(4)) == pytest.approx(np.arange(-15, 16) / 100)  # all as good
     points_m = np.einsum("kj,pij->pki", load_hand_shapes()[0, PALM], palms.turns)
     sizes = np.linalg.det(palms.turns.astype(float)) ** (1 / 3)
-    misfit = np.minimum(misfits_m2(seen.places_m, points_m) / 0.008**2, 9).sum(axis=1)
+    misfit = np.minimum(misfits_m2(seen.places_m, points_m) / 0.012**2, 9).sum(axis=1)
     np.testing.assert_allclose(palms.cost, 0.5 * ((sizes - 1) / 0.1) ** 2 + misfit, rtol=2e-3, atol=1e-3)
     np.testing.assert_allclose(palms.behind_m, points_m[..., 2].T + palms.z_m, atol=1e-6)
 

@@ -1,11 +1,13 @@
 """What lengths of limbs cost, and the choice between near and far ends."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.lifting.body_measures import load_measures
-from hicp_lib.lifting.limb_lengths import Limbs, choose_along_limbs, limbs_outwards
+from hicp_lib.lifting.limb_lengths import Limbs, choose_along_limbs, limbs_outwards, out_of_reach
 
 STEP_M = 0.002
 
@@ -13,9 +15,9 @@ STEP_M = 0.002
 @pytest.mark.parametrize(
     ("begin", "end", "share", "more_m", "most_short"),
     [
-        ("left_elbow", "left_wrist", 0.05, 0.010, 4.0),
-        ("left_index_2", "left_index_3", 0.03, 0.003, 20.0),
-        ("left_wrist", "left_hand_root", 0.03, 0.003, 20.0),  # a limb is of what it ends in
+        ("left_elbow", "left_wrist", 0.02, 0.005, 4.0),
+        ("left_index_2", "left_index_3", 0.03, 0.006, 20.0),
+        ("left_wrist", "left_hand_root", 0.03, 0.006, 20.0),  # a limb is of what it ends in
     ],
 )
 def test_lengths_cost_the_square_beyond_what_people_have(begin, end, share, more_m, most_short):
@@ -39,7 +41,9 @@ def test_an_end_out_of_reach_costs_forty(near_cost, chosen):
     costs[0, 5] = 0.0
     costs[1, [0, 5]] = 0.0, near_cost
     limb = Limbs(np.array([0]), np.array([1]), np.zeros((1, 8, 3)))
-    assert choose_along_limbs(costs, [limb]).tolist() == [5, chosen]
+    found = choose_along_limbs(costs, [limb])[0]
+    assert found.tolist() == [5, chosen]
+    assert out_of_reach(found, [limb]).tolist() == [False, chosen == 0]
 
 
 def test_the_steps_to_an_end_are_counted_from_the_beginning():
@@ -49,7 +53,7 @@ def test_the_steps_to_an_end_are_counted_from_the_beginning():
     for step, place in ((-1, 3), (0, 4), (1, 5)):
         of_steps = np.where(np.arange(-1, 2) == step, 0.0, 9.0)
         limb = Limbs(np.array([0]), np.array([1]), np.tile(of_steps, (1, 8, 1)))
-        assert choose_along_limbs(costs, [limb]).tolist() == [4, place]
+        assert choose_along_limbs(costs, [limb])[0].tolist() == [4, place]
 
 
 def test_a_limb_may_reach_from_one_end_of_the_grid_to_the_other():
@@ -57,7 +61,7 @@ def test_a_limb_may_reach_from_one_end_of_the_grid_to_the_other():
     (limbs,) = limbs_outwards(np.array([1.0, 1.1, 1.2]), rays, found, load_measures())
     assert limbs.costs.shape == (1, 3, 5)
     costs = np.array([[0.0, 1e3, 1e3], [1e3, 1e3, 0.0]])
-    assert choose_along_limbs(costs, [limbs]).tolist() == [0, 2]
+    assert choose_along_limbs(costs, [limbs])[0].tolist() == [0, 2]
 
 
 @pytest.mark.parametrize("widths", [(3, 7), (7, 3)])
@@ -66,7 +70,7 @@ def test_limbs_of_any_reach_go_together(widths):
     costs = np.full((3, 9), 30.0)  # less than an end out of reach
     costs[0, 4] = costs[1, 5] = costs[2, 6] = 0.0
     limbs = [Limbs(np.array([k]), np.array([k + 1]), np.zeros((1, 9, w))) for k, w in enumerate(widths)]
-    assert choose_along_limbs(costs, limbs).tolist() == [4, 5, 6]
+    assert choose_along_limbs(costs, limbs)[0].tolist() == [4, 5, 6]
     limbs = []
     for k, width in enumerate(widths):
         one_back = np.where(np.arange(width) == width // 2 - 1, 0.0, 30.0)
@@ -74,4 +78,27 @@ def test_limbs_of_any_reach_go_together(widths):
     flat = np.zeros((3, 9))
     flat[0] = 100.0
     flat[0, 8] = 0.0
-    assert choose_along_limbs(flat, limbs).tolist() == [8, 7, 6]
+    assert choose_along_limbs(flat, limbs)[0].tolist() == [8, 7, 6]
+
+
+def test_other_depths_cost_what_the_best_choice_with_them_does():
+    """A shoulder with two arms, against all choices of depths."""
+    rng, g = np.random.default_rng(0), 6
+    costs = rng.uniform(0, 50, (5, g))
+    limbs = [
+        Limbs(np.array(begin), np.array(end), rng.uniform(0, 45, (2, g, width)))
+        for begin, end, width in (([0, 0], [1, 3], 5), ([1, 3], [2, 4], 3))
+    ]
+    least = np.full((5, g), np.inf)
+    for depths in itertools.product(range(g), repeat=5):
+        total = costs[range(5), depths].sum()
+        for some in limbs:
+            reach = some.costs.shape[2] // 2
+            for begin, end, of_steps in zip(some.begin, some.end, some.costs, strict=True):
+                step = depths[end] - depths[begin] + reach
+                is_near = 0 <= step <= 2 * reach
+                total += min(of_steps[depths[begin], step], 40.0) if is_near else 40.0
+        least[range(5), depths] = np.minimum(least[range(5), depths], total)
+    chosen, in_all = choose_along_limbs(costs, limbs)
+    np.testing.assert_allclose(in_all, least, rtol=1e-5)
+    assert chosen.tolist() == least.argmin(axis=1).tolist()

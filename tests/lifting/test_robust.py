@@ -11,7 +11,7 @@ from hicp_lib.core.camera import Camera, deproject
 from hicp_lib.core.keypoints import HANDS, INDEX
 from hicp_lib.lifting.body_measures import load_measures
 from hicp_lib.lifting.limb_lengths import choose_along_limbs, limbs_outwards
-from hicp_lib.lifting.paper import LIFTED, NO_DEPTH, NOT_DETECTED, OUTSIDE_IMAGE, lift
+from hicp_lib.lifting.paper import GUESSED, LIFTED, NO_DEPTH, NOT_DETECTED, OUTSIDE_IMAGE, lift
 from hicp_lib.lifting.robust import STEPS, lift_in_steps, lift_robust
 from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
@@ -38,7 +38,7 @@ def test_no_other_choice_of_depths_costs_less(seed):
     costs = rng.uniform(0, 10, (4, 5))
     rays = np.column_stack([rng.uniform(-0.5, 0.5, (4, 2)), np.ones(4)])
     measures = load_measures()
-    chosen = choose_along_limbs(costs, limbs_outwards(grid_m, rays, found, measures))
+    chosen, _ = choose_along_limbs(costs, limbs_outwards(grid_m, rays, found, measures))
 
     def total(depths) -> float:
         limbs = [(1, 2), (2, 3)]  # shoulder to elbow to wrist; the nose hangs on a shoulder not found
@@ -55,7 +55,7 @@ def length_cost(begin_m, end_m, pair, measures) -> float:
     length_m, least_m, most_m = (
         np.linalg.norm(begin_m - end_m), measures.closest_m[*pair], measures.farthest_m[*pair]
     )  # fmt: skip
-    sigma_m = 0.05 * most_m + 0.010
+    sigma_m = 0.02 * most_m + 0.005
     if length_m > most_m:
         return min(((length_m - most_m) / sigma_m) ** 2, 40.0)
     return min((max(least_m - length_m, 0) / sigma_m) ** 2, 4.0)
@@ -89,7 +89,31 @@ def test_an_elbow_behind_something_is_put_behind_it():
     arm = keypoints(left_shoulder=(160, 75), left_elbow=(160, 125), left_wrist=(160, 170))
     elbow = INDEX["left_elbow"]
     assert lift(arm, depth_m, CAMERA).points_m[0, elbow, 2] == 0.7
-    assert 1.3 < lift_robust(arm, depth_m, CAMERA).points_m[0, elbow, 2] < 1.75
+    lifted, wrist = lift_robust(arm, depth_m, CAMERA), INDEX["left_wrist"]
+    assert 1.3 < lifted.points_m[0, elbow, 2] < 1.75
+    assert lifted.reason[0, [elbow, wrist]].tolist() == [GUESSED, LIFTED]
+    assert lifted.sigma_m[0, wrist] < 0.03 < lifted.sigma_m[0, elbow] < 0.3
+
+
+def test_a_hand_far_in_front_of_its_body_is_guessed_though_it_is_seen():
+    depth_m = np.full((240, 320), 1.5)
+    depth_m[80:, :] = 0.8
+    arm, wrist = keypoints(left_shoulder=(160, 60), left_elbow=(160, 105)), INDEX["left_wrist"]
+    arm[0, [wrist, *HANDS[:21]]] = (160, 150) + np.random.default_rng(0).uniform(-12, 12, (22, 2))
+    lifted = lift_robust(arm, depth_m, CAMERA)
+    assert lifted.points_m[0, wrist, 2] < 0.9 and lifted.reason[0, wrist] == GUESSED
+
+
+def test_a_joint_whose_limb_comes_towards_the_camera_lies_deeper():
+    depth_m, elbow = np.full((240, 320), 1.2), INDEX["left_elbow"]
+    depth_m[116:, :] = 0.97
+    beside, ahead = (
+        lift_robust(keypoints(left_elbow=(160, 105), left_wrist=wrist_px), depth_m, CAMERA).points_m[
+            0, elbow, 2
+        ]
+        for wrist_px in ((220, 105), (160, 125))
+    )
+    assert 0.4 < (ahead - beside) / load_measures().below_skin_m[elbow] < 0.6
 
 
 def test_reasons_are_the_papers():
@@ -114,6 +138,8 @@ def test_steps_together_give_what_each_gives_alone():
         alone = lift_in_steps(people_px, depth_m, CAMERA, [n])[0]
         np.testing.assert_array_equal(lifted.points_m, alone.points_m)
         np.testing.assert_array_equal(lifted.reason, alone.reason)
+        np.testing.assert_array_equal(lifted.sigma_m, alone.sigma_m)
+        assert np.isfinite(lifted.sigma_m).any() == (n > 1)
     np.testing.assert_array_equal(together[1].points_m, lift(people_px, depth_m, CAMERA).points_m)
     np.testing.assert_array_equal(together[2].points_m, lift_robust(people_px, depth_m, CAMERA).points_m)
     assert not np.array_equal(together[0].points_m, together[3].points_m, equal_nan=True)

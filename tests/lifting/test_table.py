@@ -62,6 +62,9 @@ def test_one_row_per_detected_keypoint_in_both_frames(recording):
     expected = [0.1 - seen[2], 0.2 + seen[0], 0.3 - seen[1]]
     np.testing.assert_allclose(wrist[["x_m", "y_m", "z_m"]].astype(float), expected, atol=0.02)
     assert table.loc[table["reason"] != "lifted", ["x_m", "x_cam_m"]].isna().all(axis=None)
+    assert table["sigma_m"].isna().all()
+    sigma_m = lift_recording(recording, [detections(), second]).set_index(["person", "keypoint"])["sigma_m"]
+    assert 0.01 <= sigma_m[0, "left_wrist"] < 0.05 and np.isnan(sigma_m[0, "nose"])
 
 
 def test_several_detectors_and_methods_give_what_each_gives_alone(recording):

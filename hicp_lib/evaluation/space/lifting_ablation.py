@@ -31,29 +31,9 @@ MIN_SCORE = 0.3
 _KEY = ["frame", "keypoint"]
 
 
-def lifting_ablation(points: pd.DataFrame, truth: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
-    """Errors of the paper's lifting and of each step beyond it.
-
-    Parameters
-    ----------
-    points : DataFrame
-        One detector's keypoints as `lift_found` gives them with `N_STEPS`.
-    truth : DataFrame
-        As `recording.read_truth` gives it.
-    min_score : float, optional
-        Detected keypoints count from this score.
-
-    Returns
-    -------
-    DataFrame
-        One row per group x method, columns `group, method, n_detected, n_lifted, n_compared` (lifted by this
-        and by the paper's method), `median_m, p95_m` (95th percentile), `p95_change` (against the paper's:
-        -0.4 is 40 % less).
-    """
-    return summary(lifting_errors(points, truth, min_score))
-
-
-def lifting_errors(points: pd.DataFrame, truth: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
+def lifting_errors(
+    points: pd.DataFrame, truth: pd.DataFrame, T_base_cam: np.ndarray, min_score: float = MIN_SCORE
+) -> pd.DataFrame:
     """Distance of every detected keypoint of `GROUPS` from its true position, by every method.
 
     Parameters
@@ -62,28 +42,68 @@ def lifting_errors(points: pd.DataFrame, truth: pd.DataFrame, min_score: float =
         One detector's keypoints as `lift_found` gives them with `N_STEPS`.
     truth : DataFrame
         As `recording.read_truth` gives it.
+    T_base_cam : array, shape (n, 4, 4)
+        Of the frames.
     min_score : float, optional
         Detected keypoints count from this score.
 
     Returns
     -------
     DataFrame
-        One row per keypoint detected with `min_score` or more, columns `frame, keypoint, group`, and one per
-        method in metres, NaN where it does not lift; those of several recordings may be put together.
+        One row per keypoint detected with `min_score` or more, columns `frame, keypoint, group`, one per
+        method in metres, NaN where it does not lift, and of the whole method `off_m` (how far its depth is
+        off), `sigma_m` and `reason`; those of several recordings may be put together.
     """
     group_of = {name: group for group, names in GROUPS.items() for name in names}
     counts = (points["person"] == 0) & (points["score"] >= min_score) & points["keypoint"].isin(group_of)
     both = points[counts].merge(truth[[*_KEY, *POSITION]], on=_KEY, suffixes=("", "_true"))
     offset = both[POSITION].to_numpy() - both[[f"{axis}_true" for axis in POSITION]].to_numpy()
-    errors = both.assign(error_m=np.linalg.norm(offset, axis=1))
-    errors = errors.pivot(index=_KEY, columns="method", values="error_m").reindex(columns=list(N_STEPS))
-    errors = errors.rename_axis(columns=None).reset_index()
+    off_m = abs((offset * T_base_cam[both["frame"], :3, 2]).sum(axis=1))
+    both = both.assign(error_m=np.linalg.norm(offset, axis=1), off_m=off_m)
+    errors = both.pivot(index=_KEY, columns="method", values="error_m").reindex(columns=list(N_STEPS))
+    whole = both[both["method"] == "robust"].set_index(_KEY)[["off_m", "sigma_m", "reason"]]
+    errors = errors.rename_axis(columns=None).join(whole).reset_index()
     errors.insert(2, "group", errors["keypoint"].map(group_of))
     return errors
 
 
+def sigma_coverage(errors: pd.DataFrame) -> pd.DataFrame:
+    """How often a depth lies within one and two of its standard deviations from the truth (normal: .68, .95).
+
+    Parameters
+    ----------
+    errors : DataFrame
+        Of `lifting_errors`.
+
+    Returns
+    -------
+    DataFrame
+        One row per group x reason ("lifted" or "guessed"), columns `group, reason, n`, `sigma_m, off_m`
+        (medians), `within_1_sigma, within_2_sigma` (shares).
+    """
+    within = {f"within_{k}_sigma": errors["off_m"] <= k * errors["sigma_m"] for k in (1, 2)}
+    lifted = errors.assign(**within).dropna(subset="off_m")
+    groups = lifted.groupby([pd.Categorical(lifted["group"], list(GROUPS)), "reason"], observed=True)
+    table = groups[["sigma_m", "off_m"]].median().join(groups[list(within)].mean())
+    table.insert(0, "n", groups.size())
+    return table.rename_axis(["group", "reason"]).reset_index()
+
+
 def summary(errors: pd.DataFrame) -> pd.DataFrame:
-    """The table of `lifting_ablation` from errors of `lifting_errors`."""
+    """Errors of the paper's lifting and of each step beyond it.
+
+    Parameters
+    ----------
+    errors : DataFrame
+        Of `lifting_errors`.
+
+    Returns
+    -------
+    DataFrame
+        One row per group x method, columns `group, method, n_detected, n_lifted, n_compared` (lifted by this
+        and by the paper's method), `median_m, p95_m` (95th percentile), `p95_change` (against the paper's:
+        -0.4 is 40 % less).
+    """
     rows = []
     for group, of_group in errors.groupby(pd.Categorical(errors["group"], list(GROUPS)), observed=True):
         for method in N_STEPS:

@@ -48,7 +48,8 @@ def finish_recording(out: Path, plan: Scenario, n: int, stamp: dict) -> None:
                 path.unlink()
     _write_table(out / TRUTH_FILE, _truth(out, times_s, T_base_cam))
     _write_table(out / JOINTS_FILE, _joints(plan, times_s))
-    settings = {"n_frames": n, "rate_hz": plan.rate_hz, "mount": plan.mount, "depth_camera": asdict(plan.depth_camera)}
+    settings = {"n_frames": n, "rate_hz": plan.rate_hz, "mount": plan.mount}
+    settings["depth_camera"] = asdict(plan.depth_camera)
     mocap = out / PARTS_DIR / MOCAP_PART
     settings |= read_json(mocap) if mocap.exists() else {}
     write_json(out / SIMULATION_FILE, stamp | settings, indent=1)

@@ -4,7 +4,6 @@ Depth is measured in an imager's own view and has the errors of its kind (`stere
 Then it is aligned to the colour camera. Both look the same way.
 """
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 
 import cv2
@@ -23,7 +22,7 @@ _HAIR_PARTS = (REGIONS.index("scalp"), REGIONS.index("scalp") + RIGHT)
 
 
 @dataclass(frozen=True, kw_only=True)
-class DepthCamera(ABC):
+class DepthCamera:
     """Geometry of a depth camera, and what all have in common; zero switches an error off.
 
     Attributes
@@ -36,8 +35,8 @@ class DepthCamera(ABC):
         From the imager to what it is compared with; f B is the disparity times depth.
     colour_offset_m : float
         From the colour camera to the imager, to the right.
-    max_range_m : float
-        No depth beyond.
+    nearest_m, max_range_m : float
+        No depth nearer, and beyond.
     depth_units_per_m : float
         What depth is a multiple of.
     """
@@ -47,6 +46,7 @@ class DepthCamera(ABC):
     focal_px: float
     baseline_m: float
     colour_offset_m: float
+    nearest_m: float
     max_range_m: float
     depth_units_per_m: float = 1000.0
 
@@ -55,12 +55,6 @@ class DepthCamera(ABC):
         """f B, in pixels times metres: disparity is this divided by depth."""
         return self.focal_px * self.baseline_m
 
-    @property
-    @abstractmethod
-    def nearest_m(self) -> float:
-        """Nothing nearer has depth."""
-
-    @abstractmethod
     def measure(self, true_px: np.ndarray, hair: np.ndarray, first_column: int, rng: Rng) -> np.ndarray:
         """What the imager measures.
 
@@ -78,6 +72,7 @@ class DepthCamera(ABC):
         array, shape (h, w), dtype float32
             Depth in metres; NaN for none.
         """
+        raise NotImplementedError
 
 
 def simulate_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCamera, rng: Rng) -> np.ndarray:
@@ -146,7 +141,8 @@ def depth_imager(colour: PlacedCamera, settings: DepthCamera) -> PlacedCamera:
 
 def _crop(imager: PlacedCamera, colour: PlacedCamera, settings: DepthCamera) -> tuple[int, PlacedCamera]:
     """The part of the imager's view that alignment and shadows need: its first column, a camera."""
-    nearest_m, offset_m = settings.nearest_m, abs(settings.colour_offset_m)
+    nearest_m = settings.nearest_m or settings.focal_baseline / settings.width_px
+    offset_m = abs(settings.colour_offset_m)
     reach = colour.width_px - 1 - colour.cx_px
     low_u = imager.cx_px - imager.fx_px * (colour.cx_px / colour.fx_px + offset_m / nearest_m)
     high_u = imager.cx_px + imager.fx_px * reach / colour.fx_px + settings.focal_baseline / nearest_m
@@ -164,8 +160,7 @@ def _measure(
     """What the imager measures, (view.height_px, view.width_px), float32, NaN for none."""
     true_px, hair = _true_disparity(scene, view, settings.focal_baseline)
     depth_m = settings.measure(true_px, hair, first_column, rng)
-    if settings.max_range_m:
-        depth_m[depth_m > settings.max_range_m] = np.nan
+    depth_m[(depth_m < settings.nearest_m) | (depth_m > (settings.max_range_m or np.inf))] = np.nan
     if settings.depth_units_per_m:
         units = np.float32(settings.depth_units_per_m)
         depth_m = np.rint(depth_m * units) / units

@@ -38,8 +38,6 @@ class StereoCamera(DepthCamera):
         Share of that slope that gets no depth.
     disparity_step_px : float
         What disparity is a multiple of.
-    searched_px : float
-        Largest disparity that is searched; nearer than f B / searched_px there is no depth.
     left_band : bool
         No depth where the right imager's image ends, at the left edge.
     shadow : bool
@@ -48,25 +46,14 @@ class StereoCamera(DepthCamera):
         Share of hair that gives no depth.
     """
 
-    width_px: int = 848
-    height_px: int = 480
-    focal_px: float = 424.0
-    baseline_m: float = 0.050
-    colour_offset_m: float = 0.015
-    max_range_m: float = 10.0
     subpixel_rms_px: float = 0.08
     window_px: int = 7
     edge_px: float = 2.5
     edge_holes: float = 0.35
     disparity_step_px: float = 1 / 32
-    searched_px: float = 126.0
     left_band: bool = True
     shadow: bool = True
     hair_holes: float = 0.25
-
-    @property
-    def nearest_m(self) -> float:
-        return self.focal_baseline / (self.searched_px or self.width_px)
 
     def measure(self, true_px: np.ndarray, hair: np.ndarray, first_column: int, rng: Rng) -> np.ndarray:
         """Depth (h, w) by matching: see `DepthCamera.measure`."""
@@ -80,8 +67,6 @@ class StereoCamera(DepthCamera):
             measured_px = measured_px + np.float32(self.subpixel_rms_px) * noise
         if self.disparity_step_px:
             measured_px = np.rint(measured_px / self.disparity_step_px) * self.disparity_step_px
-        if self.searched_px:
-            valid &= measured_px <= self.searched_px
         if self.left_band:
             column = first_column + np.arange(true_px.shape[1], dtype=np.float32)
             valid &= measured_px <= column
@@ -94,17 +79,20 @@ class StereoCamera(DepthCamera):
         return depth_m
 
 
-D435 = StereoCamera()
-"""The mode with the best depth, 848 x 480."""
+D435 = StereoCamera(
+    width_px=848, height_px=480, focal_px=424.0, baseline_m=0.050, colour_offset_m=0.015,
+    nearest_m=0.168, max_range_m=10.0,
+)  # fmt: skip
+"""The mode with the best depth, 848 x 480. Disparities are searched up to 126 px, that of `nearest_m`."""
 
-D435_VGA = StereoCamera(width_px=640, focal_px=384.0)
+D435_VGA = replace(D435, width_px=640, focal_px=384.0, nearest_m=0.152)
 """640 x 480."""
 
 
 def without_errors(settings: StereoCamera) -> StereoCamera:
     """The same camera, all its errors switched off; sampling and alignment stay."""
     return replace(
-        settings, subpixel_rms_px=0, edge_px=0, disparity_step_px=0, depth_units_per_m=0, searched_px=0,
+        settings, subpixel_rms_px=0, edge_px=0, disparity_step_px=0, depth_units_per_m=0, nearest_m=0,
         max_range_m=0, left_band=False, shadow=False, hair_holes=0,
     )  # fmt: skip
 

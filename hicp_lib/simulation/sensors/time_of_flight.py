@@ -32,8 +32,6 @@ class TimeOfFlightCamera(DepthCamera):
 
     Attributes
     ----------
-    nearest_m : float
-        No depth nearer.
     modulation_hz : float
     axial_noise_m : float
         Standard deviation at amplitude 1, more in proportion to 1 / amplitude.
@@ -51,13 +49,6 @@ class TimeOfFlightCamera(DepthCamera):
         Share of the infrared light that surfaces return.
     """
 
-    width_px: int = 640
-    height_px: int = 576
-    focal_px: float = 504.0
-    baseline_m: float = 0.032
-    colour_offset_m: float = -0.032
-    max_range_m: float = 3.86
-    nearest_m: float = 0.5
     modulation_hz: float = 100e6
     axial_noise_m: float = 0.0005
     noise_px: int = 3
@@ -84,8 +75,7 @@ class TimeOfFlightCamera(DepthCamera):
         measured_m += np.float32(self.wiggle_m) * np.sin(4 * phase)
         noise = correlated_noise(true_px.shape, self.noise_px, rng)
         measured_m += np.float32(self.axial_noise_m) * noise / np.maximum(received, 1e-6)
-        valid = (received >= self.least_amplitude) & (measured_m >= self.nearest_m)
-        return np.where(valid, measured_m, np.nan).astype(np.float32)
+        return np.where(received >= self.least_amplitude, measured_m, np.nan).astype(np.float32)
 
     def _cosine(self, true_px: np.ndarray) -> np.ndarray:
         """Of the angle between the surface and the line of sight, (h, w), from how disparity changes."""
@@ -105,5 +95,8 @@ class TimeOfFlightCamera(DepthCamera):
         return (1 - self.stray) * light + self.stray * around
 
 
-AZURE_KINECT = TimeOfFlightCamera()
+AZURE_KINECT = TimeOfFlightCamera(
+    width_px=640, height_px=576, focal_px=504.0, baseline_m=0.032, colour_offset_m=-0.032,
+    nearest_m=0.5, max_range_m=3.86,
+)  # fmt: skip
 """The mode with the narrow field of view at full resolution, 640 x 576."""

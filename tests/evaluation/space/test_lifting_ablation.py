@@ -10,8 +10,8 @@ from hicp_lib.core.keypoints import INDEX, NAMES
 from hicp_lib.evaluation.space.lifting_ablation import (
     GROUPS,
     N_STEPS,
-    lifting_ablation,
     lifting_errors,
+    sigma_coverage,
     summary,
 )
 from hicp_lib.lifting.body_measures import load_measures
@@ -20,6 +20,7 @@ from hicp_lib.recordings.recording import open_recording
 from hicp_lib.recordings.writer import RecordingWriter
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 32.0, 24.0)
+POSES = np.tile(np.eye(4), (3, 1, 1))
 WRIST, THUMB = INDEX["left_wrist"], INDEX["left_thumb_2"]
 
 
@@ -54,7 +55,7 @@ def truth():
 
 
 def test_errors_are_the_depth_below_the_skin_for_the_paper_and_none_beyond(points, truth):
-    table = lifting_ablation(points, truth).set_index(["group", "method"])
+    table = summary(lifting_errors(points, truth, POSES)).set_index(["group", "method"])
     assert set(table.index) == {(group, method) for group in ("wrists", "fingers") for method in N_STEPS}
     assert (table[["n_detected", "n_lifted", "n_compared"]] == 2).all(axis=None)
     below_m = load_measures().below_skin_m
@@ -65,8 +66,8 @@ def test_errors_are_the_depth_below_the_skin_for_the_paper_and_none_beyond(point
 
 
 def test_the_score_decides_what_counts(points, truth):
-    assert len(lifting_errors(points, truth, min_score=0.05)) == 6
-    assert len(lifting_errors(points, truth, min_score=0.85)) == 2
+    assert len(lifting_errors(points, truth, POSES, min_score=0.05)) == 6
+    assert len(lifting_errors(points, truth, POSES, min_score=0.85)) == 2
 
 
 def test_only_what_both_lift_is_compared():
@@ -79,12 +80,31 @@ def test_only_what_both_lift_is_compared():
     assert row["median_m"] == 0.5 and row["p95_change"] == -0.5
 
 
+def test_coverage_is_of_depth_along_the_cameras_axis_and_by_reason(points, truth):
+    errors = lifting_errors(points, truth, POSES)
+    assert errors["off_m"].max() < 0.1 and set(errors["reason"]) == {"lifted"}
+    truth["x_m"] += 1.0
+    turned = POSES[:, [2, 1, 0, 3]]  # the camera's axis is the base's x axis
+    across, along = (lifting_errors(points, truth, T) for T in (POSES, turned))
+    np.testing.assert_allclose(across["off_m"], errors["off_m"])
+    np.testing.assert_allclose(along["off_m"], 1.0)
+    some = pd.concat([errors.assign(off_m=k * 0.01, sigma_m=0.011) for k in range(4)])
+    some = pd.concat([some, errors.assign(off_m=0.5, sigma_m=0.3, reason="guessed")])
+    table = sigma_coverage(some).set_index(["group", "reason"])
+    assert table.loc[("wrists", "lifted"), ["n", "within_1_sigma", "within_2_sigma"]].tolist() == [
+        8,
+        0.5,
+        0.75,
+    ]
+    assert table.loc[("fingers", "guessed"), ["n", "within_1_sigma", "within_2_sigma"]].tolist() == [2, 0, 1]
+
+
 def test_fingers_are_all_joints_of_both_hands():
     assert len(GROUPS["fingers"]) == 40 and "left_hand_root" not in GROUPS["fingers"]
 
 
 def test_a_score_just_at_the_limit_counts_and_another_person_does_not(points, truth):
-    assert len(lifting_errors(points, truth, min_score=0.8)) == 4
-    assert len(lifting_errors(points.assign(score=0.3), truth)) == 6
-    assert len(lifting_errors(points.assign(score=np.nextafter(0.3, 0)), truth)) == 0
-    assert len(lifting_errors(points.assign(person=1), truth)) == 0
+    assert len(lifting_errors(points, truth, POSES, min_score=0.8)) == 4
+    assert len(lifting_errors(points.assign(score=0.3), truth, POSES)) == 6
+    assert len(lifting_errors(points.assign(score=np.nextafter(0.3, 0)), truth, POSES)) == 0
+    assert len(lifting_errors(points.assign(person=1), truth, POSES)) == 0

@@ -74,7 +74,7 @@ def test_the_left_edge_has_a_band_as_wide_as_the_disparity(mode, z_m):
 @pytest.mark.parametrize("mode", [D435, D435_VGA])
 def test_nothing_nearer_than_the_searched_disparities_allow(mode):
     nearest_m = mode.focal_px * mode.baseline_m / 126
-    settings = replace(without_errors(mode), searched_px=mode.searched_px)
+    settings = replace(without_errors(mode), nearest_m=mode.nearest_m)
     assert np.isnan(_raw([_wall(nearest_m - 1e-3)], settings)).all()
     assert np.isfinite(_raw([_wall(nearest_m + 1e-3)], settings)).all()
 
@@ -210,6 +210,6 @@ def test_the_same_generator_gives_the_same_depth_and_another_another():
 
 def test_the_aligned_image_is_that_of_the_whole_raw_one_where_errors_are_off():
     surfaces = [_wall(0.6, x=(-0.2, -0.05), y=(-0.2, 0.1)), _wall(1.5, x=(0, 3)), _wall(2.5)]
-    settings = replace(EXACT, shadow=True, left_band=True, searched_px=126.0)
+    settings = replace(EXACT, shadow=True, left_band=True, nearest_m=0.168)
     whole = align_to_colour(_raw(surfaces, settings), depth_imager(COLOUR, settings), COLOUR)
     assert np.allclose(whole, _aligned(surfaces, settings), equal_nan=True)

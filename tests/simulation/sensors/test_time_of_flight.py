@@ -17,7 +17,7 @@ from hicp_lib.simulation.sensors.time_of_flight import AZURE_KINECT
 GREY = materials.plain(np.full(3, 0.5))
 COLOUR = PlacedCamera(640, 480, 615.0, 615.0, 319.5, 239.5, np.eye(4))
 EXACT = replace(
-    AZURE_KINECT, noise_m=0, blur_px=0, stray=0, wiggle_m=0, least_amplitude=0, depth_units_per_m=0
+    AZURE_KINECT, axial_noise_m=0, blur_px=0, stray=0, wiggle_m=0, least_amplitude=0, depth_units_per_m=0
 )
 MIDDLE = np.s_[200:376, 220:420]
 
