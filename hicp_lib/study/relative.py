@@ -11,7 +11,6 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.evaluation.space.spread_causes import found_in
 from hicp_lib.experiments.recordings.open import open_experiment
 from hicp_lib.lifting.table import lift_found
 from hicp_lib.recordings.recording import Recording, read_joints, read_truth
@@ -98,7 +97,8 @@ def lift_views(views: Mapping[str, Recording], found: Found) -> pd.DataFrame:
     """
     tables = []
     for view, recording in views.items():
-        table = lift_found(recording, found_in(found, view))
+        of_view = {detector: frames for (seen_from, detector), frames in found.items() if seen_from == view}
+        table = lift_found(recording, of_view)
         tables.append(table.assign(view=view)[["view", *table.columns]])
     points = pd.concat(tables, ignore_index=True)
     if points["x_m"].isna().all():

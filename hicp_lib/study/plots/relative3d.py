@@ -1,4 +1,4 @@
-"""Figures of the relative 3D test: what the robot saw, median skeletons, stability, accuracy, causes."""
+"""Figures of the relative 3D test: what the robot saw, median skeletons, stability, accuracy."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
 from hicp_lib.study.plots.people import detections_grid, draw_rings
 from hicp_lib.study.plots.skeleton import BODY_LIMBS, HAND_LIMBS, limb_lines
-from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.style import Figure, in_style, new_figure, series_text
 
 _AXES = ("x_m", "y_m", "z_m")
 # Seen by the robot, which looks along -x; the axis that is not drawn is the one looked along.
@@ -22,10 +22,6 @@ _DIRECTIONS = {
 }  # fmt: skip
 # Fewer images than this say little about a spread.
 MIN_IMAGES = 5
-_CAUSE_STYLES = (
-    ("#888888", "o"), ("#0072B2", "s"), ("#D55E00", "^"),
-    ("#009E73", "D"), ("#CC79A7", "v"), ("#111111", "*"),
-)  # fmt: skip
 _SPREAD, _BIAS = "spread: distance to the median [cm]", "bias: median to truth [cm]"
 _PART_MARKERS = {"shoulder": "^", "elbow": "s", "wrist": "o", "hand": "*"}
 
@@ -176,41 +172,3 @@ def _part_legend(figure, axis, detectors: Sequence[str]) -> None:
     sides = [{"marker": "o", "ls": ""}, {"marker": "o", "ls": "", "mfc": "white"}]
     others = marks.legend_lines(axis, [*_PART_MARKERS, "left", "right"], [*shapes, *sides])
     figure.legend(handles=[*colours, *others], loc="outside lower center", ncols=5, fontsize=9)
-
-
-@in_style
-def spread_causes(table: pd.DataFrame, note: str) -> Figure:
-    """Spread (upper row) and bias (lower row) of every part with one cause at a time.
-
-    `table` from `hicp_lib.evaluation.space.spread_causes.spread_causes`.
-    """
-    cases, parts = table.groupby(["view", "detector"], sort=False), list(table["part"].unique())
-    size = {"width_in": max(2.9 * cases.ngroups, 7), "height_in": 1.6 + 0.8 * len(parts)}
-    figure, axes = new_figure(2, cases.ngroups, sharey=True, sharex="row", squeeze=False, **size)
-    for (case, rows), (upper, lower) in zip(cases, axes.T, strict=True):
-        _draw_causes(upper, rows, parts, "spread_m")
-        _draw_causes(lower, rows, parts, "bias_m")
-        upper.set(title=in_lines("\n".join(case)), xlabel=_SPREAD)
-        lower.set(xlabel=_BIAS)
-    marks.name_rows(axes[0, 0], parts)
-    marks.legend_below(figure, axes, ncols=3)
-    caption = (
-        "Where spread and bias come from, one cause at a time, and all. Upper row: median (marker) and "
-        "90th percentile (end of the line) of the distance to the median position; lower row: how far that "
-        f"position is from the true one: {note}."
-    )
-    medians_cm = 100 * table.groupby("cause", sort=False)[["spread_m", "bias_m"]].median()
-    said = in_words([f"{cause} {s:.1f} and {b:.1f} cm" for cause, s, b in medians_cm.itertuples()])
-    alt = f"Dots per part and cause. Median spread and bias over parts: {said}."
-    return Figure(figure, caption, alt, table)
-
-
-def _draw_causes(axis, rows: pd.DataFrame, parts: list[str], measure: str) -> None:
-    for k, (cause, part) in enumerate(rows.groupby("cause", sort=False)):
-        colour, marker = _CAUSE_STYLES[k]
-        y = part["part"].map(parts.index) + marks.offset(k, rows["cause"].nunique(), 0.13)
-        if measure == "spread_m":
-            axis.hlines(y, 100 * part["spread_m"], 100 * part["p90_m"], color=colour, lw=1.2)
-        axis.plot(100 * part[measure], y, marker, color=colour, markersize=5, label=cause)
-    axis.set(xscale="log")
-    _plain_ticks(axis.xaxis)
