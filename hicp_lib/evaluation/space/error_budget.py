@@ -22,7 +22,7 @@ from hicp_lib.core.keypoints import LEFT_HAND, NAMES, RIGHT_HAND
 from hicp_lib.evaluation.cases import labelled
 from hicp_lib.evaluation.space import error_sources as s
 from hicp_lib.evaluation.space.mocap_error import JOINTS
-from hicp_lib.evaluation.space.stability import MIN_SCORE, POSITION, counted, position_array
+from hicp_lib.evaluation.space.stability import MIN_SCORE, counted, position_array
 from hicp_lib.evaluation.statistics.design import smallest_difference
 from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
 from hicp_lib.lifting.robust import METHODS
@@ -91,9 +91,9 @@ def keypoint_errors(
     -------
     DataFrame
         A row per keypoint that counts: columns `view, subject, method, part, keypoint, frame`, `distance_m`
-        (from the camera), `towards_camera` (0 where the limb it hangs on, upper arm or forearm, is across the line
-        of sight, 1 along it), `hidden` (by something in front), and the error in metres in a column for each of
-        `STATES`.
+        (from the camera), `towards_camera` (0 where its limb, upper arm or forearm, is across the line of
+        sight, 1 along it), `hidden` (by something in front), and the error in metres in a column for each
+        of `STATES`.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def _seen(
 
 
 def _towards_camera(true_m: np.ndarray, T_base_cam: np.ndarray) -> np.ndarray:
-    """Cosine between the line of sight and the limb that a keypoint hangs on, (n, k): 0 across, 1 along it."""
+    """Cosine between the line of sight and the limb of each keypoint, (n, k): 0 across, 1 along it."""
     sides = [name.partition("_")[0] for name in _KEYPOINTS]
     ends = ("shoulder" if part == "shoulder" else "wrist" for part in _PARTS.values())
     far, near = (
@@ -201,10 +201,10 @@ def error_budget(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -
     -------
     DataFrame
         Columns `view, method, part, source` (of `TOTALS`, then of `SOURCES`), `alone_m, alone_low_m,
-        alone_high_m` (median over a person's keypoints, mean over people, 95 % interval), `gain_m, gain_low_m,
-        gain_high_m` (what the median with everything falls by without it; of a total, what it lies below),
-        `detectable_m` (the least such gain this many people show), `n_people, n` (keypoints). Without sources
-        that move nothing there.
+        alone_high_m` (median over a person's keypoints, mean over people, 95 % interval), `gain_m,
+        gain_low_m, gain_high_m` (what the error with everything falls by without it; of a total, what it
+        lies below), `detectable_m` (the least such gain that so many people show), `n_people, n`
+        (keypoints). Without sources that move nothing there.
     """
     rows = []
     for case, part in errors.groupby(["view", "method", "part"], sort=False):
@@ -238,8 +238,8 @@ def covariates(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> 
     Returns
     -------
     DataFrame
-        Columns `method, part, covariate, factor, low, high` (95 % interval), `n_people, n` (keypoints). No row
-        where the covariate is the same throughout.
+        Columns `method, part, covariate, factor, low, high` (95 % interval), `n_people, n` (keypoints). No
+        row where the covariate is the same throughout.
     """
     rows = []
     for case, part in errors.groupby(["method", "part"], sort=False):

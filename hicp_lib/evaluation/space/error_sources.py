@@ -1,7 +1,7 @@
 """What makes keypoints in space wrong, each source to be switched on: the camera, the robot, motion capture.
 
-Amounts of what is calibrated are drawn once per person, as if each came to a robot of its own, and hold for all
-their frames.
+Amounts of what is calibrated are drawn once per person, as if each came to a robot of their own, and hold for
+all their frames.
 """
 
 from dataclasses import dataclass, replace
