@@ -48,10 +48,10 @@ def error_budget(table: pd.DataFrame, paper: pd.DataFrame, note: str) -> Figure:
     axes[0, 0].set(yticks=list(rows.values()), yticklabels=list(rows), ylim=(max(rows.values()) + 0.6, -0.6))
     marks.legend_below(figure, axes, ncols=5)
     caption = (
-        f"Error of keypoints by source, {table['n_people'].max()} people. Filled: all else true; hollow: what "
-        "the error with everything falls by when this alone is true. Median of a person's keypoints, mean over "
-        "people with 95 % intervals; on top errors by many sources, against motion capture beside the medians "
-        f"of the paper's {in_words(paper['detector'].unique())}: {note}."
+        f"Error of keypoints by source, {table['n_people'].max()} people. Filled: all else true; hollow: "
+        "what the error with everything falls by when this alone is true. Median of a person's keypoints, "
+        "mean over people with 95 % intervals; on top errors by many sources, against motion capture beside "
+        f"the medians of the paper's {in_words(paper['detector'].unique())}: {note}."
     )
     first = table[~table["source"].isin(TOTALS)].sort_values("alone_m", ascending=False)
     first = first.groupby(["part", "method"], sort=False).first()

@@ -110,20 +110,6 @@ def test_spread_and_bias_are_in_centimetres_and_rare_parts_left_out():
     assert "mediapipe 1 with more bias" in figure.alt
 
 
-def test_causes_are_dots_with_the_tail_as_a_line():
-    rows = [
-        ("upper", "mediapipe", "left wrist", cause, 30, spread, 2 * spread, 0.05)
-        for cause, spread in (("depth sensor", 0.004), ("2D detection", 0.016))
-    ]
-    columns = ["view", "detector", "part", "cause", "n", "spread_m", "p90_m", "bias_m"]
-    figure = relative3d.spread_causes(pd.DataFrame(rows, columns=columns), "made up")
-    dots = [line.get_xdata()[0] for line in figure.figure.axes[0].get_lines()]
-    assert dots == pytest.approx([0.4, 1.6])
-    off = [line.get_xdata()[0] for line in figure.figure.axes[1].get_lines()]
-    assert off == pytest.approx([5, 5])
-    assert "depth sensor 0.4 and 5.0 cm and 2D detection 1.6 and 5.0 cm" in figure.alt
-
-
 def test_camera_views_have_a_row_per_frame_and_view_and_a_column_per_detector(monkeypatch):
     monkeypatch.setattr(
         relative3d, "read_rgb", lambda recording, frame: np.full((30, 40, 3), frame, np.uint8)
