@@ -49,6 +49,8 @@ _FINGERS = tuple(NAMES[k] for hand in (LEFT_HAND, RIGHT_HAND) for k in hand[1:])
 _KEYPOINTS = (*JOINTS, *_FINGERS)
 _PARTS = {name: name.partition("_")[2] for name in JOINTS} | dict.fromkeys(_FINGERS, "finger")
 _CAMERA_POSITION = ["x_cam_m", "y_cam_m", "z_cam_m"]
+_ROW = ["view", "subject", "method", "keypoint", "part", "frame", "distance_m", "towards_camera", "hidden"]
+_COLUMNS = [*_ROW, *STATES]
 _TRUE, _FOUND = "true", "found"
 _NOTHING_M = 1e-9
 # What an error may depend on: the column, and the step that a factor is for.
@@ -90,7 +92,7 @@ def keypoint_errors(
     Returns
     -------
     DataFrame
-        A row per keypoint that counts: columns `view, subject, method, part, keypoint, frame`, `distance_m`
+        A row per keypoint that counts: columns `view, subject, method, keypoint, part, frame`, `distance_m`
         (from the camera), `towards_camera` (0 where its limb, upper arm or forearm, is across the line of
         sight, 1 along it), `hidden` (by something in front), and the error in metres in a column for each
         of `STATES`.
@@ -106,7 +108,7 @@ def keypoint_errors(
         of = (recording, found[view, subject], registered.get((view, subject)))
         table = _errors(*of, amounts, slice(None, None, every), min_score, rng)
         tables.append(labelled(table, view=view, subject=subject))
-    return pd.concat(tables, ignore_index=True)
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=_COLUMNS)
 
 
 def _errors(
@@ -136,6 +138,7 @@ def _errors(
     frame, keypoint = np.nonzero(counts)
     columns = {
         "keypoint": np.array(_KEYPOINTS)[keypoint],
+        "part": np.array(list(_PARTS.values()))[keypoint],
         "frame": np.arange(n)[frames][frame],
         "distance_m": np.linalg.norm(true_cam_m, axis=-1)[counts],
         "towards_camera": _towards_camera(true_m, some.T_base_cam)[counts],
@@ -153,9 +156,7 @@ def _errors(
             off_m = at_m - sum(shift_m for source, shift_m in shifts_m.items() if source in on)
             columns[state] = np.linalg.norm(off_m, axis=-1)[counts]
         tables.append(labelled(pd.DataFrame(columns), method=method))
-    table = pd.concat(tables, ignore_index=True)
-    table.insert(1, "part", table["keypoint"].map(_PARTS))
-    return table
+    return pd.concat(tables, ignore_index=True)
 
 
 def _seen(
@@ -204,13 +205,15 @@ def error_budget(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -
         alone_high_m` (median over a person's keypoints, mean over people, 95 % interval), `gain_m,
         gain_low_m, gain_high_m` (what the error with everything falls by without it; of a total, what it
         lies below), `detectable_m` (the least such gain that so many people show), `n_people, n`
-        (keypoints). Without sources that move nothing there.
+        (keypoints). Without sources that move nothing there, and of a view without motion capture with one
+        total.
     """
     rows = []
     for case, part in errors.groupby(["view", "method", "part"], sort=False):
         medians_m = part.groupby("subject")[list(STATES)].median()
         drawn = draw_counts(np.arange(len(medians_m)), n_resamples, seed) / len(medians_m)
-        for source in (*TOTALS, *s.SOURCES):
+        has_mocap = part[_ALONE.format(s.REGISTRATION)].max() > _NOTHING_M
+        for source in (*(TOTALS if has_mocap else (ALL,)), *s.SOURCES):
             is_total = source in TOTALS
             alone_m = medians_m[source if is_total else _ALONE.format(source)]
             gain_m = medians_m[ALL] - medians_m[source if is_total else _WITHOUT.format(source)]
