@@ -12,6 +12,7 @@ lifted whichever pixels and depths are taken.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -47,10 +48,13 @@ STATES: dict[str, set[str]] = (
 
 _FINGERS = tuple(NAMES[k] for hand in (LEFT_HAND, RIGHT_HAND) for k in hand[1:])
 _KEYPOINTS = (*JOINTS, *_FINGERS)
-_PARTS = {name: name.partition("_")[2] for name in JOINTS} | dict.fromkeys(_FINGERS, "finger")
+_PARTS = [name.partition("_")[2] for name in JOINTS] + ["finger"] * len(_FINGERS)
+# The limb that a keypoint is seen on: upper arm of shoulders, else forearm.
+_SIDES = [name.partition("_")[0] for name in _KEYPOINTS]
+_ELBOWS = [_KEYPOINTS.index(f"{side}_elbow") for side in _SIDES]
+_OTHERS = ["shoulder" if part == "shoulder" else "wrist" for part in _PARTS]
+_ENDS = [_KEYPOINTS.index(f"{side}_{joint}") for side, joint in zip(_SIDES, _OTHERS, strict=True)]
 _CAMERA_POSITION = ["x_cam_m", "y_cam_m", "z_cam_m"]
-_ROW = ["view", "subject", "method", "keypoint", "part", "frame", "distance_m", "towards_camera", "hidden"]
-_COLUMNS = [*_ROW, *STATES]
 _TRUE, _FOUND = "true", "found"
 _NOTHING_M = 1e-9
 # What an error may depend on: the column, and the step that a factor is for.
@@ -62,86 +66,67 @@ _COVARIATES = {
 
 
 def keypoint_errors(
-    recordings: Mapping[tuple[str, int], Recording],
-    found: Mapping[tuple[str, int], Sequence[Detections]],
-    registered: Mapping[tuple[str, int], np.ndarray],
+    recording: Recording,
+    found: Sequence[Detections],
+    T_base_mocap: np.ndarray | None,
     amounts: s.Amounts,
     every: int = 1,
     min_score: float = MIN_SCORE,
-    seed: int = 0,
+    seed: int | Sequence[int] = 0,
 ) -> pd.DataFrame:
-    """Errors of every keypoint with each set of sources, frame by frame.
+    """Errors of every keypoint of a recording with each set of sources, frame by frame.
 
     Parameters
     ----------
-    recordings : mapping of (str, int) to Recording
-        By view and subject; simulated.
-    found : mapping of (str, int) to sequence of Detections
+    recording : Recording
+        Simulated.
+    found : sequence of Detections
         Of each frame; the best person counts.
-    registered : mapping of (str, int) to array, shape (4, 4)
-        T_base_mocap from clicks, of recordings with motion capture.
+    T_base_mocap : array or None, shape (4, 4)
+        From clicks; None: the reference is the truth, not motion capture.
     amounts : Amounts
         What is off, and how much.
     every : int, optional
         The first frame counts, and every so many after it.
     min_score : float, optional
         Keypoints above it count.
-    seed : int, optional
-        Of the amounts' draws.
+    seed : int or sequence of int, optional
+        Of the amounts' draws: the same for one person's recordings.
 
     Returns
     -------
     DataFrame
-        A row per keypoint that counts: columns `view, subject, method, keypoint, part, frame`, `distance_m`
+        A row per method and keypoint that counts: columns `method, keypoint, part, frame`, `distance_m`
         (from the camera), `towards_camera` (0 where its limb, upper arm or forearm, is across the line of
-        sight, 1 along it), `hidden` (by something in front), and the error in metres in a column for each
-        of `STATES`.
+        sight, 1 along it), `hidden` (by something in front), and the error in metres in a column for each of
+        `STATES`.
 
     Raises
     ------
     InputError
-        If a recording's joints do not give its camera poses.
+        If the joints do not give the camera's poses.
     """
-    tables = []
-    for (view, subject), recording in recordings.items():
-        rng = np.random.default_rng([seed, subject])
-        of = (recording, found[view, subject], registered.get((view, subject)))
-        table = _errors(*of, amounts, slice(None, None, every), min_score, rng)
-        tables.append(labelled(table, view=view, subject=subject))
-    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=_COLUMNS)
-
-
-def _errors(
-    recording: Recording,
-    found: Sequence[Detections],
-    T_base_mocap: np.ndarray | None,
-    amounts: s.Amounts,
-    frames: slice,
-    min_score: float,
-    rng: np.random.Generator,
-) -> pd.DataFrame:
+    rng = np.random.default_rng(seed)
     n, truth = len(recording), read_truth(recording)
     true_m = position_array(truth, _KEYPOINTS, n)
-    visible = position_array(truth, _KEYPOINTS, n, ["visible"])[frames, :, 0]
+    visible = position_array(truth, _KEYPOINTS, n, ["visible"])[..., 0]
     intrinsics = s.wrong_intrinsics(recording.intrinsics, amounts, rng)
-    poses = {off: T[frames] for off, T in s.wrong_poses(recording, amounts, rng).items()}
-    shifts_m = {}
+    poses, shifts_m = s.wrong_poses(recording, amounts, rng), {}
     if T_base_mocap is not None:
         shifts_m = s.reference_shifts(recording, true_m, T_base_mocap, amounts, rng)
-        shifts_m = {source: shift_m[frames] for source, shift_m in shifts_m.items()}
-    some = replace(recording, **{name: getattr(recording, name)[frames] for name in PER_FRAME})
-    seen_m = _seen(some, {_TRUE: s.true_detections(truth, n)[frames], _FOUND: found[frames]}, min_score)
-    true_m = true_m[frames]
-    true_cam_m = transform(np.linalg.inv(some.T_base_cam), true_m)
+    seen_m = _seen(recording, {_TRUE: s.true_detections(truth, n), _FOUND: found}, every, min_score)
+    true_cam_m = transform(np.linalg.inv(recording.T_base_cam), true_m)
     places_m = [*seen_m.values(), *shifts_m.values()]
     counts = np.all([np.isfinite(at_m).all(axis=-1) for at_m in places_m], axis=0) & (visible > 0)
     frame, keypoint = np.nonzero(counts)
+    limb_m, sight_m = true_m[:, _ENDS] - true_m[:, _ELBOWS], true_m - recording.T_base_cam[:, None, :3, 3]
+    cosine = (_unit(limb_m) * _unit(sight_m)).sum(axis=-1)
     columns = {
         "keypoint": np.array(_KEYPOINTS)[keypoint],
-        "part": np.array(list(_PARTS.values()))[keypoint],
-        "frame": np.arange(n)[frames][frame],
-        "distance_m": np.linalg.norm(true_cam_m, axis=-1)[counts],
-        "towards_camera": _towards_camera(true_m, some.T_base_cam)[counts],
+        "part": np.array(_PARTS)[keypoint],
+        "frame": frame,
+        "distance_m": np.linalg.norm(sight_m, axis=-1)[counts],
+        "towards_camera": abs(cosine[counts]),
         "hidden": visible[counts] == 1,
     }
     tables = []
@@ -152,40 +137,32 @@ def _errors(
             at_m = at_m if s.SKIN in on else at_m - skin_m
             if s.INTRINSICS in on:
                 at_m = deproject(intrinsics, project(recording.intrinsics, at_m), at_m[..., 2])
-            at_m = transform(poses[s.OFFSETS in on, s.MOUNT in on], at_m) - true_m
-            off_m = at_m - sum(shift_m for source, shift_m in shifts_m.items() if source in on)
-            columns[state] = np.linalg.norm(off_m, axis=-1)[counts]
+            off_m = transform(poses[s.OFFSETS in on, s.MOUNT in on], at_m) - true_m
+            off_m = off_m - sum(shift_m for source, shift_m in shifts_m.items() if source in on)
+            columns[state] = np.linalg.norm(off_m[counts], axis=-1)
         tables.append(labelled(pd.DataFrame(columns), method=method))
     return pd.concat(tables, ignore_index=True)
 
 
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
 def _seen(
-    recording: Recording, found: Mapping[str, Sequence[Detections]], min_score: float
+    recording: Recording, found: Mapping[str, Sequence[Detections]], every: int, min_score: float
 ) -> dict[tuple[str, str, bool], np.ndarray]:
     """Places in the camera's frame (n, k, 3) by method, pixels, and whether the depth is the sensor's."""
-    exact_paths = [recording.folder / EXACT_DEPTH_DIR / path.name for path in recording.depth_paths]
-    seen_m = {}
-    for is_measured, of in ((True, recording), (False, replace(recording, depth_paths=exact_paths))):
-        lifted = counted(lift_found(of, found), min_score, _CAMERA_POSITION)
-        for method in METHODS:
-            for pixels in found:
-                rows = lifted[(lifted["method"] == method) & (lifted["detector"] == pixels)]
-                places_m = position_array(rows, _KEYPOINTS, len(of), _CAMERA_POSITION)
-                seen_m[method, pixels, is_measured] = places_m
+    some = replace(recording, **{name: getattr(recording, name)[::every] for name in PER_FRAME})
+    exact_paths = [recording.folder / EXACT_DEPTH_DIR / path.name for path in some.depth_paths]
+    people, seen_m = {pixels: of[::every] for pixels, of in found.items()}, {}
+    for is_measured, of in ((True, some), (False, replace(some, depth_paths=exact_paths))):
+        lifted = counted(lift_found(of, people), min_score, _CAMERA_POSITION)
+        lifted = lifted.assign(frame=every * lifted["frame"])
+        for method, pixels in product(METHODS, found):
+            rows = lifted[(lifted["method"] == method) & (lifted["detector"] == pixels)]
+            places_m = position_array(rows, _KEYPOINTS, len(recording), _CAMERA_POSITION)
+            seen_m[method, pixels, is_measured] = places_m
     return seen_m
-
-
-def _towards_camera(true_m: np.ndarray, T_base_cam: np.ndarray) -> np.ndarray:
-    """Cosine between the line of sight and the limb of each keypoint, (n, k): 0 across, 1 along it."""
-    sides = [name.partition("_")[0] for name in _KEYPOINTS]
-    ends = ("shoulder" if part == "shoulder" else "wrist" for part in _PARTS.values())
-    far, near = (
-        true_m[:, [_KEYPOINTS.index(f"{side}_{joint}") for side, joint in zip(sides, joints, strict=True)]]
-        for joints in (ends, ["elbow"] * len(sides))
-    )
-    limb_m, sight_m = far - near, true_m - T_base_cam[:, None, :3, 3]
-    lengths_m2 = np.linalg.norm(limb_m, axis=-1) * np.linalg.norm(sight_m, axis=-1)
-    return np.abs((limb_m * sight_m).sum(axis=-1)) / lengths_m2
 
 
 def error_budget(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
@@ -194,36 +171,35 @@ def error_budget(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -
     Parameters
     ----------
     errors : DataFrame
-        As from `keypoint_errors`.
+        As from `keypoint_errors`, of several people: columns `view, subject` besides.
     n_resamples, seed : int, optional
         Number of bootstrap draws of people, and what they are drawn with.
 
     Returns
     -------
     DataFrame
-        Columns `view, method, part, source` (of `TOTALS`, then of `SOURCES`), `alone_m, alone_low_m,
-        alone_high_m` (median over a person's keypoints, mean over people, 95 % interval), `gain_m,
-        gain_low_m, gain_high_m` (what the error with everything falls by without it; of a total, what it
-        lies below), `detectable_m` (the least such gain that so many people show), `n_people, n`
-        (keypoints). Without sources that move nothing there, and of a view without motion capture with one
-        total.
+        Columns `view, method, part, source, kind`, `value_m, low_m, high_m` (median over a person's
+        keypoints, mean over people, 95 % interval), `detectable_m` (the least such mean that so many people
+        would tell from 0), `n_people, n` (keypoints). Of the kind "total" are `TOTALS`, without motion
+        capture only the first; "alone" is the error by a source alone, "gain" what the error with everything
+        falls by without it. No rows of sources that move nothing.
     """
-    rows = []
+    rows: list[tuple] = []
     for case, part in errors.groupby(["view", "method", "part"], sort=False):
         medians_m = part.groupby("subject")[list(STATES)].median()
-        drawn = draw_counts(np.arange(len(medians_m)), n_resamples, seed) / len(medians_m)
-        has_mocap = part[_ALONE.format(s.REGISTRATION)].max() > _NOTHING_M
-        for source in (*(TOTALS if has_mocap else (ALL,)), *s.SOURCES):
-            is_total = source in TOTALS
-            alone_m = medians_m[source if is_total else _ALONE.format(source)]
-            gain_m = medians_m[ALL] - medians_m[source if is_total else _WITHOUT.format(source)]
-            means = (with_interval(drawn @ of_m, len(medians_m)) for of_m in (alone_m, gain_m))
-            bounds = [bound for interval in means for bound in interval]
-            rows.append((*case, source, *bounds, smallest_difference(gain_m), len(medians_m), len(part)))
-    numbers = [f"{name}{bound}_m" for name in ("alone", "gain") for bound in ("", "_low", "_high")]
-    columns = ["view", "method", "part", "source", *numbers, "detectable_m", "n_people", "n"]
-    table = pd.DataFrame(rows, columns=columns)
-    return table[table["alone_m"] > _NOTHING_M].reset_index(drop=True)
+        n_people, acts = len(medians_m), medians_m.max() > _NOTHING_M
+        drawn = draw_counts(np.arange(n_people), n_resamples, seed) / n_people
+        totals = TOTALS if acts[_ALONE.format(s.REGISTRATION)] else (ALL,)
+        values_m = {(total, "total"): medians_m[total] for total in totals}
+        for source in s.SOURCES:
+            if acts[_ALONE.format(source)]:
+                values_m[source, "alone"] = medians_m[_ALONE.format(source)]
+                values_m[source, "gain"] = medians_m[ALL] - medians_m[_WITHOUT.format(source)]
+        for what, of_m in values_m.items():
+            numbers = (*with_interval(drawn @ of_m, n_people), smallest_difference(of_m))
+            rows.append((*case, *what, *numbers, n_people, len(part)))
+    names = ["source", "kind", "value_m", "low_m", "high_m", "detectable_m", "n_people", "n"]
+    return pd.DataFrame(rows, columns=["view", "method", "part", *names])
 
 
 def covariates(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
@@ -234,7 +210,7 @@ def covariates(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> 
     Parameters
     ----------
     errors : DataFrame
-        As from `keypoint_errors`; views are taken together.
+        The same; views are taken together.
     n_resamples, seed : int, optional
         Number of bootstrap draws of people, and what they are drawn with.
 
@@ -255,6 +231,5 @@ def covariates(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> 
         factors = np.exp(np.linalg.pinv(sums[:, :-1, :-1]) @ sums[:, :-1, -1:])[:, 1:, 0]
         bounds = zip(steps, *with_interval(factors, len(people)), strict=True)
         rows += [(*case, *row, len(people), len(part)) for row in bounds]
-    return pd.DataFrame(
-        rows, columns=["method", "part", "covariate", "factor", "low", "high", "n_people", "n"]
-    )
+    names = ["covariate", "factor", "low", "high", "n_people", "n"]
+    return pd.DataFrame(rows, columns=["method", "part", *names])

@@ -4,6 +4,7 @@ Amounts of what is calibrated are drawn once per person, as if each came to a ro
 all their frames.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from hicp_lib.core.camera import Camera, transform
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
-from hicp_lib.core.keypoints import FACE, INDEX, N_KEYPOINTS, NAMES
+from hicp_lib.core.keypoints import FACE, N_KEYPOINTS, NAMES
 from hicp_lib.core.rotations import rotation
 from hicp_lib.evaluation.space.mocap_error import JOINTS, marker_means
 from hicp_lib.evaluation.space.stability import position_array
@@ -30,7 +31,7 @@ OFFSETS, MOUNT, INTRINSICS = "joint offsets", "camera mount", "intrinsics"
 SOURCES = (SKIN, SENSOR, PIXEL, MARKERS, REGISTRATION, CLOCK, OFFSETS, MOUNT, INTRINSICS)
 
 _SAME_POSE_M = 1e-3
-_FACE = [NAMES[k] for k in FACE]
+WITHOUT_FACE = [k for k in range(N_KEYPOINTS) if k not in FACE]
 
 
 @dataclass(frozen=True)
@@ -58,22 +59,31 @@ class Amounts:
     jitter_s: float
 
 
-def is_simulated(recording: rec.Recording) -> bool:
-    """Whether a recording has truth, depth without errors and joints, as simulated ones have."""
-    tables = (rec.read_truth(recording), rec.read_joints(recording))
-    return (recording.folder / rec.EXACT_DEPTH_DIR).is_dir() and all(table is not None for table in tables)
+def true_detections(
+    truth: pd.DataFrame, n_frames: int, keypoints: Sequence[int] = WITHOUT_FACE
+) -> list[Detections]:
+    """The true pixels as if detected, hidden ones too, one person per frame.
 
+    Parameters
+    ----------
+    truth : DataFrame
+        As from `read_truth`.
+    n_frames : int
+        Number of images.
+    keypoints : sequence of int, optional
+        Indices of those detected. Those of the face decide on no other's depth.
 
-def true_detections(truth: pd.DataFrame, n_frames: int) -> list[Detections]:
-    """The true pixels as if detected with full score, one person per frame; `truth` as from `read_truth`.
-
-    Without the face: its keypoints decide on no other's depth.
+    Returns
+    -------
+    list of Detections
+        With scores of 1.
     """
-    truth = truth[~truth["keypoint"].isin(_FACE)]
-    pixels = np.full((n_frames, N_KEYPOINTS, 2), np.nan)
-    pixels[truth["frame"], truth["keypoint"].map(INDEX)] = truth[["u_px", "v_px"]]
-    scores = np.isfinite(pixels).all(axis=-1).astype(float)
-    return [Detections(pixels[k : k + 1], scores[k : k + 1], np.ones(1)) for k in range(n_frames)]
+    keypoints_px = np.full((n_frames, 1, N_KEYPOINTS, 2), np.nan)
+    keypoints_px[:, 0, keypoints] = position_array(
+        truth, [NAMES[k] for k in keypoints], n_frames, ["u_px", "v_px"]
+    )
+    scores = np.isfinite(keypoints_px).all(axis=-1).astype(float)
+    return [Detections(*person, np.ones(1)) for person in zip(keypoints_px, scores, strict=True)]
 
 
 def wrong_intrinsics(camera: Camera, amounts: Amounts, rng: np.random.Generator) -> Camera:
@@ -106,30 +116,24 @@ def wrong_poses(
     Raises
     ------
     InputError
-        If the recording has no joints, or they do not give its poses.
+        If the recording's joints do not give its poses.
     """
-    joints, columns = rec.read_joints(recording), [f"{name}_rad" for name in HEAD_JOINTS]
-    path = recording.folder / rec.JOINTS_FILE
-    if joints is None or not set(columns) <= set(joints):
-        raise InputError(f"{path}: expected a table with {', '.join(columns)}")
-    angles_rad, icub = joints.sort_values("frame")[columns].to_numpy(), load_icub()
+    columns, icub = [f"{name}_rad" for name in HEAD_JOINTS], load_icub()
+    joints = rec.read_joints(recording).sort_values("frame").reindex(columns=columns)
+    angles_rad, recorded = joints.to_numpy(), recording.T_base_cam
     given = {mount: icub.T_root_camera(angles_rad, mount) for mount in icub.T_head_camera}
-    mounts = [mount for mount, T in given.items() if _is_same(T, recording.T_base_cam)]
+    mounts = [mount for mount, T in given.items() if _is_same(T, recorded)]
     if not mounts:
         raise InputError(
-            f"{path}: the joints do not give the camera poses with any of the holders {', '.join(given)}; "
-            "record both with the same robot model"
+            f"{recording.folder / rec.JOINTS_FILE}: the joints ({', '.join(columns)}) do not give the camera "
+            f"poses with any of the holders {', '.join(given)}; record both with the same robot model"
         )
     off_rad = angles_rad + rng.normal(0, amounts.joint_offset_rad, len(columns))
     moved = np.eye(4)
     moved[:3, :3] = rotation(rng.normal(0, amounts.mount_rad, 3))
     moved[:3, 3] = rng.normal(0, amounts.mount_m, 3)
-    by_joints = {False: recording.T_base_cam, True: icub.T_root_camera(off_rad, mounts[0])}
-    return {
-        (off, is_moved): T @ moved if is_moved else T
-        for off, T in by_joints.items()
-        for is_moved in (False, True)
-    }
+    poses = {(False, False): recorded, (True, False): icub.T_root_camera(off_rad, mounts[0])}
+    return poses | {(is_off, True): T @ moved for (is_off, _), T in poses.items()}
 
 
 def _is_same(T_base_cam: np.ndarray, recorded: np.ndarray) -> bool:

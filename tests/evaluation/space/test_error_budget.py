@@ -10,10 +10,9 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.evaluation.space import error_budget as b
 from hicp_lib.evaluation.space import error_sources as s
 from hicp_lib.recordings.recording import read_truth
-from tests.evaluation.space.wall import BEHIND_M, CAMERA, DEPTH_ERROR_M, N, NOTHING, WALL_M, wall_recording
+from tests.evaluation.space.wall import BEHIND_M, CAMERA, DEPTH_ERROR_M, NOTHING, WALL_M, N, wall_recording
 
 PIXEL_ERROR_PX, OFFSET_RAD, SHARE = 6.0, 0.01, 0.02
-CASE = ("upper", 0)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +32,7 @@ def found(recording):
 @pytest.fixture(scope="module")
 def errors(recording, found):
     amounts = replace(NOTHING, joint_offset_rad=OFFSET_RAD, focal_share=SHARE)
-    return b.keypoint_errors({CASE: recording}, {CASE: found}, {}, amounts, seed=2)
+    return b.keypoint_errors(recording, found, None, amounts, seed=2)
 
 
 def of_paper(errors, source):
@@ -60,12 +59,13 @@ def test_errors_put_in_come_out_alone(errors):
 
 
 def test_wrong_intrinsics_move_keypoints_off_the_middle_of_the_image(errors, recording):
-    share = np.random.default_rng([2, 0]).normal(0, SHARE)
+    share = np.random.default_rng(2).normal(0, SHARE)
     truth = read_truth(recording).set_index(["frame", "keypoint"])
     rows = errors[errors["method"] == "paper"]
     at = truth.loc[list(zip(rows["frame"], rows["keypoint"], strict=True))]
     sine = np.linalg.norm(
-        (at[["u_px", "v_px"]] - (CAMERA.cx_px, CAMERA.cy_px)) / (CAMERA.fx_px, CAMERA.fy_px), axis=1
+        (at[["u_px", "v_px"]].to_numpy() - (CAMERA.cx_px, CAMERA.cy_px)) / (CAMERA.fx_px, CAMERA.fy_px),
+        axis=1,
     )
     depth_m = rows["distance_m"].to_numpy() / np.sqrt(1 + sine**2)
     expected_m = abs(1 / (1 + share) - 1) * sine * depth_m
@@ -73,7 +73,7 @@ def test_wrong_intrinsics_move_keypoints_off_the_middle_of_the_image(errors, rec
 
 
 def test_joint_offsets_move_as_the_camera_that_they_move(errors, recording):
-    rng = np.random.default_rng([2, 0])
+    rng = np.random.default_rng(2)
     amounts = replace(NOTHING, joint_offset_rad=OFFSET_RAD, focal_share=SHARE)
     s.wrong_intrinsics(recording.intrinsics, amounts, rng)
     off = s.wrong_poses(recording, amounts, rng)[True, False] @ np.linalg.inv(recording.T_base_cam)
@@ -85,25 +85,24 @@ def test_joint_offsets_move_as_the_camera_that_they_move(errors, recording):
     assert row[f"{s.OFFSETS}, alone"] == pytest.approx(np.linalg.norm(moved_m - true_m), abs=1e-6)
 
 
-def test_a_limb_across_the_line_of_sight_is_told_from_one_along_it():
-    true_m = np.zeros((1, len(b._KEYPOINTS), 3))
-    for name, at in (
-        ("left_elbow", (-1, 0, 0)),
-        ("left_wrist", (-0.7, 0, 0)),
-        ("left_shoulder", (-1, 0, 0.3)),
-    ):
-        true_m[0, b._KEYPOINTS.index(name)] = at
-    true_m[0, [b._KEYPOINTS.index(f"right_{joint}") for joint in ("elbow", "wrist", "shoulder")]] = [
-        (-1, 1, 0), (-1, 1, 0.3), (-1, 1, -0.3)
-    ]  # fmt: skip
-    cosine = b._towards_camera(true_m, np.eye(4)[None])[0]
-    assert cosine[b._KEYPOINTS.index("left_wrist")] == pytest.approx(1)
-    assert cosine[b._KEYPOINTS.index("right_elbow")] == pytest.approx(0, abs=1e-9)
-    assert cosine[b._KEYPOINTS.index("left_shoulder")] == pytest.approx(0.3 / np.hypot(1, 0.3))
+def test_a_limb_along_the_line_of_sight_points_at_the_camera(errors, recording):
+    truth = read_truth(recording).set_index(["frame", "keypoint"])
+    rows = errors[errors["method"] == "paper"]
+    for part, ends in (("wrist", ("elbow", "wrist")), ("shoulder", ("elbow", "shoulder"))):
+        row = rows[rows["part"] == part].iloc[0]
+        side = row["keypoint"].partition("_")[0]
+        near, far, at = (
+            truth.loc[(row["frame"], name), ["x_m", "y_m", "z_m"]].to_numpy(float)
+            for name in (*(f"{side}_{joint}" for joint in ends), row["keypoint"])
+        )
+        limb, sight = far - near, at - recording.T_base_cam[row["frame"], :3, 3]
+        cosine = limb @ sight / np.linalg.norm(limb) / np.linalg.norm(sight)
+        assert row["towards_camera"] == pytest.approx(abs(cosine))
+        assert row["distance_m"] == pytest.approx(np.linalg.norm(sight))
 
 
 def test_every_so_many_frames_count_by_their_own_number(recording, found, errors):
-    some = b.keypoint_errors({CASE: recording}, {CASE: found}, {}, NOTHING, every=5)
+    some = b.keypoint_errors(recording, found, None, NOTHING, every=5)
     assert set(some["frame"]) == set(range(0, N, 5))
     columns = ["keypoint", "frame", f"{s.SKIN}, alone"]
     both = some.loc[some["method"] == "paper", columns].merge(
@@ -117,7 +116,7 @@ def test_what_is_not_found_or_not_sure_does_not_count(recording, found):
     unsure = [replace(person, scores=np.full((1, 136), 0.05)) for person in found]
     nobody = [Detections.none()] * N
     for detections in (unsure, nobody):
-        assert b.keypoint_errors({CASE: recording}, {CASE: detections}, {}, NOTHING).empty
+        assert b.keypoint_errors(recording, detections, None, NOTHING).empty
 
 
 def made_up(n_people, noise=0.0):
@@ -130,6 +129,7 @@ def made_up(n_people, noise=0.0):
             f"without {s.SKIN}": 0.04,
         }
         row |= {b.IN_BASE: 0.05, b.AGAINST_MOCAP: 0.045}
+        row |= {f"{s.REGISTRATION}, alone": 0.01, f"without {s.REGISTRATION}": 0.05}
         worse = 0.01 * (subject == 0)
         row = {state: value + worse * (value > 0) for state, value in row.items()}
         labels = {"view": "upper", "subject": subject, "method": "paper", "part": "wrist"}
@@ -144,18 +144,28 @@ def made_up(n_people, noise=0.0):
 
 
 def test_the_budget_is_the_mean_of_peoples_medians():
-    table = b.error_budget(made_up(12), n_resamples=200).set_index("source")
-    assert list(table.index) == [b.ALL, b.AGAINST_MOCAP, b.IN_BASE, s.SKIN]  # what moves nothing is not there
-    assert table.loc[s.SKIN, "alone_m"] == pytest.approx(0.03 + 0.01 / 12)
-    assert table.loc[s.SKIN, "gain_m"] == pytest.approx(0.01)
-    assert table.loc[b.AGAINST_MOCAP, "gain_m"] == pytest.approx(0.005)
-    assert table.loc[s.SKIN, "alone_low_m"] < table.loc[s.SKIN, "alone_m"] < table.loc[s.SKIN, "alone_high_m"]
+    table = b.error_budget(made_up(12), n_resamples=200).set_index(["source", "kind"])
+    both = [(source, kind) for source in (s.SKIN, s.REGISTRATION) for kind in ("alone", "gain")]
+    assert list(table.index) == [
+        *((total, "total") for total in b.TOTALS),
+        *both,
+    ]  # what moves nothing is not
+    assert table.loc[(s.SKIN, "alone"), "value_m"] == pytest.approx(0.03 + 0.01 / 12)
+    assert table.loc[(s.SKIN, "gain"), "value_m"] == pytest.approx(0.01)
+    assert table.loc[(b.AGAINST_MOCAP, "total"), "value_m"] == pytest.approx(0.045 + 0.01 / 12)
+    low_m, value_m, high_m = table.loc[(s.SKIN, "alone"), ["low_m", "value_m", "high_m"]]
+    assert low_m < value_m < high_m
     assert (table["n_people"] == 12).all() and (table["n"] == 60).all()
+
+
+def test_without_motion_capture_there_is_one_total():
+    errors = made_up(3).assign(**{f"{s.REGISTRATION}, alone": 0.0})
+    assert list(b.error_budget(errors)["source"]) == [b.ALL, s.SKIN, s.SKIN]
 
 
 def test_few_people_have_no_interval():
     table = b.error_budget(made_up(3), n_resamples=200)
-    assert table["alone_low_m"].isna().all() and table["alone_m"].notna().all()
+    assert table["low_m"].isna().all() and table["value_m"].notna().all()
 
 
 def test_covariates_come_out_as_factors():
@@ -171,8 +181,3 @@ def test_covariates_come_out_as_factors():
 def test_a_covariate_that_never_changes_has_no_factor():
     table = b.covariates(made_up(12).assign(hidden=False), n_resamples=50)
     assert "hidden" not in set(table["covariate"]) and len(table) == 2
-
-
-def test_recordings_without_truth_have_no_budget():
-    errors = b.keypoint_errors({}, {}, {}, NOTHING)
-    assert errors.empty and b.error_budget(errors).empty and b.covariates(errors).empty
