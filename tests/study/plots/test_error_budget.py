@@ -26,7 +26,7 @@ def test_marks_lie_at_the_errors_and_gains_in_centimetres():
     )
     figure = error_budget(table.assign(n_people=12, view="upper"), medians, "made up")
     wrists, fingers = figure.figure.axes
-    drawn = [(line.get_marker(), line.get_xdata().tolist()) for line in wrists.get_lines()]
+    drawn = [(line.get_marker(), list(line.get_xdata())) for line in wrists.get_lines()]
     for marker, at_cm in (("o", [5, 4]), ("o", [3]), ("D", [2]), ("|", [2.7])):
         assert (marker, pytest.approx(at_cm)) in drawn
     assert [label.get_text() for label in wrists.get_yticklabels()] == [ALL, AGAINST_MOCAP, "skin depth"]
