@@ -90,8 +90,8 @@ def wrong_intrinsics(camera: Camera, amounts: Amounts, rng: np.random.Generator)
     """The camera with another focal length and another centre of the image."""
     factor = 1 + rng.normal(0, amounts.focal_share)
     cx_px, cy_px = rng.normal((camera.cx_px, camera.cy_px), amounts.centre_px)
-    wrong_px = {"fx_px": factor * camera.fx_px, "fy_px": factor * camera.fy_px}
-    return replace(camera, cx_px=cx_px, cy_px=cy_px, **wrong_px)
+    fx_px, fy_px = factor * camera.fx_px, factor * camera.fy_px
+    return replace(camera, fx_px=fx_px, fy_px=fy_px, cx_px=cx_px, cy_px=cy_px)
 
 
 def wrong_poses(
@@ -119,8 +119,9 @@ def wrong_poses(
         If the recording's joints do not give its poses.
     """
     columns, icub = [f"{name}_rad" for name in HEAD_JOINTS], load_icub()
-    joints = rec.read_joints(recording).sort_values("frame").reindex(columns=columns)
-    angles_rad, recorded = joints.to_numpy(), recording.T_base_cam
+    joints, recorded = rec.read_joints(recording), recording.T_base_cam
+    joints = pd.DataFrame(columns=["frame"]) if joints is None else joints
+    angles_rad = joints.sort_values("frame").reindex(columns=columns).to_numpy(float)
     given = {mount: icub.T_root_camera(angles_rad, mount) for mount in icub.T_head_camera}
     mounts = [mount for mount, T in given.items() if _is_same(T, recorded)]
     if not mounts:
@@ -168,7 +169,8 @@ def reference_shifts(
         By source: the middle of two markers beside the joint (0 where there are none; NaN where one was not
         measured), the registration, and where the keypoint is an instant later.
     """
-    simulation, mocap = rec.read_simulation(recording), read_mocap(recording.mocap_path)
+    simulation = rec.read_simulation(recording) or {}
+    mocap = read_mocap(recording.mocap_path or recording.folder / rec.MOCAP_FILE)
     exact, n = np.array(simulation["T_base_mocap"]), len(JOINTS)
     means = marker_means(mocap, recording.times_s - simulation["mocap_offset_s"], exact)
     markers_m = np.zeros_like(true_m)
