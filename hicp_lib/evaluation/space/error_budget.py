@@ -84,7 +84,7 @@ def keypoint_errors(
         Of each frame; the best person counts.
     T_base_mocap : array or None, shape (4, 4)
         From clicks; None: the reference is the truth, not motion capture.
-    amounts : Amounts
+    amounts : s.Amounts
         What is off, and how much.
     every : int, optional
         The first frame counts, and every so many after it.

@@ -87,7 +87,22 @@ def true_detections(
 
 
 def wrong_intrinsics(camera: Camera, amounts: Amounts, rng: np.random.Generator) -> Camera:
-    """The camera with another focal length and another centre of the image."""
+    """The camera with another focal length and another centre of the image.
+
+    Parameters
+    ----------
+    camera : Camera
+        As it is.
+    amounts : Amounts
+        What is off, and how much.
+    rng : numpy.random.Generator
+        Of the draws.
+
+    Returns
+    -------
+    Camera
+        What it is taken for.
+    """
     factor = 1 + rng.normal(0, amounts.focal_share)
     cx_px, cy_px = rng.normal((camera.cx_px, camera.cy_px), amounts.centre_px)
     fx_px, fy_px = factor * camera.fx_px, factor * camera.fy_px
@@ -101,7 +116,7 @@ def wrong_poses(
 
     Parameters
     ----------
-    recording : Recording
+    recording : rec.Recording
         With joints.
     amounts : Amounts
         What is off, and how much.
@@ -152,7 +167,7 @@ def reference_shifts(
 
     Parameters
     ----------
-    recording : Recording
+    recording : rec.Recording
         Simulated, with motion capture.
     true_m : array, shape (n_frames, n_keypoints, 3)
         Where they are (base frame), `JOINTS` first.
