@@ -44,11 +44,14 @@ def error_budget(table: pd.DataFrame, paper: pd.DataFrame, note: str) -> Figure:
         axis.axvline(0, color="#888888", lw=0.8)
     axes[0, 0].set(yticks=[*rows.values()], yticklabels=[*rows], ylim=(max(rows.values()) + 0.6, -0.6))
     marks.legend_below(figure, axes, ncols=5)
+    theirs = (
+        f", against motion capture beside the medians of the paper's {in_words(paper['detector'].unique())}"
+    )
+    beside = theirs if AGAINST_MOCAP in rows else ""
     caption = (
         f"Error of keypoints by source, {table['n_people'].max()} people. Filled: all else true; hollow: "
         "what the error with everything falls by when this alone is true. Median of a person's keypoints, "
-        "mean over people with 95 % intervals; on top errors by many sources, against motion capture beside "
-        f"the medians of the paper's {in_words(paper['detector'].unique())}: {note}."
+        f"mean over people with 95 % intervals; on top errors by many sources{beside}: {note}."
     )
     first = table[table["kind"] == "alone"].sort_values("value_m", ascending=False)
     first = first.drop_duplicates(["part", "method"]).set_index(["part", "method", "source"])["value_m"]
