@@ -120,12 +120,13 @@ def keypoint_errors(
     counts = np.all([np.isfinite(at_m).all(axis=-1) for at_m in places_m], axis=0) & (visible > 0)
     frame, keypoint = np.nonzero(counts)
     limb_m, sight_m = true_m[:, _ENDS] - true_m[:, _ELBOWS], true_m - recording.T_base_cam[:, None, :3, 3]
-    cosine = (_unit(limb_m) * _unit(sight_m)).sum(axis=-1)
+    away_m = np.linalg.norm(sight_m, axis=-1)
+    cosine = (limb_m * sight_m).sum(axis=-1) / away_m / np.linalg.norm(limb_m, axis=-1)
     columns = {
         "keypoint": np.array(_KEYPOINTS)[keypoint],
         "part": np.array(_PARTS)[keypoint],
         "frame": frame,
-        "distance_m": np.linalg.norm(sight_m, axis=-1)[counts],
+        "distance_m": away_m[counts],
         "towards_camera": abs(cosine[counts]),
         "hidden": visible[counts] == 1,
     }
@@ -142,10 +143,6 @@ def keypoint_errors(
             columns[state] = np.linalg.norm(off_m[counts], axis=-1)
         tables.append(labelled(pd.DataFrame(columns), method=method))
     return pd.concat(tables, ignore_index=True)
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def _seen(

@@ -101,6 +101,25 @@ def test_a_limb_along_the_line_of_sight_points_at_the_camera(errors, recording):
         assert row["distance_m"] == pytest.approx(np.linalg.norm(sight))
 
 
+def test_motion_capture_moves_the_reference(recording, found, monkeypatch):
+    def shifts_m(recording, true_m, T_base_mocap, amounts, rng):
+        markers_m = np.full_like(true_m, 0.01)
+        markers_m[3] = np.nan  # a marker that was not measured
+        return {s.MARKERS: markers_m, s.CLOCK: np.full_like(true_m, (0.0, 0.0, 0.02))}
+
+    monkeypatch.setattr(s, "reference_shifts", shifts_m)
+    errors = b.keypoint_errors(recording, found, np.eye(4), NOTHING)
+    assert 3 not in set(errors["frame"])
+    np.testing.assert_allclose(errors[f"{s.MARKERS}, alone"], 0.01 * np.sqrt(3), atol=1e-6)
+    np.testing.assert_allclose(errors[f"{s.CLOCK}, alone"], 0.02, atol=1e-6)
+    # nothing else of motion capture is off: the robot's frame differs by both
+    without = b.keypoint_errors(recording, found, None, NOTHING)
+    both = errors.merge(without, on=["method", "keypoint", "frame"], suffixes=("", "_without"))
+    np.testing.assert_allclose(both[b.IN_BASE], both[f"{b.ALL}_without"])
+    np.testing.assert_allclose(both[b.AGAINST_MOCAP], both[b.ALL])
+    assert (both[b.ALL] - both[b.IN_BASE]).abs().median() > 0.005
+
+
 def test_every_so_many_frames_count_by_their_own_number(recording, found, errors):
     some = b.keypoint_errors(recording, found, None, NOTHING, every=5)
     assert set(some["frame"]) == set(range(0, N, 5))
