@@ -4,7 +4,6 @@ Amounts of what is calibrated are drawn once per person, as if each came to a ro
 all their frames.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +30,7 @@ OFFSETS, MOUNT, INTRINSICS = "joint offsets", "camera mount", "intrinsics"
 SOURCES = (SKIN, SENSOR, PIXEL, MARKERS, REGISTRATION, CLOCK, OFFSETS, MOUNT, INTRINSICS)
 
 _SAME_POSE_M = 1e-3
-WITHOUT_FACE = [k for k in range(N_KEYPOINTS) if k not in FACE]
+WITHOUT_FACE = np.setdiff1d(np.arange(N_KEYPOINTS), FACE)
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class Amounts:
 
 
 def true_detections(
-    truth: pd.DataFrame, n_frames: int, keypoints: Sequence[int] = WITHOUT_FACE
+    truth: pd.DataFrame, n_frames: int, keypoints: np.ndarray = WITHOUT_FACE
 ) -> list[Detections]:
     """The true pixels as if detected, hidden ones too, one person per frame.
 
@@ -70,7 +69,7 @@ def true_detections(
         As from `read_truth`.
     n_frames : int
         Number of images.
-    keypoints : sequence of int, optional
+    keypoints : array of int, optional
         Indices of those detected. Those of the face decide on no other's depth.
 
     Returns
