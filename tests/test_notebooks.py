@@ -128,6 +128,18 @@ def test_every_line_of_a_profile_says_what_it_asks_for():
     assert [line for line in lines if "=" in line and not re.search(r"  # \S", line)] == []
 
 
+@pytest.mark.parametrize("name", ["quick", "full"])
+def test_the_error_budget_looks_at_what_other_pages_have_rendered(name):
+    notebooks = read_notebooks(CHECKOUT / "notebooks")
+    changed = read_profile(CHECKOUT / "notebooks" / "profiles.toml", name, notebooks).parameters
+    values = {one.name: one.defaults | changed.get(one.name, {}) for one in notebooks}
+    budget = values["04b_error_budget"]
+    for page, frames in (("03_relative_3d", "n_images"), ("04_mocap_3d", "n_frames")):
+        assert budget[frames] == values[page]["n_frames"] and budget["seed"] == values[page]["seed"]
+        assert budget["n_people"] <= values[page]["n_people"]
+        assert budget["detector"] in values[page]["detectors"]
+
+
 def test_a_page_shows_data_at_work_and_one_figure_to_try(path, notebook):
     tagged = [cell for tag in SHOWING for cell in notebook.cells if tag in cell.metadata.get("tags", [])]
     assert [cell.cell_type for cell in tagged] == ["code", "code"]

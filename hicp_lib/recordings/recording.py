@@ -31,6 +31,8 @@ CAMERA_FILE, RGB_LIST, DEPTH_LIST, POSES_FILE = "camera.json", "rgb.txt", "depth
 MOCAP_FILE = "mocap.tsv"
 TRUTH_FILE, JOINTS_FILE, SIMULATION_FILE = "truth.parquet", "joints.parquet", "simulation.json"
 EXACT_DEPTH_DIR = "exact_depth"
+PER_FRAME = ("times_s", "rgb_paths", "depth_paths", "T_base_cam")
+"""Attributes of a recording with an entry for each frame."""
 _TRUTH_COLUMNS = ("frame", "t_s", "keypoint", "x_m", "y_m", "z_m", "u_px", "v_px", "visible")
 
 
@@ -130,8 +132,7 @@ def first_frames(recording: Recording, n: int) -> Recording:
     """
     if n < 1:
         raise InputError(f"{recording.folder}: {n} frames were asked for; expected at least 1")
-    per_frame = ("times_s", "rgb_paths", "depth_paths", "T_base_cam")
-    return replace(recording, **{name: getattr(recording, name)[:n] for name in per_frame})
+    return replace(recording, **{name: getattr(recording, name)[:n] for name in PER_FRAME})
 
 
 def associate_frames(

@@ -7,14 +7,14 @@ image that lean towards the skin in sight may bring a detector below it.
 
 from collections.abc import Sequence
 
-import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.keypoints import BODY, N_KEYPOINTS, NAMES
+from hicp_lib.core.keypoints import BODY
 from hicp_lib.evaluation.cases import labelled, over_people
+from hicp_lib.evaluation.space.error_sources import true_detections
 from hicp_lib.evaluation.space.mocap_error import MIN_SCORES, TABLE_JOINTS, median_errors, mocap_errors
-from hicp_lib.evaluation.space.stability import POSITION, position_array
+from hicp_lib.evaluation.space.stability import POSITION
 from hicp_lib.lifting.table import lift_pixels
 from hicp_lib.recordings.recording import Recording, read_truth
 from hicp_lib.study.plots.palette import PERFECT
@@ -34,13 +34,7 @@ def perfect_detections(recording: Recording) -> dict[str, list[Detections]]:
         Under `PERFECT`, in the order of the frames; empty where the truth is not known.
     """
     truth = read_truth(recording)
-    if truth is None:
-        return {}
-    keypoints_px = np.full((len(recording), 1, N_KEYPOINTS, 2), np.nan)
-    names, columns = [NAMES[k] for k in BODY], ["u_px", "v_px", "u_px"]
-    keypoints_px[:, 0, BODY] = position_array(truth, names, len(recording), columns)[..., :2]
-    scores = np.isfinite(keypoints_px[..., 0]).astype(float)
-    return {PERFECT: [Detections(*person, np.ones(1)) for person in zip(keypoints_px, scores, strict=True)]}
+    return {} if truth is None else {PERFECT: true_detections(truth, len(recording), BODY)}
 
 
 def medians_by_radius(
