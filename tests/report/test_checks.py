@@ -34,7 +34,10 @@ def test_a_sound_page_has_no_problem(tmp_path):
         ("<link rel='preload' as='font' href='https://x.example/a.woff'>", "loads from the network"),
         ("<img alt=a src='HTTPS://x.example/a.png'>", "loads from the network: <img src="),
         ("<iframe src='https://x.example'></iframe>", "loads from the network"),
-        ("<video aria-label=a poster='https://x.example/a.jpg'></video>", "loads from the network: <video poster="),
+        (
+            "<video aria-label=a poster='https://x.example/a.jpg'></video>",
+            "loads from the network: <video poster=",
+        ),
         ("<img alt=a srcset='//x.example/a.png 2x'>", "loads from the network: <img srcset="),
         ("<object data='https://x.example/a.svg'></object>", "loads from the network: <object data="),
         ("<track src='https://x.example/a.vtt'>", "loads from the network: <track src="),

@@ -11,6 +11,7 @@ from hicp_lib.robot.shape import SHAPE_FILE, robot_shape
 from hicp_lib.robot.skin import read_skin
 from tools.bake_robot import bake
 
+
 def test_the_file_is_what_the_tool_makes():
     arrays = bake()
     with np.load(SHAPE_FILE) as stored:
@@ -23,7 +24,9 @@ def test_the_file_is_what_the_tool_makes():
 @pytest.mark.parametrize("turned", [0.0, 0.4])
 def test_all_that_the_camera_may_see_is_taken_for_the_robot(icub, home, turned):
     """A keypoint on what is drawn is left out, whatever the posture."""
-    posture = home.moved("left", home.angles("left") + turned * np.array([0.3, 0, 0.5, 0, 1, 1, 0.5, 1, -0.5, 0.5]))
+    posture = home.moved(
+        "left", home.angles("left") + turned * np.array([0.3, 0, 0.5, 0, 1, 1, 0.5, 1, -0.5, 0.5])
+    )
     with np.load(SHAPE_FILE) as stored:
         links = stored["links"][stored["vertex_link"]]
     upper = ~np.isin(links, ["root", "head head", "camera"])  # the camera does not see legs and head
@@ -40,7 +43,9 @@ def test_taxels_lie_on_the_covers(icub, home):
     taxels_m, outward = read_skin().in_root(icub, home)
     nearest = np.linalg.norm(taxels_m[:, None] - middles_m, axis=-1).argmin(axis=1)
     above_m = np.einsum("ij,ij->i", taxels_m - middles_m[nearest], normals[nearest])
-    assert (np.einsum("ij,ij->i", outward, normals[nearest]) > 0.5).mean() > 0.9  # beside a pad, its edge is as near
+    assert (
+        np.einsum("ij,ij->i", outward, normals[nearest]) > 0.5
+    ).mean() > 0.9  # beside a pad, its edge is as near
     assert np.abs(above_m).max() < 0.008 and np.median(np.abs(above_m)) < 0.003
 
 
@@ -58,7 +63,10 @@ def test_both_sides_are_alike_and_solid(icub):
 
 def test_a_limb_turns_with_its_link_and_the_rest_stays(icub):
     still, bent = Posture(), Posture(left_rad=np.array([0, 0, 0, 1.0, 0, 0, 0]))
-    moved = np.linalg.norm(robot_shape(icub, still).vertices_m - robot_shape(icub, bent).vertices_m, axis=1) > 1e-5
+    moved = (
+        np.linalg.norm(robot_shape(icub, still).vertices_m - robot_shape(icub, bent).vertices_m, axis=1)
+        > 1e-5
+    )
     before = robot_shape(icub, still).vertices_m
     assert moved.any() and (before[moved][:, 1] < -0.05).all() and (before[moved][:, 2] < 0.06).all()
 
