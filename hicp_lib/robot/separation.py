@@ -2,7 +2,7 @@
 
 `S = S_h + S_r + S_s + C + Z_d + Z_r`: what the person covers until the robot stands, what the robot covers
 while it reacts and while it stops, how far a body reaches before it is noticed, and how uncertain the places
-of both are. The 2025 edition took this over from ISO/TS 15066:2016. Its text was not at hand: the terms are as
+of both are. The 2025 edition took this over from ISO/TS 15066:2016. Its text was not at hand: terms are as
 Marvel and Norcross (2017) describe those of the specification; whether the edition changes them is unsure.
 A yardstick: nothing in this project is a safety function.
 """
