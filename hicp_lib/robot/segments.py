@@ -10,7 +10,7 @@ import numpy as np
 from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
 
-_UPPER_ARM_M, _FOREARM_M, _HAND_M, _FINGERS_M = 0.035, 0.03, 0.025, 0.035
+_UPPER_ARM_M, _FOREARM_M, _HAND_M, _FINGERS_M = 0.035, 0.03, 0.025, 0.036
 _TIPS_M = 0.075  # from the origin of the hand's link along its x axis to the fingertips
 _CAPSULES = (
     ("torso", "root", "head torso", 0.07),

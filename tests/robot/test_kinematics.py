@@ -371,7 +371,7 @@ def test_segments_join_up():
 
 def test_the_thickness_of_every_part():
     radii_m = {segment.part: segment.radius_m for segment in body_segments(load_icub(), Posture())}
-    arm = {"upper_arm": 0.035, "forearm": 0.03, "hand": 0.025}
+    arm = {"upper_arm": 0.035, "forearm": 0.03, "hand": 0.025, "fingers": 0.036}
     assert radii_m == {
         "torso": 0.07, "shoulders": 0.05, "neck": 0.03, "head": 0.06,
         **{f"{side}_{part}": radius for side in ("left", "right") for part, radius in arm.items()},

@@ -1,6 +1,7 @@
 """Points on the robot itself are left out, others stay."""
 
 import numpy as np
+import pytest
 
 from hicp_lib.robot import self_filter
 from hicp_lib.robot.posture import Posture
@@ -35,10 +36,11 @@ def test_the_margin_is_two_centimetres_and_belongs_to_others(icub, home):
 
 
 def test_beyond_its_end_a_limb_is_round(icub, home):
-    hand = next(s for s in body_segments(icub, home) if s.part == "left_hand")
-    along = (hand.end_m - hand.start_m) / np.linalg.norm(hand.end_m - hand.start_m)
-    tip = hand.end_m + np.array([[0.1], [0.2]]) * along
-    np.testing.assert_allclose(self_distance_m(icub, home, tip), [0.1 - 0.025, 0.2 - 0.025], atol=1e-9)
+    fingers = next(s for s in body_segments(icub, home) if s.part == "left_fingers")
+    assert np.linalg.norm(fingers.end_m - fingers.start_m) == pytest.approx(0.075)
+    along = (fingers.end_m - fingers.start_m) / 0.075
+    tip = fingers.end_m + np.array([[0.1], [0.2]]) * along
+    np.testing.assert_allclose(self_distance_m(icub, home, tip), [0.1 - 0.036, 0.2 - 0.036], atol=1e-9)
 
 
 def test_limbs_run_between_the_origins_of_links(icub, home):
@@ -46,8 +48,8 @@ def test_limbs_run_between_the_origins_of_links(icub, home):
     radii_m = {s.part: s.radius_m for s in body_segments(icub, home)}
     assert radii_m == {
         "torso": 0.07, "shoulders": 0.05, "neck": 0.03, "head": 0.06,
-        "left_upper_arm": 0.035, "left_forearm": 0.03, "left_hand": 0.025,
-        "right_upper_arm": 0.035, "right_forearm": 0.03, "right_hand": 0.025,
+        "left_upper_arm": 0.035, "left_forearm": 0.03, "left_hand": 0.025, "left_fingers": 0.036,
+        "right_upper_arm": 0.035, "right_forearm": 0.03, "right_hand": 0.025, "right_fingers": 0.036,
     }  # fmt: skip
     hanging = {s.part: s for s in body_segments(icub, Posture())}
     np.testing.assert_allclose(hanging["shoulders"].start_m, (-0.010817, -0.110116, 0.1753), atol=1e-6)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -98,10 +99,16 @@ def test_the_stamp_says_what_was_run(study, shown, tmp_path):
 
 
 def test_an_animation_is_saved_whole_and_shown_with_its_words(study, shown):
-    study.animation("moves", b"RIFF....WEBP", "It <moves>.", 'An "arm"')
-    assert (study.folder / "moves.webp").read_bytes() == b"RIFF....WEBP"
-    assert 'src="data:image/webp;base64,' in shown[0] and 'alt="An &quot;arm&quot;"' in shown[0]
-    assert "It &lt;moves&gt;." in shown[0] and 'href="../results/quick/07_x/moves.webp"' in shown[0]
+    study.animation("moves", b"....ftypisom", "It <moves>.", 'An "arm"')
+    assert (study.folder / "moves.mp4").read_bytes() == b"....ftypisom"
+    assert 'src="data:video/mp4;base64,' in shown[0] and 'aria-label="An &quot;arm&quot;"' in shown[0]
+    assert "It &lt;moves&gt;." in shown[0] and 'href="../results/quick/07_x/moves.mp4"' in shown[0]
+
+
+def test_a_film_has_controls_and_waits_to_be_started(study, shown):
+    study.animation("moves", b"....ftypisom", "It moves.", "An arm")
+    (tag,) = re.findall("<video[^>]*>", shown[0])
+    assert " controls " in tag and "autoplay" not in tag
 
 
 def test_a_scene_is_described_and_carries_no_library_of_its_own(study, shown):

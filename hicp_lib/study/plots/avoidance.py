@@ -116,7 +116,8 @@ def separation_terms(separations: Mapping[str, Separation], note: str) -> Figure
     sums = [f"{name} {100 * separation.distance_m:.0f} cm" for name, separation in separations.items()]
     return Figure(
         figure,
-        f"Terms of the separation by ISO/TS 15066; nothing here is a safety function. Data: {note}.",
+        "Terms of the separation that ISO 10218-2:2025 asks for; nothing here is a safety function. Data: "
+        f"{note}.",
         f"Stacked bars: {in_words(sums)}.",
         separation_table(separations),
     )

@@ -57,10 +57,12 @@ def test_distance_is_that_to_a_single_vertex(spheres):
 def test_the_robot_is_drawn_where_it_is():
     icub = load_icub()
     posture = home_posture(icub)
-    vertices = in_root(np.concatenate([s.mesh.vertices_m for s in robot_surfaces(icub, posture)]))
+    (surface,) = robot_surfaces(icub, posture)
+    vertices = in_root(surface.mesh.vertices_m[surface.mesh.triangles].reshape(-1, 3))
     for side in ("left", "right"):
         hand_m = icub.chains[side].T_root_link("hand", posture.angles(side))[:3, 3]
-        assert np.linalg.norm(vertices - hand_m, axis=1).min() == pytest.approx(0.025, abs=0.004)
+        assert np.linalg.norm(vertices - hand_m, axis=1).min() < 0.012  # the link's origin lies on the palm
+    assert vertices[:, 2].max() < icub.chains["head"].T_root_link("torso", posture.angles("head"))[2, 3]
 
 
 @dataclass

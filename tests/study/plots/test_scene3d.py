@@ -9,7 +9,7 @@ from hicp_lib.recordings.recording import open_recording
 from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.posture import Posture
-from hicp_lib.robot.segments import body_segments
+from hicp_lib.robot.shape import robot_shape
 from hicp_lib.study.plots import scene3d
 
 CAMERA = Camera(width_px=64, height_px=48, fx_px=50, fy_px=50, cx_px=31.5, cy_px=23.5)
@@ -52,10 +52,13 @@ def test_the_cloud_is_thinned(recording):
 def test_the_scene_holds_robot_cameras_skeletons_and_truth(recording):
     medians = SKELETON.assign(view="upper", detector="mediapipe")
     figure = scene3d.scene(
-        {"upper": recording}, medians, body_segments(load_icub(), Posture()), {"upper": SKELETON}
+        {"upper": recording}, medians, robot_shape(load_icub(), Posture()), {"upper": SKELETON}
     )
     traces = {trace.name: trace for trace in figure.data}
     assert list(traces) == ["point cloud", "robot", "cameras (upper)", "mediapipe (upper)", "true skeleton"]
+    robot = traces["robot"]
+    assert len(robot.i) > 5000 and max(robot.k) < len(robot.x) == len(robot.vertexcolor)
+    assert min(robot.z) == pytest.approx(-0.6, abs=0.01)
     arm = traces["mediapipe (upper)"]
     np.testing.assert_allclose(
         arm.x[:2], [-0.8, -0.6], atol=1e-6

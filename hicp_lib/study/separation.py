@@ -1,0 +1,117 @@
+"""The separation that ISO 10218-2:2025 would ask for before each detector, from its runs of avoidance."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from scipy.spatial import cKDTree
+
+from hicp_lib.core.keypoints import N_KEYPOINTS
+from hicp_lib.experiments.avoidance.runs import Run
+from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
+from hicp_lib.robot.separation import ASSUMED, Brakes, Separation
+from hicp_lib.simulation.body.identities import split_members
+from hicp_lib.simulation.body.model import load_body, pose_body
+from hicp_lib.study.avoidance import sure_keypoints
+
+_COMES_NEAR = ("hand", "face", "scalp")  # regions of the body
+_EVERY = 4  # of their vertices one is looked at
+
+
+def separations(
+    runs: Sequence[Run],
+    errors: pd.DataFrame,
+    latencies_s: Mapping[str, float],
+    period_s: float,
+    brakes: Brakes = ASSUMED,
+    robot_uncertainty_m: float = 0.01,
+) -> dict[str, Separation]:
+    """The separation each detector would need; a detector that gave no keypoint near the hand has none.
+
+    Speeds of the hand and of the fastest joint are the highest in any of the runs. It takes a latency and a
+    control period to react; then `brakes` stop the arm. The uncertainty of the person's place is the 95th
+    percentile of the detector's errors near the hand, the intrusion `beyond_keypoints_m`.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    errors : pd.DataFrame
+        As from `hicp_lib.study.avoidance.keypoint_errors`.
+    latencies_s : mapping of str to float
+        From light to loop, by detector.
+    period_s : float
+        Of the controller.
+    brakes : Brakes, optional
+    robot_uncertainty_m : float, optional
+        Of the robot's own place (assumed: joint offsets and the camera's mount).
+
+    Returns
+    -------
+    dict of str to Separation
+        By detector.
+    """
+    hand_m_s, joint_rad_s = np.max([_speeds(run.cycles) for run in runs], axis=0)
+    place_m = errors[errors["near"]].groupby("detector")["error_m"].quantile(0.95)
+    return {
+        name: Separation(
+            robot_m_s=hand_m_s,
+            reaction_s=latency_s + period_s,
+            stopping_s=brakes.stopping_s(joint_rad_s),
+            brake_delay_s=brakes.delay_s,
+            intrusion_m=beyond_keypoints_m(_found(runs, name)),
+            human_uncertainty_m=float(place_m[name]),
+            robot_uncertainty_m=robot_uncertainty_m,
+        )
+        for name, latency_s in latencies_s.items()
+        if name in place_m.index
+    }
+
+
+def beyond_keypoints_m(found: np.ndarray) -> float:
+    """How far the skin of hands and head reaches beyond the nearest of some keypoints.
+
+    Our reading of the standard's intrusion distance for keypoints; over the adults of the body model that
+    everything is tuned on.
+
+    Parameters
+    ----------
+    found : array of bool, shape (136,)
+
+    Returns
+    -------
+    float
+        Infinite without keypoints.
+
+    Examples
+    --------
+    >>> wrists = np.isin(np.arange(136), [0, 9, 10])  # and the nose
+    >>> round(beyond_keypoints_m(wrists), 1), round(beyond_keypoints_m(np.ones(136, bool)), 1)
+    (0.2, 0.1)
+    """
+    if not found.any():
+        return np.inf
+    body = load_body()
+    skin = np.flatnonzero(body.in_regions(*_COMES_NEAR))[::_EVERY]
+    people = [pose_body(body, name, {}) for name in split_members("development")["bodies"]]
+    return max(
+        float(cKDTree(person.keypoints_m[found]).query(person.vertices_m[skin])[0].max()) for person in people
+    )
+
+
+def _found(runs: Sequence[Run], detector: str) -> np.ndarray:
+    """Which keypoints a detector has ever been sure of, (136,)."""
+    found = np.zeros(N_KEYPOINTS, bool)
+    for run in runs:
+        if run.job.condition.split(", ")[0] == detector:
+            for _, frame in run.frames.iterrows():
+                found |= sure_keypoints(frame)[1].any(axis=0)
+    return found
+
+
+def _speeds(cycles: pd.DataFrame) -> tuple[float, float]:
+    """The highest speed of the hand (m/s) and of any joint (rad/s)."""
+    angles_rad, t_s = cycles[[f"{joint}_rad" for joint in ARM_JOINTS]].to_numpy(), cycles["t_s"].to_numpy()
+    hand_m = load_icub().chains["left"].T_root_link("hand", angles_rad)[:, :3, 3]
+    steps_s = np.diff(t_s)
+    hand_m_s = np.linalg.norm(np.diff(hand_m, axis=0), axis=1) / steps_s
+    return float(hand_m_s.max()), float((np.abs(np.diff(angles_rad, axis=0)) / steps_s[:, None]).max())
