@@ -1,13 +1,13 @@
-"""What avoidance was worth over people: how near they came, how soon the robot gave way and came back, and why not."""
+"""What avoidance was worth over people: how near they came, how soon the robot gave way, and why not."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-from scipy.stats import binomtest
 
 from hicp_lib.core.keypoints import HEAD, mirror
 from hicp_lib.evaluation.statistics.proportions import mean_with_interval
+from hicp_lib.experiments.avoidance.closed_loop import Latency
 from hicp_lib.experiments.avoidance.error_model import GROUPS, found_groups
 from hicp_lib.experiments.avoidance.reaching import LEAVES_S, PHASES_S, SCRIPTS
 from hicp_lib.experiments.avoidance.runs import IDEAL, Run, keypoints_m
@@ -26,6 +26,7 @@ MOVED_M = 0.005  # the hand has begun to give way
 LOST_S = 0.5  # without a sighting for longer, the robot has forgotten
 AT_HEAD_M = 0.15  # a keypoint of the head this near a true one is on the head
 ENOUGH_SHARE = 0.5  # of the images; a head that is found in fewer is the reason
+Z = 1.96  # of 95 %
 BACK_M = 0.02  # the hand is back at its post
 SURE = 0.3  # the paper's threshold for scores
 
@@ -61,7 +62,7 @@ def over_people(table: pd.DataFrame, by: Sequence[str], of: str = "min_distance_
     pd.DataFrame
         Columns `by`; `value, low, high`, the mean and its 95 % interval over people (none from fewer than ten);
         for each of `MARKS_M` as `kept_5cm` the share of people with as much, `kept_5cm_low`, `kept_5cm_high`
-        (exact 95 % interval); `n_people`.
+        (Wilson's 95 % interval); `n_people`.
 
     Examples
     --------
@@ -73,13 +74,21 @@ def over_people(table: pd.DataFrame, by: Sequence[str], of: str = "min_distance_
     for group, part in table.groupby(list(by), sort=False):
         people = part["script"] + part["subject"].astype(str)
         row = dict(zip(by, group, strict=True))
-        row |= dict(zip(("value", "low", "high"), mean_with_interval(part[of], people), strict=True))
+        row |= dict(
+            zip(("value", "low", "high"), mean_with_interval(part[of], people, subjects=people), strict=True)
+        )
         for mark_m in MARKS_M:
             kept, name = part[of] >= mark_m, f"kept_{100 * mark_m:.0f}cm"
-            bounds = binomtest(int(kept.sum()), len(kept)).proportion_ci()
-            row |= {name: kept.mean(), f"{name}_low": bounds.low, f"{name}_high": bounds.high}
+            low, high = _wilson(int(kept.sum()), len(kept))
+            row |= {name: kept.mean(), f"{name}_low": low, f"{name}_high": high}
         rows.append(row | {"n_people": people.nunique()})
     return pd.DataFrame(rows)
+
+
+def _wilson(k: int, n: int) -> tuple[float, float]:
+    """Wilson's score interval of a share k/n."""
+    centre, half = (k + Z**2 / 2) / (n + Z**2), Z / (n + Z**2) * np.sqrt(k * (n - k) / n + Z**2 / 4)
+    return centre - half, centre + half
 
 
 def reasons(table: pd.DataFrame) -> pd.DataFrame:
@@ -99,6 +108,66 @@ def reasons(table: pd.DataFrame) -> pd.DataFrame:
     failed = failed.assign(why=[_why(row) for row in failed.itertuples()])
     counts = failed.groupby(["detector", "gains", "why"], sort=False).size()
     return counts.rename("n_people").reset_index()
+
+
+def false_retreats(table: pd.DataFrame) -> pd.DataFrame:
+    """Whom the arm moved for, of bystanders.
+
+    Parameters
+    ----------
+    table : pd.DataFrame
+        As from `metrics`.
+
+    Returns
+    -------
+    pd.DataFrame
+        Columns `script, detector, value, low, high` (share of people, Wilson's interval), `retreat_m` (the
+        largest), `n_people`.
+    """
+    rows = []
+    for (script, detector), part in table.groupby(["script", "detector"], sort=False):
+        moved, n = int((part["retreat_m"] > MOVED_M).sum()), len(part)
+        row = {"script": script, "detector": detector, "value": moved / n}
+        row |= dict(zip(("low", "high"), _wilson(moved, n), strict=True))
+        rows.append(row | {"retreat_m": part["retreat_m"].max(), "n_people": n})
+    return pd.DataFrame(rows)
+
+
+def model_check(table: pd.DataFrame, swept: pd.DataFrame, follow_m_s: float) -> pd.DataFrame:
+    """First reaches of rendered people beside those with modelled errors, with our gains.
+
+    Parameters
+    ----------
+    table : pd.DataFrame
+        As from `metrics`.
+    swept : pd.DataFrame
+        As from `sweeps.sweep`; has the same people, following as fast, at the same latencies.
+    follow_m_s : float
+
+    Returns
+    -------
+    pd.DataFrame
+        Columns `detector, rendered_m, modelled_m` (means over people), `apart_m` (root mean square of the
+        differences between runs of a person), `n_people`.
+    """
+    same = swept[(swept["follow_m_s"] == follow_m_s) & (swept["lost_share"] == 0)]
+    keys = ["script", "subject", "detector", "gains"]
+    both = table.merge(same.drop(columns="latency_s"), on=keys, suffixes=("", "_modelled"))
+    both = both[~both["detector"].isin(IDEAL)].assign(
+        squared=lambda rows: (rows["reach_m"] - rows["reach_m_modelled"]) ** 2
+    )
+    by = both.groupby("detector", sort=False)
+    columns = {"rendered_m": by["reach_m"].mean(), "modelled_m": by["reach_m_modelled"].mean()}
+    columns |= {"apart_m": by["squared"].mean() ** 0.5, "n_people": by.size()}
+    return pd.DataFrame(columns).reset_index()
+
+
+def curves(swept: pd.DataFrame, latencies: Mapping[str, Latency]) -> dict[str, pd.DataFrame]:
+    """The rows of each curve, by the column that was swept; see `sweeps.variants`."""
+    stated_s = swept["detector"].map({name: latency.total_s for name, latency in latencies.items()}).fillna(0.0)
+    still, whole, stated = swept["follow_m_s"] == 0, swept["lost_share"] == 0, swept["latency_s"] == stated_s
+    kept = {"latency_s": still & whole, "lost_share": still & stated, "follow_m_s": whole & stated}
+    return {column: swept[rows].sort_values(column, kind="stable") for column, rows in kept.items()}
 
 
 def sightings(runs: Iterable[Run]) -> pd.DataFrame:
@@ -168,7 +237,9 @@ def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> d
         By detector; the terms of ISO/TS 15066.
     """
     runs = list(runs)
-    robot_m_s = max(float((run.cycles["hand_error_m"].diff() / run.cycles["t_s"].diff()).abs().max()) for run in runs)
+    robot_m_s = max(
+        float((run.cycles["hand_error_m"].diff() / run.cycles["t_s"].diff()).abs().max()) for run in runs
+    )
     delays_s = {run.job.detector: run.job.latency.total_s for run in runs if run.job.detector not in IDEAL}
     by_detector = errors[errors["near"]].groupby("detector")["error_m"].quantile(0.95)
     return {
@@ -176,13 +247,6 @@ def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> d
         for name, delay_s in delays_s.items()
         if name in by_detector.index
     }
-
-
-def error_quantiles(errors: pd.DataFrame) -> pd.DataFrame:
-    """Of `keypoint_errors` near the hand: columns `script, detector, n_keypoints, median_m, p95_m`."""
-    by = errors[errors["near"]].groupby(["script", "detector"], sort=False)["error_m"]
-    columns = {"n_keypoints": by.size(), "median_m": by.median(), "p95_m": by.quantile(0.95)}
-    return pd.DataFrame(columns).reset_index()
 
 
 def measured_times(runs: Iterable[Run]) -> pd.DataFrame:
@@ -194,7 +258,9 @@ def measured_times(runs: Iterable[Run]) -> pd.DataFrame:
     rows: dict[str, list[np.ndarray]] = {}
     stated = {run.job.detector: run.job.latency for run in runs if len(run.frames)}
     for run in runs:
-        rows.setdefault(run.job.detector, []).append(run.frames["time_ms"].to_numpy()[1:] if len(run.frames) else [])
+        rows.setdefault(run.job.detector, []).append(
+            run.frames["time_ms"].to_numpy()[1:] if len(run.frames) else []
+        )
     table = []
     for detector, latency in stated.items():
         times_ms = np.concatenate(rows[detector])
@@ -208,7 +274,12 @@ def _metrics(run: Run) -> dict:
     cycles, job = run.cycles, run.job
     t, distance, away = (cycles[name].to_numpy() for name in ("t_s", "distance_m", "hand_error_m"))
     period_s = t[1] - t[0]
-    row = {"script": job.trial.script, "subject": job.trial.subject.number, "detector": job.detector, "gains": job.gains}
+    row = {
+        "script": job.trial.script,
+        "subject": job.trial.subject.number,
+        "detector": job.detector,
+        "gains": job.gains,
+    }
     row |= {"latency_s": job.latency.total_s} | least_distances(cycles)
     row |= {f"under_{round(100 * m)}cm_s": period_s * (distance < m).sum() for m in MARKS_M}
     row["reaction_s"] = _first(t, away > MOVED_M) - _crossing_s(t, distance)

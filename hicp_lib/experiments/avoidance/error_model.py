@@ -7,7 +7,6 @@ image to image. All of it is estimated per group, in the robot's root frame. Wha
 away from the person's own is not modelled: it counts as lost.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np

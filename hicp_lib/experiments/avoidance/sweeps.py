@@ -4,8 +4,9 @@ Of every run only the least distances are kept, so that latencies, losses and sp
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 
 import pandas as pd
 
@@ -43,6 +44,44 @@ class Variant:
     burst_images: float = 1.0
 
 
+def variants(
+    trials: Sequence[Trial],
+    latencies: Mapping[str, Latency],
+    models: Mapping[str, ErrorModel],
+    speeds_m_s: Sequence[float] = (),
+    latencies_s: Sequence[float] = (),
+    losses: Sequence[float] = (),
+) -> list[Variant]:
+    """One thing swept at a time, for true keypoints and every model, with every person.
+
+    Latencies and losses are swept with people who do not follow, losses and speeds at the stated latency.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+    latencies : mapping of str to Latency
+        Stated, by detector.
+    models : mapping of str to ErrorModel
+        By detector.
+    speeds_m_s, latencies_s, losses : sequence of float
+        What is swept.
+
+    Returns
+    -------
+    list of Variant
+        Without repetition.
+    """
+    found: dict[Variant, None] = {}
+    for trial, name in product(trials, [TRUE_KEYPOINTS, *models]):
+        stated, still = latencies.get(name, Latency()), replace(trial, follow_m_s=0.0)
+        burst = models[name].burst_images if name in models else 1.0
+        at = partial(Variant, detector=name, burst_images=burst)
+        found |= dict.fromkeys(at(replace(trial, follow_m_s=v), latency=stated) for v in speeds_m_s)
+        found |= dict.fromkeys(at(still, latency=Latency(transport_s=v)) for v in latencies_s)
+        found |= dict.fromkeys(at(still, latency=stated, lost_share=v) for v in losses)
+    return list(found)
+
+
 def least_distances(cycles: pd.DataFrame) -> dict[str, float]:
     """How near the person came: `reach_m` until their first reach ended, `min_distance_m` until they left."""
     distance_m, t_s = cycles["distance_m"], cycles["t_s"]
@@ -61,8 +100,8 @@ def sweep(variants: Sequence[Variant], models: Mapping[str, ErrorModel]) -> pd.D
     Returns
     -------
     pd.DataFrame
-        A row per variant, in their order: `script, subject, follow_m_s, detector, gains, latency_s, lost_share,
-        reach_m, min_distance_m`.
+        A row per variant, in their order: `script, subject, follow_m_s, detector, gains, latency_s,
+        lost_share, reach_m, min_distance_m`.
     """
     by_person: dict[tuple[str, Subject], list[int]] = {}
     for row, variant in enumerate(variants):
