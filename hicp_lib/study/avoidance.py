@@ -36,11 +36,12 @@ def metrics(runs: Iterable[Run]) -> pd.DataFrame:
 
     Columns: `script`, `subject`, `detector`, `gains`, `latency_s`, `reach_m` and `min_distance_m` (see
     `sweeps.least_distances`), `under_5cm_s`, `under_10cm_s`, `reaction_s` (from the person's coming within
-    `CROSSED_M` to the first motion), `retreat_m` (the hand's largest distance from its post), `false_retreats`
-    (begun while the person was farther than `FIELD_M`), `idle_error_m` (the hand's mean error before the person
-    moves), `back_s` (from the person's having left to the hand's being back), `seen_share` (of the images taken
-    while the person is near, those with any sure keypoint in space), `head_share` (those with one of the head
-    that is on the head), `blind_s` (longest time the person was near with nothing new seen of them).
+    `CROSSED_M` to the first motion), `retreat_m` (the hand's largest distance from its post),
+    `false_retreats` (begun while the person was farther than `FIELD_M`), `idle_error_m` (the hand's mean
+    error before the person moves), `back_s` (from the person's having left to the hand's being back),
+    `seen_share` (of the images taken while the person is near, those with any sure keypoint in space),
+    `head_share` (those with one of the head that is on the head), `blind_s` (longest time the person was near
+    with nothing new seen of them).
     """
     return pd.DataFrame([_metrics(run) for run in runs])
 
@@ -60,13 +61,14 @@ def over_people(table: pd.DataFrame, by: Sequence[str], of: str = "min_distance_
     Returns
     -------
     pd.DataFrame
-        Columns `by`; `value, low, high`, the mean and its 95 % interval over people (none from fewer than ten);
-        for each of `MARKS_M` as `kept_5cm` the share of people with as much, `kept_5cm_low`, `kept_5cm_high`
-        (Wilson's 95 % interval); `n_people`.
+        Columns `by`; `value, low, high`, the mean and its 95 % interval over people (none from fewer than
+        ten); for each of `MARKS_M` as `kept_5cm` the share of people with as much, `kept_5cm_low`,
+        `kept_5cm_high` (Wilson's 95 % interval); `n_people`.
 
     Examples
     --------
-    >>> runs = pd.DataFrame({"detector": "a", "script": "b", "subject": [0, 1], "min_distance_m": [0.04, 0.12]})
+    >>> runs = pd.DataFrame({"detector": "a", "script": "b", "subject": [0, 1]})
+    >>> runs["min_distance_m"] = 0.04, 0.12
     >>> over_people(runs, ["detector"])[["value", "kept_5cm", "n_people"]].values.tolist()
     [[0.08, 0.5, 2.0]]
     """
@@ -164,7 +166,9 @@ def model_check(table: pd.DataFrame, swept: pd.DataFrame, follow_m_s: float) -> 
 
 def curves(swept: pd.DataFrame, latencies: Mapping[str, Latency]) -> dict[str, pd.DataFrame]:
     """The rows of each curve, by the column that was swept; see `sweeps.variants`."""
-    stated_s = swept["detector"].map({name: latency.total_s for name, latency in latencies.items()}).fillna(0.0)
+    stated_s = (
+        swept["detector"].map({name: latency.total_s for name, latency in latencies.items()}).fillna(0.0)
+    )
     still, whole, stated = swept["follow_m_s"] == 0, swept["lost_share"] == 0, swept["latency_s"] == stated_s
     kept = {"latency_s": still & whole, "lost_share": still & stated, "follow_m_s": whole & stated}
     return {column: swept[rows].sort_values(column, kind="stable") for column, rows in kept.items()}
@@ -252,8 +256,9 @@ def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> d
 def measured_times(runs: Iterable[Run]) -> pd.DataFrame:
     """What detector and lifting took per image when the runs were first simulated, beside what is stated.
 
-    Columns: `detector`, `inference_s` and `latency_s` as stated, `median_ms`, `p99_ms`, `within_share` (of the
-    images, those that took no longer than `inference_s`). The first image of a run is left out: the detector is made ready with it.
+    Columns: `detector`, `inference_s` and `latency_s` as stated, `median_ms`, `p99_ms`, `within_share` (of
+    the images, those that took no longer than `inference_s`). The first image of a run is left out: the
+    detector is made ready with it.
     """
     rows: dict[str, list[np.ndarray]] = {}
     stated = {run.job.detector: run.job.latency for run in runs if len(run.frames)}

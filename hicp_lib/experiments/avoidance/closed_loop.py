@@ -1,8 +1,8 @@
 """The loop closed in simulation: the robot sees the person, gives way, and sees from its new posture.
 
-Time advances in the controller's periods. Joints follow their velocities exactly, but are read with noise. The
-camera runs on its own; whenever the detector is free, it takes the next image, and what it makes of that reaches
-the loop after a stated latency. The person, too, sees the robot, and follows its hand.
+Time advances in the controller's periods. Joints follow their velocities exactly, but are read with noise.
+The camera runs on its own; whenever the detector is free, it takes the next image, and what it makes of that
+reaches the loop after a stated latency. The person, too, sees the robot, and follows its hand.
 """
 
 from collections import deque
@@ -161,7 +161,7 @@ class Follower:
         self._followed_m = [np.array(HOME_M["left"])]  # every `_POSED_S`
 
     def see(self, time_s: float, hand_m: np.ndarray) -> None:
-        """Where the robot's hand is at a time; called in the order of time, at least every `REACTION_S` / 2."""
+        """Where the robot's hand is at a time; called in the order of time, every `REACTION_S` / 2 or oftener."""
         self._hands.append((time_s, hand_m))
         while len(self._followed_m) * _POSED_S < min(time_s + REACTION_S / 2, LEAVES_S[0]) + 1e-9:
             then_s, last_m = len(self._followed_m) * _POSED_S - REACTION_S, self._followed_m[-1]
@@ -222,10 +222,10 @@ def simulate(
     Returns
     -------
     pd.DataFrame
-        A row per two control periods: `t_s`, `distance_m` between robot and person, `activations` of all taxels
-        (a list) and `activation`, the highest, `status`, `hand_error_m` (from the post), a column per joint in
-        radians, `HAND_COLUMNS` (where the person takes the hand to be), and `seen_s`, when the newest image that
-        the loop knows was taken (NaN: none yet).
+        A row per two control periods: `t_s`, `distance_m` between robot and person, `activations` of all
+        taxels (a list) and `activation`, the highest, `status`, `hand_error_m` (from the post), a column per
+        joint in radians, `HAND_COLUMNS` (where the person takes the hand to be), and `seen_s`, when the
+        newest image that the loop knows was taken (NaN: none yet).
     """
     icub, posture, person = load_icub(), start_posture(), Follower(trial)
     latency, rng = perceiver.latency, trial.subject.stream(trial.script, "joints")

@@ -1,10 +1,10 @@
 """A detector as its errors: what it found of people in rendered runs, drawn again without rendering.
 
-Keypoints go in groups (`GROUPS`), each found or lost as a whole. Whether a group is found depends on whether it
-can be seen, roughly, and on whether it was found in the image before. What is found is off by a vector that all
-its keypoints share: the detector's bias, a part that lasts (drawn once for a person) and one that changes from
-image to image. All of it is estimated per group, in the robot's root frame. What is found more than `ELSEWHERE_M`
-away from the person's own is not modelled: it counts as lost.
+Keypoints go in groups (`GROUPS`), each found or lost as a whole. Whether a group is found depends on whether
+it can be seen, roughly, and on whether it was found in the image before. What is found is off by a vector
+that all its keypoints share: the detector's bias, a part that lasts (drawn once for a person) and one that
+changes from image to image. All of it is estimated per group, in the robot's root frame. What is found more
+than `ELSEWHERE_M` away from the person's own is not modelled: it counts as lost.
 """
 
 from dataclasses import dataclass, field

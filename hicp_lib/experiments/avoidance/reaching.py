@@ -1,9 +1,10 @@
-"""What people do before the robot, as scripts: they come for its left hand and follow it, or mean something else.
+"""What people do before the robot, as scripts: they come for its left hand and follow it, or stand by.
 
 The paper's three trials (section IV-E): sitting, they reach for the hand with theirs; standing, they do;
-sitting, they approach it with the head. Unless the robot gives way, the person's skin comes within `CONTACT_M`
-of it; if it does, they follow the hand as it was `REACTION_S` ago, as far as they can reach. Two scripts of bystanders (`BYSTANDERS`), who come no nearer than `BYSTAND_M`: one gestures, one
-passes by. Every script has the same phases (`PHASES_S`): far, getting ready, approach, near, leaving, far again.
+sitting, they approach it with the head. Unless the robot gives way, the person's skin comes within
+`CONTACT_M` of it; if it does, they follow the hand as it was `REACTION_S` ago, as far as they can reach. Two
+scripts of bystanders (`BYSTANDERS`), who come no nearer than `BYSTAND_M`: one gestures, one passes by. Every
+script has the same phases (`PHASES_S`): far, getting ready, approach, near, leaving, far again.
 """
 
 from collections.abc import Callable, Iterable
@@ -188,8 +189,8 @@ def script(name: str, subject: Subject = Subject()) -> Script:
 
     Examples
     --------
-    >>> tip = Moment("standing, hand", Subject(), NEAR_S).person.keypoints_m[127]  # of the right middle finger
-    >>> bool(np.linalg.norm(in_root(tip) - HOME_M["left"]) < 0.3)
+    >>> fingertip_m = Moment("standing, hand", Subject(), NEAR_S).person.keypoints_m[127]
+    >>> bool(np.linalg.norm(in_root(fingertip_m) - HOME_M["left"]) < 0.3)
     True
     """
     staging, identity = (SCRIPTS | BYSTANDERS)[name], subject.identity

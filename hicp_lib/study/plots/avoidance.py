@@ -1,4 +1,4 @@
-"""Figures of avoidance: clearances of people, over time, against latency, losses and speed; separation's terms."""
+"""Figures of avoidance: clearances of people, over time and against what is swept; separation's terms."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -43,7 +43,9 @@ def clearances(metrics: pd.DataFrame, note: str) -> Figure:
         for place, row in enumerate(tables[of].itertuples()):
             colour = condition_colour(row.detector)
             mine = metrics[(metrics["detector"] == row.detector) & (metrics["gains"] == row.gains)]
-            for marker, (script, people) in zip(_SCRIPT_MARKERS, mine.groupby("script", sort=False)):
+            for marker, (script, people) in zip(
+                _SCRIPT_MARKERS, mine.groupby("script", sort=False), strict=False
+            ):
                 label = script if place == 0 else None
                 options = {"s": 22, "alpha": 0.45, "color": colour, "lw": 0, "marker": marker, "label": label}
                 axis.scatter(100 * people[of], [place + 0.18] * len(people), **options)
@@ -60,8 +62,8 @@ def clearances(metrics: pd.DataFrame, note: str) -> Figure:
     means = [f"{name} {100 * value:.1f}" for name, value in zip(conditions, table["value"], strict=False)]
     return Figure(
         figure,
-        "Least distance between the person's skin and the robot, a mark per person; above it the mean and its "
-        f"95 % interval over people. Dotted: the marks of 5 and 10 cm. Data: {note}.",
+        "Least distance between the person's skin and the robot, a mark per person; above, the mean and its 95 % "
+        f"interval over people. Dotted: the marks of 5 and 10 cm. Data: {note}.",
         f"Dots per condition, two panels. Means in the first reach, in cm: {in_words(means)}.",
         table,
     )
@@ -112,9 +114,9 @@ def over_time(runs: Sequence[Run], separations: Mapping[str, Separation], note: 
     return Figure(
         figure,
         "Distance between the person's skin and the robot, the highest activation of any taxel, and how far "
-        "the hand is from its post, means over people. Grey: the first reach is over and the person follows the "
-        "hand; dotted levels: separation (not a safety function); grey lines: 5 and 10 cm, and where receptive "
-        f"fields begin. Data: {note}.",
+        "the hand is from its post, means over people. Grey: the first reach is over, the person follows; dotted "
+        "levels: separation (not a safety function); grey lines: 5 and 10 cm, and where receptive fields begin. "
+        f"Data: {note}.",
         "Lines over time, a column per script. Least mean distances in cm: "
         + in_words(f"{', '.join(key)} {100 * value:.1f}" for key, value in least.items()) + ".",
         means,
@@ -151,7 +153,7 @@ def sweep_curves(sweeps: Mapping[str, pd.DataFrame], note: str) -> Figure:
     marks.legend_below(figure, axes, ncols=2)
     return Figure(
         figure,
-        "Mean least distance over people against what was swept; bands: 95 % intervals over people; dotted: 5 and "
+        "Mean least distance over people against what was swept; bands: 95 % intervals; dotted: 5 and "
         f"10 cm. Keypoints are true, or have a detector's errors; nothing is rendered. Data: {note}.",
         "Lines that fall: " + in_words(_ends(tables)) + ".",
         pd.concat(tables, names=["swept"]).reset_index(level=0),
