@@ -161,7 +161,7 @@ class Follower:
         self._followed_m = [np.array(HOME_M["left"])]  # every `_POSED_S`
 
     def see(self, time_s: float, hand_m: np.ndarray) -> None:
-        """Where the robot's hand is at a time; called in the order of time, every `REACTION_S` / 2 or oftener."""
+        """Where the robot's hand is at a time; in the order of time, at least every `REACTION_S` / 2."""
         self._hands.append((time_s, hand_m))
         while len(self._followed_m) * _POSED_S < min(time_s + REACTION_S / 2, LEAVES_S[0]) + 1e-9:
             then_s, last_m = len(self._followed_m) * _POSED_S - REACTION_S, self._followed_m[-1]

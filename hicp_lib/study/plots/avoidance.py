@@ -62,8 +62,8 @@ def clearances(metrics: pd.DataFrame, note: str) -> Figure:
     means = [f"{name} {100 * value:.1f}" for name, value in zip(conditions, table["value"], strict=False)]
     return Figure(
         figure,
-        "Least distance between the person's skin and the robot, a mark per person; above, the mean and its 95 % "
-        f"interval over people. Dotted: the marks of 5 and 10 cm. Data: {note}.",
+        "Least distance between the person's skin and the robot, a mark per person; above, the mean and its "
+        f"95 % interval over people. Dotted: the marks of 5 and 10 cm. Data: {note}.",
         f"Dots per condition, two panels. Means in the first reach, in cm: {in_words(means)}.",
         table,
     )
@@ -114,9 +114,9 @@ def over_time(runs: Sequence[Run], separations: Mapping[str, Separation], note: 
     return Figure(
         figure,
         "Distance between the person's skin and the robot, the highest activation of any taxel, and how far "
-        "the hand is from its post, means over people. Grey: the first reach is over, the person follows; dotted "
-        "levels: separation (not a safety function); grey lines: 5 and 10 cm, and where receptive fields begin. "
-        f"Data: {note}.",
+        "the hand is from its post, means over people. Grey: the first reach is over, the person follows; "
+        "dotted levels: separation (not a safety function); grey lines: 5 and 10 cm, and where receptive "
+        f"fields begin. Data: {note}.",
         "Lines over time, a column per script. Least mean distances in cm: "
         + in_words(f"{', '.join(key)} {100 * value:.1f}" for key, value in least.items()) + ".",
         means,
