@@ -10,12 +10,12 @@ from itertools import product
 
 import pandas as pd
 
+from hicp_lib.core.executor import run_jobs
 from hicp_lib.experiments.avoidance.closed_loop import Latency, Trial, TrueKeypoints, simulate
 from hicp_lib.experiments.avoidance.error_model import ErrorModel, Lossy, Modelled
 from hicp_lib.experiments.avoidance.reaching import LEAVES_S, LOOKED_AT_S, NEAR_S
 from hicp_lib.experiments.avoidance.runs import TRUE_KEYPOINTS, settings_of
 from hicp_lib.simulation.body.identities import Subject
-from hicp_lib.simulation.world.batch import run_jobs
 
 
 @dataclass(frozen=True)
@@ -106,8 +106,9 @@ def sweep(variants: Sequence[Variant], models: Mapping[str, ErrorModel]) -> pd.D
     by_person: dict[tuple[str, Subject], list[int]] = {}
     for row, variant in enumerate(variants):
         by_person.setdefault((variant.trial.script, variant.trial.subject), []).append(row)
-    jobs = [partial(_of_person, [variants[row] for row in rows], models) for rows in by_person.values()]
-    parts = [part.set_axis(rows) for part, rows in zip(run_jobs(jobs), by_person.values(), strict=True)]
+    runs = {person: [variants[row] for row in rows] for person, rows in by_person.items()}
+    jobs = [(person, partial(_of_person, own, models)) for person, own in runs.items()]
+    parts = [part.set_axis(by_person[person]) for person, part in run_jobs(jobs)]
     return pd.concat(parts).sort_index()
 
 
