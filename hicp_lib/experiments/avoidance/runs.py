@@ -37,7 +37,6 @@ from hicp_lib.experiments.avoidance.head_camera import HeadCamera, ImageCache, O
 from hicp_lib.experiments.avoidance.reaching import Moment
 from hicp_lib.experiments.laboratory import COLOUR, in_root
 from hicp_lib.robot.controller import PUBLISHED, Settings
-from hicp_lib.simulation.body.model import PosedBody
 
 NO_AVOIDANCE, TRUE_KEYPOINTS = "no avoidance", "ground truth"
 IDEAL = (NO_AVOIDANCE, TRUE_KEYPOINTS)
@@ -124,11 +123,6 @@ def run_all(jobs: Iterable[Job]) -> list[Run]:
     return [Run(job, *(pd.read_parquet(folders[job] / name) for name in _TABLES)) for job in jobs]
 
 
-def of_condition(runs: Iterable[Run], condition: str) -> list[Run]:
-    """The runs of one condition, a script each."""
-    return [run for run in runs if run.job.condition == condition]
-
-
 def choose(runs: Iterable[Run], name: str, condition: str) -> Run:
     """The run of a script under a condition; the first of the condition if the script was not run.
 
@@ -148,7 +142,8 @@ def choose(runs: Iterable[Run], name: str, condition: str) -> Run:
     InputError
         If there is no run of the condition.
     """
-    found = sorted(of_condition(runs, condition), key=lambda run: run.job.trial.script != name)
+    with_it = [run for run in runs if run.job.condition == condition]
+    found = sorted(with_it, key=lambda run: run.job.trial.script != name)
     if not found:
         raise InputError(f"no run of {condition!r}; add it to the detectors")
     return found[0]
@@ -170,11 +165,11 @@ def keypoints_m(frame: pd.Series) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return perceived_m, scores[..., 0], truth_m
 
 
-def person_at(run: Run, time_s: float) -> PosedBody:
-    """The person of a run at a time: where they are depends on what the robot did."""
+def moment_at(run: Run, time_s: float) -> Moment:
+    """What there is in a run at a time: where the person is depends on what the robot did."""
     row = run.cycles.iloc[int((run.cycles["t_s"] - time_s).abs().argmin())]
     hand_m = tuple(float(row[column]) for column in HAND_COLUMNS)
-    return Moment(run.job.trial.script, run.job.trial.subject, float(time_s), hand_m).person
+    return Moment(run.job.trial.script, run.job.trial.subject, float(time_s), hand_m)
 
 
 def settings_of(gains: str) -> Settings:

@@ -20,7 +20,7 @@ from hicp_lib.experiments.avoidance.runs import (
     choose,
     image,
     keypoints_m,
-    person_at,
+    moment_at,
     run_all,
     settings_of,
 )
@@ -67,7 +67,7 @@ def test_what_was_seen_is_kept_as_it_was(detector, monkeypatch):
     np.testing.assert_allclose(scores, detector.found.scores, atol=1e-6)
     person_m = in_root(Moment("sitting, head", Subject(), 1.3).person.keypoints_m)
     np.testing.assert_allclose(truth, person_m, atol=1e-6)
-    np.testing.assert_allclose(in_root(person_at(run, 1.3).keypoints_m), person_m, atol=1e-6)
+    np.testing.assert_allclose(in_root(moment_at(run, 1.3).person.keypoints_m), person_m, atol=1e-6)
     assert frame["in_sight"].shape == (len(GROUPS),) and set(frame["in_sight"]) <= {0, 1}
     rgb, seen = image(frame)
     assert rgb.shape == (240, 320, 3) and np.abs(rgb.astype(int) - (40, 90, 160)).max() < 6
