@@ -1,19 +1,16 @@
-"""Figures of avoidance: clearances of people, over time and against what is swept; separation's terms."""
+"""Figures of avoidance: clearances of people, and against what is swept; separation's terms."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import pandas as pd
 
-from hicp_lib.experiments.avoidance.reaching import LEAVES_S, NEAR_S
-from hicp_lib.experiments.avoidance.runs import IDEAL, NO_AVOIDANCE, Run
-from hicp_lib.experiments.avoidance.skin_distance import FAR_M
+from hicp_lib.experiments.avoidance.runs import IDEAL
 from hicp_lib.robot.separation import Separation, separation_table
-from hicp_lib.study.avoidance import FIELD_M, MARKS_M, over_people
+from hicp_lib.study.avoidance import MARKS_M, over_people
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
 from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure
 
-_ROWS = {"distance_m": "distance (cm)", "activation": "activation", "hand_error_m": "hand from post (cm)"}
 _TERM_COLOURS = ("#0072B2", "#E69F00", "#D55E00", "#999999", "#009E73", "#CC79A7")
 _GAINS = {"ours": "-", "published": "--"}
 _SCRIPT_MARKERS = "os^Dv"
@@ -70,60 +67,6 @@ def clearances(metrics: pd.DataFrame, note: str) -> Figure:
 
 
 @in_style
-def over_time(runs: Sequence[Run], separations: Mapping[str, Separation], note: str) -> Figure:
-    """Distance, highest activation and the hand's way over time, mean over people: a column per script.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-    separations : mapping of str to Separation
-        By detector; drawn as dotted levels.
-    note : str
-        What the data are, for the caption.
-    """
-    means = _means_over_time(runs)
-    scripts = means["script"].unique()
-    size = {"width_in": 3.6 * len(scripts) + 0.6, "height_in": 7.2}
-    figure, axes = new_figure(3, len(scripts), **size, sharex=True, sharey="row", squeeze=False)
-    for column, script in zip(axes.T, scripts, strict=True):
-        column[0].set_title(script)
-        for axis in column:
-            axis.axvspan(NEAR_S, LEAVES_S[0], color="#F0F0F0", lw=0)
-        for (detector, gains), rows in means[means["script"] == script].groupby(
-            ["detector", "gains"], sort=False
-        ):
-            style = {
-                "color": condition_colour(detector),
-                "ls": _GAINS[gains],
-                "label": f"{detector}, {gains}",
-            }
-            style |= {"ls": ":", "label": detector} if detector == NO_AVOIDANCE else {}
-            for axis, what in zip(column, _ROWS, strict=True):
-                axis.plot(rows["t_s"], (100 if what.endswith("_m") else 1) * rows[what], lw=1.6, **style)
-        for detector, separation in separations.items():
-            level_cm = 100 * min(separation.distance_m, FAR_M)
-            column[0].axhline(level_cm, color=condition_colour(detector), lw=1, ls=(0, (1, 2)))
-        for level_m in (*MARKS_M, FIELD_M):
-            column[0].axhline(100 * level_m, color="#888888", lw=0.6)
-        column[-1].set_xlabel("time (s)")
-    for axis, label in zip(axes[:, 0], _ROWS.values(), strict=True):
-        axis.set_ylabel(label)
-    axes[0, 0].set_ylim(0, 100 * FAR_M)
-    marks.legend_below(figure, axes, ncols=2, fontsize=10)
-    least = means.groupby(["detector", "gains"], sort=False)["distance_m"].min()
-    return Figure(
-        figure,
-        "Distance between the person's skin and the robot, the highest activation of any taxel, and how far "
-        "the hand is from its post, means over people. Grey: the first reach is over, the person follows; "
-        "dotted levels: separation (not a safety function); grey lines: 5 and 10 cm, and where receptive "
-        f"fields begin. Data: {note}.",
-        "Lines over time, a column per script. Least mean distances in cm: "
-        + in_words(f"{', '.join(key)} {100 * value:.1f}" for key, value in least.items()) + ".",
-        means,
-    )  # fmt: skip
-
-
-@in_style
 def sweep_curves(sweeps: Mapping[str, pd.DataFrame], note: str) -> Figure:
     """Mean clearance of the first reach against what was swept, with its interval over people: a panel each.
 
@@ -166,15 +109,6 @@ def _ends(tables: Mapping[str, pd.DataFrame]) -> Iterator[str]:
         for (detector, gains), rows in table.groupby(["detector", "gains"], sort=False):
             first, last = 100 * rows["value"].iloc[[0, -1]]
             yield f"{detector} with {gains} gains from {first:.1f} to {last:.1f} cm over {column}"
-
-
-def _means_over_time(runs: Sequence[Run]) -> pd.DataFrame:
-    parts = []
-    for run in runs:
-        about = {"script": run.job.trial.script, "detector": run.job.detector, "gains": run.job.gains}
-        parts.append(run.cycles[["t_s", *_ROWS]].assign(**about))
-    by = ["script", "detector", "gains", "t_s"]
-    return pd.concat(parts).groupby(by, sort=False)[[*_ROWS]].mean().reset_index()
 
 
 @in_style
