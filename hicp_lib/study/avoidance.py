@@ -155,9 +155,8 @@ def model_check(table: pd.DataFrame, swept: pd.DataFrame, follow_m_s: float) -> 
     same = swept[(swept["follow_m_s"] == follow_m_s) & (swept["lost_share"] == 0)]
     keys = ["script", "subject", "detector", "gains"]
     both = table.merge(same.drop(columns="latency_s"), on=keys, suffixes=("", "_modelled"))
-    both = both[~both["detector"].isin(IDEAL)].assign(
-        squared=lambda rows: (rows["reach_m"] - rows["reach_m_modelled"]) ** 2
-    )
+    both = both[~both["detector"].isin(IDEAL)]
+    both["squared"] = (both["reach_m"] - both["reach_m_modelled"]) ** 2
     by = both.groupby("detector", sort=False)
     columns = {"rendered_m": by["reach_m"].mean(), "modelled_m": by["reach_m_modelled"].mean()}
     columns |= {"apart_m": by["squared"].mean() ** 0.5, "n_people": by.size()}
@@ -166,9 +165,8 @@ def model_check(table: pd.DataFrame, swept: pd.DataFrame, follow_m_s: float) -> 
 
 def curves(swept: pd.DataFrame, latencies: Mapping[str, Latency]) -> dict[str, pd.DataFrame]:
     """The rows of each curve, by the column that was swept; see `sweeps.variants`."""
-    stated_s = (
-        swept["detector"].map({name: latency.total_s for name, latency in latencies.items()}).fillna(0.0)
-    )
+    totals_s = {name: latency.total_s for name, latency in latencies.items()}
+    stated_s = swept["detector"].map(totals_s).fillna(0.0)
     still, whole, stated = swept["follow_m_s"] == 0, swept["lost_share"] == 0, swept["latency_s"] == stated_s
     kept = {"latency_s": still & whole, "lost_share": still & stated, "follow_m_s": whole & stated}
     return {column: swept[rows].sort_values(column, kind="stable") for column, rows in kept.items()}
@@ -260,15 +258,10 @@ def measured_times(runs: Iterable[Run]) -> pd.DataFrame:
     the images, those that took no longer than `inference_s`). The first image of a run is left out: the
     detector is made ready with it.
     """
-    rows: dict[str, list[np.ndarray]] = {}
-    stated = {run.job.detector: run.job.latency for run in runs if len(run.frames)}
-    for run in runs:
-        rows.setdefault(run.job.detector, []).append(
-            run.frames["time_ms"].to_numpy()[1:] if len(run.frames) else []
-        )
-    table = []
-    for detector, latency in stated.items():
-        times_ms = np.concatenate(rows[detector])
+    runs, table = [run for run in runs if len(run.frames)], []
+    for detector, latency in {run.job.detector: run.job.latency for run in runs}.items():
+        frames = [run.frames for run in runs if run.job.detector == detector]
+        times_ms = np.concatenate([part["time_ms"].to_numpy()[1:] for part in frames])
         row = {"detector": detector, "inference_s": latency.inference_s, "latency_s": latency.total_s}
         row |= dict(zip(("median_ms", "p99_ms"), np.percentile(times_ms, (50, 99)), strict=True))
         table.append(row | {"within_share": np.mean(times_ms <= 1e3 * latency.inference_s)})
@@ -279,13 +272,8 @@ def _metrics(run: Run) -> dict:
     cycles, job = run.cycles, run.job
     t, distance, away = (cycles[name].to_numpy() for name in ("t_s", "distance_m", "hand_error_m"))
     period_s = t[1] - t[0]
-    row = {
-        "script": job.trial.script,
-        "subject": job.trial.subject.number,
-        "detector": job.detector,
-        "gains": job.gains,
-    }
-    row |= {"latency_s": job.latency.total_s} | least_distances(cycles)
+    row = {"script": job.trial.script, "subject": job.trial.subject.number, "detector": job.detector}
+    row |= {"gains": job.gains, "latency_s": job.latency.total_s} | least_distances(cycles)
     row |= {f"under_{round(100 * m)}cm_s": period_s * (distance < m).sum() for m in MARKS_M}
     row["reaction_s"] = _first(t, away > MOVED_M) - _crossing_s(t, distance)
     row["retreat_m"] = away.max()

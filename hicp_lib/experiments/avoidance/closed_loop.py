@@ -167,7 +167,7 @@ class Follower:
             then_s, last_m = len(self._followed_m) * _POSED_S - REACTION_S, self._followed_m[-1]
             seen_m = next((m for t, m in reversed(self._hands) if t <= then_s + 1e-9), last_m)
             away_m = seen_m - last_m
-            share = min(1.0, self.trial.follow_m_s * _POSED_S / max(np.linalg.norm(away_m), 1e-9))
+            share = min(1.0, self.trial.follow_m_s * _POSED_S / max(float(np.linalg.norm(away_m)), 1e-9))
             self._followed_m.append(last_m + share * away_m)
 
     def moment(self, time_s: float) -> Moment:
@@ -188,7 +188,7 @@ class Follower:
         return first + np.float32(time_s / _POSED_S - before) * (then - first)
 
 
-@memoised(256)
+@memoised(128)
 def _skin_m(moment: Moment) -> np.ndarray:
     return in_root(moment.person.vertices_m).astype(np.float32)
 

@@ -172,7 +172,7 @@ class Moment:
         return replace(self, time_s=float(np.clip(self.time_s, PHASES_S["far"], LEAVES_S[1])))
 
 
-@memoised(256)
+@memoised(64)
 def _person(moment: Moment) -> PosedBody:
     scene = script(moment.script, moment.subject)
     return posed(scene.appearance.shape, scene.posture_at(moment.time_s, np.array(moment.hand_m)))

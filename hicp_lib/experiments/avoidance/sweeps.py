@@ -120,9 +120,8 @@ def _run(variant: Variant, model: ErrorModel | None) -> dict:
     trial = variant.trial
     # The same errors and losses at every latency, as far as images are the same.
     drawn = partial(trial.subject.stream, trial.script)
-    eyes = TrueKeypoints(variant.latency)
-    if variant.detector != TRUE_KEYPOINTS:
-        eyes = Modelled(model, variant.latency, drawn(variant.detector))
+    true = TrueKeypoints(variant.latency)
+    eyes = Modelled(model, variant.latency, drawn(variant.detector)) if model else true
     eyes = Lossy(eyes, variant.lost_share, variant.burst_images, drawn("losses"))
     cycles = simulate(trial, eyes, settings=settings_of(variant.gains), start_s=LOOKED_AT_S[0])
     row = {"script": trial.script, "subject": trial.subject.number, "follow_m_s": trial.follow_m_s}
