@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import pandas as pd
 
-from hicp_lib.experiments.avoidance.runs import IDEAL
+from hicp_lib.experiments.avoidance.runs import IDEAL, NO_AVOIDANCE
 from hicp_lib.robot.separation import Separation, separation_table
 from hicp_lib.study.avoidance import MARKS_M, over_people
 from hicp_lib.study.plots import marks
@@ -34,7 +34,10 @@ def clearances(metrics: pd.DataFrame, note: str) -> Figure:
     """
     shown = {"reach_m": "in the first reach", "min_distance_m": "until they leave"}
     tables = {of: over_people(metrics, ["detector", "gains"], of) for of in shown}
-    conditions = [f"{row.detector}, {row.gains}" for row in tables["reach_m"].itertuples()]
+    conditions = [
+        row.detector + (f", {row.gains}" if row.detector != NO_AVOIDANCE else "")
+        for row in tables["reach_m"].itertuples()
+    ]
     figure, axes = new_figure(1, 2, 10.0, 1.6 + 0.42 * len(conditions), sharey=True, sharex=True)
     for axis, (of, title) in zip(axes, shown.items(), strict=True):
         for place, row in enumerate(tables[of].itertuples()):
@@ -108,7 +111,7 @@ def _ends(tables: Mapping[str, pd.DataFrame]) -> Iterator[str]:
     for column, table in tables.items():
         for (detector, gains), rows in table.groupby(["detector", "gains"], sort=False):
             first, last = 100 * rows["value"].iloc[[0, -1]]
-            yield f"{detector} with {gains} gains from {first:.1f} to {last:.1f} cm over {column}"
+            yield f"{detector}, {gains}, from {first:.1f} to {last:.1f} cm over {column}"
 
 
 @in_style

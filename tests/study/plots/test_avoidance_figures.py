@@ -50,7 +50,7 @@ def test_clearances_and_sweeps_are_drawn_over_people():
         [people.assign(latency_s=late_s, min_distance_m=0.05 - late_s / 10) for late_s in (0.0, 0.3)]
     )
     figure = sweep_curves({"latency_s": swept}, "made up")
-    assert "mediapipe with ours gains from 5.0 to 2.0 cm over latency_s" in figure.alt
+    assert "mediapipe, ours, from 5.0 to 2.0 cm over latency_s" in figure.alt
     assert figure.figure.axes[0].get_lines()[0].get_xdata().tolist() == [0, 300]
 
 
