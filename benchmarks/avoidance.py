@@ -5,8 +5,8 @@ detector, the lifting, the tracking, the skin's activation and the controller; o
 then with a detector's. Two baselines: activations one keypoint at a time in plain numpy (double precision),
 and the controller's period of 20 ms. The project's floors: activation and controller 2 ms together, from
 perception to command 33 ms (median) with the fast pair of detectors on two cores, by either way of lifting;
-the 99th percentile is told beside it. Processor time of the calling thread, which tells more on a machine that
-is busy otherwise; wall time where a detector's own threads work, too.
+the 99th percentile is told beside it. Processor time of the calling thread, which tells more on a machine
+that is busy otherwise; wall time where a detector's own threads work, too.
 """
 
 from __future__ import annotations
