@@ -9,7 +9,7 @@ from hicp_lib.core.keypoints import HEAD, mirror
 from hicp_lib.evaluation.statistics.proportions import mean_with_interval
 from hicp_lib.experiments.avoidance.closed_loop import Latency
 from hicp_lib.experiments.avoidance.error_model import GROUPS, found_groups
-from hicp_lib.experiments.avoidance.reaching import LEAVES_S, PHASES_S, SCRIPTS
+from hicp_lib.experiments.avoidance.reaching import LEAVES_S, LOOKED_AT_S, PHASES_S, SCRIPTS
 from hicp_lib.experiments.avoidance.runs import IDEAL, Run, keypoints_m
 from hicp_lib.experiments.avoidance.sweeps import least_distances
 from hicp_lib.robot.home import HOME_M
@@ -283,7 +283,8 @@ def _metrics(run: Run) -> dict:
     far = np.flatnonzero(away > BACK_M)
     back = far[-1] + 1 if len(far) else 0
     row["back_s"] = max(0.0, t[back] - LEAVES_S[1]) if 0 < back < len(t) else np.nan
-    return row | _sightings(run, t[distance < FIELD_M])
+    looked = (t >= LOOKED_AT_S[0]) & (t <= LOOKED_AT_S[1])
+    return row | _sightings(run, t[looked & (distance < FIELD_M)])
 
 
 def _sightings(run: Run, near_s: np.ndarray) -> dict:
