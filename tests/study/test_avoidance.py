@@ -90,7 +90,7 @@ def test_metrics_of_runs_with_known_answers(runs):
     assert truth["reaction_s"] == pytest.approx(1.8 - crossing_s, abs=0.05)
     assert np.isnan(none["back_s"]) and np.isnan(none["reaction_s"])
     assert table.loc["sees", "seen_share"] == 1 and table.loc["blind", "seen_share"] == 0
-    near_until_s = 3.6 + (0.25 - 0.01) / 0.59
+    near_until_s = 3.88  # they are not looked at for longer
     assert loses["blind_s"] == pytest.approx(near_until_s - 2.1, abs=0.05)
 
 

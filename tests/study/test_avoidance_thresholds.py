@@ -94,10 +94,10 @@ def test_blind_is_the_longest_time_without_a_sure_keypoint_while_near():
     seen_s = (1.0, 2.0, 3.0)
     frames = [frame(t, 0.9 if t in seen_s else SURE) for t in times_s]
     found = row(distance_m=distance_m, frames=frames)
-    assert found["blind_s"] == 2.0  # from 3 s to 5 s, when they are near no more
-    assert found["seen_share"] == pytest.approx(3 / 9)  # from 1 s to 5 s, both included
+    assert found["blind_s"] == 1.0  # from 2 s to 3 s; they are looked at from 1.25 s to 3.75 s
+    assert found["seen_share"] == pytest.approx(2 / 5)  # of the images from 1.5 s to 3.5 s
     late = [frame(t, 0.9 if t >= 4.5 else SURE) for t in times_s]
-    assert row(distance_m=distance_m, frames=late)["blind_s"] == 3.5
+    assert row(distance_m=distance_m, frames=late)["blind_s"] == 2.5
 
 
 def test_a_keypoint_is_sure_above_the_threshold():
