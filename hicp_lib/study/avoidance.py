@@ -1,18 +1,23 @@
-"""What a run of avoidance was worth: how near the person came, how soon the robot gave way and came back."""
+"""What avoidance was worth over people: how near they came, how soon the robot gave way, and why not."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
 from hicp_lib.core.keypoints import HEAD, mirror
-from hicp_lib.experiments.avoidance.reaching import LEAVES_S, PHASES_S, SCRIPTS
-from hicp_lib.experiments.avoidance.runs import IDEAL, NO_AVOIDANCE, Run, keypoints_m
+from hicp_lib.evaluation.statistics.proportions import mean_with_interval
+from hicp_lib.experiments.avoidance.closed_loop import Latency
+from hicp_lib.experiments.avoidance.error_model import GROUPS, found_groups
+from hicp_lib.experiments.avoidance.reaching import LEAVES_S, LOOKED_AT_S, PHASES_S, SCRIPTS
+from hicp_lib.experiments.avoidance.runs import IDEAL, Run, keypoints_m
+from hicp_lib.experiments.avoidance.sweeps import least_distances
 from hicp_lib.robot.home import HOME_M
 from hicp_lib.robot.loop import AVOIDING
 from hicp_lib.robot.separation import Separation
 
-WITHIN_M = (0.05, 0.10, 0.20)
+MARKS_M = (0.05, 0.10)
+"""Clearances that are asked for."""
 FIELD_M = 0.25
 """The person is near the robot's skin when nearer than this: about where its receptive fields begin."""
 REACH_M = 0.4  # keypoints this near the post can threaten the hand
@@ -21,6 +26,7 @@ MOVED_M = 0.005  # the hand has begun to give way
 LOST_S = 0.5  # without a sighting for longer, the robot has forgotten
 AT_HEAD_M = 0.15  # a keypoint of the head this near a true one is on the head
 ENOUGH_SHARE = 0.5  # of the images; a head that is found in fewer is the reason
+Z = 1.96  # of 95 %
 BACK_M = 0.02  # the hand is back at its post
 SURE = 0.3  # the paper's threshold for scores
 
@@ -28,48 +34,154 @@ SURE = 0.3  # the paper's threshold for scores
 def metrics(runs: Iterable[Run]) -> pd.DataFrame:
     """One row per run; seconds and metres, NaN for what did not happen.
 
-    Columns: `script`, `detector` (the condition), `delay_s`, `min_distance_m`, `under_5cm_s`, `under_10cm_s`,
-    `under_20cm_s`, `reaction_s` (from the person's coming within `CROSSED_M` to the first motion),
-    `retreat_m` (the hand's largest distance from its post), `false_retreats` (begun while the person was
-    farther than `FIELD_M`), `idle_error_m` (the hand's mean error before the person moves), `back_s` (from
-    the person's having left to the hand's being back), `seen_share` (of the images taken while the person
-    is near, those with any sure keypoint in space), `head_share` (those with one of the head that is on the
-    head), `blind_s` (longest time the person was near with nothing new seen of them).
+    Columns: `script`, `subject`, `detector`, `gains`, `latency_s`, `reach_m` and `min_distance_m` (see
+    `sweeps.least_distances`), `under_5cm_s`, `under_10cm_s`, `reaction_s` (from the person's coming within
+    `CROSSED_M` to the first motion), `retreat_m` (the hand's largest distance from its post),
+    `false_retreats` (begun while the person was farther than `FIELD_M`), `idle_error_m` (the hand's mean
+    error before the person moves), `back_s` (from the person's having left to the hand's being back),
+    `seen_share` (of the images taken while the person is near, those with any sure keypoint in space),
+    `head_share` (those with one of the head that is on the head), `blind_s` (longest time the person was near
+    with nothing new seen of them).
     """
     return pd.DataFrame([_metrics(run) for run in runs])
 
 
-def against_no_avoidance(table: pd.DataFrame, times: float = 2.0) -> pd.DataFrame:
-    """How many times the least distance without avoidance each condition keeps, and whether that is enough.
+def over_people(table: pd.DataFrame, by: Sequence[str], of: str = "min_distance_m") -> pd.DataFrame:
+    """Clearances of a group of runs, one of each person.
+
+    Parameters
+    ----------
+    table : pd.DataFrame
+        As from `metrics` or `sweeps.sweep`.
+    by : sequence of str
+        Columns that make the groups.
+    of : str, optional
+        The clearance's column.
+
+    Returns
+    -------
+    pd.DataFrame
+        Columns `by`; `value, low, high`, the mean and its 95 % interval over people (none from fewer than
+        ten); for each of `MARKS_M` as `kept_5cm` the share of people with as much, `kept_5cm_low`,
+        `kept_5cm_high` (Wilson's 95 % interval); `n_people`.
+
+    Examples
+    --------
+    >>> runs = pd.DataFrame({"detector": "a", "script": "b", "subject": [0, 1]})
+    >>> runs["min_distance_m"] = 0.04, 0.12
+    >>> over_people(runs, ["detector"])[["value", "kept_5cm", "n_people"]].values.tolist()
+    [[0.08, 0.5, 2.0]]
+    """
+    rows = []
+    for group, part in table.groupby(list(by), sort=False):
+        people = part["script"] + part["subject"].astype(str)
+        row = dict(zip(by, group, strict=True))
+        row |= dict(
+            zip(("value", "low", "high"), mean_with_interval(part[of], people, subjects=people), strict=True)
+        )
+        for mark_m in MARKS_M:
+            kept, name = part[of] >= mark_m, f"kept_{100 * mark_m:.0f}cm"
+            low, high = _wilson(int(kept.sum()), len(kept))
+            row |= {name: kept.mean(), f"{name}_low": low, f"{name}_high": high}
+        rows.append(row | {"n_people": people.nunique()})
+    return pd.DataFrame(rows)
+
+
+def _wilson(k: int, n: int) -> tuple[float, float]:
+    """Wilson's score interval of a share k/n."""
+    centre, half = (k + Z**2 / 2) / (n + Z**2), Z / (n + Z**2) * np.sqrt(k * (n - k) / n + Z**2 / 4)
+    return centre - half, centre + half
+
+
+def reasons(table: pd.DataFrame) -> pd.DataFrame:
+    """Why people came nearer than the first of `MARKS_M` in their first reach.
 
     Parameters
     ----------
     table : pd.DataFrame
         As from `metrics`.
-    times : float
-        What is enough.
 
     Returns
     -------
     pd.DataFrame
-        Columns `script, detector, min_distance_m, value` (the ratio), `enough` (at least `times`), and
-        `why` in words where it is not.
-
-    Examples
-    --------
-    >>> runs = pd.DataFrame(
-    ...     {"script": "a", "detector": [NO_AVOIDANCE, "mediapipe"], "min_distance_m": [0.04, 0.12]}
-    ... )
-    >>> against_no_avoidance(runs)[["detector", "value", "enough"]].values.tolist()
-    [['mediapipe', 3.0, True]]
+        Columns `detector, gains, why, n_people`.
     """
-    base = table[table["detector"] == NO_AVOIDANCE].set_index("script")["min_distance_m"]
-    rest = table[table["detector"] != NO_AVOIDANCE].copy()
-    rest["value"] = rest["min_distance_m"].to_numpy() / base[rest["script"]].to_numpy()
-    rest["enough"] = rest["value"] >= times
-    rest["why"] = ["" if row.enough else _why(row) for row in rest.itertuples()]
-    columns = ["script", "detector", "min_distance_m", "value", "enough", "why"]
-    return rest[columns].reset_index(drop=True)
+    failed = table[(table["reach_m"] < MARKS_M[0]) & (table["detector"] != IDEAL[0])]
+    failed = failed.assign(why=[_why(row) for row in failed.itertuples()])
+    counts = failed.groupby(["detector", "gains", "why"], sort=False).size()
+    return counts.rename("n_people").reset_index()
+
+
+def false_retreats(table: pd.DataFrame) -> pd.DataFrame:
+    """Whom the arm moved for, of bystanders.
+
+    Parameters
+    ----------
+    table : pd.DataFrame
+        As from `metrics`.
+
+    Returns
+    -------
+    pd.DataFrame
+        Columns `script, detector, value, low, high` (share of people, Wilson's interval), `retreat_m` (the
+        largest), `n_people`.
+    """
+    rows = []
+    for (script, detector), part in table.groupby(["script", "detector"], sort=False):
+        moved, n = int((part["retreat_m"] > MOVED_M).sum()), len(part)
+        row = {"script": script, "detector": detector, "value": moved / n}
+        row |= dict(zip(("low", "high"), _wilson(moved, n), strict=True))
+        rows.append(row | {"retreat_m": part["retreat_m"].max(), "n_people": n})
+    return pd.DataFrame(rows)
+
+
+def model_check(table: pd.DataFrame, swept: pd.DataFrame, follow_m_s: float) -> pd.DataFrame:
+    """First reaches of rendered people beside those with modelled errors, with our gains.
+
+    Parameters
+    ----------
+    table : pd.DataFrame
+        As from `metrics`.
+    swept : pd.DataFrame
+        As from `sweeps.sweep`; has the same people, following as fast, at the same latencies.
+    follow_m_s : float
+
+    Returns
+    -------
+    pd.DataFrame
+        Columns `detector, rendered_m, modelled_m` (means over people), `apart_m` (root mean square of the
+        differences between runs of a person), `n_people`.
+    """
+    same = swept[(swept["follow_m_s"] == follow_m_s) & (swept["lost_share"] == 0)]
+    keys = ["script", "subject", "detector", "gains"]
+    both = table.merge(same.drop(columns="latency_s"), on=keys, suffixes=("", "_modelled"))
+    both = both[~both["detector"].isin(IDEAL)]
+    both["squared"] = (both["reach_m"] - both["reach_m_modelled"]) ** 2
+    by = both.groupby("detector", sort=False)
+    columns = {"rendered_m": by["reach_m"].mean(), "modelled_m": by["reach_m_modelled"].mean()}
+    columns |= {"apart_m": by["squared"].mean() ** 0.5, "n_people": by.size()}
+    return pd.DataFrame(columns).reset_index()
+
+
+def curves(swept: pd.DataFrame, latencies: Mapping[str, Latency]) -> dict[str, pd.DataFrame]:
+    """The rows of each curve, by the column that was swept; see `sweeps.variants`."""
+    totals_s = {name: latency.total_s for name, latency in latencies.items()}
+    stated_s = swept["detector"].map(totals_s).fillna(0.0)
+    still, whole, stated = swept["follow_m_s"] == 0, swept["lost_share"] == 0, swept["latency_s"] == stated_s
+    kept = {"latency_s": still & whole, "lost_share": still & stated, "follow_m_s": whole & stated}
+    return {column: swept[rows].sort_values(column, kind="stable") for column, rows in kept.items()}
+
+
+def sightings(runs: Iterable[Run]) -> pd.DataFrame:
+    """What a detector found of people's keypoints, in the form of `error_model.fit`."""
+    parts = []
+    for number, run in enumerate(runs):
+        for image, frame in run.frames.iterrows():
+            offsets_m = found_groups(*sure_keypoints(frame))
+            columns = {"group": [*GROUPS], "in_sight": np.asarray(frame["in_sight"]) > 0}
+            columns |= dict(zip(("x_m", "y_m", "z_m"), offsets_m.T, strict=True))
+            parts.append(pd.DataFrame(columns).assign(run=number, image=image))
+    return pd.concat(parts, ignore_index=True)
 
 
 def sure_keypoints(frame: pd.Series) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -99,7 +211,7 @@ def keypoint_errors(runs: Iterable[Run]) -> pd.DataFrame:
             points, is_sure, truth = sure_keypoints(frame)
             either_m = [np.linalg.norm(points - side, axis=2) for side in (truth, truth[mirror("halpe136")])]
             near = np.linalg.norm(points - HOME_M["left"], axis=2) < REACH_M
-            about = {"script": run.job.trial.script, "detector": run.job.condition, "t_s": frame["t_s"]}
+            about = {"script": run.job.trial.script, "detector": run.job.detector, "t_s": frame["t_s"]}
             errors = {"error_m": np.min(either_m, axis=0)[is_sure], "near": near[is_sure]}
             parts.append(pd.DataFrame(errors).assign(**about))
     empty = {"error_m": np.zeros(0), "near": np.zeros(0, bool), "script": [], "detector": [], "t_s": []}
@@ -127,8 +239,10 @@ def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> d
         By detector; the terms of ISO/TS 15066.
     """
     runs = list(runs)
-    robot_m_s = max(float(run.cycles["hand_error_m"].diff().abs().max()) for run in runs) / period_s
-    delays_s = {run.job.condition: run.job.delay_s for run in runs if run.job.condition not in IDEAL}
+    robot_m_s = max(
+        float((run.cycles["hand_error_m"].diff() / run.cycles["t_s"].diff()).abs().max()) for run in runs
+    )
+    delays_s = {run.job.detector: run.job.latency.total_s for run in runs if run.job.detector not in IDEAL}
     by_detector = errors[errors["near"]].groupby("detector")["error_m"].quantile(0.95)
     return {
         name: Separation(robot_m_s, delay_s + period_s, period_s, float(by_detector[name]))
@@ -137,39 +251,30 @@ def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> d
     }
 
 
-def error_quantiles(errors: pd.DataFrame) -> pd.DataFrame:
-    """Of `keypoint_errors` near the hand: columns `script, detector, n_keypoints, median_m, p95_m`."""
-    by = errors[errors["near"]].groupby(["script", "detector"], sort=False)["error_m"]
-    columns = {"n_keypoints": by.size(), "median_m": by.median(), "p95_m": by.quantile(0.95)}
-    return pd.DataFrame(columns).reset_index()
-
-
 def measured_times(runs: Iterable[Run]) -> pd.DataFrame:
-    """What detector and lifting took per image when the runs were first simulated, beside the stated delay.
+    """What detector and lifting took per image when the runs were first simulated, beside what is stated.
 
-    Columns: `detector`, `delay_s`, `median_ms`, `within_share` (of the images, those that took no longer than
-    the delay). The first image of a run is left out: the detector is made ready with it.
+    Columns: `detector`, `inference_s` and `latency_s` as stated, `median_ms`, `p99_ms`, `within_share` (of
+    the images, those that took no longer than `inference_s`). The first image of a run is left out: the
+    detector is made ready with it.
     """
-    parts = [
-        run.frames[["time_ms"]].iloc[1:].assign(detector=run.job.condition, delay_s=run.job.delay_s)
-        for run in runs
-        if len(run.frames)
-    ]
-    empty = pd.DataFrame({"time_ms": [], "detector": [], "delay_s": []})
-    times = pd.concat(parts) if parts else empty
-    times = times.assign(within=times["time_ms"] <= 1e3 * times["delay_s"])
-    by = times.groupby("detector", sort=False)
-    columns = {"median_ms": by["time_ms"].median(), "within_share": by["within"].mean()}
-    return pd.DataFrame({"delay_s": by["delay_s"].first()} | columns).reset_index()
+    runs, table = [run for run in runs if len(run.frames)], []
+    for detector, latency in {run.job.detector: run.job.latency for run in runs}.items():
+        frames = [run.frames for run in runs if run.job.detector == detector]
+        times_ms = np.concatenate([part["time_ms"].to_numpy()[1:] for part in frames])
+        row = {"detector": detector, "inference_s": latency.inference_s, "latency_s": latency.total_s}
+        row |= dict(zip(("median_ms", "p99_ms"), np.percentile(times_ms, (50, 99)), strict=True))
+        table.append(row | {"within_share": np.mean(times_ms <= 1e3 * latency.inference_s)})
+    return pd.DataFrame(table)
 
 
 def _metrics(run: Run) -> dict:
     cycles, job = run.cycles, run.job
     t, distance, away = (cycles[name].to_numpy() for name in ("t_s", "distance_m", "hand_error_m"))
     period_s = t[1] - t[0]
-    row = {"script": job.trial.script, "detector": job.condition, "delay_s": job.delay_s}
-    row["min_distance_m"] = distance.min()
-    row |= {f"under_{round(100 * m)}cm_s": period_s * (distance < m).sum() for m in WITHIN_M}
+    row = {"script": job.trial.script, "subject": job.trial.subject.number, "detector": job.detector}
+    row |= {"gains": job.gains, "latency_s": job.latency.total_s} | least_distances(cycles)
+    row |= {f"under_{round(100 * m)}cm_s": period_s * (distance < m).sum() for m in MARKS_M}
     row["reaction_s"] = _first(t, away > MOVED_M) - _crossing_s(t, distance)
     row["retreat_m"] = away.max()
     begins = (cycles["status"] == AVOIDING) & (cycles["status"].shift() != AVOIDING)
@@ -178,7 +283,8 @@ def _metrics(run: Run) -> dict:
     far = np.flatnonzero(away > BACK_M)
     back = far[-1] + 1 if len(far) else 0
     row["back_s"] = max(0.0, t[back] - LEAVES_S[1]) if 0 < back < len(t) else np.nan
-    return row | _sightings(run, t[distance < FIELD_M])
+    looked = (t >= LOOKED_AT_S[0]) & (t <= LOOKED_AT_S[1])
+    return row | _sightings(run, t[looked & (distance < FIELD_M)])
 
 
 def _sightings(run: Run, near_s: np.ndarray) -> dict:
@@ -211,11 +317,11 @@ def _first(t: np.ndarray, which: np.ndarray) -> float:
 
 def _why(row) -> str:
     if np.isnan(row.seen_share):
-        return "the controller is too slow"
+        return "perfect keypoints: the controller is too slow"
     if row.seen_share == 0:
-        return "the detector never finds the person while they are near"
-    if SCRIPTS[row.script].by_head and row.head_share < ENOUGH_SHARE:
-        return f"it is the head that comes, and that is found in {row.head_share:.0%} of the images"
+        return "never found while near"
+    if SCRIPTS[row.script].by == "head" and row.head_share < ENOUGH_SHARE:
+        return "the head comes, and is found in less than half of the images"
     if row.blind_s > LOST_S:
-        return f"the person is lost in {1 - row.seen_share:.0%} of the images, for up to {row.blind_s:.1f} s"
-    return f"found in {row.seen_share:.0%} of the images, but the hand moves {row.reaction_s:.1f} s late"
+        return f"lost for more than {LOST_S:g} s"
+    return "found, and the hand moves too late"

@@ -18,7 +18,7 @@ from hicp_lib.experiments import laboratory
 from hicp_lib.experiments.avoidance.reaching import PHASES_S, SCRIPTS, script
 from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
 from hicp_lib.experiments.recordings.gestures import Gestures
-from hicp_lib.robot.home import home_posture
+from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.simulation.appearance import (
     clothing,
@@ -383,7 +383,7 @@ def scripts_made() -> list[np.ndarray]:
     at_s = np.cumsum([0.0, *PHASES_S.values()])
     found = []
     for name in SCRIPTS:
-        postures = [script(name).motion.at(t - PHASES_S["far"]) for t in (*at_s, 2.0)]
+        postures = [script(name).posture_at(t, np.array(HOME_M["left"])) for t in (*at_s, 2.6)]
         names = sorted(postures[0].joints | postures[3].joints)
         found.append(
             np.array([[*p.place_m, *(p.joints.get(joint, 0.0) for joint in names)] for p in postures])

@@ -10,7 +10,7 @@ import numpy as np
 
 from hicp_lib.experiments.avoidance.closed_loop import Trial, TrueKeypoints, simulate, start_posture
 from hicp_lib.experiments.avoidance.head_camera import photograph
-from hicp_lib.experiments.avoidance.reaching import SCRIPTS, script
+from hicp_lib.experiments.avoidance.reaching import SCRIPTS, Moment
 from hicp_lib.experiments.doses import doses
 from hicp_lib.experiments.recordings.frames import record_frame
 from hicp_lib.experiments.recordings.scenarios import scenario
@@ -30,7 +30,7 @@ def closed_loop(number: int) -> str:
     """The first steps of a run of avoidance, and what the robot's camera sees then."""
     name = list(SCRIPTS)[number % len(SCRIPTS)]
     cycles = simulate(Trial(name, 0.2, Subject(number=number)), TrueKeypoints())
-    seen = photograph(script(name, Subject(number=number)), 2.0, start_posture())
+    seen = photograph(Moment(name, Subject(number=number), 2.0), start_posture())
     return content(cycles.to_dict("list"), seen)
 
 

@@ -1,17 +1,20 @@
 """The loop closed in simulation: the robot sees the person, gives way, and sees from its new posture.
 
-Time advances in the controller's periods. Joints follow their velocities exactly. Images are taken at the
-camera's rate, but only when the one before is done with; what was perceived reaches the loop after a delay.
+Time advances in the controller's periods. Joints follow their velocities exactly, but are read with noise.
+The camera runs on its own; whenever the detector is free, it takes the next image, and what it makes of that
+reaches the loop after a stated latency. The person, too, sees the robot, and follows its hand.
 """
 
+from collections import deque
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 import pandas as pd
 
+from hicp_lib.core.errors import InputError
 from hicp_lib.core.memo import memoised
-from hicp_lib.experiments.avoidance.reaching import Script, script
+from hicp_lib.experiments.avoidance.reaching import LEAVES_S, REACTION_S, Moment
 from hicp_lib.experiments.avoidance.skin_distance import robot_spheres, skin_distance_m
 from hicp_lib.experiments.laboratory import in_root
 from hicp_lib.robot.controller import Controller, Settings
@@ -25,7 +28,46 @@ from hicp_lib.simulation.body.identities import Subject
 MOUNT = "tilted"
 NECK_RAD = np.radians([3.0, 0.0, 4.0])
 """How the robot holds its head: it looks at its left hand and at whoever comes for it."""
-_POSED_S = 0.08  # the person's skin is posed this often, and moves on straight lines in between
+HAND_COLUMNS = ("followed_x_m", "followed_y_m", "followed_z_m")
+_POSED_S = 0.1  # the person's skin is posed this often, and moves on straight lines in between
+_ROW_PERIODS = 2  # control periods from one row to the next
+
+
+@dataclass(frozen=True)
+class Latency:
+    """From light to keypoints in the loop, stated: one that is measured would differ by machine and by run.
+
+    Attributes
+    ----------
+    exposure_s : float
+        From the middle of the exposure to its end.
+    transport_s : float
+        Readout, cable and driver.
+    queue_s : float
+        Until the detector is free.
+    inference_s : float
+        Detector and lifting, during which no other image is worked on.
+
+    Raises
+    ------
+    InputError
+        If one of them is no number of seconds.
+    """
+
+    exposure_s: float = 0.0
+    transport_s: float = 0.0
+    queue_s: float = 0.0
+    inference_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value_s in vars(self).items():
+            if not (isinstance(value_s, int | float) and 0 <= value_s < np.inf):
+                raise InputError(f"{name} is {value_s!r}; expected seconds, 0 or more")
+
+    @property
+    def total_s(self) -> float:
+        """The sum."""
+        return self.exposure_s + self.transport_s + self.queue_s + self.inference_s
 
 
 @dataclass(frozen=True)
@@ -35,39 +77,45 @@ class Trial:
     Attributes
     ----------
     script : str
-        What the person does, a key of `SCRIPTS`.
+        What the person does, a key of `SCRIPTS` or `BYSTANDERS`.
     duration_s : float
         For how long.
     subject : Subject
         Who the person is; draws room and noise too.
     camera_hz : float
         Images per second, if perception is as fast.
+    follow_m_s : float
+        How fast the person follows the robot's hand at most; 0: they go where it was at first.
+    joint_noise_rad : float
+        Standard deviation of each reading of a joint.
     """
 
     script: str
-    duration_s: float = 7.6
+    duration_s: float = 5.4
     subject: Subject = Subject()
     camera_hz: float = 10.0
+    follow_m_s: float = 0.8
+    joint_noise_rad: float = 0.0
 
 
 class Perceiver(Protocol):
     """What the robot perceives people with."""
 
     @property
-    def delay_s(self) -> float:
+    def latency(self) -> Latency:
         """From the image to when the loop knows."""
         ...
 
-    def perceive(self, script: Script, time_s: float, posture: Posture) -> Perception:
+    def perceive(self, moment: Moment, posture: Posture, read: Posture) -> Perception:
         """Who is there, as seen from a posture.
 
         Parameters
         ----------
-        script : Script
-        time_s : float
-            From the script's beginning.
+        moment : Moment
         posture : Posture
             The robot's.
+        read : Posture
+            The same as the robot knows it.
 
         Returns
         -------
@@ -78,27 +126,71 @@ class Perceiver(Protocol):
 
 @dataclass(frozen=True)
 class TrueKeypoints:
-    """The upper bound: every keypoint where it is, hidden or not, known at once."""
+    """The upper bound: every keypoint where it is, hidden or not, known at once or after a latency."""
 
-    delay_s: float = 0.0
+    latency: Latency = Latency()
 
-    def perceive(self, script: Script, time_s: float, posture: Posture) -> Perception:
+    def perceive(self, moment: Moment, posture: Posture, read: Posture) -> Perception:
         """Where every keypoint is.
 
         Parameters
         ----------
-        script : Script
-        time_s : float
-            From the script's beginning.
-        posture : Posture
-            The robot's.
+        moment : Moment
+        posture, read : Posture
+            Not used.
 
         Returns
         -------
         Perception
         """
-        points_m = in_root(script.person_at(time_s).keypoints_m)[None]
-        return Perception(time_s, points_m, np.ones(points_m.shape[:2]))
+        points_m = in_root(moment.person.keypoints_m)[None]
+        return Perception(moment.time_s, points_m, np.ones(points_m.shape[:2]))
+
+
+class Follower:
+    """The person of a trial: takes the robot's hand to be where it was a while ago, and goes there.
+
+    Parameters
+    ----------
+    trial : Trial
+    """
+
+    def __init__(self, trial: Trial):
+        self.trial = trial
+        self._hands: list[tuple[float, np.ndarray]] = []
+        self._followed_m = [np.array(HOME_M["left"])]  # every `_POSED_S`
+
+    def see(self, time_s: float, hand_m: np.ndarray) -> None:
+        """Where the robot's hand is at a time; in the order of time, at least every `REACTION_S` / 2."""
+        self._hands.append((time_s, hand_m))
+        while len(self._followed_m) * _POSED_S < min(time_s + REACTION_S / 2, LEAVES_S[0]) + 1e-9:
+            then_s, last_m = len(self._followed_m) * _POSED_S - REACTION_S, self._followed_m[-1]
+            seen_m = next((m for t, m in reversed(self._hands) if t <= then_s + 1e-9), last_m)
+            away_m = seen_m - last_m
+            share = min(1.0, self.trial.follow_m_s * _POSED_S / max(float(np.linalg.norm(away_m)), 1e-9))
+            self._followed_m.append(last_m + share * away_m)
+
+    def moment(self, time_s: float) -> Moment:
+        """What there is at a time, no later than `_POSED_S` after what was seen last."""
+        before = min(int(time_s / _POSED_S + 1e-9), len(self._followed_m) - 1)
+        first_m, then_m = (
+            self._followed_m[before],
+            self._followed_m[min(before + 1, len(self._followed_m) - 1)],
+        )
+        hand_m = first_m + min(time_s / _POSED_S - before, 1.0) * (then_m - first_m)
+        # A robot that nobody threatens moves by less: everybody then sees the same.
+        return Moment(self.trial.script, self.trial.subject, time_s, tuple(hand_m.round(3).tolist()))
+
+    def skin_m(self, time_s: float) -> np.ndarray:
+        """Vertices (v, 3) of the person's skin, root frame."""
+        before = int(time_s / _POSED_S + 1e-9)
+        first, then = (_skin_m(self.moment(round(k * _POSED_S, 9))) for k in (before, before + 1))
+        return first + np.float32(time_s / _POSED_S - before) * (then - first)
+
+
+@memoised(128)
+def _skin_m(moment: Moment) -> np.ndarray:
+    return in_root(moment.person.vertices_m).astype(np.float32)
 
 
 @memoised()
@@ -108,7 +200,11 @@ def start_posture() -> Posture:
 
 
 def simulate(
-    trial: Trial, perceiver: Perceiver, avoids: bool = True, settings: Settings | None = None
+    trial: Trial,
+    perceiver: Perceiver,
+    avoids: bool = True,
+    settings: Settings | None = None,
+    start_s: float = 0.0,
 ) -> pd.DataFrame:
     """One run of a trial.
 
@@ -120,57 +216,47 @@ def simulate(
         Whether the robot gives way at all.
     settings : Settings, optional
         The controller's.
+    start_s : float, optional
+        What is before is left out.
 
     Returns
     -------
     pd.DataFrame
-        A row per control period: `t_s`, `distance_m` between robot and person, `activations` of all taxels (a
-        list) and `activation`, the highest, `status`, `hand_error_m` (from the post), a column per joint in
-        radians, and `seen_s`, when the newest image that the loop knows was taken (NaN: none yet).
+        A row per two control periods: `t_s`, `distance_m` between robot and person, `activations` of all
+        taxels (a list) and `activation`, the highest, `status`, `hand_error_m` (from the post), a column per
+        joint in radians, `HAND_COLUMNS` (where the person takes the hand to be), and `seen_s`, when the
+        newest image that the loop knows was taken (NaN: none yet).
     """
-    scene, icub = script(trial.script, trial.subject), load_icub()
-    posture = start_posture()
-    delay_s = perceiver.delay_s
-    between_s = next_image_s(0.0, delay_s, trial.camera_hz)
-    loop = _loop(icub, posture, delay_s + between_s, avoids, settings or Settings())
-    period_s, under_way, free_s, rows = loop.controller.settings.period_s, None, 0.0, []
-    for k in range(round(trial.duration_s / period_s)):
-        now_s, arrived = k * period_s, None
-        if under_way is not None and now_s >= under_way.time_s + delay_s - 1e-9:
-            arrived, under_way = under_way, None
-        if under_way is None and now_s >= free_s - 1e-9:
-            under_way = perceiver.perceive(scene, now_s, posture)
-            free_s = next_image_s(now_s, delay_s, trial.camera_hz)
-            if delay_s == 0:
-                arrived, under_way = under_way, None
-        command, threat = loop.cycle(now_s, posture, arrived)
-        rows.append(_row(trial, now_s, loop, posture, command, threat))
-        posture = posture.moved("left", posture.angles("left") + period_s * command.velocities_rad_s)
+    icub, posture, person = load_icub(), start_posture(), Follower(trial)
+    latency, rng = perceiver.latency, trial.subject.stream(trial.script, "joints")
+    loop = _loop(icub, posture, latency.total_s + between_s(trial, latency), avoids, settings or Settings())
+    period_s, under_way, free_s, rows = loop.controller.settings.period_s, deque[Perception](), 0.0, []
+    for k in range(round(start_s / period_s), round(trial.duration_s / period_s)):
+        now_s, q = k * period_s, posture.angles("left")
+        person.see(now_s, icub.chains["left"].T_root_link("hand", q)[:3, 3])
+        read = posture.moved("left", q + rng.normal(0.0, trial.joint_noise_rad, len(q)))
+        if now_s >= free_s - 1e-9:
+            under_way.append(perceiver.perceive(person.moment(now_s), posture, read))
+            free_s = now_s + between_s(trial, latency)
+        arrived = None
+        if under_way and now_s >= under_way[0].time_s + latency.total_s - 1e-9:
+            arrived = under_way.popleft()
+        command, threat = loop.cycle(now_s, read, arrived)
+        if k % _ROW_PERIODS == 0:
+            rows.append(_row(person, now_s, loop, posture, command, threat))
+        posture = posture.moved("left", q + period_s * command.velocities_rad_s)
     return pd.DataFrame(rows)
 
 
-def next_image_s(taken_s: float, delay_s: float, camera_hz: float) -> float:
-    """When the next image is taken: the camera's first one after the last is done with.
-
-    Parameters
-    ----------
-    taken_s : float
-        When the last image was taken.
-    delay_s : float
-        How long it is worked on.
-    camera_hz : float
-
-    Returns
-    -------
-    float
-        Seconds.
+def between_s(trial: Trial, latency: Latency) -> float:
+    """From one image to the next: the camera's first one after the detector is free again.
 
     Examples
     --------
-    >>> float(next_image_s(1.0, delay_s=0.15, camera_hz=10.0))
-    1.2
+    >>> float(between_s(Trial("sitting, hand", camera_hz=10.0), Latency(transport_s=0.5, inference_s=0.15)))
+    0.2
     """
-    return taken_s + max(1, np.ceil(delay_s * camera_hz - 1e-9)) / camera_hz
+    return max(1, np.ceil(latency.inference_s * trial.camera_hz - 1e-9)) / trial.camera_hz
 
 
 def _loop(icub: ICub, posture: Posture, late_s: float, avoids: bool, settings: Settings) -> AvoidanceLoop:
@@ -183,31 +269,18 @@ def _loop(icub: ICub, posture: Posture, late_s: float, avoids: bool, settings: S
 
 
 def _row(
-    trial: Trial, now_s: float, loop: AvoidanceLoop, posture: Posture, command: Command, threat: Threat
+    person: Follower, now_s: float, loop: AvoidanceLoop, posture: Posture, command: Command, threat: Threat
 ) -> dict:
     icub, q = loop.controller.icub, posture.angles("left")
     hand_m = icub.chains["left"].T_root_link("hand", q)[:3, 3]
-    spheres = robot_spheres(icub, loop.skin, posture)
     row = {
         "t_s": now_s,
-        "distance_m": skin_distance_m(spheres, person_skin_m(trial, now_s)),
+        "distance_m": skin_distance_m(robot_spheres(icub, loop.skin, posture), person.skin_m(now_s)),
         "activation": float(threat.activations.max()),
         "activations": threat.activations.round(3).tolist(),
         "status": command.status,
         "hand_error_m": float(np.linalg.norm(hand_m - loop.controller.post_m)),
         "seen_s": loop.tracker.latest_s if np.isfinite(loop.tracker.latest_s) else np.nan,
     }
+    row |= dict(zip(HAND_COLUMNS, person.moment(now_s).hand_m, strict=True))
     return row | {f"{joint}_rad": angle for joint, angle in zip(ARM_JOINTS, q.tolist(), strict=True)}
-
-
-def person_skin_m(trial: Trial, time_s: float) -> np.ndarray:
-    """Vertices (v, 3) of the person's skin at a time, root frame."""
-    before = int(time_s / _POSED_S + 1e-9)
-    share = time_s / _POSED_S - before
-    first, then = (_posed_skin_m(trial.script, trial.subject, k) for k in (before, before + 1))
-    return first + np.float32(share) * (then - first)
-
-
-@memoised(256)
-def _posed_skin_m(name: str, subject: Subject, k: int) -> np.ndarray:
-    return in_root(script(name, subject).person_at(k * _POSED_S).vertices_m).astype(np.float32)

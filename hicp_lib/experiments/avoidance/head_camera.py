@@ -12,11 +12,12 @@ import numpy as np
 
 from hicp_lib.core.camera import transform
 from hicp_lib.core.detections import Detections, Detector
-from hicp_lib.experiments.avoidance.closed_loop import MOUNT, start_posture
-from hicp_lib.experiments.avoidance.reaching import Script
+from hicp_lib.core.keypoints import N_KEYPOINTS
+from hicp_lib.experiments.avoidance.closed_loop import MOUNT, Latency, start_posture
+from hicp_lib.experiments.avoidance.reaching import LOOKED_AT_S, Moment
 from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
 from hicp_lib.experiments.laboratory import COLOUR, colour_and_depth, robot_camera
-from hicp_lib.lifting.paper import lift
+from hicp_lib.lifting.robust import METHODS, lift_in_steps
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.loop import Perception
 from hicp_lib.robot.posture import Posture
@@ -25,8 +26,8 @@ from hicp_lib.simulation.rendering.render import render
 
 RgbdImage = tuple[np.ndarray, np.ndarray]
 """Image (480, 640, 3), RGB uint8, and depth in metres (480, 640)."""
-ImageCache = MutableMapping[tuple, RgbdImage]
-_AT_POST_RAD = 1e-6  # a robot that nobody threatens moves less
+ImageCache = MutableMapping[Moment, RgbdImage]
+_AT_POST_RAD = 2e-3  # a robot that nobody threatens moves less
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +36,9 @@ class Observation:
 
     Attributes
     ----------
+    moment : Moment
+    posture : Posture
+        The robot's.
     rgb : array, shape (480, 640, 3), dtype uint8
     detections : Detections
     perception : Perception
@@ -43,6 +47,8 @@ class Observation:
         What detector and lifting took on this machine. It moves nothing that is simulated.
     """
 
+    moment: Moment
+    posture: Posture
     rgb: np.ndarray
     detections: Detections
     perception: Perception
@@ -57,8 +63,10 @@ class HeadCamera:
     ----------
     detector : Detector
         Looks at the images.
-    delay_s : float
+    latency : Latency
         From image to keypoints in the loop.
+    lifting : str
+        One of `hicp_lib.lifting.robust.METHODS`.
     images : mapping
         Images taken from the robot's post; until it first gives way, all detectors see the same.
     observations : list of Observation
@@ -66,52 +74,55 @@ class HeadCamera:
     """
 
     detector: Detector
-    delay_s: float
+    latency: Latency
+    lifting: str = "robust"
     images: ImageCache = field(default_factory=dict)
     observations: list[Observation] = field(default_factory=list)
 
-    def perceive(self, script: Script, time_s: float, posture: Posture) -> Perception:
+    def perceive(self, moment: Moment, posture: Posture, read: Posture) -> Perception:
         """Render what is to be seen, find people and lift them; remember all of it.
+
+        Outside `LOOKED_AT_S` nothing is rendered, and nobody found.
 
         Parameters
         ----------
-        script : Script
-        time_s : float
-            From the script's beginning.
+        moment : Moment
         posture : Posture
             The robot's.
+        read : Posture
+            The same as the robot knows it.
 
         Returns
         -------
         Perception
         """
-        rgb, depth_m = self._image(script, time_s, posture)
+        if not LOOKED_AT_S[0] <= moment.time_s <= LOOKED_AT_S[1]:
+            return Perception(moment.time_s, np.zeros((0, N_KEYPOINTS, 3)), np.zeros((0, N_KEYPOINTS)))
+        rgb, depth_m = self._image(moment, posture)
         start_s = time.perf_counter()
         found = self.detector.detect(rgb)
-        perception = lifted(found, depth_m, time_s, posture)
+        perception = lifted(found, depth_m, moment.time_s, read, self.lifting)
         elapsed_ms = 1e3 * (time.perf_counter() - start_s)
-        self.observations.append(Observation(rgb, found, perception, elapsed_ms))
+        self.observations.append(Observation(moment, posture, rgb, found, perception, elapsed_ms))
         return perception
 
-    def _image(self, script: Script, time_s: float, posture: Posture) -> RgbdImage:
-        angles, post = posture.angles("left"), start_posture().angles("left")
-        if not np.allclose(angles, post, rtol=0, atol=_AT_POST_RAD):
-            return photograph(script, time_s, posture)
-        key = (script.name, script.subject, time_s, angles.tobytes())
-        taken = self.images.get(key)
+    def _image(self, moment: Moment, posture: Posture) -> RgbdImage:
+        post = start_posture()
+        if not np.allclose(posture.angles("left"), post.angles("left"), rtol=0, atol=_AT_POST_RAD):
+            return photograph(moment, posture)
+        taken = self.images.get(moment)
         if taken is None:
-            taken = self.images[key] = photograph(script, time_s, posture)
+            taken = self.images[moment] = photograph(moment, post)
         return taken
 
 
-def photograph(script: Script, time_s: float, posture: Posture) -> RgbdImage:
+def photograph(moment: Moment, posture: Posture) -> RgbdImage:
     """What the camera on the head takes.
 
     Parameters
     ----------
-    script : Script
-    time_s : float
-        From the script's beginning.
+    moment : Moment
+        Its subject and time draw the noise.
     posture : Posture
         The robot's.
 
@@ -120,13 +131,15 @@ def photograph(script: Script, time_s: float, posture: Posture) -> RgbdImage:
     rgb : array, shape (480, 640, 3), dtype uint8
     depth_m : array, shape (480, 640), dtype float32
     """
-    icub, rng = load_icub(), script.subject.stream(script.name, round(1000 * time_s))
+    icub, rng = load_icub(), moment.subject.stream(moment.script, round(1000 * moment.time_s))
     camera = robot_camera(icub.T_root_camera(posture.angles("head"), MOUNT))
-    world, _ = script.at(time_s, robot_surfaces(icub, posture))
+    world = moment.world(robot_surfaces(icub, posture))
     return colour_and_depth(render(world, camera, rng), camera, rng)
 
 
-def lifted(found: Detections, depth_m: np.ndarray, time_s: float, posture: Posture) -> Perception:
+def lifted(
+    found: Detections, depth_m: np.ndarray, time_s: float, posture: Posture, method: str = "robust"
+) -> Perception:
     """Keypoints in the root frame, without those on the robot's own body.
 
     Parameters
@@ -137,13 +150,15 @@ def lifted(found: Detections, depth_m: np.ndarray, time_s: float, posture: Postu
         When the image was taken.
     posture : Posture
         The robot's, then.
+    method : str, optional
+        One of `hicp_lib.lifting.robust.METHODS`.
 
     Returns
     -------
     Perception
     """
     icub = load_icub()
-    in_camera_m = lift(found.keypoints_px, depth_m, COLOUR).points_m
+    (in_camera,) = lift_in_steps(found.keypoints_px, depth_m, COLOUR, [METHODS[method]])
     T_root_camera = icub.T_root_camera(posture.angles("head"), MOUNT)
-    points_m = filter_self(icub, posture, transform(T_root_camera, in_camera_m))
+    points_m = filter_self(icub, posture, transform(T_root_camera, in_camera.points_m))
     return Perception(time_s, points_m, found.scores)

@@ -1,12 +1,13 @@
-"""The paper's three trials of avoidance as scripts: a person comes near the robot's left hand, and leaves.
+"""What people do before the robot, as scripts: they come for its left hand and follow it, or stand by.
 
-Sitting, they reach for it with the hand; standing, they do; sitting, they approach it with the head
-(section IV-E). Every script has the same phases (`PHASES_S`): far, getting ready, approach, near, leaving,
-far again. Unless the robot gives way, the person's skin comes within `CONTACT_M` of it. They do not follow
-the hand: where they go is decided beforehand.
+The paper's three trials (section IV-E): sitting, they reach for the hand with theirs; standing, they do;
+sitting, they approach it with the head. Unless the robot gives way, the person's skin comes within
+`CONTACT_M` of it; if it does, they follow the hand as it was `REACTION_S` ago, as far as they can reach. Two
+scripts of bystanders (`BYSTANDERS`), who come no nearer than `BYSTAND_M`: one gestures, one passes by. Every
+script has the same phases (`PHASES_S`): far, getting ready, approach, near, leaving, far again.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +25,7 @@ from hicp_lib.experiments.laboratory import (
     in_root,
     posed,
 )
-from hicp_lib.experiments.minimum_jerk import Motion, Move, Posture
+from hicp_lib.experiments.minimum_jerk import Posture, between, minimum_jerk
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.skin import read_skin
@@ -37,29 +38,39 @@ from hicp_lib.simulation.body.reach import reach
 from hicp_lib.simulation.rendering.render import World
 from hicp_lib.simulation.rendering.surfaces import Surface
 
-PHASES_S = {"far": 0.6, "ready": 0.9, "approach": 1.1, "near": 1.4, "leave": 1.0}
+PHASES_S = {"far": 0.6, "ready": 0.9, "approach": 1.1, "near": 1.0, "leave": 1.0}
 """How long the person is far, takes to get ready, to approach, stays near, and takes to leave."""
-NEAR_S = PHASES_S["far"] + PHASES_S["ready"] + PHASES_S["approach"]
-"""When the person is as near as they go."""
+READY_S = PHASES_S["far"] + PHASES_S["ready"]
+NEAR_S = READY_S + PHASES_S["approach"]
+"""When the person begins to approach, and when they are as near as they would come to a robot that stays."""
 LEAVES_S = NEAR_S + PHASES_S["near"], sum(PHASES_S.values())
 """When the person begins to leave, and has left."""
-CONTACT_M = 0.01
+LOOKED_AT_S = READY_S - 0.3, LEAVES_S[0] + 0.3
+"""When it matters what the robot sees; before and after, people are too far away."""
+CONTACT_M, BYSTAND_M = 0.01, 0.36
+REACTION_S = 0.2
+"""How old what the person acts on is: eyes to arm (150 to 200 ms to a target that jumps)."""
 
 _SITTING_DEG = {"hip_flexion": 86.0, "knee_flexion": 86.0, "hip_abduction": 12.0}
 _HANGING_DEG = {"left_shoulder_abduction": 6.0, "right_shoulder_abduction": 6.0, "left_elbow_flexion": 12.0}
 _HAND_DEG = {"forearm_supination": -15.0, "wrist_flexion": 0.0, "wrist_deviation": 0.0}
-_LEANS_DEG = range(0, 120, 5)  # how far the trunk bends in all, tried from upright on
+_LEANS_DEG = np.arange(0.0, 100.1, 5.0)  # how far the trunk bends in all; the neck no further
+_FINE_DEG = np.arange(0.0, 100.1, 0.25)
 _LEAN_SHARES = {PELVIS_LEAN: 0.35, "spine_flexion": 0.65, "neck_flexion": -0.45}  # the eyes look ahead
 _FROM = np.array([-0.66, 0.55, 0.45])  # whence the hand comes, root frame: from the palm's side
-_WRISTS_M = np.arange(0.40, 0.04, -0.03)  # how far the wrist is from the robot's palm, tried from afar
+_WRISTS_M = np.arange(0.70, 0.04, -0.03)  # how far the wrist is from the robot's palm, tried from afar
+_PASSES_M = np.arange(1.5, 0.4, -0.05)  # how far off somebody passes, likewise
+_PASSES_X_M = (-0.9, 0.1, 0.9)  # from where to where
 _N_HALVINGS = 6  # of the step in which contact comes about
 _READY_M = 0.24  # how far from the end of the approach the person gets ready
 _HEAD_FROM_DEG = 20.0  # how much more upright the trunk is when the head gets ready
-_MISS_M = 0.005  # a wrist this near its goal is there
+_STRETCHED = 0.97  # of the arm's length: the trunk bends so far that this suffices
 _REST_M = np.array([0.16, 0.19, 0.08])  # a sitting person's wrist before, beside and above the pelvis
 _SEAT_M = 0.11  # how far below the pelvis's origin a seat is
 # Where elbows go, see `reach`: with the hands in the lap, and of the arm that reaches.
 _ELBOW_AT_REST, _ELBOW_REACHING = (-0.5, 0.7, -0.5), (-0.2, 0.5, -0.9)
+Reach = Callable[[np.ndarray], Posture]
+"""From where the robot's hand is taken to be (3,), root frame, to how the person then touches it."""
 
 
 @dataclass(frozen=True)
@@ -68,21 +79,27 @@ class Staging:
 
     Attributes
     ----------
-    sits, by_head : bool
-        Whether the person sits, and whether they come with the head instead of the hand.
+    sits : bool
+        Whether the person sits.
     place_m : tuple of float
         Where on the floor they are (x, y), world frame.
+    by : str
+        What they come with: "hand", "head", or as bystanders "gesture" or "passing".
     """
 
     sits: bool
-    by_head: bool
     place_m: tuple[float, float]
+    by: str
 
 
+BYSTANDERS = {
+    "sitting, gesture": Staging(True, (0.26, 1.02), "gesture"),
+    "standing, passing": Staging(False, (0.26, 1.5), "passing"),
+}
 SCRIPTS = {
-    "sitting, hand": Staging(True, False, (0.26, 1.02)),
-    "standing, hand": Staging(False, False, (0.26, 0.92)),
-    "sitting, head": Staging(True, True, (-0.14, 1.0)),
+    "sitting, hand": Staging(True, (0.26, 1.02), "hand"),
+    "standing, hand": Staging(False, (0.26, 0.92), "hand"),
+    "sitting, head": Staging(True, (-0.14, 1.0), "head"),
 }
 
 
@@ -93,108 +110,160 @@ class Script:
     Attributes
     ----------
     name : str
-        Key of `SCRIPTS`.
-    subject : Subject
-        Who the person is.
+        Key of `SCRIPTS` or `BYSTANDERS`.
     room : World
         Without the person.
     appearance : Appearance
         The person's.
-    motion : Motion
-        What they do, from when they begin to get ready.
+    rest, ready : Posture
+        How they are before, and from where they approach.
+    touch : callable
+        How they are when they touch the robot's hand, see `Reach`.
     """
 
     name: str
-    subject: Subject
     room: World
     appearance: Appearance
-    motion: Motion
+    rest: Posture
+    ready: Posture
+    touch: Reach
 
-    def person_at(self, time_s: float) -> PosedBody:
+    def posture_at(self, time_s: float, hand_m: np.ndarray) -> Posture:
+        """What the person does at a time, if they take the robot's hand to be at a place (3,), root frame."""
+        if time_s <= READY_S:
+            return _way(self.rest, self.ready, (time_s - PHASES_S["far"]) / PHASES_S["ready"])
+        there = self.touch(hand_m)
+        if time_s <= LEAVES_S[0]:
+            return _way(self.ready, there, (time_s - READY_S) / PHASES_S["approach"])
+        return _way(there, self.rest, (time_s - LEAVES_S[0]) / PHASES_S["leave"])
+
+
+@dataclass(frozen=True)
+class Moment:
+    """All that a script shows at a time.
+
+    Attributes
+    ----------
+    script : str
+    subject : Subject
+    time_s : float
+    hand_m : tuple of float
+        Where the person takes the robot's hand to be, root frame.
+    """
+
+    script: str
+    subject: Subject
+    time_s: float
+    hand_m: tuple[float, ...] = tuple(HOME_M["left"])
+
+    @property
+    def person(self) -> PosedBody:
         """The person, not dressed, in the world."""
-        return _person(self, self.motion.still_since_s(time_s - PHASES_S["far"]))
+        return _person(self._still)
 
-    def at(self, time_s: float, robot: list[Surface]) -> tuple[World, PosedBody]:
-        """All there is to see, with the robot as it is then, and the person in it."""
-        motion_s = self.motion.still_since_s(time_s - PHASES_S["far"])
-        surfaces = [*self.room.surfaces, *_worn(self, motion_s), *robot]
-        return replace(self.room, surfaces=surfaces), _person(self, motion_s)
+    def world(self, robot: list[Surface]) -> World:
+        """All there is to see, with the robot as it is then."""
+        room = script(self.script, self.subject).room
+        return replace(room, surfaces=[*room.surfaces, *_worn(self._still), *robot])
+
+    @property
+    def _still(self) -> "Moment":
+        # Whoever keeps still is posed and dressed once.
+        return replace(self, time_s=float(np.clip(self.time_s, PHASES_S["far"], LEAVES_S[1])))
 
 
-# Whoever keeps still is posed and dressed once.
+@memoised(64)
+def _person(moment: Moment) -> PosedBody:
+    scene = script(moment.script, moment.subject)
+    return posed(scene.appearance.shape, scene.posture_at(moment.time_s, np.array(moment.hand_m)))
+
+
 @memoised(4)
-def _person(scene: Script, motion_s: float) -> PosedBody:
-    return posed(scene.appearance.shape, scene.motion.at(motion_s))
-
-
-@memoised(4)
-def _worn(scene: Script, motion_s: float) -> list[Surface]:
-    return dress(scene.appearance, _person(scene, motion_s), 0)
+def _worn(moment: Moment) -> list[Surface]:
+    return dress(script(moment.script, moment.subject).appearance, _person(moment), 0)
 
 
 @memoised()
 def script(name: str, subject: Subject = Subject()) -> Script:
-    """A script of `SCRIPTS` as a subject follows it in a room of theirs. The same in every process.
+    """A script of `SCRIPTS` or `BYSTANDERS` as a subject follows it in a room of theirs.
 
     Examples
     --------
-    >>> scene = script("standing, hand")
-    >>> tip = scene.person_at(NEAR_S).keypoints_m[127]  # of the right middle finger
-    >>> bool(np.linalg.norm(in_root(tip) - HOME_M["left"]) < 0.3)
+    >>> fingertip_m = Moment("standing, hand", Subject(), NEAR_S).person.keypoints_m[127]
+    >>> bool(np.linalg.norm(in_root(fingertip_m) - HOME_M["left"]) < 0.3)
     True
     """
-    staging, identity = SCRIPTS[name], subject.identity
+    staging, identity = (SCRIPTS | BYSTANDERS)[name], subject.identity
     appearance, rng = appearance_of(identity, skirts=False), identity.draw("room", "chair")
-    by = _by_head if staging.by_head else _by_hand
-    rest, ready, near = by(identity.draw("poses"), appearance.shape, staging)
+    rest = _rest(identity.draw("poses"), appearance.shape, staging)
+    rest, ready, touch = _WAYS[staging.by](appearance.shape, rest)
     x, y = staging.place_m
     seat = []
     if staging.sits:
         seat = chair(rng, (x, y), float(posed(appearance.shape, rest).heads_m[0, 2]) - _SEAT_M)
-    room = furnished(identity, seat, [(x, y - 0.2, 0.8), (x, y + 0.4, 0.7)])
-    return Script(name, subject, room, appearance, Motion(rest, _moves(rest, ready, near)))
+    passed = [(px, y - 0.4, 0.7) for px in _PASSES_X_M if staging.by == "passing"]
+    room = furnished(identity, seat, [(x, y - 0.2, 0.8), (x, y + 0.4, 0.7), *passed])
+    return Script(name, room, appearance, rest, ready, touch)
 
 
-def _moves(rest: Posture, ready: Posture, near: Posture) -> Iterator[Move]:
-    yield Move(PHASES_S["ready"], ready)
-    yield Move(PHASES_S["approach"], near)
-    yield Move(PHASES_S["near"], near)
-    yield Move(PHASES_S["leave"], rest)
-    while True:
-        yield Move(1.0, rest)
+def _way(start: Posture, end: Posture, share: float) -> Posture:
+    return between(start, end, minimum_jerk(float(np.clip(share, 0, 1))))
 
 
-def _by_hand(rng, shape: np.ndarray, staging: Staging) -> tuple[Posture, Posture, Posture]:
+def _by_hand(shape: np.ndarray, rest: Posture, gap_m: float = CONTACT_M) -> tuple[Posture, Posture, Reach]:
     """Far, ready and near for the right hand."""
-    rest = _rest(rng, shape, staging)
-    pelvis_m = posed(shape, rest).heads_m[0]
-    away = _FROM / np.linalg.norm(_FROM)
-
-    def with_wrist(distance_m: float) -> Posture:
-        wrist_m = transform(T_WORLD_ROOT, HOME_M["left"] + distance_m * away)
-        return _leaning_reach(shape, rest, pelvis_m, wrist_m)
-
-    near_m = _contact(_WRISTS_M, lambda distance_m: _distance_m(shape, with_wrist(distance_m)))
-    return rest, with_wrist(near_m + _READY_M), with_wrist(near_m)
+    home_m, away = np.array(HOME_M["left"]), _FROM / np.linalg.norm(_FROM)
+    with_wrist = _leaning_reach(shape, rest)
+    near_m = _contact(_WRISTS_M, lambda off_m: _distance_m(shape, with_wrist(home_m + off_m * away)), gap_m)
+    ready = with_wrist(home_m + (near_m + _READY_M) * away)
+    return rest, ready, lambda hand_m: with_wrist(hand_m + near_m * away)
 
 
-def _by_head(rng, shape: np.ndarray, staging: Staging) -> tuple[Posture, Posture, Posture]:
-    """Far, ready and near for the head: the trunk bends forward until it is there."""
-    rest = _rest(rng, shape, staging)
+def _by_gesture(shape: np.ndarray, rest: Posture) -> tuple[Posture, Posture, Reach]:
+    """The right hand comes near, not to the robot, and goes again."""
+    rest, ready, touch = _by_hand(shape, rest, BYSTAND_M)
+    near = touch(np.array(HOME_M["left"]))
+    return rest, ready, lambda hand_m: near
+
+
+def _by_passing(shape: np.ndarray, rest: Posture) -> tuple[Posture, Posture, Reach]:
+    """From one side to the other and back, the right arm a little before the body."""
+    start_x, middle_x, end_x = _PASSES_X_M
+    y = _contact(_PASSES_M, lambda y: _distance_m(shape, replace(rest, place_m=(middle_x, y))), BYSTAND_M)
+    start, middle, end = (replace(rest, place_m=(x, y)) for x in (start_x, middle_x, end_x))
+    return start, middle, lambda hand_m: end
+
+
+def _by_head(shape: np.ndarray, rest: Posture) -> tuple[Posture, Posture, Reach]:
+    """Far, ready and near for the head: the trunk bends forward until it is there, and no other way."""
     near_deg = _contact(_LEANS_DEG, lambda lean_deg: _distance_m(shape, _leaning(rest, lean_deg)))
-    return rest, _leaning(rest, near_deg - _HEAD_FROM_DEG), _leaning(rest, near_deg)
+    bodies = [posed(shape, _leaning(rest, lean_deg)) for lean_deg in _LEANS_DEG]
+    skin_m = in_root(posed(shape, _leaning(rest, near_deg)).vertices_m)
+    first = int(np.linalg.norm(skin_m - HOME_M["left"], axis=1).argmin())  # what would touch the hand
+    coarse_m = in_root(np.array([body.vertices_m[first] for body in bodies]))
+    way_m = np.stack([np.interp(_FINE_DEG, _LEANS_DEG, column) for column in coarse_m.T], axis=1)
+    to_hand_m = np.array(HOME_M["left"]) - way_m[np.abs(_FINE_DEG - near_deg).argmin()]
+
+    def touch(hand_m: np.ndarray) -> Posture:
+        off_m = np.linalg.norm(way_m + to_hand_m - hand_m, axis=1)
+        return _leaning(rest, float(_FINE_DEG[off_m.argmin()]))
+
+    return rest, _leaning(rest, near_deg - _HEAD_FROM_DEG), touch
 
 
-def _contact(way: Iterable[float], distance_m: Callable[[float], float]) -> float:
-    """Where on a way the distance first falls to `CONTACT_M`; the way's end if it does not."""
+_WAYS = {"hand": _by_hand, "head": _by_head, "gesture": _by_gesture, "passing": _by_passing}
+
+
+def _contact(way: Iterable[float], distance_m: Callable[[float], float], gap_m: float = CONTACT_M) -> float:
+    """Where on a way the distance first falls to `gap_m`; the way's end if it does not."""
     before, *further = way
     for after in [before, *further]:
-        if distance_m(after) < CONTACT_M:
+        if distance_m(after) < gap_m:
             break
         before = after
     for _ in range(_N_HALVINGS):
         middle = (before + after) / 2
-        before, after = (before, middle) if distance_m(middle) < CONTACT_M else (middle, after)
+        before, after = (before, middle) if distance_m(middle) < gap_m else (middle, after)
     return float(before)
 
 
@@ -229,22 +298,33 @@ def _leaning(posture: Posture, lean_deg: float) -> Posture:
     return replace(posture, joints=posture.joints | bent)
 
 
-def _leaning_reach(shape: np.ndarray, posture: Posture, pelvis_m: np.ndarray, wrist_m: np.ndarray) -> Posture:
-    """The right wrist at a point of the world, the trunk no further bent than that takes."""
-    body = load_body()
-    from_pelvis = facing_robot(0.0)[:3, :3].T @ (wrist_m - pelvis_m)
-    best, best_miss_m = posture, np.inf
+def _leaning_reach(shape: np.ndarray, rest: Posture) -> Reach:
+    """How the right wrist comes to a point of the root frame, the trunk no further bent than that takes."""
+    body, pelvis_m, to_body = load_body(), posed(shape, rest).heads_m[0], facing_robot(0.0)[:3, :3].T
+    arm = [body.bone_numbers[f"{name}.R"] for name in ("upperarm01", "lowerarm01", "wrist")]
+    shoulders_m = []
     for lean_deg in _LEANS_DEG:
-        bent = dict(_leaning(posture, lean_deg).joints)
-        lean = bent.pop(PELVIS_LEAN)
-        target = about(1, lean).T @ from_pelvis
-        found = reach(body, shape, bent, "right", target, _ELBOW_REACHING)
-        if found is None:
-            continue
-        _, heads = pose_bones(body, shape, pose_from_joints(found))
-        miss_m = float(np.linalg.norm(heads[body.bone_numbers["wrist.R"]] - target))
-        if miss_m < best_miss_m:
-            best, best_miss_m = replace(posture, joints=found | {PELVIS_LEAN: lean}), miss_m
-        if miss_m < _MISS_M:
-            break
-    return best
+        bent, lean = _bent(rest, lean_deg)
+        _, heads = pose_bones(body, shape, pose_from_joints(bent))
+        shoulders_m.append(about(1, lean) @ heads[arm[0]])
+    length_m = np.linalg.norm(np.diff(heads[arm], axis=0), axis=1).sum()
+
+    def with_wrist(wrist_m: np.ndarray) -> Posture:
+        from_pelvis_m = to_body @ (transform(T_WORLD_ROOT, wrist_m) - pelvis_m)
+        lacks_m = np.linalg.norm(from_pelvis_m - shoulders_m, axis=1) - _STRETCHED * length_m
+        first = int((lacks_m <= 0).argmax() if (lacks_m <= 0).any() else lacks_m.argmin())
+        least_deg = np.interp(0, lacks_m[[first, max(first - 1, 0)]], _LEANS_DEG[[first, max(first - 1, 0)]])
+        for lean_deg in (least_deg, *_LEANS_DEG[_LEANS_DEG > least_deg]):
+            bent, lean = _bent(rest, lean_deg)
+            found = reach(body, shape, bent, "right", about(1, lean).T @ from_pelvis_m, _ELBOW_REACHING)
+            if found:
+                return replace(rest, joints=found | {PELVIS_LEAN: lean})
+        return _leaning(rest, least_deg)
+
+    return with_wrist
+
+
+def _bent(rest: Posture, lean_deg: float) -> tuple[dict[str, float], float]:
+    """Joints of a bent trunk without the pelvis, and how far that leans (radians)."""
+    joints = dict(_leaning(rest, lean_deg).joints)
+    return joints, joints.pop(PELVIS_LEAN)

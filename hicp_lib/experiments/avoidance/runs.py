@@ -1,10 +1,9 @@
 """Runs of the closed loop, one per script and condition: simulated in parallel, cached.
 
-A run is cached under a key of all it depends on: trial, condition, delay, the detector's settings and
+A run is cached under a key of all it depends on: trial, condition, latency, the detector's settings and
 weights, and the code and data of simulation, lifting, robot and detectors.
 """
 
-import math
 import multiprocessing
 from collections.abc import Iterable
 from contextlib import nullcontext
@@ -25,19 +24,27 @@ from hicp_lib.core.images import decode_image
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.results import identity
-from hicp_lib.experiments.avoidance.closed_loop import Trial, TrueKeypoints, next_image_s, simulate
+from hicp_lib.experiments.avoidance.closed_loop import (
+    HAND_COLUMNS,
+    Latency,
+    Trial,
+    TrueKeypoints,
+    between_s,
+    simulate,
+)
+from hicp_lib.experiments.avoidance.error_model import in_sight
 from hicp_lib.experiments.avoidance.head_camera import HeadCamera, ImageCache, Observation
-from hicp_lib.experiments.avoidance.reaching import script
+from hicp_lib.experiments.avoidance.reaching import Moment
 from hicp_lib.experiments.laboratory import COLOUR, in_root
-from hicp_lib.robot.controller import PUBLISHED
-from hicp_lib.simulation.body.model import PosedBody
+from hicp_lib.robot.controller import PUBLISHED, Settings
 
 NO_AVOIDANCE, TRUE_KEYPOINTS = "no avoidance", "ground truth"
-PUBLISHED_GAINS = "ground truth, published gains"
-IDEAL = (NO_AVOIDANCE, TRUE_KEYPOINTS, PUBLISHED_GAINS)
-"""Conditions without a detector; every other condition is a detector's name, or that and `TRACKING`."""
+IDEAL = (NO_AVOIDANCE, TRUE_KEYPOINTS)
+"""Conditions without a detector; every other one begins with a detector's name."""
 TRACKING = ", tracking"
-"""Of MediaPipe: each image is searched where the person was in the one before."""
+"""After MediaPipe's name: each image is searched where the person was in the one before."""
+PUBLISHED_GAINS = ", published gains"
+"""At the end of a condition: the controller's gains are the published ones, not the project's own."""
 
 _TABLES = ("cycles.parquet", "frames.parquet")
 _SHOWN_PX = (320, 240)  # cached images are for looking at
@@ -53,24 +60,27 @@ class Job:
     ----------
     trial : Trial
     condition : str
-        One of `IDEAL` or a detector's name; "mediapipe, tracking" is MediaPipe on a video.
-    delay_s : float
-        From the image to when the loop knows. It is stated: one that is measured would differ by machine
-        and by run, and all that is simulated with it.
-
-    Raises
-    ------
-    InputError
-        If the delay is no number of seconds.
+        One of `IDEAL` or a detector's name, `TRACKING` and `PUBLISHED_GAINS` after it where they apply.
+    latency : Latency
+        From the image to when the loop knows.
+    lifting : str
+        Of keypoints that a detector found, "robust" or "paper".
     """
 
     trial: Trial
     condition: str
-    delay_s: float = 0.0
+    latency: Latency = Latency()
+    lifting: str = "robust"
 
-    def __post_init__(self) -> None:
-        if not (isinstance(self.delay_s, (int, float)) and 0 <= self.delay_s < math.inf):
-            raise InputError(f"delay of {self.condition!r} is {self.delay_s!r}; expected seconds, 0 or more")
+    @property
+    def detector(self) -> str:
+        """The condition without the gains."""
+        return self.condition.removesuffix(PUBLISHED_GAINS)
+
+    @property
+    def gains(self) -> str:
+        """Whose gains the controller has."""
+        return "published" if self.condition.endswith(PUBLISHED_GAINS) else "ours"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,11 +92,11 @@ class Run:
     job : Job
         What was run.
     cycles : pd.DataFrame
-        A row per control period, see `closed_loop.simulate`.
+        A row per two control periods, see `closed_loop.simulate`.
     frames : pd.DataFrame
         A row per image: `t_s`, `time_ms` (what detector and lifting took, measured), `jpeg` (bytes),
-        and as flat lists `keypoints_px`, `scores` and `keypoints_m` (root frame) of all people, and
-        `truth_m` of the one there is.
+        and as flat lists `keypoints_px`, `scores` and `keypoints_m` (root frame) of all people,
+        `truth_m` of the one there is, and of `error_model.GROUPS` which could be seen (`in_sight`).
     """
 
     job: Job
@@ -100,21 +110,16 @@ def run_all(jobs: Iterable[Job]) -> list[Run]:
     folders = {job: out / _run_key(job) for job in jobs}
     missing = [job for job, folder in folders.items() if not (folder / _TABLES[0]).is_file()]
     # The longest first, so that no core is left with one at the end: detectors, the fastest see most.
-    missing.sort(key=lambda job: (job.condition in IDEAL, job.delay_s))
+    missing.sort(key=lambda job: (job.detector in IDEAL, job.latency.inference_s))
     workers = resolved(None)
     is_shared = isinstance(workers, int) and len(missing) > 1
     with multiprocessing.get_context("spawn").Manager() if is_shared else nullcontext() as manager:
         images = manager.dict() if manager else {}  # shared by the processes of this machine
         todo = {job: partial(_simulate, run=folders[job].name, job=job, images=images) for job in missing}
         named = [(f"{folders[job].name}/{_TABLES[0]}", call) for job, call in todo.items()]
-        known = partial(_known, *sorted({job.condition for job in missing}))
+        known = partial(_known, *sorted({job.detector for job in missing}))
         list(run_jobs(named, workers, folder=out, alike=known))
     return [Run(job, *(pd.read_parquet(folders[job] / name) for name in _TABLES)) for job in jobs]
-
-
-def of_condition(runs: Iterable[Run], condition: str) -> list[Run]:
-    """The runs of one condition, a script each."""
-    return [run for run in runs if run.job.condition == condition]
 
 
 def choose(runs: Iterable[Run], name: str, condition: str) -> Run:
@@ -136,7 +141,8 @@ def choose(runs: Iterable[Run], name: str, condition: str) -> Run:
     InputError
         If there is no run of the condition.
     """
-    found = sorted(of_condition(runs, condition), key=lambda run: run.job.trial.script != name)
+    with_it = [run for run in runs if run.job.condition == condition]
+    found = sorted(with_it, key=lambda run: run.job.trial.script != name)
     if not found:
         raise InputError(f"no run of {condition!r}; add it to the detectors")
     return found[0]
@@ -158,23 +164,34 @@ def keypoints_m(frame: pd.Series) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return perceived_m, scores[..., 0], truth_m
 
 
+def moment_at(run: Run, time_s: float) -> Moment:
+    """What there is in a run at a time: where the person is depends on what the robot did."""
+    row = run.cycles.iloc[int((run.cycles["t_s"] - time_s).abs().argmin())]
+    hand_m = tuple(float(row[column]) for column in HAND_COLUMNS)
+    return Moment(run.job.trial.script, run.job.trial.subject, float(time_s), hand_m)
+
+
+def settings_of(gains: str) -> Settings:
+    """The controller's settings by `Job.gains`."""
+    return PUBLISHED if gains == "published" else Settings()
+
+
 def _simulate(out: Path, run: str, job: Job, images: ImageCache) -> None:
     """Simulate a run and write its tables; it counts as finished when the first of them is there."""
     observations: list[Observation] = []
-    if job.condition in IDEAL:
-        settings = PUBLISHED if job.condition == PUBLISHED_GAINS else None
-        cycles = simulate(job.trial, TrueKeypoints(), job.condition != NO_AVOIDANCE, settings)
+    avoids, settings = job.detector != NO_AVOIDANCE, settings_of(job.gains)
+    if job.detector in IDEAL:
+        cycles = simulate(job.trial, TrueKeypoints(job.latency), avoids, settings)
     else:
-        camera = HeadCamera(_detector(job), job.delay_s, images)
-        cycles, observations = simulate(job.trial, camera), camera.observations
-    scene = script(job.trial.script, job.trial.subject)
-    frames = pd.DataFrame([_frame(seen, scene.person_at(seen.perception.time_s)) for seen in observations])
+        camera = HeadCamera(_detector(job), job.latency, job.lifting, images)
+        cycles, observations = simulate(job.trial, camera, settings=settings), camera.observations
+    frames = pd.DataFrame(list(map(_frame, observations)))
     for name, table in zip(reversed(_TABLES), (frames, cycles), strict=True):
         with atomic_path(out / run / name) as temporary:
             table.to_parquet(temporary, index=False)
 
 
-def _frame(seen: Observation, person: PosedBody) -> dict:
+def _frame(seen: Observation) -> dict:
     small = cv2.resize(seen.rgb, _SHOWN_PX, interpolation=cv2.INTER_AREA)
     options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
     _, jpeg = cv2.imencode(".jpg", np.ascontiguousarray(small[..., ::-1]), options)
@@ -182,7 +199,8 @@ def _frame(seen: Observation, person: PosedBody) -> dict:
         "keypoints_px": seen.detections.keypoints_px,
         "scores": seen.perception.scores,
         "keypoints_m": seen.perception.keypoints_m,
-        "truth_m": in_root(person.keypoints_m),
+        "truth_m": in_root(seen.moment.person.keypoints_m),
+        "in_sight": in_sight(seen.moment, seen.posture),
     }
     flat = {name: np.asarray(array, np.float32).ravel().tolist() for name, array in arrays.items()}
     return {"t_s": seen.perception.time_s, "time_ms": seen.time_ms, "jpeg": jpeg.tobytes()} | flat
@@ -193,7 +211,7 @@ def _array(flat: np.ndarray, width: int) -> np.ndarray:
 
 
 def _run_key(job: Job) -> str:
-    known = {} if job.condition in IDEAL else identity(_detector(job))
+    known = {} if job.detector in IDEAL else identity(_detector(job))
     # Of the detectors only the one that looks has a say, and its identity says which.
     return key([run_all], without=[make_detector.__module__], job=job, detector=known)[:_KEY_LENGTH]
 
@@ -206,10 +224,10 @@ def _known(*conditions: str) -> dict:
 
 def _detector(job: Job) -> Detector:
     """Made once in every process; one that tracks anew for each run, which begins with nobody seen."""
-    if not job.condition.endswith(TRACKING):
-        return _kept_detector(job.condition)
-    every_s = next_image_s(0.0, job.delay_s, job.trial.camera_hz)
-    return make_detector(job.condition.removesuffix(TRACKING), tracking_hz=float(1 / every_s))
+    if not job.detector.endswith(TRACKING):
+        return _kept_detector(job.detector)
+    every_s = between_s(job.trial, job.latency)
+    return make_detector(job.detector.removesuffix(TRACKING), tracking_hz=float(1 / every_s))
 
 
 _kept_detector = cache(make_detector)

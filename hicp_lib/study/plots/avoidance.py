@@ -1,101 +1,117 @@
-"""Figures of avoidance: distance, activation and retreat over time, joints, and separation's terms."""
+"""Figures of avoidance: clearances of people, and against what is swept; separation's terms."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
-import numpy as np
 import pandas as pd
 
-from hicp_lib.experiments.avoidance.reaching import LEAVES_S, NEAR_S
-from hicp_lib.experiments.avoidance.runs import IDEAL, NO_AVOIDANCE, PUBLISHED_GAINS, Run
-from hicp_lib.experiments.avoidance.skin_distance import FAR_M
-from hicp_lib.robot.kinematics import ARM_JOINTS
+from hicp_lib.experiments.avoidance.runs import IDEAL, NO_AVOIDANCE
 from hicp_lib.robot.separation import Separation, separation_table
-from hicp_lib.study.avoidance import FIELD_M, WITHIN_M
+from hicp_lib.study.avoidance import MARKS_M, over_people
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.palette import detector_colour, detector_marker
 from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure
 
-_STYLES = {NO_AVOIDANCE: ":", PUBLISHED_GAINS: "--"}
-_ROWS = {"distance_m": "distance (cm)", "activation": "activation", "hand_error_m": "hand from post (cm)"}
 _TERM_COLOURS = ("#0072B2", "#E69F00", "#D55E00", "#999999", "#009E73", "#CC79A7")
-_ANGLES = [f"{joint}_rad" for joint in ARM_JOINTS]
-_EVERY = 5  # control periods between rows of the tables
+_GAINS = {"ours": "-", "published": "--"}
+_SCRIPT_MARKERS = "os^Dv"
 
 
 def condition_colour(name: str) -> str:
     """Black shades for the conditions without a detector, the detector's own colour otherwise."""
-    return "#111111" if name in IDEAL else detector_colour(name)
+    return "#111111" if name.startswith(IDEAL) else detector_colour(name)
 
 
 @in_style
-def over_time(runs: Sequence[Run], separations: Mapping[str, Separation], note: str) -> Figure:
-    """Distance, highest activation and the hand's way over time: a column per script.
+def clearances(metrics: pd.DataFrame, note: str) -> Figure:
+    """The least distance of every person in their first reach and in all, a row per condition.
 
     Parameters
     ----------
-    runs : sequence of Run
-    separations : mapping of str to Separation
-        By detector; drawn as dotted levels.
+    metrics : pd.DataFrame
+        As from `avoidance.metrics`.
     note : str
         What the data are, for the caption.
     """
-    by_script: dict[str, list[Run]] = {}
-    for run in runs:
-        by_script.setdefault(run.job.trial.script, []).append(run)
-    size = {"width_in": 3.6 * len(by_script) + 0.6, "height_in": 7.2}
-    figure, axes = new_figure(3, len(by_script), **size, sharex=True, sharey="row", squeeze=False)
-    for column, (script, of_script) in zip(axes.T, by_script.items(), strict=True):
-        column[0].set_title(script)
-        _shade_near_phase(column)
-        for run in of_script:
-            _draw_run(column, run)
-        for detector, separation in separations.items():
-            level_cm = 100 * min(separation.distance_m, FAR_M)
-            column[0].axhline(level_cm, color=condition_colour(detector), lw=1, ls=(0, (1, 2)))
-        column[0].axhline(100 * FIELD_M, color="#888888", lw=0.8)
-        column[-1].set_xlabel("time (s)")
-    for axis, label in zip(axes[:, 0], _ROWS.values(), strict=True):
-        axis.set_ylabel(label)
-    axes[0, 0].set_ylim(0, 100 * FAR_M)
-    marks.legend_below(figure, axes, ncols=2, fontsize=10)
-    nearest: dict[str, list[str]] = {run.job.condition: [] for run in runs}
-    for run in runs:
-        nearest[run.job.condition].append(f"{100 * run.cycles['distance_m'].min():.1f}")
+    shown = {"reach_m": "in the first reach", "min_distance_m": "until they leave"}
+    tables = {of: over_people(metrics, ["detector", "gains"], of) for of in shown}
+    conditions = [
+        row.detector + (f", {row.gains}" if row.detector != NO_AVOIDANCE else "")
+        for row in tables["reach_m"].itertuples()
+    ]
+    figure, axes = new_figure(1, 2, 10.0, 1.6 + 0.42 * len(conditions), sharey=True, sharex=True)
+    for axis, (of, title) in zip(axes, shown.items(), strict=True):
+        for place, row in enumerate(tables[of].itertuples()):
+            colour = condition_colour(row.detector)
+            mine = metrics[(metrics["detector"] == row.detector) & (metrics["gains"] == row.gains)]
+            for marker, (script, people) in zip(
+                _SCRIPT_MARKERS, mine.groupby("script", sort=False), strict=False
+            ):
+                label = script if place == 0 else None
+                options = {"s": 22, "alpha": 0.45, "color": colour, "lw": 0, "marker": marker, "label": label}
+                axis.scatter(100 * people[of], [place + 0.18] * len(people), **options)
+            axis.plot([100 * row.low, 100 * row.high], [place - 0.15] * 2, color=colour, lw=2)
+            axis.plot(100 * row.value, place - 0.15, "|", color=colour, ms=12, mew=2.5)
+        for mark_m in MARKS_M:
+            axis.axvline(100 * mark_m, color="#888888", lw=1, ls=":")
+        axis.set(title=title, xlabel="least distance (cm)")
+    marks.name_rows(axes[0], conditions)
+    marks.legend_below(figure, axes[:1])
+    table = pd.concat({title: tables[of] for of, title in shown.items()}, names=["until"]).reset_index(
+        level=0
+    )
+    means = [f"{name} {100 * value:.1f}" for name, value in zip(conditions, table["value"], strict=False)]
     return Figure(
         figure,
-        "Distance between the person's skin and the robot, the highest activation of any taxel, and how far "
-        "the hand is from its post. Grey: the person stays near; dotted levels: separation by ISO/TS 15066 "
-        f"(not a safety function); grey line: {100 * FIELD_M:.0f} cm. Data: {note}.",
-        "Lines over time, a column per script. Least distances in cm, in the order of the scripts: "
-        + "; ".join(f"{name} {', '.join(values)}" for name, values in nearest.items()) + ".",
-        _table(runs, [*_ROWS]),
-    )  # fmt: skip
+        "Least distance between the person's skin and the robot, a mark per person; above, the mean and its "
+        f"95 % interval over people. Dotted: the marks of 5 and 10 cm. Data: {note}.",
+        f"Dots per condition, two panels. Means in the first reach, in cm: {in_words(means)}.",
+        table,
+    )
 
 
 @in_style
-def joint_motion(runs: Sequence[Run], note: str) -> Figure:
-    """How far each joint turns from its rest: a panel per script, of one condition."""
-    figure, axes = new_figure(1, len(runs), 3.6 * len(runs) + 0.6, 3.4, sharey=True, squeeze=False)
-    turned_most = []
-    for axis, run in zip(axes[0], runs, strict=True):
-        angles_rad = run.cycles[_ANGLES].to_numpy()
-        turned_deg = np.degrees(angles_rad - angles_rad[0])
-        most = ARM_JOINTS[int(np.abs(turned_deg).max(axis=0).argmax())]
-        turned_most.append(f"{most.replace('_', ' ')} ({run.job.trial.script})")
-        _shade_near_phase([axis])
-        for number, joint in enumerate(ARM_JOINTS):
-            style = "--" if joint.startswith("torso") else "-"
-            axis.plot(run.cycles["t_s"], turned_deg[:, number], style, lw=1.4, label=joint.replace("_", " "))
-        axis.set(title=run.job.trial.script, xlabel="time (s)")
-    axes[0, 0].set_ylabel("turned (degrees)")
-    marks.legend_below(figure, axes, ncols=5, fontsize=10)
+def sweep_curves(sweeps: Mapping[str, pd.DataFrame], note: str) -> Figure:
+    """Mean clearance of the first reach against what was swept, with its interval over people: a panel each.
+
+    Parameters
+    ----------
+    sweeps : mapping of str to DataFrame
+        As from `sweeps.sweep`, by the column that was swept.
+    note : str
+        What the data are, for the caption.
+    """
+    labels = {"latency_s": ("latency (ms)", 1000), "lost_share": ("images lost (%)", 100)}
+    labels["follow_m_s"] = ("the person follows at most at (cm/s)", 100)
+    figure, axes = new_figure(1, len(sweeps), 4.2 * len(sweeps), 4.2, sharey=True, squeeze=False)
+    tables = {}
+    for axis, (column, swept) in zip(axes[0], sweeps.items(), strict=True):
+        tables[column] = table = over_people(swept, ["detector", "gains", column], "min_distance_m")
+        label, factor = labels[column]
+        for (detector, gains), rows in table.groupby(["detector", "gains"], sort=False):
+            colour, x = condition_colour(detector), factor * rows[column]
+            options = {"color": colour, "ls": _GAINS[gains], "marker": detector_marker(detector)}
+            axis.plot(x, 100 * rows["value"], label=f"{detector}, {gains}", **options)
+            axis.fill_between(x, 100 * rows["low"], 100 * rows["high"], color=colour, alpha=0.1, lw=0)
+        for mark_m in MARKS_M:
+            axis.axhline(100 * mark_m, color="#888888", lw=1, ls=":")
+        axis.set_xlabel(label)
+    axes[0, 0].set(ylabel="least distance (cm)", ylim=(0, None))
+    marks.legend_below(figure, axes, ncols=2)
     return Figure(
         figure,
-        "Joints of torso (dashed) and arm, from their angles at the post; "
-        f"{runs[0].job.condition}. Data: {note}.",
-        f"Lines over time. The joints that turn most: {in_words(turned_most)}.",
-        _table(runs, _ANGLES),
-    )  # fmt: skip
+        "Mean least distance over people against what was swept; bands: 95 % intervals; dotted: 5 and "
+        f"10 cm. Keypoints are true, or have a detector's errors; nothing is rendered. Data: {note}.",
+        "Lines that fall: " + in_words(_ends(tables)) + ".",
+        pd.concat(tables, names=["swept"]).reset_index(level=0),
+    )
+
+
+def _ends(tables: Mapping[str, pd.DataFrame]) -> Iterator[str]:
+    """First and last value of every line of a sweep, in words."""
+    for column, table in tables.items():
+        for (detector, gains), rows in table.groupby(["detector", "gains"], sort=False):
+            first, last = 100 * rows["value"].iloc[[0, -1]]
+            yield f"{detector}, {gains}, from {first:.1f} to {last:.1f} cm over {column}"
 
 
 @in_style
@@ -121,28 +137,3 @@ def separation_terms(separations: Mapping[str, Separation], note: str) -> Figure
         f"Stacked bars: {in_words(sums)}.",
         separation_table(separations),
     )
-
-
-def _draw_run(column, run: Run) -> None:
-    name, t = run.job.condition, run.cycles["t_s"]
-    for axis, what in zip(column, _ROWS, strict=True):
-        scale = 100 if what.endswith("_m") else 1
-        style, colour = _STYLES.get(name, "-"), condition_colour(name)
-        axis.plot(t, scale * run.cycles[what], style, color=colour, lw=1.6, label=name)
-    if name == NO_AVOIDANCE:
-        for level in WITHIN_M:
-            column[0].axhline(100 * level, color="#DDDDDD", lw=0.6)
-
-
-def _shade_near_phase(axes) -> None:
-    """Shade the time from when the person is as near as they go until they begin to leave."""
-    for axis in axes:
-        axis.axvspan(NEAR_S, LEAVES_S[0], color="#F0F0F0", lw=0)
-
-
-def _table(runs: Sequence[Run], columns: list[str]) -> pd.DataFrame:
-    parts = []
-    for run in runs:
-        about = {"script": run.job.trial.script, "detector": run.job.condition}
-        parts.append(run.cycles.loc[::_EVERY, ["t_s", *columns]].assign(**about))
-    return pd.concat(parts, ignore_index=True)[["script", "detector", "t_s", *columns]]

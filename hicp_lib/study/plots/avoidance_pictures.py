@@ -17,9 +17,9 @@ from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.experiments.avoidance.closed_loop import start_posture
 from hicp_lib.experiments.avoidance.onlooker import CAMERA, onlooker_view
-from hicp_lib.experiments.avoidance.reaching import LEAVES_S, NEAR_S, script
+from hicp_lib.experiments.avoidance.reaching import LEAVES_S, NEAR_S
 from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
-from hicp_lib.experiments.avoidance.runs import Run, image
+from hicp_lib.experiments.avoidance.runs import Run, image, moment_at
 from hicp_lib.experiments.laboratory import T_WORLD_ROOT
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.skin import read_skin
@@ -154,8 +154,7 @@ def _drawn(run: Run, frame: pd.Series) -> np.ndarray:
 def _draw_space(axis, run: Run, cycle: pd.Series, frame: pd.Series | None) -> None:
     posture = start_posture().moved("left", np.array([cycle[f"{joint}_rad"] for joint in ARM_JOINTS]))
     robot = robot_surfaces(load_icub(), posture, with_head=True)
-    world, _ = script(run.job.trial.script, run.job.trial.subject).at(cycle["t_s"], [])
-    axis.imshow(onlooker_view(world, robot))
+    axis.imshow(onlooker_view(moment_at(run, cycle["t_s"]).world([]), robot))
     activations = np.asarray(cycle["activations"])
     threatened = np.flatnonzero(activations > _THREATENED)
     threatened = threatened[np.argsort(activations[threatened])]

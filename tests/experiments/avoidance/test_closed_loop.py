@@ -1,13 +1,30 @@
 """The loop closed in simulation, with keypoints that are true: no images are rendered."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 
-from hicp_lib.experiments.avoidance import closed_loop
-from hicp_lib.experiments.avoidance.closed_loop import Trial, TrueKeypoints, next_image_s, simulate
-from hicp_lib.experiments.avoidance.reaching import CONTACT_M, LEAVES_S, NEAR_S, SCRIPTS, script
+from hicp_lib.core.errors import InputError
+from hicp_lib.experiments.avoidance.closed_loop import (
+    Follower,
+    Latency,
+    Trial,
+    TrueKeypoints,
+    between_s,
+    simulate,
+)
+from hicp_lib.experiments.avoidance.reaching import (
+    BYSTAND_M,
+    BYSTANDERS,
+    CONTACT_M,
+    LEAVES_S,
+    NEAR_S,
+    REACTION_S,
+    SCRIPTS,
+    Moment,
+    script,
+)
 from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
 from hicp_lib.experiments.avoidance.skin_distance import FAR_M, robot_spheres, skin_distance_m
 from hicp_lib.experiments.laboratory import in_root
@@ -15,7 +32,10 @@ from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.loop import Perception
 from hicp_lib.robot.skin import read_skin
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.body.joints import within_limits
+
+HOME = np.array(HOME_M["left"])
 
 
 @pytest.fixture(scope="module")
@@ -24,24 +44,67 @@ def spheres():
     return robot_spheres(icub, read_skin(), home_posture(icub))
 
 
+def distance_m(spheres, name: str, time_s: float, hand_m=HOME) -> float:
+    return skin_distance_m(spheres, in_root(Moment(name, Subject(), time_s, tuple(hand_m)).person.vertices_m))
+
+
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_a_script_brings_the_person_to_the_hand_and_away_again(name, spheres):
-    scene = script(name)
-    person_m = {t: in_root(scene.person_at(t).vertices_m) for t in (0.0, NEAR_S, LEAVES_S[1])}
-    far, near, left = (skin_distance_m(spheres, vertices) for vertices in person_m.values())
+    far, near, left = (distance_m(spheres, name, t) for t in (0.0, NEAR_S, LEAVES_S[1]))
     assert near == pytest.approx(CONTACT_M, abs=0.005)
-    assert far == pytest.approx(left) and far > 0.2
-    nearest = np.linalg.norm(person_m[NEAR_S] - HOME_M["left"], axis=1).min()
-    assert nearest < 0.1
+    assert far == pytest.approx(left) and far > 0.15
+    person = Moment(name, Subject(), NEAR_S).person
+    assert np.linalg.norm(in_root(person.vertices_m) - HOME, axis=1).min() < 0.1
+
+
+@pytest.mark.parametrize("name", BYSTANDERS)
+def test_a_bystander_moves_before_the_robot_and_comes_no_nearer(name, spheres):
+    times_s = np.arange(0, LEAVES_S[1], 0.1)
+    least_m = min(distance_m(spheres, name, float(t), HOME + [-0.1, 0, 0]) for t in times_s)
+    assert BYSTAND_M - 0.08 < least_m < BYSTAND_M + 0.02
+    wrists = [Moment(name, Subject(), float(t)).person.keypoints_m[10] for t in times_s]
+    assert np.ptp(wrists, axis=0).max() > 0.2
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_joints_of_a_script_stay_within_their_limits(name):
-    scene = script(name)
     for t in np.arange(0, LEAVES_S[1], 0.5):
-        joints = dict(scene.motion.at(t).joints)
+        joints = dict(script(name).posture_at(t, HOME + [0.1, -0.05, -0.05]).joints)
         joints.pop("pelvis_flexion", None)
         assert within_limits(joints)
+
+
+@pytest.mark.parametrize(
+    ("name", "away_m"), [("standing, hand", [0.04, -0.02, 0.05]), ("sitting, hand", [0.06, -0.04, -0.04])]
+)
+def test_a_hand_follows_the_robots_wherever_it_can_reach(name, away_m):
+    places = [
+        in_root(Moment(name, Subject(), 3.0, tuple(hand_m)).person.keypoints_m[10])
+        for hand_m in (HOME, HOME + np.array(away_m))
+    ]
+    np.testing.assert_allclose(places[1] - places[0], away_m, atol=0.012)
+    far = Moment(name, Subject(), 3.0, (3.0, 0.0, 0.5)).person
+    assert np.linalg.norm(in_root(far.keypoints_m[10]) - [3.0, 0.0, 0.5]) > 1.5
+
+
+def test_a_head_follows_as_its_bow_allows():
+    nose = [
+        in_root(Moment("sitting, head", Subject(), 3.0, tuple(HOME + off)).person.keypoints_m[0])
+        for off in ([0, 0, 0], [0.05, 0, -0.06])
+    ]
+    assert nose[1][2] < nose[0][2] - 0.02
+
+
+def test_a_follower_is_late_and_no_faster_than_told():
+    follower = Follower(Trial("sitting, hand", follow_m_s=0.5))
+    for k in range(100):
+        time_s = 0.02 * k
+        follower.see(time_s, HOME + [0.2 * (time_s >= 0.5), 0, 0])
+    moved_m = np.array([follower.moment(0.1 * k).hand_m[0] - HOME[0] for k in range(16)])
+    times_s = 0.1 * np.arange(16)
+    assert (moved_m[times_s < 0.5 + REACTION_S - 1e-9] == 0).all()
+    assert moved_m[-1] == pytest.approx(0.2, abs=1e-3)
+    assert np.diff(moved_m).max() == pytest.approx(0.05, abs=1e-3)
 
 
 def test_distance_is_that_to_a_single_vertex(spheres):
@@ -67,33 +130,43 @@ def test_the_robot_is_drawn_where_it_is():
 
 @dataclass
 class SlowPerceiver:
-    """True keypoints that come late; remembers when it looked, and when the loop heard."""
+    """True keypoints that come late; remembers when it looked."""
 
-    delay_s: float
+    latency: Latency
+    looked_s: list[float] = field(default_factory=list)
 
-    def __post_init__(self):
-        self.looked_s = []
-
-    def perceive(self, script, time_s, posture) -> Perception:
-        self.looked_s.append(time_s)
-        return TrueKeypoints().perceive(script, time_s, posture)
+    def perceive(self, moment, posture, read) -> Perception:
+        self.looked_s.append(moment.time_s)
+        return TrueKeypoints().perceive(moment, posture, read)
 
 
-def test_slow_eyes_skip_images_and_none_of_theirs_is_lost(monkeypatch):
-    monkeypatch.setattr(closed_loop, "person_skin_m", lambda trial, time_s: np.full((1, 3), 9.0))
-    perceiver = SlowPerceiver(0.2)
-    run = simulate(Trial("sitting, hand", 1.2), perceiver)
+@pytest.mark.parametrize("latency", [Latency(inference_s=0.2), Latency(transport_s=0.25, inference_s=0.15)])
+def test_images_wait_for_the_detector_only_and_none_is_lost(monkeypatch, latency):
+    monkeypatch.setattr(Follower, "skin_m", lambda self, time_s: np.full((1, 3), 9.0))
+    perceiver = SlowPerceiver(latency)
+    run = simulate(Trial("sitting, hand", 1.2, camera_hz=10.0), perceiver)
     np.testing.assert_allclose(perceiver.looked_s, np.arange(0, 1.2, 0.2), atol=1e-9)
     heard = run.dropna().drop_duplicates("seen_s")
-    np.testing.assert_allclose(heard["t_s"] - heard["seen_s"], 0.2, atol=1e-9)
-    assert len(heard) == 5
-    assert next_image_s(1.0, 0.05, 10.0) == pytest.approx(1.1)
-    assert next_image_s(1.0, 0.11, 10.0) == pytest.approx(1.2)
+    np.testing.assert_allclose(heard["t_s"] - heard["seen_s"], latency.total_s, atol=0.02)
+    assert len(heard) == (5 if latency.total_s < 0.4 - 1e-9 else 4)
+    assert between_s(Trial("sitting, hand", camera_hz=10.0), latency) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("value_s", [-0.1, float("nan"), float("inf"), "0.1", None])
+def test_a_latency_that_is_none_is_refused(value_s):
+    with pytest.raises(InputError, match="queue_s is .*; expected seconds, 0 or more"):
+        Latency(queue_s=value_s)
 
 
 def test_with_true_keypoints_the_hand_gives_way_and_without_avoidance_it_stays():
-    trial = Trial("standing, hand", 2.8)
+    trial = Trial("standing, hand", 2.8, follow_m_s=0.0)
     stays, gives_way = (simulate(trial, TrueKeypoints(), avoids) for avoids in (False, True))
     assert stays["hand_error_m"].max() < 0.002 and stays["distance_m"].min() < 0.02
     assert gives_way["distance_m"].min() > 0.03
     assert gives_way["activation"].max() < stays["activation"].max()
+
+
+def test_noisy_joints_make_the_hand_tremble_and_not_wander():
+    runs = [simulate(Trial("standing, hand", 0.6, joint_noise_rad=n), TrueKeypoints()) for n in (0, 0.01)]
+    still, trembling = (run["hand_error_m"] for run in runs)
+    assert still.max() < 1e-4 < trembling.max() < 0.01

@@ -8,8 +8,9 @@ import pytest
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.experiments.avoidance import head_camera
-from hicp_lib.experiments.avoidance.closed_loop import MOUNT, start_posture
+from hicp_lib.experiments.avoidance.closed_loop import MOUNT, Latency, start_posture
 from hicp_lib.experiments.avoidance.head_camera import HeadCamera
+from hicp_lib.experiments.avoidance.reaching import LOOKED_AT_S
 from hicp_lib.experiments.laboratory import COLOUR, ROOT_HEIGHT_M, furnished
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.simulation.appearance import materials as m
@@ -20,17 +21,19 @@ from hicp_lib.simulation.rendering.surfaces import Surface
 TABLE_M = -0.15  # below the robot's root
 
 
-@dataclass
+@dataclass(frozen=True)
 class Table:
     """A red table before the robot instead of a person."""
 
-    name: str = "table"
+    script: str = "table"
     subject: Subject = Subject()
 
-    def at(self, time_s, robot):
+    time_s: float = 2.0
+
+    def world(self, robot):
         high = ROOT_HEIGHT_M + TABLE_M
         top = Surface(g.box([-1, 0.05, high - 0.02], [1, 1.2, high]), m.plain(np.array([0.6, 0.02, 0.02])))
-        return furnished(Subject().identity, [top, *robot], []), None
+        return furnished(Subject().identity, [top, *robot], [])
 
 
 @dataclass
@@ -56,8 +59,8 @@ def test_points_of_a_table_are_found_where_they_are_and_the_robots_hand_is_none(
     posture = start_posture()
     palm_m = load_icub().chains["left"].T_root_link("hand", posture.angles("left"))[:3, 3]
     assert len(points_m) + 1 == N_KEYPOINTS
-    camera = HeadCamera(Pointing(seen_at_px(np.r_[points_m, palm_m[None]])), 0.1)
-    found_m = camera.perceive(Table(), 0.5, posture).keypoints_m[0]
+    camera = HeadCamera(Pointing(seen_at_px(np.r_[points_m, palm_m[None]])), Latency(), "paper")
+    found_m = camera.perceive(Table(), posture, posture).keypoints_m[0]
     assert np.isnan(found_m[-1]).all()
     assert np.isfinite(found_m[:-1]).mean() > 0.9
     assert np.nanmax(np.linalg.norm(found_m[:-1] - points_m, axis=1)) < 0.01
@@ -71,7 +74,7 @@ def taken(monkeypatch):
     """Postures that pictures were taken in; no picture is rendered."""
     postures = []
 
-    def photograph(script, time_s, posture):
+    def photograph(moment, posture):
         postures.append(posture)
         return np.full((480, 640, 3), len(postures), np.uint8), np.full((480, 640), np.nan, np.float32)
 
@@ -81,16 +84,22 @@ def taken(monkeypatch):
 
 def test_detectors_share_pictures_until_the_robot_gives_way(taken):
     images, pixels = {}, np.full((N_KEYPOINTS, 2), np.nan)  # nothing to lift
-    first, second = (HeadCamera(Pointing(pixels), 0.1, images=images) for _ in range(2))
+    first, second = (HeadCamera(Pointing(pixels), Latency(), images=images) for _ in range(2))
     post = start_posture()
-    away = post.moved("left", post.angles("left") + 0.01)
-    for camera in (first, second):
-        camera.perceive(Table(), 0.1, post)
+    trembles, away = (post.moved("left", post.angles("left") + turn) for turn in (1e-3, 0.01))
+    for camera, posture in ((first, post), (second, trembles)):
+        camera.perceive(Table(), posture, posture)
     assert len(taken) == 1 and np.array_equal(first.observations[0].rgb, second.observations[0].rgb)
-    first.perceive(Table(), 0.2, post)
-    second.perceive(Table(subject=Subject(1)), 0.2, post)
-    second.perceive(Table("chair"), 0.2, post)
+    for other in (Table(time_s=2.1), Table(subject=Subject(1)), Table("chair")):
+        second.perceive(other, post, post)
     assert len(taken) == 4
     for camera in (first, second):
-        camera.perceive(Table(), 0.3, away)
+        camera.perceive(Table(time_s=2.2), away, away)
     assert len(taken) == 6 and not np.array_equal(first.observations[-1].rgb, second.observations[-1].rgb)
+
+
+@pytest.mark.parametrize("time_s", [LOOKED_AT_S[0] - 0.01, LOOKED_AT_S[1] + 0.01])
+def test_nobody_is_found_where_no_picture_is_taken(taken, time_s):
+    camera = HeadCamera(Pointing(np.full((N_KEYPOINTS, 2), np.nan)), Latency())
+    assert not len(camera.perceive(Table(time_s=time_s), start_posture(), start_posture()).scores)
+    assert not taken

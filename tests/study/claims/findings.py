@@ -57,7 +57,6 @@ VALUES = {  # columns of the number and of its interval, "" for none
     SEEN: ("found", "found_low", "found_high"),  # in the same table
     MEDIAN_PAIRS: IN_METRES,
     BETWEEN: IN_METRES,
-    "06_hri_avoidance/against_no_avoidance": ("min_distance_m", "", ""),
 }
 N_FRAMES = 480  # of the paper's recording, about
 
@@ -103,8 +102,7 @@ def size(level: int) -> dict[str, Any]:
 FLICKERS = {"measure": "flicker rate"}
 BENT, HIPS_IN, TILT = "broken fingers", "hips in the abdomen", "shoulder line tilt [rad]"
 COUNTS = "01_dataset/counts"
-CLEARANCE = "06_hri_avoidance/against_no_avoidance"
-SCRIPTS = ("sitting, hand", "standing, hand", "head")
+CLEARANCE = "06_hri_avoidance/clearance"
 AT_10_CM = {"threshold_m": 0.1, "reference": "median"}
 
 WORLD: list[Row] = [
@@ -161,7 +159,7 @@ WORLD: list[Row] = [
     (REMARKS, remark("mean score of shoulders, less that of the other joints", "detectron2"), -0.2, 0.03),
     (REMARKS, remark("hands given without their wrist", "openpose"), 0.0, 0),
     # The robot gave way, judged by eye.
-    (CLEARANCE, {"script": SCRIPTS, "detector": "ground truth, published gains"}, 0.15, 0),
+    (CLEARANCE, {"until": "until they leave", "gains": "published", "detector": "ground truth"}, 0.15, 0.02),
 ]  # fmt: skip
 
 # By claim: table, labels of the rows that come out otherwise, what becomes of a number.
@@ -256,8 +254,8 @@ OPPOSITES: dict[str, list[Turn]] = {
         (REMARKS, remark("mean score of shoulders, less that of the other joints", "detectron2"), is_now(0.2))
     ],
     "openpose-fingers": [(REMARKS, remark("hands given without their wrist", "openpose"), is_now(0.3))],
-    "clearance-5cm": [(CLEARANCE, {"script": "head"}, is_now(0.03))],
-    "clearance-10cm": [(CLEARANCE, {"script": "head"}, is_now(0.07))],
+    "clearance-5cm": [(CLEARANCE, {"gains": "published"}, is_now(0.02))],
+    "clearance-10cm": [(CLEARANCE, {"gains": "published"}, is_now(0.07))],
     "best-whole-body": [
         (SEEN, joint("left_wrist", 0.3, "detectron2"), is_now(0.98)),
         (MEDIAN_PAIRS, joint("right_elbow", 0.3, "mmpose") | {"other": "openpose"}, is_now(0.02)),

@@ -5,13 +5,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.experiments.avoidance.closed_loop import Trial
+from hicp_lib.experiments.avoidance.closed_loop import HAND_COLUMNS, Latency, Trial
 from hicp_lib.experiments.avoidance.runs import Job, Run
-from hicp_lib.robot.home import home_posture
+from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.separation import Separation
 from hicp_lib.robot.skin import read_skin
-from hicp_lib.study.plots.avoidance import joint_motion, over_time, separation_terms
+from hicp_lib.study.plots.avoidance import clearances, separation_terms, sweep_curves
 from hicp_lib.study.plots.avoidance_pictures import animation, filmstrip, nearest_views
 
 
@@ -22,26 +22,33 @@ def run() -> Run:
     angles[:, 6] += 0.2 * t
     columns = {"t_s": t, "distance_m": 0.3 - 0.1 * t, "activation": t, "hand_error_m": 0.1 * t}
     columns |= {f"{joint}_rad": angles[:, k] for k, joint in enumerate(ARM_JOINTS)}
+    columns |= dict(zip(HAND_COLUMNS, HOME_M["left"], strict=True))
     cycles = pd.DataFrame(columns).assign(activations=[np.full(len(read_skin()), 0.3)] * len(t))
     jpeg = cv2.imencode(".jpg", np.full((240, 320, 3), 90, np.uint8))[1].tobytes()
     empty = {name: [] for name in ("keypoints_px", "scores", "keypoints_m")}
     frames = pd.DataFrame([{"t_s": 0.0, "jpeg": jpeg, "truth_m": np.zeros(408).tolist()} | empty])
-    return Run(Job(Trial("sitting, hand"), "mediapipe", 0.04), cycles, frames)
+    return Run(Job(Trial("sitting, hand"), "mediapipe", Latency(inference_s=0.04)), cycles, frames)
 
 
-def test_lines_over_time_carry_their_numbers(run):
+def test_terms_of_the_separation_add_up():
     separations = {"mediapipe": Separation(0.2, 0.06, 0.02, 0.05)}
-    figure = over_time([run], separations, "made up")
-    assert "22.2" in figure.alt and "not a safety function" in figure.caption
-    assert {"script", "detector", "t_s", "distance_m"} <= set(figure.table.columns)
     terms = separation_terms(separations, "made up")
     values_m = terms.table.set_index("term")["value"]
     assert values_m["sum"] == pytest.approx(separations["mediapipe"].distance_m)
     assert values_m.drop("sum").sum() == pytest.approx(values_m["sum"])
 
 
-def test_the_joint_that_turns_most_is_named(run):
-    assert "elbow" in joint_motion([run], "made up").alt
+def test_clearances_and_sweeps_are_drawn_over_people():
+    people = pd.DataFrame({"script": "sitting, hand", "subject": range(12), "gains": "ours"})
+    people = people.assign(min_distance_m=0.02, reach_m=np.linspace(0, 0.11, 12), detector="mediapipe")
+    figure = clearances(people, "made up")
+    assert "mediapipe, ours 5.5" in figure.alt and figure.table["n_people"].tolist() == [12, 12]
+    swept = pd.concat(
+        [people.assign(latency_s=late_s, min_distance_m=0.05 - late_s / 10) for late_s in (0.0, 0.3)]
+    )
+    figure = sweep_curves({"latency_s": swept}, "made up")
+    assert "mediapipe, ours, from 5.0 to 2.0 cm over latency_s" in figure.alt
+    assert figure.figure.axes[0].get_lines()[0].get_xdata().tolist() == [0, 300]
 
 
 def test_pictures_stand_still_and_move(run, tmp_path):
@@ -57,9 +64,9 @@ def test_pictures_stand_still_and_move(run, tmp_path):
 
 def test_each_detector_shows_the_last_image_before_the_middle_of_the_near_phase(run):
     grey = {t_s: cv2.imencode(".png", np.full((240, 320, 3), level, np.uint8))[1].tobytes()
-            for t_s, level in ((0.0, 10), (3.2, 90), (3.5, 200))}  # fmt: skip
+            for t_s, level in ((0.0, 10), (3.0, 90), (3.3, 200))}  # fmt: skip
     frames = pd.concat([run.frames.assign(t_s=t_s, jpeg=content) for t_s, content in grey.items()])
-    other = Job(Trial("sitting, head"), "movenet-thunder", 0.0)
+    other = Job(Trial("sitting, head"), "movenet-thunder")
     unseeing = Run(Job(run.job.trial, "ground truth"), run.cycles, pd.DataFrame())
     runs = [unseeing, Run(run.job, run.cycles, frames), Run(other, run.cycles, run.frames)]
     figure = nearest_views(runs, "made up")

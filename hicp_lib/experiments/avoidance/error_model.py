@@ -1,0 +1,254 @@
+"""A detector as its errors: what it found of people in rendered runs, drawn again without rendering.
+
+Keypoints go in groups (`GROUPS`), each found or lost as a whole. Whether a group is found depends on whether
+it can be seen, roughly, and on whether it was found in the image before. What is found is off by a vector
+that all its keypoints share: the detector's bias, a part that lasts (drawn once for a person) and one that
+changes from image to image. All of it is estimated per group, in the robot's root frame. What is found more
+than `ELSEWHERE_M` away from the person's own is not modelled: it counts as lost.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from hicp_lib.core.camera import transform
+from hicp_lib.core.keypoints import FACE, HEAD, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND, mirror
+from hicp_lib.experiments.avoidance.closed_loop import MOUNT, Latency, Perceiver
+from hicp_lib.experiments.avoidance.reaching import Moment
+from hicp_lib.experiments.avoidance.skin_distance import robot_spheres
+from hicp_lib.experiments.laboratory import COLOUR, in_root
+from hicp_lib.robot.kinematics import load_icub
+from hicp_lib.robot.loop import Perception
+from hicp_lib.robot.posture import Posture
+from hicp_lib.robot.skin import read_skin
+
+GROUPS = {
+    "head": np.setdiff1d(HEAD, FACE), "face": FACE, "trunk": np.array([5, 6, 11, 12, 18, 19]),
+    "left arm": np.array([7, 9]), "right arm": np.array([8, 10]),
+    "left hand": LEFT_HAND, "right hand": RIGHT_HAND, "legs": np.array([13, 14, 15, 16, *range(20, 26)]),
+}  # fmt: skip
+ELSEWHERE_M = 0.25
+_CELL_PX = 16  # of the coarse image that tells what hides what
+_FLESH_M = 0.08  # a keypoint may lie so far behind what is seen
+_OFFSETS = ["x_m", "y_m", "z_m"]
+
+
+def in_sight(moment: Moment, posture: Posture) -> np.ndarray:
+    """Which groups the robot can see about half of, or more: neither outside the image nor hidden.
+
+    Parameters
+    ----------
+    moment : Moment
+    posture : Posture
+        The robot's.
+
+    Returns
+    -------
+    array of bool, shape (n_groups,)
+    """
+    icub, person = load_icub(), moment.person
+    places, radii = robot_spheres(icub, read_skin(), posture)
+    points = [in_root(person.keypoints_m), in_root(person.vertices_m), places]
+    T_camera_root = np.linalg.inv(icub.T_root_camera(posture.angles("head"), MOUNT))
+    x, y, depth_m = transform(T_camera_root, np.concatenate(points)).T
+    depth_m = np.where(depth_m > 0.05, depth_m, np.inf)
+    u = (COLOUR.fx_px * x / depth_m + COLOUR.cx_px) // _CELL_PX
+    v = (COLOUR.fy_px * y / depth_m + COLOUR.cy_px) // _CELL_PX
+    columns, rows = COLOUR.width_px // _CELL_PX, COLOUR.height_px // _CELL_PX
+    inside = (u >= 0) & (u < columns) & (v >= 0) & (v < rows) & np.isfinite(depth_m)
+    cell = np.where(inside, v * columns + u, rows * columns).astype(int)
+    nearest_m = np.full(rows * columns + 1, np.inf)
+    np.minimum.at(nearest_m, cell[N_KEYPOINTS:], depth_m[N_KEYPOINTS:])
+    seen = inside[:N_KEYPOINTS] & (depth_m[:N_KEYPOINTS] <= nearest_m[cell[:N_KEYPOINTS]] + _FLESH_M)
+    return np.array([seen[group].mean() >= 0.5 for group in GROUPS.values()])
+
+
+def found_groups(points_m: np.ndarray, is_sure: np.ndarray, truth_m: np.ndarray) -> np.ndarray:
+    """How far each group of the true person was found off, of an image; NaN where it was not.
+
+    Which of two hands or arms it is matters to names, not to distances: the nearer counts.
+
+    Parameters
+    ----------
+    points_m : array, shape (p, 136, 3)
+        Of all people found.
+    is_sure : array of bool, shape (p, 136)
+        Those that are believed.
+    truth_m : array, shape (136, 3)
+
+    Returns
+    -------
+    array, shape (n_groups, 3)
+        Mean over the group's keypoints.
+    """
+    offsets_m = np.full((len(GROUPS), 3), np.nan)
+    for row, group in enumerate(GROUPS.values()):
+        for names in (group, mirror("halpe136")[group]):
+            for person, sure in zip(points_m[:, names], is_sure[:, names], strict=True):
+                if sure.any():
+                    off_m = (person - truth_m[group])[sure].mean(axis=0)
+                    least_m = np.nan_to_num(np.linalg.norm(offsets_m[row]), nan=ELSEWHERE_M)
+                    if np.linalg.norm(off_m) < least_m:
+                        offsets_m[row] = off_m
+    return offsets_m
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorModel:
+    """What `fit` estimates, a row per group of `GROUPS`.
+
+    Attributes
+    ----------
+    found_share : array, shape (n_groups, 2, 2)
+        By whether it can be seen, and whether it was found in the image before.
+    bias_m : array, shape (n_groups, 3)
+    lasting_m2, passing_m2 : array, shape (n_groups, 3, 3)
+        Covariances between people, and from image to image.
+    burst_images : float
+        How many images in a row nothing is found of somebody, on average.
+    """
+
+    found_share: np.ndarray
+    bias_m: np.ndarray
+    lasting_m2: np.ndarray
+    passing_m2: np.ndarray
+    burst_images: float
+
+
+def fit(sightings: pd.DataFrame) -> ErrorModel:
+    """The model of one detector.
+
+    Parameters
+    ----------
+    sightings : pd.DataFrame
+        A row per image and group, in the order of time within a `run`: columns `run, group, in_sight` and the
+        group's offset `x_m, y_m, z_m` (NaN: lost).
+
+    Returns
+    -------
+    ErrorModel
+    """
+    table = sightings.assign(found=sightings["x_m"].notna())
+    table["before"] = table.groupby(["run", "group"])["found"].shift(fill_value=False)
+    shares, biases, lasting, passing = [], [], [], []
+    for group in GROUPS:
+        rows = table[table["group"] == group]
+        n = rows.groupby(["in_sight", "before"])["found"].agg(["sum", "count"])
+        n = n.reindex(pd.MultiIndex.from_product([(False, True)] * 2), fill_value=0)
+        # Half a case of either kind: what was never met is not impossible.
+        shares.append(((n["sum"] + 0.5 * rows["found"].mean()) / (n["count"] + 0.5)).to_numpy().reshape(2, 2))
+        found = rows[rows["found"]]
+        means = found.groupby("run")[_OFFSETS].transform("mean")
+        biases.append(found[_OFFSETS].mean().fillna(0.0))
+        lasting.append(_covariance(means))
+        passing.append(_covariance(found[_OFFSETS] - means))
+    lost = ~table.groupby(["run", "image"], sort=False)["found"].any()
+    starts = lost & ~lost.groupby("run").shift(fill_value=False)
+    burst = lost.sum() / max(starts.sum(), 1)
+    estimated = (np.array(values) for values in (shares, biases, lasting, passing))
+    return ErrorModel(*estimated, max(float(burst), 1.0))
+
+
+def _covariance(offsets_m: pd.DataFrame) -> np.ndarray:
+    return np.cov(offsets_m.to_numpy(), rowvar=False) if len(offsets_m) > 1 else np.zeros((3, 3))
+
+
+@dataclass(eq=False)
+class Modelled:
+    """Perceives what a detector with a model's errors would find.
+
+    Attributes
+    ----------
+    model : ErrorModel
+    latency : Latency
+    rng : numpy.random.Generator
+        Of everything that is drawn.
+    """
+
+    model: ErrorModel
+    latency: Latency
+    rng: np.random.Generator
+    _found: np.ndarray = field(init=False)
+    _lasting_m: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._found = np.zeros(len(GROUPS), bool)
+        self._lasting_m = self.model.bias_m + self._draw_m(self.model.lasting_m2)
+
+    def perceive(self, moment: Moment, posture: Posture, read: Posture) -> Perception:
+        """What is found of the person.
+
+        Parameters
+        ----------
+        moment : Moment
+        posture : Posture
+            The robot's.
+        read : Posture
+            Not used: how well the robot knows its joints is part of the errors.
+
+        Returns
+        -------
+        Perception
+        """
+        seen, rows = in_sight(moment, posture).astype(int), np.arange(len(GROUPS))
+        share = self.model.found_share[rows, seen, self._found.astype(int)]
+        self._found = self.rng.random(len(GROUPS)) < share
+        off_m = self._lasting_m + self._draw_m(self.model.passing_m2)
+        truth_m = in_root(moment.person.keypoints_m)
+        points_m, scores = np.full((1, N_KEYPOINTS, 3), np.nan), np.zeros((1, N_KEYPOINTS))
+        for row in np.flatnonzero(self._found):
+            group = [*GROUPS.values()][row]
+            points_m[0, group], scores[0, group] = truth_m[group] + off_m[row], 1.0
+        return Perception(moment.time_s, points_m, scores)
+
+    def _draw_m(self, covariances_m2: np.ndarray) -> np.ndarray:
+        return np.array([self.rng.multivariate_normal(np.zeros(3), c) for c in covariances_m2])
+
+
+@dataclass(eq=False)
+class Lossy:
+    """Loses images of another perceiver in bursts: in those nobody is found.
+
+    Attributes
+    ----------
+    perceiver : Perceiver
+    lost_share : float
+        Of all images, below 1.
+    burst_images : float
+        How many in a row on average; more where the share asks for it.
+    rng : numpy.random.Generator
+    """
+
+    perceiver: Perceiver
+    lost_share: float
+    burst_images: float
+    rng: np.random.Generator
+
+    def __post_init__(self) -> None:
+        odds = self.lost_share / (1 - self.lost_share)
+        self._ends = 1 / max(self.burst_images, odds, 1.0)
+        self._begins = odds * self._ends
+        self._lost = self.rng.random() < self.lost_share
+
+    @property
+    def latency(self) -> Latency:
+        """The perceiver's."""
+        return self.perceiver.latency
+
+    def perceive(self, moment: Moment, posture: Posture, read: Posture) -> Perception:
+        """What the perceiver perceives, or nobody.
+
+        Parameters
+        ----------
+        moment : Moment
+        posture, read : Posture
+            The robot's, and as it knows it.
+
+        Returns
+        -------
+        Perception
+        """
+        seen = self.perceiver.perceive(moment, posture, read)
+        lost, self._lost = self._lost, self.rng.random() < (1 - self._ends if self._lost else self._begins)
+        return Perception(moment.time_s, seen.keypoints_m[:0], seen.scores[:0]) if lost else seen
