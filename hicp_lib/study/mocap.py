@@ -16,7 +16,7 @@ from hicp_lib.detectors.runtime.results import detections_of
 from hicp_lib.detectors.runtime.run import detect_images
 from hicp_lib.evaluation.cases import labelled, over_people
 from hicp_lib.evaluation.space import mocap_error
-from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_errors, summary
+from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_errors, sigma_coverage, summary
 from hicp_lib.evaluation.space.occlusion import joint_occlusion
 from hicp_lib.evaluation.space.stability import POSITION, position_array
 from hicp_lib.lifting.robust import METHODS
@@ -249,11 +249,14 @@ def errors_at_joints(registered: Sequence[Registered], points: Sequence[pd.DataF
     return over_people(tables, [len(one.recording) for one in registered])
 
 
-def ablation(people: Sequence[Person]) -> pd.DataFrame | None:
-    """Each step of lifting on all people's `stepwise`; None where true positions are not known."""
+def ablation(people: Sequence[Person]) -> tuple[pd.DataFrame, pd.DataFrame] | None:
+    """Each step of lifting on all people's `stepwise`, and how often depths lie within their standard deviation.
+
+    None where true positions are not known.
+    """
     errors = [
         lifting_errors(person.stepwise, truth, person.recording.T_base_cam)
         for person in people
         if (truth := read_truth(person.recording)) is not None
     ]
-    return summary(pd.concat(errors)) if errors else None
+    return (summary(pd.concat(errors)), sigma_coverage(pd.concat(errors))) if errors else None

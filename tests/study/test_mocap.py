@@ -60,7 +60,8 @@ def test_every_step_is_lifted_where_it_can_be_judged(laboratory):
     again, stepwise = lift_frames(recording, found)
     pd.testing.assert_frame_equal(again.reset_index(drop=True), points.reset_index(drop=True))
     assert set(stepwise["detector"]) == {"one"} and set(stepwise["method"]) == set(N_STEPS)
-    table = ablation([replace(person, stepwise=stepwise)] * 3)
+    table, covered = ablation([replace(person, stepwise=stepwise)] * 3)
+    assert covered["n"].sum() == 6
     assert table["method"].tolist() == list(N_STEPS) and (table["n_compared"] == 6).all()
 
 

@@ -82,7 +82,11 @@ def test_only_what_both_lift_is_compared():
 
 def test_coverage_is_of_depth_along_the_cameras_axis_and_by_reason(points, truth):
     errors = lifting_errors(points, truth, POSES)
-    assert errors["off_m"].max() < 0.1 and set(errors["reason"]) == {"lifted"}
+    assert errors["off_m"].max() < 0.1 and set(errors["reason"]) == {
+        "lifted",
+        "guessed",
+    }  # the thumb is hidden
+    errors["reason"] = "lifted"
     truth["x_m"] += 1.0
     turned = POSES[:, [2, 1, 0, 3]]  # the camera's axis is the base's x axis
     across, along = (lifting_errors(points, truth, T) for T in (POSES, turned))
