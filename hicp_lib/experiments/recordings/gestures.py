@@ -35,7 +35,7 @@ _HIGH_DEG: Ranges = {
 _BENT_DEG: Ranges = {"spine_flexion": (60, 78), "neck_flexion": (-10, 30)}
 _HANGING_DOWN_DEG: Ranges = {"shoulder_flexion": (55, 85), "elbow_flexion": (0, 25)}  # of whoever bends down
 _AROUND_DEG = {"shoulder_flexion": -25.0, "shoulder_abduction": 35.0, "elbow_flexion": 25.0}
-_ASIDE_M = ((0.6, DISTANCE_M), (0.95, DISTANCE_M + 0.2))  # half out of the image; two corners, (x, y)
+_ASIDE_M = ((0.5, DISTANCE_M), (0.8, DISTANCE_M + 0.2))  # half out of the image; two corners, (x, y)
 _CLOSE_M = ((-0.15, 0.75), (0.15, 1.05))  # torso and arms are in it
 _STEP_M, _LIFTED_DEG = (
     0.5,
