@@ -29,15 +29,8 @@ from hicp_lib.study.mocap_floor import perfect_detections
 from hicp_lib.study.registration import Registered
 
 _CLOCKS = [
-    "person",
-    "n_frames",
-    "offset_s",
-    "first_half_s",
-    "second_half_s",
-    "correlation",
-    "off_s",
-    "left_out",
-]
+    "person", "n_frames", "offset_s", "first_half_s", "second_half_s", "correlation", "off_s", "left_out",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -143,16 +143,8 @@ def median_errors(
         centre_m = part["centre_error_m"].where(part["score"] > case[-1]).median()
         rows.append((*case, found.sum(), known.sum(), n_people, *medians, *shares, centre_m, block_frames))
     numbers = [
-        "count",
-        "n_frames",
-        "n_people",
-        "median_m",
-        "low_m",
-        "high_m",
-        "found",
-        "found_low",
-        "found_high",
-    ]
+        "count", "n_frames", "n_people", "median_m", "low_m", "high_m", "found", "found_low", "found_high",
+    ]  # fmt: skip
     return pd.DataFrame(rows, columns=[*_CASE, "min_score", *numbers, "centre_median_m", "block_frames"])
 
 
@@ -235,9 +227,8 @@ def distance_shares(
             hits = found_m > threshold_m if beyond else found_m <= threshold_m
             interval = with_interval(_shares(weights, hits, of), n_people)
             rows.append((*case, threshold_m, *interval, n_people))
-    return pd.DataFrame(
-        rows, columns=[*_CASE, "min_score", "threshold_m", "value", "low", "high", "n_people"]
-    )
+    columns = [*_CASE, "min_score", "threshold_m", "value", "low", "high", "n_people"]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def _cases(

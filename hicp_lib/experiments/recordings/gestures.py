@@ -1,4 +1,4 @@
-"""What a person does before the robot, one gesture after another: reaches, waves, crosses the arms, touches
+"""What a person does before the robot, one gesture after another: reaches, points, crosses the arms, touches
 the table between them; and what takes parts of the body out of the image: raises the arms, steps half out of
 it or close, bends down, puts the hands behind the back.
 """
@@ -9,6 +9,7 @@ from operator import or_
 
 import numpy as np
 
+from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND
 from hicp_lib.experiments.laboratory import posed
 from hicp_lib.experiments.minimum_jerk import Move, Posture, between
 from hicp_lib.simulation.body.arms import Ranges, uniform
@@ -24,14 +25,9 @@ DISTANCE_M = 1.65  # of the person from the robot's root, along the floor
 TABLE_HEIGHT_M = 0.72
 TABLE_M = ((-0.6, 0.75), (0.6, 1.3))  # two corners of its top, (x, y)
 _LEGS = ("hip_flexion", "hip_abduction", "hip_rotation", "knee_flexion", "ankle_flexion")
-_WRIST_M = 0.07  # a wrist above the table that its hand lies on
-_LEANING_DEG = {"spine_flexion": 28.0, "neck_flexion": 10.0}
+_HANDS, _HALF_FINGER_M = {"left": LEFT_HAND, "right": RIGHT_HAND}, 0.01
+_LEANING_DEG = {"spine_flexion": 40.0, "neck_flexion": 0.0}
 _PALM_DOWN_DEG = {"forearm_supination": -70.0, "wrist_flexion": -15.0}
-_WAVING_DEG = {
-    "shoulder_abduction": 65.0, "shoulder_flexion": 15.0, "shoulder_rotation": -80.0,
-    "elbow_flexion": 100.0, "forearm_supination": -50.0, "wrist_flexion": 0.0,
-}  # fmt: skip
-_SWINGING = (("shoulder_abduction", 1), ("elbow_flexion", -1))  # how the joints go to and fro
 _HIGH_DEG: Ranges = {
     "shoulder_flexion": (150, 178), "shoulder_abduction": (0, 15), "shoulder_rotation": (-10, 20),
     "elbow_flexion": (0, 25), "forearm_supination": (-60, 60),
@@ -39,9 +35,12 @@ _HIGH_DEG: Ranges = {
 _BENT_DEG: Ranges = {"spine_flexion": (60, 78), "neck_flexion": (-10, 30)}
 _HANGING_DOWN_DEG: Ranges = {"shoulder_flexion": (55, 85), "elbow_flexion": (0, 25)}  # of whoever bends down
 _AROUND_DEG = {"shoulder_flexion": -25.0, "shoulder_abduction": 35.0, "elbow_flexion": 25.0}
-_ASIDE_M = ((0.6, DISTANCE_M), (0.95, DISTANCE_M + 0.2))  # half out of the image; two corners, (x, y)
+_ASIDE_M = ((0.5, DISTANCE_M), (0.8, DISTANCE_M + 0.2))  # half out of the image; two corners, (x, y)
 _CLOSE_M = ((-0.15, 0.75), (0.15, 1.05))  # torso and arms are in it
-_STEP_M = 0.5  # the longest
+_STEP_M, _LIFTED_DEG = (
+    0.5,
+    {"hip_flexion": 15.0, "knee_flexion": 26.0, "hip_abduction": 7.0},
+)  # the longest step
 _PENETRATION_M = 0.03  # skin and clothes give way this far on the way from one posture to the next
 _N_TRIES = 12
 
@@ -72,9 +71,9 @@ class Gestures:
 
     def moves(self) -> Iterator[Move]:
         """Movements without end, in rounds in which each kind of gesture comes once, in any order."""
-        kinds = ("reaching", "reaching_both", "hips", "crossed", "face", "pointing")
+        kinds = ("reaching", "reaching_both", "hips", "crossed", "face", "pointing", "raised")
         gestures: list[Callable[[], Iterator[Move]]] = [partial(self._gesture, kind) for kind in kinds]
-        gestures += [self._wave, self._step, self._raise_high, self._behind_back]
+        gestures += [self._step, self._raise_high, self._behind_back]
         gestures += [partial(self._step_away, _ASIDE_M)]
         gestures += [self._touch_table] if self.at_table else [partial(self._step_away, _CLOSE_M), self._bend]
         while True:
@@ -109,23 +108,16 @@ class Gestures:
         return joints
 
     def _with_hand_on_table(self, joints: Joints, side: str, pelvis_m: np.ndarray) -> Joints:
-        """A wrist a little beyond the table's edge, the palm down."""
+        """A wrist a little beyond the table's edge, palm down, as low as the hand lies on the table."""
         ahead_m = pelvis_m[1] - TABLE_M[1][1] + self.rng.uniform(0.1, 0.18)
         left_m = self.rng.uniform(0.12, 0.3) * (1 if side == "left" else -1)
-        wrist_m = np.array([ahead_m, left_m, TABLE_HEIGHT_M + _WRIST_M - pelvis_m[2]])
-        joints = reach(self.body, self.shape, joints, side, wrist_m, (-0.2, 0.7, -0.7)) or joints
-        return joints | radians(_PALM_DOWN_DEG, f"{side}_")
-
-    def _wave(self) -> Iterator[Move]:
-        """One hand up, forearm to and fro."""
-        joints = self.at_ease().joints
-        side = str(self.rng.choice(["left", "right"]))
-        joints = joints | radians(_WAVING_DEG, f"{side}_")
-        yield from self._go(self._standing(joints))
-        for swing_deg in (20, -20, 20, -20, 0):
-            turned_deg = {name: _WAVING_DEG[name] + sign * swing_deg for name, sign in _SWINGING}
-            self.now = self._standing(joints | radians(turned_deg, f"{side}_"))
-            yield Move(0.35, self.now)
+        wrist_m = np.array([ahead_m, left_m, TABLE_HEIGHT_M + 0.07 - pelvis_m[2]])
+        for _ in range(3):
+            joints = reach(self.body, self.shape, joints, side, wrist_m, (-0.2, 0.7, -0.7)) or joints
+            joints = joints | radians(_PALM_DOWN_DEG, f"{side}_")
+            hand_m = posed(self.shape, self._standing(joints)).keypoints_m[_HANDS[side]]
+            wrist_m[2] += TABLE_HEIGHT_M + _HALF_FINGER_M - hand_m[:, 2].min()
+        return joints
 
     def _raise_high(self) -> Iterator[Move]:
         """One arm or both, beyond the upper edge of the image."""
@@ -174,7 +166,7 @@ class Gestures:
         first = int(to_m[0] >= start_m[0])  # the person faces the robot: their left is -x
         for k in range(n_steps):
             side = ("left", "right")[(first + k) % 2]
-            lifted = {f"{side}_hip_flexion": 0.3, f"{side}_knee_flexion": 0.5, f"{side}_hip_abduction": 0.12}
+            lifted = radians(_LIFTED_DEG, f"{side}_")
             middle_m, end_m = (start_m + (k + part) / n_steps * (to_m - start_m) for part in (0.5, 1))
             yield Move(
                 0.45, Posture(self.now.joints | self.legs | lifted, (float(middle_m[0]), float(middle_m[1])))

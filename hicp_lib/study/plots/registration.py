@@ -44,7 +44,7 @@ def registration(
     _draw_bars(axes[-1], 1000 * table.set_index("method")[column], label)
     marks.legend_below(figure, axes[0])
     what = (
-        "how far it puts the person's markers from where they truly are, median over markers and frames"
+        "how far it puts the person's markers from where they truly are, median over markers, frames, people"
         if known
         else "the median error of a marker under the fit of the others"
     )
