@@ -13,13 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from hicp_lib.core.errors import InputError
+
 HUMAN_SPEED_M_S = 1.6
 """How fast a person is taken to be when nobody measures it."""
 
 
 @dataclass(frozen=True)
 class Brakes:
-    """How the arm stops: the command takes its time, then every joint decelerates evenly.
+    """How the arm stops: the command takes its time, then joints decelerate evenly.
 
     Attributes
     ----------
@@ -29,6 +31,11 @@ class Brakes:
         Of the joint that takes longest. Assumed (100 degrees per second squared): none is published for the
         iCub; it stops joints at the controller's 30 degrees per second within 0.3 s.
 
+    Raises
+    ------
+    InputError
+        If they are no such numbers.
+
     Examples
     --------
     >>> round(Brakes().stopping_s(np.deg2rad(30)), 2)
@@ -37,6 +44,10 @@ class Brakes:
 
     delay_s: float = 0.02
     deceleration_rad_s2: float = np.deg2rad(100.0)
+
+    def __post_init__(self) -> None:
+        if not (0 <= self.delay_s < np.inf and 0 < self.deceleration_rad_s2 < np.inf):
+            raise InputError(f"{self} never stop an arm; expected seconds, 0 or more, and rad/s^2, above 0")
 
     def stopping_s(self, joint_rad_s: float) -> float:
         """From the command to standstill, T_s, when the fastest joint turns this fast."""

@@ -14,7 +14,6 @@ from hicp_lib.experiments.avoidance.runs import IDEAL, Run, keypoints_m
 from hicp_lib.experiments.avoidance.sweeps import least_distances
 from hicp_lib.robot.home import HOME_M
 from hicp_lib.robot.loop import AVOIDING
-from hicp_lib.robot.separation import Separation
 
 MARKS_M = (0.05, 0.10)
 """Clearances that are asked for."""
@@ -216,39 +215,6 @@ def keypoint_errors(runs: Iterable[Run]) -> pd.DataFrame:
             parts.append(pd.DataFrame(errors).assign(**about))
     empty = {"error_m": np.zeros(0), "near": np.zeros(0, bool), "script": [], "detector": [], "t_s": []}
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(empty)
-
-
-def separations(runs: Iterable[Run], errors: pd.DataFrame, period_s: float) -> dict[str, Separation]:
-    """The separation each detector would need: its delay, its error near the hand (95th percentile), speeds.
-
-    The robot's speed is the fastest the hand was in any of the runs. It brakes within one control period,
-    which is when its velocities can be zero: an assumption, real joints take longer. Detectors that gave
-    no keypoint have no error, and no separation.
-
-    Parameters
-    ----------
-    runs : iterable of Run
-    errors : pd.DataFrame
-        As from `keypoint_errors`.
-    period_s : float
-        Of the controller.
-
-    Returns
-    -------
-    dict of str to Separation
-        By detector; the terms of ISO/TS 15066.
-    """
-    runs = list(runs)
-    robot_m_s = max(
-        float((run.cycles["hand_error_m"].diff() / run.cycles["t_s"].diff()).abs().max()) for run in runs
-    )
-    delays_s = {run.job.detector: run.job.latency.total_s for run in runs if run.job.detector not in IDEAL}
-    by_detector = errors[errors["near"]].groupby("detector")["error_m"].quantile(0.95)
-    return {
-        name: Separation(robot_m_s, delay_s + period_s, period_s, float(by_detector[name]))
-        for name, delay_s in delays_s.items()
-        if name in by_detector.index
-    }
 
 
 def measured_times(runs: Iterable[Run]) -> pd.DataFrame:

@@ -1,13 +1,13 @@
 """The separation that ISO 10218-2:2025 would ask for before each detector, from its runs of avoidance."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
 from hicp_lib.core.keypoints import N_KEYPOINTS
-from hicp_lib.experiments.avoidance.runs import Run
+from hicp_lib.experiments.avoidance.runs import IDEAL, Run
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.separation import ASSUMED, Brakes, Separation
 from hicp_lib.simulation.body.identities import split_members
@@ -18,10 +18,9 @@ _COMES_NEAR = ("hand", "face", "scalp")  # regions of the body
 _EVERY = 4  # of their vertices one is looked at
 
 
-def separations(
+def separations_before(
     runs: Sequence[Run],
     errors: pd.DataFrame,
-    latencies_s: Mapping[str, float],
     period_s: float,
     brakes: Brakes = ASSUMED,
     robot_uncertainty_m: float = 0.01,
@@ -37,8 +36,6 @@ def separations(
     runs : sequence of Run
     errors : pd.DataFrame
         As from `hicp_lib.study.avoidance.keypoint_errors`.
-    latencies_s : mapping of str to float
-        From light to loop, by detector.
     period_s : float
         Of the controller.
     brakes : Brakes, optional
@@ -50,6 +47,7 @@ def separations(
     dict of str to Separation
         By detector.
     """
+    latencies_s = {run.job.detector: run.job.latency.total_s for run in runs if run.job.detector not in IDEAL}
     hand_m_s, joint_rad_s = np.max([_speeds(run.cycles) for run in runs], axis=0)
     place_m = errors[errors["near"]].groupby("detector")["error_m"].quantile(0.95)
     return {
@@ -102,7 +100,7 @@ def _found(runs: Sequence[Run], detector: str) -> np.ndarray:
     """Which keypoints a detector has ever been sure of, (136,)."""
     found = np.zeros(N_KEYPOINTS, bool)
     for run in runs:
-        if run.job.condition.split(", ")[0] == detector:
+        if run.job.detector == detector:
             for _, frame in run.frames.iterrows():
                 found |= sure_keypoints(frame)[1].any(axis=0)
     return found

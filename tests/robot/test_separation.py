@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hicp_lib.core.errors import InputError
 from hicp_lib.robot.separation import Brakes, Separation, separation_table
 
 
@@ -36,6 +37,12 @@ def test_an_arm_stops_as_one_does_that_is_stepped_through_time():
     assert stopping_s == pytest.approx(time_s, abs=1e-4) == 0.35
     separation = Separation(lever_m * joint_rad_s, 0.1, stopping_s, 0.0, brake_delay_s=brakes.delay_s)
     assert separation.terms_m()["S_s: robot, while it stops"] == pytest.approx(travelled_m, abs=1e-4)
+
+
+@pytest.mark.parametrize("wrong", [{"delay_s": -0.1}, {"deceleration_rad_s2": 0.0}, {"delay_s": np.nan}])
+def test_brakes_that_never_stop_are_told(wrong):
+    with pytest.raises(InputError, match="never stop an arm"):
+        Brakes(**wrong)
 
 
 def test_a_still_arm_only_waits_for_its_brakes():

@@ -20,7 +20,6 @@ from hicp_lib.study.avoidance import (
     model_check,
     over_people,
     reasons,
-    separations,
     sightings,
 )
 
@@ -179,14 +178,10 @@ def test_sightings_say_what_was_found_where(runs):
     assert table[table["group"] == "head"]["x_m"].isna().all()
 
 
-def test_errors_do_not_mind_the_side_and_feed_the_separation(runs):
+def test_errors_do_not_mind_the_side(runs):
     errors = keypoint_errors(runs)
     np.testing.assert_allclose(errors["error_m"], 0.03, atol=1e-6)
     assert errors["near"].all() and set(errors["detector"]) == {"sees", "loses"}
-    found = separations(runs, errors, 0.02)
-    assert set(found) == {"sees", "loses"}
-    assert found["sees"].human_uncertainty_m == pytest.approx(0.03)
-    assert found["sees"].reaction_s == pytest.approx(0.12)
 
 
 def test_times_are_told_beside_the_stated_delay(runs):

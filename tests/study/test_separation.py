@@ -5,12 +5,12 @@ import pandas as pd
 import pytest
 
 from hicp_lib.core.keypoints import BODY, HANDS, N_KEYPOINTS
-from hicp_lib.experiments.avoidance.closed_loop import Trial
+from hicp_lib.experiments.avoidance.closed_loop import Latency, Trial
 from hicp_lib.experiments.avoidance.runs import Job, Run
 from hicp_lib.robot.home import home_posture
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.separation import Brakes
-from hicp_lib.study.separation import beyond_keypoints_m, separations
+from hicp_lib.study.separation import beyond_keypoints_m, separations_before
 
 SPEED_RAD_S = 0.3
 WRISTS = np.isin(np.arange(N_KEYPOINTS), BODY)
@@ -33,7 +33,10 @@ def runs() -> list[Run]:
         "truth_m": np.zeros(3 * N_KEYPOINTS),
     }
     frames = pd.DataFrame([{name: np.ravel(value).tolist() for name, value in frame.items()}]).assign(t_s=0.0)
-    return [Run(Job(Trial("sitting, hand"), name), cycles, frames) for name in ("mediapipe", "blind")]
+    latency = Latency(transport_s=0.03, inference_s=0.07)
+    return [
+        Run(Job(Trial("sitting, hand"), name, latency), cycles, frames) for name in ("mediapipe", "blind")
+    ]
 
 
 def errors(*values_m: float) -> pd.DataFrame:
@@ -42,7 +45,7 @@ def errors(*values_m: float) -> pd.DataFrame:
 
 def test_terms_come_from_runs_brakes_and_latency(runs):
     brakes = Brakes(delay_s=0.05, deceleration_rad_s2=1.0)
-    found = separations(runs, errors(0.04, 0.04), {"mediapipe": 0.1, "blind": 0.1}, 0.02, brakes)
+    found = separations_before(runs, errors(0.04, 0.04), 0.02, brakes)
     assert list(found) == ["mediapipe"]
     mine = found["mediapipe"]
     assert mine.reaction_s == pytest.approx(0.12)

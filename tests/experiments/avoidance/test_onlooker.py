@@ -6,17 +6,19 @@ import pytest
 from hicp_lib.core.camera import transform
 from hicp_lib.experiments.avoidance.closed_loop import start_posture
 from hicp_lib.experiments.avoidance.onlooker import CAMERA, onlooker_view
-from hicp_lib.experiments.avoidance.reaching import NEAR_S, script
+from hicp_lib.experiments.avoidance.reaching import NEAR_S, Moment
 from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
 from hicp_lib.experiments.laboratory import T_WORLD_ROOT
 from hicp_lib.robot.home import HOME_M
 from hicp_lib.robot.kinematics import load_icub
+from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.rendering.camera import project_world
 
 
 @pytest.fixture(scope="module")
 def moment():
-    return script("sitting, hand").at(NEAR_S, [])
+    moment = Moment("sitting, hand", Subject(), NEAR_S)
+    return moment.world([]), moment.person
 
 
 def seen_px(points_m: np.ndarray) -> np.ndarray:
