@@ -9,7 +9,7 @@ from hicp_lib.core.keypoints import HEAD, mirror
 from hicp_lib.evaluation.statistics.proportions import mean_with_interval
 from hicp_lib.experiments.avoidance.closed_loop import Latency
 from hicp_lib.experiments.avoidance.error_model import GROUPS, found_groups
-from hicp_lib.experiments.avoidance.reaching import LEAVES_S, LOOKED_AT_S, PHASES_S, SCRIPTS
+from hicp_lib.experiments.avoidance.reaching import LEAVES_S, LOOKED_AT_S, SCRIPTS
 from hicp_lib.experiments.avoidance.runs import IDEAL, Run, keypoints_m
 from hicp_lib.experiments.avoidance.sweeps import least_distances
 from hicp_lib.robot.home import HOME_M
@@ -36,11 +36,10 @@ def metrics(runs: Iterable[Run]) -> pd.DataFrame:
     Columns: `script`, `subject`, `detector`, `gains`, `latency_s`, `reach_m` and `min_distance_m` (see
     `sweeps.least_distances`), `under_5cm_s`, `under_10cm_s`, `reaction_s` (from the person's coming within
     `CROSSED_M` to the first motion), `retreat_m` (the hand's largest distance from its post),
-    `false_retreats` (begun while the person was farther than `FIELD_M`), `idle_error_m` (the hand's mean
-    error before the person moves), `back_s` (from the person's having left to the hand's being back),
-    `seen_share` (of the images taken while the person is near, those with any sure keypoint in space),
-    `head_share` (those with one of the head that is on the head), `blind_s` (longest time the person was near
-    with nothing new seen of them).
+    `false_retreats` (begun while the person was farther than `FIELD_M`), `back_s` (from the person's
+    having left to the hand's being back), `seen_share` (of the images taken while the person is near, those
+    with any sure keypoint in space), `head_share` (those with one of the head that is on the head), `blind_s`
+    (longest time the person was near with nothing new seen of them).
     """
     return pd.DataFrame([_metrics(run) for run in runs])
 
@@ -245,7 +244,6 @@ def _metrics(run: Run) -> dict:
     row["retreat_m"] = away.max()
     begins = (cycles["status"] == AVOIDING) & (cycles["status"].shift() != AVOIDING)
     row["false_retreats"] = int((begins & (distance >= FIELD_M)).sum())
-    row["idle_error_m"] = away[t < PHASES_S["far"]].mean()
     far = np.flatnonzero(away > BACK_M)
     back = far[-1] + 1 if len(far) else 0
     row["back_s"] = max(0.0, t[back] - LEAVES_S[1]) if 0 < back < len(t) else np.nan

@@ -29,7 +29,7 @@ def dressed(number: int) -> str:
 def closed_loop(number: int) -> str:
     """The first steps of a run of avoidance, and what the robot's camera sees then."""
     name = list(SCRIPTS)[number % len(SCRIPTS)]
-    cycles = simulate(Trial(name, 0.2, Subject(number=number)), TrueKeypoints())
+    cycles = simulate(Trial(name, 1.2, Subject(number=number)), TrueKeypoints())
     seen = photograph(Moment(name, Subject(number=number), 2.0), start_posture())
     return content(cycles.to_dict("list"), seen)
 

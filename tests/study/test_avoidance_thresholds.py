@@ -6,7 +6,7 @@ import pytest
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.experiments.avoidance.closed_loop import Latency, Trial
-from hicp_lib.experiments.avoidance.reaching import LEAVES_S, PHASES_S
+from hicp_lib.experiments.avoidance.reaching import LEAVES_S
 from hicp_lib.experiments.avoidance.runs import Job, Run
 from hicp_lib.robot.loop import AVOIDING, FREE
 from hicp_lib.study.avoidance import (
@@ -76,11 +76,6 @@ def test_the_hand_is_back_at_its_threshold_and_not_before_the_person_left():
     assert row(away_m=late)["back_s"] == pytest.approx(T[T >= left_s + 1][0] - left_s)
     assert row(away_m=np.where(T < 1, 0.1, 0))["back_s"] == 0
     assert np.isnan(row(away_m=BACK_M)["back_s"]) and np.isnan(row(away_m=0.1)["back_s"])
-
-
-def test_errors_before_the_person_moves_are_idle():
-    away_m = np.where(T < PHASES_S["far"], 0.001, 0.1)
-    assert row(away_m=away_m)["idle_error_m"] == pytest.approx(0.001)
 
 
 @pytest.mark.parametrize(("distance_m", "expected"), [(FIELD_M, 1), (FIELD_M - 1e-9, 0)])

@@ -14,7 +14,7 @@ import pandas as pd
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.memo import memoised
-from hicp_lib.experiments.avoidance.reaching import LEAVES_S, REACTION_S, Moment
+from hicp_lib.experiments.avoidance.reaching import LEAVES_S, LOOKED_AT_S, REACTION_S, Moment
 from hicp_lib.experiments.avoidance.skin_distance import robot_spheres, skin_distance_m
 from hicp_lib.experiments.laboratory import in_root
 from hicp_lib.robot.controller import Controller, Settings
@@ -28,6 +28,8 @@ from hicp_lib.simulation.body.identities import Subject
 MOUNT = "tilted"
 NECK_RAD = np.radians([3.0, 0.0, 4.0])
 """How the robot holds its head: it looks at its left hand and at whoever comes for it."""
+STARTS_S = LOOKED_AT_S[0] - 0.2
+"""When runs begin; people are still far."""
 HAND_COLUMNS = ("followed_x_m", "followed_y_m", "followed_z_m")
 _POSED_S = 0.1  # the person's skin is posed this often, and moves on straight lines in between
 _ROW_PERIODS = 2  # control periods from one row to the next
@@ -200,13 +202,9 @@ def start_posture() -> Posture:
 
 
 def simulate(
-    trial: Trial,
-    perceiver: Perceiver,
-    avoids: bool = True,
-    settings: Settings | None = None,
-    start_s: float = 0.0,
+    trial: Trial, perceiver: Perceiver, avoids: bool = True, settings: Settings | None = None
 ) -> pd.DataFrame:
-    """One run of a trial.
+    """One run of a trial, from shortly before what the robot sees begins to matter.
 
     Parameters
     ----------
@@ -216,8 +214,6 @@ def simulate(
         Whether the robot gives way at all.
     settings : Settings, optional
         The controller's.
-    start_s : float, optional
-        What is before is left out.
 
     Returns
     -------
@@ -231,7 +227,7 @@ def simulate(
     latency, rng = perceiver.latency, trial.subject.stream(trial.script, "joints")
     loop = _loop(icub, posture, latency.total_s + between_s(trial, latency), avoids, settings or Settings())
     period_s, under_way, free_s, rows = loop.controller.settings.period_s, deque[Perception](), 0.0, []
-    for k in range(round(start_s / period_s), round(trial.duration_s / period_s)):
+    for k in range(round(STARTS_S / period_s), round(trial.duration_s / period_s)):
         now_s, q = k * period_s, posture.angles("left")
         person.see(now_s, icub.chains["left"].T_root_link("hand", q)[:3, 3])
         read = posture.moved("left", q + rng.normal(0.0, trial.joint_noise_rad, len(q)))

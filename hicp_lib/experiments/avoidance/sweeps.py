@@ -13,7 +13,7 @@ import pandas as pd
 from hicp_lib.core.executor import run_jobs
 from hicp_lib.experiments.avoidance.closed_loop import Latency, Trial, TrueKeypoints, simulate
 from hicp_lib.experiments.avoidance.error_model import ErrorModel, Lossy, Modelled
-from hicp_lib.experiments.avoidance.reaching import LEAVES_S, LOOKED_AT_S, NEAR_S
+from hicp_lib.experiments.avoidance.reaching import LEAVES_S, NEAR_S
 from hicp_lib.experiments.avoidance.runs import TRUE_KEYPOINTS, settings_of
 from hicp_lib.simulation.body.identities import Subject
 
@@ -117,13 +117,13 @@ def _of_person(variants: Sequence[Variant], models: Mapping[str, ErrorModel]) ->
 
 
 def _run(variant: Variant, model: ErrorModel | None) -> dict:
-    trial = variant.trial
+    trial = replace(variant.trial, duration_s=LEAVES_S[0])  # what comes after is not asked for
     # The same errors and losses at every latency, as far as images are the same.
     drawn = partial(trial.subject.stream, trial.script)
     true = TrueKeypoints(variant.latency)
     eyes = Modelled(model, variant.latency, drawn(variant.detector)) if model else true
     eyes = Lossy(eyes, variant.lost_share, variant.burst_images, drawn("losses"))
-    cycles = simulate(trial, eyes, settings=settings_of(variant.gains), start_s=LOOKED_AT_S[0])
+    cycles = simulate(trial, eyes, settings=settings_of(variant.gains))
     row = {"script": trial.script, "subject": trial.subject.number, "follow_m_s": trial.follow_m_s}
     row |= {"detector": variant.detector, "gains": variant.gains, "latency_s": variant.latency.total_s}
-    return row | {"lost_share": variant.lost_share} | least_distances(cycles[cycles["t_s"] <= LEAVES_S[0]])
+    return row | {"lost_share": variant.lost_share} | least_distances(cycles)

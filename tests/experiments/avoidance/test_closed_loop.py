@@ -7,6 +7,7 @@ import pytest
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.experiments.avoidance.closed_loop import (
+    STARTS_S,
     Follower,
     Latency,
     Trial,
@@ -144,8 +145,8 @@ class SlowPerceiver:
 def test_images_wait_for_the_detector_only_and_none_is_lost(monkeypatch, latency):
     monkeypatch.setattr(Follower, "skin_m", lambda self, time_s: np.full((1, 3), 9.0))
     perceiver = SlowPerceiver(latency)
-    run = simulate(Trial("sitting, hand", 1.2, camera_hz=10.0), perceiver)
-    np.testing.assert_allclose(perceiver.looked_s, np.arange(0, 1.2, 0.2), atol=1e-9)
+    run = simulate(Trial("sitting, hand", STARTS_S + 1.2, camera_hz=10.0), perceiver)
+    np.testing.assert_allclose(perceiver.looked_s, STARTS_S + np.arange(0, 1.2, 0.2), atol=1e-9)
     heard = run.dropna().drop_duplicates("seen_s")
     np.testing.assert_allclose(heard["t_s"] - heard["seen_s"], latency.total_s, atol=0.02)
     assert len(heard) == (5 if latency.total_s < 0.4 - 1e-9 else 4)
@@ -167,6 +168,9 @@ def test_with_true_keypoints_the_hand_gives_way_and_without_avoidance_it_stays()
 
 
 def test_noisy_joints_make_the_hand_tremble_and_not_wander():
-    runs = [simulate(Trial("standing, hand", 0.6, joint_noise_rad=n), TrueKeypoints()) for n in (0, 0.01)]
+    runs = [
+        simulate(Trial("standing, hand", STARTS_S + 0.2, joint_noise_rad=n), TrueKeypoints())
+        for n in (0, 0.01)
+    ]
     still, trembling = (run["hand_error_m"] for run in runs)
     assert still.max() < 1e-4 < trembling.max() < 0.01
