@@ -88,7 +88,7 @@ def facing_robot(y_m: float, x_m: float = 0.0) -> np.ndarray:
     return T_world_body
 
 
-def posed(shape: np.ndarray, posture: Posture) -> PosedBody:
+def posed(shape: str, posture: Posture) -> PosedBody:
     """A person in a posture, facing the robot; `PELVIS_LEAN` tilts the pelvis, the legs stay."""
     joints = dict(posture.joints)
     lean = joints.pop(PELVIS_LEAN, 0.0)

@@ -33,7 +33,7 @@ from hicp_lib.simulation.appearance import (
 from hicp_lib.simulation.body import arms, poses
 from hicp_lib.simulation.body.identities import HELD_OUT, Subject, draw_identity
 from hicp_lib.simulation.body.joints import LIMITS_DEG
-from hicp_lib.simulation.body.model import load_body, pose_body, rest_shape, shape_weights
+from hicp_lib.simulation.body.model import load_body, pose_body, rest_shape
 from hicp_lib.simulation.body.self_collision import collision_model
 from hicp_lib.simulation.rendering import lights, textures
 from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at
@@ -254,7 +254,14 @@ def outfits() -> list[np.ndarray]:
         for w in a.worn
     ]
     shapes = [
-        [*a.shape, a.skirt is None, a.shoes is None, a.style is None, a.complexion.stubble, a.seed / 2**31]
+        [
+            BODY.shape_names.index(a.shape),
+            a.skirt is None,
+            a.shoes is None,
+            a.style is None,
+            a.complexion.stubble,
+            a.seed / 2**31,
+        ]
         for a in drawn
     ]
     return [np.array(worn, float), np.array(shapes, float)]
@@ -370,7 +377,7 @@ def experiments() -> list[np.ndarray]:
 
 
 def gestures_made() -> list[np.ndarray]:
-    gestures = Gestures(np.random.default_rng(3), shape_weights(BODY, SHAPE))
+    gestures = Gestures(np.random.default_rng(3), SHAPE)
     moves = [move for move, _ in zip(gestures.moves(), range(24), strict=False)]
     rows = [
         [move.duration_s, *move.to.place_m, *(move.to.joints.get(name, 0) for name in LIMITS_DEG)]

@@ -210,7 +210,7 @@ def _way(start: Posture, end: Posture, share: float) -> Posture:
     return between(start, end, minimum_jerk(float(np.clip(share, 0, 1))))
 
 
-def _by_hand(shape: np.ndarray, rest: Posture, gap_m: float = CONTACT_M) -> tuple[Posture, Posture, Reach]:
+def _by_hand(shape: str, rest: Posture, gap_m: float = CONTACT_M) -> tuple[Posture, Posture, Reach]:
     """Far, ready and near for the right hand."""
     home_m, away = np.array(HOME_M["left"]), _FROM / np.linalg.norm(_FROM)
     with_wrist = _leaning_reach(shape, rest)
@@ -219,14 +219,14 @@ def _by_hand(shape: np.ndarray, rest: Posture, gap_m: float = CONTACT_M) -> tupl
     return rest, ready, lambda hand_m: with_wrist(hand_m + near_m * away)
 
 
-def _by_gesture(shape: np.ndarray, rest: Posture) -> tuple[Posture, Posture, Reach]:
+def _by_gesture(shape: str, rest: Posture) -> tuple[Posture, Posture, Reach]:
     """The right hand comes near, not to the robot, and goes again."""
     rest, ready, touch = _by_hand(shape, rest, BYSTAND_M)
     near = touch(np.array(HOME_M["left"]))
     return rest, ready, lambda hand_m: near
 
 
-def _by_passing(shape: np.ndarray, rest: Posture) -> tuple[Posture, Posture, Reach]:
+def _by_passing(shape: str, rest: Posture) -> tuple[Posture, Posture, Reach]:
     """From one side to the other and back, the right arm a little before the body."""
     start_x, middle_x, end_x = _PASSES_X_M
     y = _contact(_PASSES_M, lambda y: _distance_m(shape, replace(rest, place_m=(middle_x, y))), BYSTAND_M)
@@ -234,7 +234,7 @@ def _by_passing(shape: np.ndarray, rest: Posture) -> tuple[Posture, Posture, Rea
     return start, middle, lambda hand_m: end
 
 
-def _by_head(shape: np.ndarray, rest: Posture) -> tuple[Posture, Posture, Reach]:
+def _by_head(shape: str, rest: Posture) -> tuple[Posture, Posture, Reach]:
     """Far, ready and near for the head: the trunk bends forward until it is there, and no other way."""
     near_deg = _contact(_LEANS_DEG, lambda lean_deg: _distance_m(shape, _leaning(rest, lean_deg)))
     bodies = [posed(shape, _leaning(rest, lean_deg)) for lean_deg in _LEANS_DEG]
@@ -267,7 +267,7 @@ def _contact(way: Iterable[float], distance_m: Callable[[float], float], gap_m: 
     return float(before)
 
 
-def _distance_m(shape: np.ndarray, posture: Posture) -> float:
+def _distance_m(shape: str, posture: Posture) -> float:
     """Between the person and the robot at its post."""
     return skin_distance_m(_robot_at_post(), in_root(posed(shape, posture).vertices_m))
 
@@ -278,7 +278,7 @@ def _robot_at_post() -> tuple[np.ndarray, np.ndarray]:
     return robot_spheres(icub, read_skin(), home_posture(icub))
 
 
-def _rest(rng, shape: np.ndarray, staging: Staging) -> Posture:
+def _rest(rng, shape: str, staging: Staging) -> Posture:
     """Upright; arms hang, or lie in the lap."""
     joints = radians(_HANGING_DEG)
     if staging.sits:
@@ -298,7 +298,7 @@ def _leaning(posture: Posture, lean_deg: float) -> Posture:
     return replace(posture, joints=posture.joints | bent)
 
 
-def _leaning_reach(shape: np.ndarray, rest: Posture) -> Reach:
+def _leaning_reach(shape: str, rest: Posture) -> Reach:
     """How the right wrist comes to a point of the root frame, the trunk no further bent than that takes."""
     body, pelvis_m, to_body = load_body(), posed(shape, rest).heads_m[0], facing_robot(0.0)[:3, :3].T
     arm = [body.bone_numbers[f"{name}.R"] for name in ("upperarm01", "lowerarm01", "wrist")]

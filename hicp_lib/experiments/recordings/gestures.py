@@ -51,13 +51,13 @@ class Gestures:
     Parameters
     ----------
     rng : numpy.random.Generator
-    shape : array, shape (n_shapes,)
+    shape : str
         The person's.
     at_table : bool, optional
         Whether there is a table before them, to be touched, or they can come near.
     """
 
-    def __init__(self, rng: Rng, shape: np.ndarray, at_table: bool = True):
+    def __init__(self, rng: Rng, shape: str, at_table: bool = True):
         self.rng, self.body, self.shape, self.at_table = rng, load_body(), shape, at_table
         self.collision_model = collision_model(self.body, shape)
         self.place_m = (0.0, DISTANCE_M)

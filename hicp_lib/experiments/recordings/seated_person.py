@@ -52,7 +52,7 @@ def seated_person(subject: Subject) -> tuple[World, PosedBody]:
     return furnished(identity, surfaces, clear), person
 
 
-def _sit_down(body: Body, shape: np.ndarray, rng: np.random.Generator) -> PosedBody:
+def _sit_down(body: Body, shape: str, rng: np.random.Generator) -> PosedBody:
     """The posture, with the arms brought down until the hands lie on the table."""
     upright = [name for name in _POSTURE_DEG if name.startswith(("spine", "neck"))]
     joints = radians(
@@ -75,7 +75,7 @@ def _sit_down(body: Body, shape: np.ndarray, rng: np.random.Generator) -> PosedB
     return person
 
 
-def _with_arm(body: Body, shape: np.ndarray, joints: Joints, side: str, wrist_m: np.ndarray) -> Joints:
+def _with_arm(body: Body, shape: str, joints: Joints, side: str, wrist_m: np.ndarray) -> Joints:
     found = reach(body, shape, joints, side, wrist_m, elbow_toward=(-0.1, 0.8, -0.7))
     if found is None:
         raise ValueError(f"the {side} hand cannot come to the table")

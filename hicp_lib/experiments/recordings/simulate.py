@@ -75,7 +75,7 @@ def simulate_recording(
     check_numbers(n_frames=(n, 1, plan.max_frames))
     check_output(out, PARTS_DIR, "for the recording", "simulated")
     (out / RGB_LIST).unlink(missing_ok=True)  # it is no recording until it is finished
-    who = {"subject": asdict(subject), "identity": subject.identity.record()}
+    who = {"subject": asdict(subject), "identity": asdict(subject.identity)}
     stamp = {"scenario": name, **who, "version": key([simulate_recording])}
     keep_parts(out, PARTS_DIR, stamp, ["rgb/*", "depth/*", f"{EXACT_DEPTH_DIR}/*", *_MOCAP_FILES])
     missing = [k for k in range(n) if not part_path(out, k).exists()]

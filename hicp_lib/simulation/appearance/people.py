@@ -55,8 +55,8 @@ class Appearance:
 
     Attributes
     ----------
-    shape : array, shape (n_shapes,)
-        Weights over the body's shapes.
+    shape : str
+        Name of the body's shape.
     complexion : skin.Complexion
     style : hair_styles.Style or None
         Of the hair; None is bald.
@@ -68,7 +68,7 @@ class Appearance:
         Of the locks of hair.
     """
 
-    shape: np.ndarray
+    shape: str
     complexion: skin.Complexion
     style: hair_styles.Style | None
     worn: list[Worn]
@@ -94,11 +94,10 @@ def appearance_of(identity: Identity, skirts: bool = True) -> Appearance:
     --------
     >>> from hicp_lib.simulation.body.identities import Subject
     >>> someone = appearance_of(Subject().identity, skirts=False)
-    >>> round(float(someone.shape.sum()), 3), [worn.garment.kind for worn in someone.worn]
-    (1.0, ['top', 'bottom'])
+    >>> someone.shape == Subject().identity.body, [worn.garment.kind for worn in someone.worn]
+    (True, ['top', 'bottom'])
     """
-    rng, (name, _) = identity.draw("clothes"), identity.bodies[0]
-    woman, origin = is_woman(name), traits(name)
+    rng, woman, origin = identity.draw("clothes"), is_woman(identity.body), traits(identity.body)
     age = origin["age_years"]
     tone = np.clip(0.12 + 0.24 * origin["asian"] + 0.62 * origin["african"] + rng.normal(0, 0.09), 0, 1)
     complexion = skin.random_complexion(rng, float(tone), woman, age)
@@ -107,7 +106,7 @@ def appearance_of(identity: Identity, skirts: bool = True) -> Appearance:
         complexion = replace(complexion, stubble=0.85)
     worn, skirt = _outfit(rng, woman, skirts)
     shoes = footwear.random_shoes(rng) if rng.random() < 0.93 else None
-    return Appearance(identity.shape, complexion, style, worn, skirt, shoes, int(rng.integers(2**31)))
+    return Appearance(identity.body, complexion, style, worn, skirt, shoes, int(rng.integers(2**31)))
 
 
 # How often, and what of a top differs from `_PLAIN_TOP`: of several values one is drawn, in this order.

@@ -212,7 +212,7 @@ def _bring(
     if joints is None:
         return None
     joints = joints | uniform(draft.rng, _WRISTS_DEG[wrist], f"{side}_")
-    return reach(draft.body, draft.model.weights, joints, side, wrist_m, elbow_toward)
+    return reach(draft.body, draft.model.shape, joints, side, wrist_m, elbow_toward)
 
 
 def _side(rng: Rng) -> str:
@@ -221,6 +221,6 @@ def _side(rng: Rng) -> str:
 
 def _heads(draft: Draft, joints: Joints, side: str) -> dict[str, np.ndarray]:
     """Where the bones of a side and of the middle begin, from the pelvis."""
-    _, heads = pose_bones(draft.body, draft.model.weights, pose_from_joints(joints))
+    _, heads = pose_bones(draft.body, draft.model.shape, pose_from_joints(joints))
     end = "." + side[0].upper()
     return {name.removesuffix(end): heads[i] for i, name in enumerate(draft.body.bone_names)}

@@ -6,7 +6,7 @@ and hair), rooms, lights, poses and cameras are drawn from; each number seeds a 
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import zip_longest
 from typing import Any
@@ -17,14 +17,11 @@ from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
 from hicp_lib.core.memo import memoised, plain_fields
-from hicp_lib.simulation.body.model import load_body
 
 SPLITS = ("development", "held out")
 HELD_OUT = SPLITS[1]
 KINDS = ("clothes", "room", "lights", "poses", "camera")
 _read = memoised()(read_json)
-_MAX_NUMBER = 2**32 - 1
-_MOST_OF_ANOTHER = 0.4  # of a shape that is a blend
 
 
 @dataclass(frozen=True)
@@ -35,36 +32,23 @@ class Identity:
     ----------
     split : str
         One of `SPLITS`.
-    bodies : tuple of (str, float)
-        Names of one or two shapes, and their shares.
+    body : str
+        Name of a shape of the body model.
     clothes, room, lights, poses, camera : int
         What each is drawn from.
     """
 
     split: str
-    bodies: tuple[tuple[str, float], ...]
+    body: str
     clothes: int
     room: int
     lights: int
     poses: int
     camera: int
 
-    @property
-    def shape(self) -> np.ndarray:
-        """Weights over the shapes of the body model, shape (n_shapes,)."""
-        names = load_body().shape_names
-        weights = np.zeros(len(names), np.float32)
-        for name, share in self.bodies:
-            weights[names.index(name)] += share
-        return weights
-
     def draw(self, kind: str, *more: int | str) -> np.random.Generator:
         """A generator of one of `KINDS`, from its beginning; `more` make it one of its own, see `stream`."""
         return stream(kind, getattr(self, kind), *more)
-
-    def record(self) -> dict[str, Any]:
-        """All of it, JSON-able."""
-        return asdict(self) | {"bodies": dict(self.bodies)}
 
 
 @dataclass(frozen=True)
@@ -72,14 +56,13 @@ class Subject:
     """One person of an experiment, and all that is drawn around them.
 
     Subjects of one seed are different people: bodies are dealt without repetition, women and men in turn.
-    Those beyond the number of bodies are blends of two.
 
     Attributes
     ----------
     seed : int
         Of the experiment.
     number : int
-        Of the person, from 0 on.
+        Of the person, from 0 to less than there are bodies.
     split : str
         One of `SPLITS`.
 
@@ -90,8 +73,8 @@ class Subject:
 
     Examples
     --------
-    >>> len({Subject(0, number).identity.bodies for number in range(12)})
-    12
+    >>> len({Subject(0, number).identity.body for number in range(40)})
+    40
     """
 
     seed: int = 0
@@ -100,18 +83,15 @@ class Subject:
 
     def __post_init__(self) -> None:
         plain_fields(self)
-        split_members(self.split)
-        for name in ("seed", "number"):
+        for name, most in (("seed", 2**32), ("number", len(split_members(self.split)["bodies"]) - 1)):
             value = getattr(self, name)
-            if not isinstance(value, int) or not 0 <= value <= _MAX_NUMBER:
-                raise InputError(f"{name} is {value!r}; expected a whole number from 0 to {_MAX_NUMBER}")
+            if not isinstance(value, int) or not 0 <= value <= most:
+                raise InputError(f"{name} is {value!r}; expected a whole number from 0 to {most}")
 
     @cached_property
     def identity(self) -> Identity:
         """Who it is; the same in every process."""
-        dealt = _dealt(self.split, self.seed)
-        body = dealt[self.number] if self.number < len(dealt) else None
-        return draw_identity(self.stream("identity"), self.split, body)
+        return draw_identity(self.stream("identity"), self.split, _dealt(self.split, self.seed)[self.number])
 
     def stream(self, *numbers: int | str) -> np.random.Generator:
         """A generator of noise or whatever else belongs to this subject alone, see `stream`."""
@@ -144,7 +124,7 @@ def draw_identity(rng: np.random.Generator, split: str, body: str | None = None)
     split : str
         One of `SPLITS`.
     body : str, optional
-        Name of the shape; a blend of two of the same sex when left out.
+        Name of the shape; drawn too when left out.
 
     Returns
     -------
@@ -158,12 +138,7 @@ def draw_identity(rng: np.random.Generator, split: str, body: str | None = None)
     members = split_members(split)
     names, ranges = members["bodies"], {kind: members[kind] for kind in KINDS}
     numbers = {kind: int(rng.integers(low, high + 1)) for kind, (low, high) in ranges.items()}
-    if body is not None:
-        return Identity(split, ((body, 1.0),), **numbers)
-    first = names[rng.integers(len(names))]
-    alike = [name for name in names if is_woman(name) == is_woman(first) and name != first]
-    share = float(rng.uniform(0, _MOST_OF_ANOTHER))
-    return Identity(split, ((first, 1 - share), (alike[rng.integers(len(alike))], share)), **numbers)
+    return Identity(split, body or names[rng.integers(len(names))], **numbers)
 
 
 def split_members(split: str) -> Mapping[str, Any]:

@@ -153,8 +153,8 @@ Pose = Mapping[str, np.ndarray]
 """Bone name -> rotation, as a vector (3,) in radians or a matrix (3, 3); bones left out stay as in
 the reference stance."""
 
-Shape = int | str | np.ndarray
-"""Index or name of a shape of the body model, or convex weights (n_shapes,) to blend shapes."""
+Shape = int | str
+"""Index or name of a shape of the body model."""
 
 
 @memoised(4)
@@ -169,17 +169,15 @@ def load_body(path: Path = BODY_FILE) -> Body:
     Raises
     ------
     InputError
-        If the file is missing, or is not a body model this version can pose.
+        If the file is missing, or is not a body model.
     """
     try:
         with np.load(path, allow_pickle=False) as stored:
-            body = _unpack(stored)
+            return _unpack(stored)
     except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(
             f"{path}: not a body model ({error}); restore it from the repository or run tools/bake_body.py"
         ) from None
-    _check(body, path)
-    return body
 
 
 def pose_body(body: Body, shape: Shape, pose: Pose, T_world_body: np.ndarray | None = None) -> PosedBody:
@@ -188,8 +186,8 @@ def pose_body(body: Body, shape: Shape, pose: Pose, T_world_body: np.ndarray | N
     Parameters
     ----------
     body : Body
-    shape : int or str or array, shape (n_shapes,)
-        Index or name of a shape, or convex weights to blend shapes.
+    shape : int or str
+        Index or name.
     pose : mapping of str to array
         Rotation vectors or matrices by bone name, in body axes.
     T_world_body : array, shape (4, 4), optional
@@ -203,7 +201,7 @@ def pose_body(body: Body, shape: Shape, pose: Pose, T_world_body: np.ndarray | N
     Raises
     ------
     ValueError
-        For an unknown shape or bone, or weights that are no blend.
+        For an unknown shape or bone.
 
     Examples
     --------
@@ -212,9 +210,8 @@ def pose_body(body: Body, shape: Shape, pose: Pose, T_world_body: np.ndarray | N
     >>> person.keypoints_m.shape, float(person.vertices_m[:, 2].min().round(3))
     ((136, 3), 0.0)
     """
-    weights = shape_weights(body, shape)
-    vertices, heads = rest_shape(body, weights)
-    rotations, posed_heads = pose_bones(body, weights, pose)
+    vertices, heads = rest_shape(body, shape)
+    rotations, posed_heads = pose_bones(body, shape, pose)
     posed = _skin(body, vertices, rotations, posed_heads - np.einsum("bij,bj->bi", rotations, heads))
     offset = np.array([-posed_heads[0, 0], -posed_heads[0, 1], -posed[:, 2].min()])
     T = np.eye(4) if T_world_body is None else np.asarray(T_world_body, float)
@@ -237,7 +234,7 @@ def pose_bones(body: Body, shape: Shape, pose: Pose) -> tuple[np.ndarray, np.nda
     Parameters
     ----------
     body : Body
-    shape : int or str or array, shape (n_shapes,)
+    shape : int or str
         As in `pose_body`.
     pose : mapping of str to array
         As in `pose_body`.
@@ -249,7 +246,8 @@ def pose_bones(body: Body, shape: Shape, pose: Pose) -> tuple[np.ndarray, np.nda
     heads_m : array, shape (n_bones, 3)
         Where the bones begin, relative to the pelvis, body axes.
     """
-    _, heads, to_reference = _rest(body, shape_weights(body, shape).tobytes())
+    number = shape_number(body, shape)
+    heads, to_reference = body.heads_m[number], body.to_reference[number]
     # Turns of the reference stance add up along the chain; the turn from rest to it comes before all.
     rotations = rotation_matrices(body, pose)
     for level in body.levels:
@@ -260,24 +258,19 @@ def pose_bones(body: Body, shape: Shape, pose: Pose) -> tuple[np.ndarray, np.nda
     return rotations, body.chains @ steps
 
 
-def shape_weights(body: Body, shape: Shape) -> np.ndarray:
-    """Convex weights, shape (n_shapes,), of a shape given by index, name or weights.
+def shape_number(body: Body, shape: Shape) -> int:
+    """Index of a shape given by index or name.
 
     Raises
     ------
     ValueError
-        For an unknown name, or weights that are negative or do not sum to 1.
+        For an unknown name.
     """
     if isinstance(shape, str):
         if shape not in body.shape_names:
             raise ValueError(f"no shape {shape!r}; there are {', '.join(body.shape_names)}")
-        shape = body.shape_names.index(shape)
-    if np.ndim(shape) == 0:
-        return np.eye(len(body.shape_names), dtype=np.float32)[shape]
-    weights = np.asarray(shape, np.float32)
-    if weights.shape != (len(body.shape_names),) or weights.min() < 0 or abs(weights.sum() - 1) > 1e-4:
-        raise ValueError(f"shape weights must be {len(body.shape_names)} numbers >= 0 that sum to 1")
-    return weights
+        return body.shape_names.index(shape)
+    return shape
 
 
 def rotation_matrices(body: Body, pose: Pose) -> np.ndarray:
@@ -303,22 +296,10 @@ def rotation_matrices(body: Body, pose: Pose) -> np.ndarray:
     return result
 
 
-@memoised(16)
-def _rest(body: Body, weights: bytes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices and bone heads at rest, and rotations to the reference stance, of a blend of shapes."""
-    blend = np.frombuffer(weights, np.float32)
-    mixed = np.flatnonzero(blend)  # mostly one or two shapes
-    vertices = np.tensordot(blend[mixed], body.vertices_m[mixed], 1)
-    # Blends of rotations are brought back to the nearest ones (orthogonal Procrustes); these
-    # are so alike that their blends never turn inside out.
-    u, _, vt = np.linalg.svd(np.tensordot(blend, body.to_reference, 1))
-    return vertices, np.tensordot(blend, body.heads_m, 1), u @ vt
-
-
 def rest_shape(body: Body, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n_v, 3) and bone heads (n_bones, 3) of a shape at rest; not to be written to."""
-    vertices, heads, _ = _rest(body, shape_weights(body, shape).tobytes())
-    return vertices, heads
+    number = shape_number(body, shape)
+    return body.vertices_m[number], body.heads_m[number]
 
 
 def _skin(body: Body, vertices, rotations, translations) -> np.ndarray:
@@ -348,19 +329,3 @@ def _unpack(stored) -> Body:
 
 _STORED = {"heads_m": float, "to_reference": float, "bone_parents": int, "triangles": np.int32,
            "regions": int, "fields": np.float32}  # fmt: skip
-
-
-def _check(body: Body, path: Path) -> None:
-    n_v, n_bones = body.skin_weights.shape
-    weights = (body.skin_weights.data, body.keypoint_weights.data)
-    numbers = (body.vertices_m, body.heads_m, body.fields, *weights)
-    problems = {
-        "triangles name missing vertices": body.triangles.min() < 0 or body.triangles.max() >= n_v,
-        "bones do not follow their parents": (body.bone_parents >= np.arange(n_bones)).any(),
-        "numbers are not finite": not all(np.isfinite(array).all() for array in numbers),
-        "regions are unknown": body.regions.min() < 0 or body.regions.max() >= len(REGIONS),
-        "fields do not match": body.fields.shape != (n_v, len(FIELDS)),
-    }
-    for problem, present in problems.items():
-        if present:
-            raise InputError(f"{path}: {problem}; restore it from the repository or run tools/bake_body.py")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from hicp_lib.simulation.body.model import Body, Pose, Shape, pose_bones, rest_shape, shape_weights
+from hicp_lib.simulation.body.model import Body, Pose, Shape, pose_bones, rest_shape
 
 Spheres = tuple[np.ndarray, np.ndarray]  # centres (n, 3) and radii (n,)
 
@@ -29,8 +29,8 @@ class CollisionModel:
 
     Attributes
     ----------
-    weights : array, shape (n_shapes,)
-        The shape's, see `shape_weights`.
+    shape : int or str
+        As in `pose_body`.
     bones : array of int, shape (n_parts,)
         Which bone each part moves with.
     bone_heads_m : array, shape (n_parts, 3)
@@ -43,7 +43,7 @@ class CollisionModel:
         Of limbs, by region.
     """
 
-    weights: np.ndarray
+    shape: Shape
     bones: np.ndarray
     bone_heads_m: np.ndarray
     centres_m: np.ndarray
@@ -58,8 +58,7 @@ class CollisionModel:
 
 def collision_model(body: Body, shape: Shape) -> CollisionModel:
     """Measure a shape, which is given as in `pose_body`."""
-    weights = shape_weights(body, shape)
-    vertices, heads = rest_shape(body, weights)
+    vertices, heads = rest_shape(body, shape)
     vertices, heads = vertices - heads[0], heads - heads[0]
     trunk, head = (
         np.flatnonzero(body.in_regions(*names)) for names in (("torso", "hips"), ("face", "scalp"))
@@ -74,7 +73,7 @@ def collision_model(body: Body, shape: Shape) -> CollisionModel:
     half_axes[:-1, 2] = (edges[1] - edges[0]) / 2
     radii = {limb[0]: _radius(body, vertices, heads, limb) for limb in (_UPPER_ARM, _FOREARM, _HAND, _THIGH)}
     radii["hand"] *= _HAND_FLATNESS
-    return CollisionModel(weights, bones, heads[bones], (low + high) / 2, half_axes, radii)
+    return CollisionModel(shape, bones, heads[bones], (low + high) / 2, half_axes, radii)
 
 
 def self_collision_distance_m(body: Body, model: CollisionModel, pose: Pose) -> float:
@@ -104,7 +103,7 @@ def self_collision_distance_m(body: Body, model: CollisionModel, pose: Pose) -> 
     >>> self_collision_distance_m(body, collision_model(body, 0), into_the_trunk) < 0
     True
     """
-    rotations, heads = pose_bones(body, model.weights, pose)
+    rotations, heads = pose_bones(body, model.shape, pose)
     left, right = (_spheres(body, model, heads, (_UPPER_ARM, _FOREARM, _HAND), side) for side in "LR")
     arms = np.concatenate([left[0], right[0]]), np.concatenate([left[1], right[1]])
     gaps = [_gap_to_trunk(model, rotations, heads, *arms).min(), _gap(left, right)]

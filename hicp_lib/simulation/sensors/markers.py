@@ -9,7 +9,7 @@ import numpy as np
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.core.memo import memoised
-from hicp_lib.simulation.body.model import Body, PosedBody, Shape, load_body, pose_body, shape_weights
+from hicp_lib.simulation.body.model import Body, PosedBody, Shape, load_body, pose_body
 from hicp_lib.simulation.rendering.mesh import Mesh
 from hicp_lib.simulation.rendering.raycast import RayScene
 from hicp_lib.simulation.rendering.surfaces import Hits, Look, Surface
@@ -64,6 +64,7 @@ def camera_marker_m(T_world_camera: np.ndarray) -> np.ndarray:
     return T[..., :3, :3] @ np.array(CAMERA_MARKER_M) + T[..., :3, 3]
 
 
+@memoised(64)
 def marker_vertices(shape: Shape) -> np.ndarray:
     """Vertices of the body model that the markers are taped to.
 
@@ -71,7 +72,7 @@ def marker_vertices(shape: Shape) -> np.ndarray:
 
     Parameters
     ----------
-    shape : int or str or array, shape (n_shapes,)
+    shape : int or str
         As in `pose_body`.
 
     Returns
@@ -87,12 +88,7 @@ def marker_vertices(shape: Shape) -> np.ndarray:
     True
     """
     body = load_body()
-    return _marker_vertices(body, shape_weights(body, shape).tobytes())
-
-
-@memoised(64)
-def _marker_vertices(body: Body, weights: bytes) -> np.ndarray:
-    person = pose_body(body, np.frombuffer(weights, np.float32), {})
+    person = pose_body(body, shape, {})
     arm = (body.field("arm") > _BELOW_SHOULDER)[body.triangles].all(axis=1)
     parts = [_place(body, person, "shoulder", np.ones_like(arm))]
     # A heavy person's trunk may touch the hanging arm: the trunk is no place for the elbow's marker.

@@ -6,6 +6,7 @@ image would be five times as large and tell no more. Image k depends on the seed
 the number of worker processes changes nothing, and a larger data set contains the smaller one.
 """
 
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
@@ -151,7 +152,7 @@ def annotate(stage: Stage, frame: Frame) -> list[dict]:
         last = [stage.camera.width_px - 1, stage.camera.height_px - 1, 2]
         keypoints = np.clip(keypoints.round(2), 0, last).tolist()
         away_m = round(distance_m(stage.camera, person), 3)
-        about = {"distance_m": away_m, "identity": identity.record()}
+        about = {"distance_m": away_m, "identity": asdict(identity)}
         rows.append({"bbox": box, "area": len(u), "keypoints": keypoints} | about)
     return rows
 

@@ -8,7 +8,6 @@ from hicp_lib.simulation.body.identities import (
     KINDS,
     SPLITS,
     Subject,
-    draw_identity,
     is_woman,
     split_members,
     stream,
@@ -39,31 +38,19 @@ def test_both_splits_span_ages_and_heights_of_both_sexes():
 
 @pytest.mark.parametrize("split", SPLITS)
 def test_subjects_of_a_seed_are_different_people_women_and_men_in_turn(split):
-    members = split_members(split)
-    n = len(members["bodies"])
+    bodies = split_members(split)["bodies"]
+    order = []
     for seed in (0, 3):
-        people = [Subject(seed, number, split).identity for number in range(n + 6)]
-        first = [person.bodies for person in people[:n]]
-        assert sorted(name for ((name, share),) in first) == sorted(members["bodies"])
-        women = [is_woman(name) for ((name, _),) in first[: n - 1]]
+        people = [Subject(seed, number, split).identity for number in range(len(bodies))]
+        order.append([person.body for person in people])
+        assert sorted(order[-1]) == sorted(bodies)
+        women = [is_woman(name) for name in order[-1]]
         assert all(a != b for a, b in zip(women, women[1:], strict=False))
-        assert all(len(person.bodies) == 2 for person in people[n:])
         for kind in KINDS:
-            assert len({getattr(person, kind) for person in people}) == n + 6
-    order = [[Subject(seed, number, split).identity.bodies for number in range(n)] for seed in (0, 3)]
+            assert len({getattr(person, kind) for person in people}) == len(bodies)
     assert order[0] != order[1]
-
-
-def test_a_blend_is_of_two_of_the_same_sex_and_split():
-    rng = np.random.default_rng(0)
-    for split in SPLITS * 20:
-        identity = draw_identity(rng, split)
-        (first, most), (other, rest) = identity.bodies
-        assert first != other and is_woman(first) == is_woman(other) and most >= 0.6
-        assert {first, other} <= set(split_members(split)["bodies"])
-        names = load_body().shape_names
-        assert identity.shape[names.index(first)] == pytest.approx(most)
-        assert identity.shape.sum() == pytest.approx(1) and rest == pytest.approx(1 - most)
+    with pytest.raises(InputError, match=f"expected a whole number from 0 to {len(bodies) - 1}"):
+        Subject(0, len(bodies), split)
 
 
 def test_streams_are_of_their_own():

@@ -11,7 +11,7 @@ from hicp_lib.core.files import sha256_file
 from hicp_lib.core.keypoints import FACE, INDEX, LEFT_HAND, NAMES
 from hicp_lib.core.rotations import rotation
 from hicp_lib.simulation.body.identities import traits
-from hicp_lib.simulation.body.model import BODY_FILE, REGIONS, load_body, pose_body, pose_bones, shape_weights
+from hicp_lib.simulation.body.model import BODY_FILE, REGIONS, load_body, pose_body, pose_bones
 
 BODY = load_body()
 SHAPES = st.sampled_from(BODY.shape_names)
@@ -161,19 +161,6 @@ def test_vectors_and_matrices_pose_alike():
     assert np.array_equal(a, b)
 
 
-@given(SEEDS)
-@settings(max_examples=10, deadline=None)
-def test_blends_lie_between_their_shapes(seed):
-    rng = np.random.default_rng(seed)
-    i, j = rng.choice(len(BODY.shape_names), 2, replace=False)
-    weights = np.zeros(len(BODY.shape_names))
-    share = rng.uniform()
-    weights[[i, j]] = share, 1 - share
-    a, b, between = (pose_body(BODY, shape, {}).keypoints_m for shape in (int(i), int(j), weights))
-    stature = [k[INDEX["head_top"], 2] for k in (a, b, between)]
-    assert stature[2] == pytest.approx(share * stature[0] + (1 - share) * stature[1], abs=0.012)
-
-
 def test_shapes_have_the_size_of_people():
     for i, name in enumerate(BODY.shape_names):
         stature_m = pose_body(BODY, i, {}).keypoints_m[INDEX["head_top"], 2]
@@ -237,23 +224,11 @@ def test_a_missing_file_is_refused():
         load_body(Path("no-such-body.npz"))
 
 
-def test_a_damaged_model_is_refused(tmp_path):
-    with np.load(BODY_FILE) as stored:
-        arrays = dict(stored)
-    arrays["triangles"] = arrays["triangles"] + np.uint16(60_000)
-    np.savez(tmp_path / "body.npz", **arrays)
-    with pytest.raises(InputError, match="triangles"):
-        load_body(tmp_path / "body.npz")
-
-
-def test_unknown_names_and_bad_weights_are_refused():
+def test_unknown_names_are_refused():
     with pytest.raises(ValueError, match="no shape 'nobody'"):
         pose_body(BODY, "nobody", {})
     with pytest.raises(ValueError, match="no bone 'tail'"):
         pose_body(BODY, 0, {"tail": np.zeros(3)})
-    for weights in (np.ones(len(BODY.shape_names)), np.array([1.0]), -np.eye(len(BODY.shape_names))[0]):
-        with pytest.raises(ValueError, match="weights"):
-            shape_weights(BODY, weights)
 
 
 def test_the_data_page_names_the_file_by_its_hash():
