@@ -243,7 +243,7 @@ def errors_at_joints(registered: Sequence[Registered], points: Sequence[pd.DataF
 
 
 def ablation(people: Sequence[Person]) -> tuple[pd.DataFrame, pd.DataFrame] | None:
-    """Each step of lifting on all people's `stepwise`, and how often depths lie within their standard deviation.
+    """Each step of lifting on all people's `stepwise`, and how often depths lie within their sigma.
 
     None where true positions are not known.
     """

@@ -39,8 +39,10 @@ class TimeOfFlightCamera(DepthCamera):
         Side of the neighbourhood in which noise is alike, odd.
     blur_px : float
         Standard deviation of the spot that a point's light makes.
-    stray, stray_px : float
-        Share of the light that the lens scatters, and over about how far.
+    stray : float
+        Share of the light that the lens scatters.
+    stray_px : int
+        Side of the square that it scatters over.
     wiggle_m : float
         Systematic error; a wave with the distance, four to a turn of the phase.
     least_amplitude : float
@@ -54,7 +56,7 @@ class TimeOfFlightCamera(DepthCamera):
     noise_px: int = 3
     blur_px: float = 0.7
     stray: float = 0.02
-    stray_px: float = 40.0
+    stray_px: int = 129
     wiggle_m: float = 0.003
     least_amplitude: float = 0.01
     reflectivity: float = 0.6
@@ -84,15 +86,8 @@ class TimeOfFlightCamera(DepthCamera):
 
     def _scattered(self, light: np.ndarray) -> np.ndarray:
         """Light (h, w, 2) after the lens."""
-        if self.blur_px:
-            light = cv2.GaussianBlur(light, (0, 0), self.blur_px)
-        if not self.stray:
-            return light
-        # Far enough to be taken from a small image.
-        small = cv2.resize(light, None, fx=1 / 8, fy=1 / 8, interpolation=cv2.INTER_AREA)
-        around = cv2.GaussianBlur(small, (0, 0), self.stray_px / 8)
-        around = cv2.resize(around, light.shape[1::-1], interpolation=cv2.INTER_LINEAR)
-        return (1 - self.stray) * light + self.stray * around
+        sharp = cv2.GaussianBlur(light, (0, 0), self.blur_px) if self.blur_px else light
+        return (1 - self.stray) * sharp + self.stray * cv2.blur(sharp, (self.stray_px, self.stray_px))
 
 
 AZURE_KINECT = TimeOfFlightCamera(
