@@ -72,9 +72,9 @@ def similar_views(
     -------
     DataFrame
         Columns `view, detector, method, part, measure, value, low, high, n` (pairs that count), `n_people`
-        (with one that does). "flicker rate": of the pairs in which any keypoint of the part is found in
-        either view, the share in which none is in the other. "moves [m]": median over pairs of how far a
-        keypoint moves; of several, their median.
+        (with one that does; no interval from fewer than `MIN_DRAWN` of several). "flicker rate": of the pairs
+        in which any keypoint of the part is found in either view, the share in which none is in the other.
+        "moves [m]": median over pairs of how far a keypoint moves; of several, their median.
     """
     rows: list[tuple] = []
     pairs = {view: similar_pairs(poses).T for view, poses in T_base_cam.items()}
@@ -90,7 +90,7 @@ def similar_views(
         moved, moved_m = np.isfinite(moves_m), weighted_median(moves_m, together)
         for measure, draws, count in (("flicker rate", rate, either), ("moves [m]", moved_m, moved)):
             n_people = len(set(whose[a[count]]))
-            interval = with_interval(draws, len(set(whose)))
+            interval = with_interval(draws, n_people if n_people > 1 or len(set(whose)) == 1 else 0)
             rows.append((*case, part, measure, *interval, count.sum(), n_people))
     return pd.DataFrame(rows, columns=[*ROW, "value", "low", "high", "n", "n_people"])
 

@@ -40,7 +40,8 @@ def spread_and_bias(
     Returns
     -------
     DataFrame
-        Columns `view, detector, method, part, n_images` (in which it was found), `n_people`, then in metres,
+        Columns `view, detector, method, part, n_images` (in which it was found), `n_people` (of spread and
+        bias; no intervals from fewer than `MIN_DRAWN` of several), then in metres,
         each with `_low` and `_high` beside it: `spread_m`, the median distance to the subject's median
         position; with `truth` also `bias_m`, how far a subject's median position is from the true one, mean
         over subjects, and `error_m`, the median distance to the truth. For a hand, the mean of each over its
@@ -51,13 +52,21 @@ def spread_and_bias(
     rows = []
     for case, part, found_m, true_m in cases(points, subjects, truth, min_score):
         whose, n_images = subjects[case[0]], np.isfinite(found_m[..., 0]).sum(axis=0).mean()
-        weights, n_people = draw_counts(whose, n_resamples, seed), len(set(whose))
+        weights, n_people = draw_counts(whose, n_resamples, seed), _n_people(found_m, whose)
         labels = [*CASE, "part", "n_images", "n_people"]
         row = dict(zip(labels, (*case, part, n_images, n_people), strict=True))
+        several = n_people > 1 or len(set(whose)) == 1
         for name, draws in _distances_drawn(found_m, true_m, weights, whose).items():
-            row |= zip((name, f"{name}_low", f"{name}_high"), with_interval(draws, n_people), strict=True)
+            interval = with_interval(draws, n_people if several else 0)
+            row |= zip((name, f"{name}_low", f"{name}_high"), interval, strict=True)
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def _n_people(found_m: np.ndarray, subjects: np.ndarray) -> int:
+    """In how many a keypoint of the part is found in `_LEAST_IMAGES`."""
+    counts = [np.isfinite(found_m[of, :, 0]).sum(axis=0).max() for of in of_each(subjects)]
+    return int(np.sum(np.array(counts) >= _LEAST_IMAGES))
 
 
 def _distances_drawn(

@@ -90,8 +90,8 @@ def with_interval(draws: np.ndarray, n_people: int = 1) -> tuple[Any, Any, Any]:
     draws : array, shape (n_draws, ...)
         Draws in which nothing counts (NaN) are left out.
     n_people : int, optional
-        How many subjects were drawn: of several, the percentiles are those with which a mean's interval is as
-        wide as Student's.
+        How many subjects the values are of: of several, the percentiles are those with which a mean's
+        interval is as wide as Student's. No interval from none, or from two to `MIN_DRAWN` - 1.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def with_interval(draws: np.ndarray, n_people: int = 1) -> tuple[Any, Any, Any]:
     """
     others = draws[1:]
     bounds = np.full((2, *draws.shape[1:]), np.nan)
-    some = np.isfinite(others).any(axis=0)
+    some = np.isfinite(others).any(axis=0) & (n_people == 1 or n_people >= MIN_DRAWN)
     bounds[:, some] = np.nanpercentile(others[:, some], _percentiles(n_people), axis=0)
     return draws[0], *bounds
 

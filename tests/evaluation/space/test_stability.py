@@ -203,3 +203,17 @@ def test_a_person_found_once_has_no_spread():
     alone_m = [0.05, 0.03, 0.01, 0.01, 0.03, 0.05]
     assert row.loc["left wrist", "spread_m"] == pytest.approx(np.median(alone_m))
     assert row.loc["left wrist", "bias_m"] == pytest.approx(0.05)
+    assert row.loc["left wrist", "n_people"] == 1
+
+
+@pytest.mark.parametrize("n_found, known", [(1, False), (9, False), (10, True)])
+def test_intervals_of_distances_need_ten_people_in_whom_it_is_found(n_found, known):
+    points, people = of_people(apart_m=0.05)
+    points.loc[points["subject"] >= n_found, ["x_m", "y_m", "z_m"]] = np.nan
+    table = spread_and_bias(points, people, {"upper": make_truth(120)}, n_resamples=200)
+    row = table.set_index("part").loc["left wrist"]
+    assert row["n_people"] == n_found and row[["spread_m", "bias_m", "error_m"]].notna().all()
+    for name in ("spread_m", "bias_m", "error_m"):
+        assert (row[f"{name}_low"] == row[f"{name}_low"]) == known
+    alone = spread_and_bias(points[points["frame"] < 10], {"upper": np.zeros(10, int)}, n_resamples=200)
+    assert alone.set_index("part").loc["left wrist", "spread_m_low"] > 0

@@ -104,6 +104,7 @@ def test_intervals_over_people_cover_the_mean(n_people, between, least, most):
 
 def test_of_few_people_intervals_are_wider_than_percentiles_that_fit_many():
     draws = np.random.default_rng(0).normal(size=20_001)
+    assert np.isnan([with_interval(draws, n)[1:] for n in (0, 2, 9)]).all()
     widths = [np.diff(with_interval(draws, n)[1:])[0] for n in (1, 10_000, 12)]
     assert widths[0] == pytest.approx(widths[1], rel=1e-3)
     # Student's with 11 degrees of freedom, and the deviation of 12 from their own mean.
