@@ -182,7 +182,7 @@ def registration_readings(
         If fewer than three clicks have a depth, or the camera has no marker.
     """
     tables = [
-        _drawn_readings(one, n_images, noise_px, n_draws, seed + number)
+        _drawn_readings(one, one.exact, n_images, noise_px, n_draws, seed + number)
         for number, one in enumerate(people)
         if one.exact is not None
     ]
@@ -196,11 +196,11 @@ def registration_readings(
 
 
 def _drawn_readings(
-    registered: Registered, n_images: int, noise_px: float, n_draws: int, seed: int
+    registered: Registered, exact: np.ndarray, n_images: int, noise_px: float, n_draws: int, seed: int
 ) -> pd.DataFrame:
     """`compare_registrations` of every reading, in every draw."""
     recording, mocap, offset_s = registered.recording, registered.mocap, registered.offset_s
-    clicks, exact = simulated_clicks(recording, mocap, n_images, noise_px, seed)
+    clicks, _ = simulated_clicks(recording, mocap, n_images, noise_px, seed)
     base = r.lift_clicks(recording, clicks, mocap, offset_s)
     sharp, _ = simulated_clicks(recording, mocap, n_images, 0.0, seed)
     sharp = r.lift_clicks(recording, sharp, mocap, offset_s)

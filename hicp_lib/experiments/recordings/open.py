@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from hicp_lib.core.cache import key
 from hicp_lib.core.executor import run_jobs
@@ -52,7 +53,8 @@ def open_people(
     from hicp_lib.experiments.recordings.simulate import simulate_recording
 
     check_numbers(n_people=(n_people, 1, 1000))
-    made = {"scenario": scenario, "n_frames": known(scenario).n_frames if n_frames is None else n_frames}
+    n = known(scenario).n_frames if n_frames is None else n_frames
+    made: dict[str, Any] = {"scenario": scenario, "n_frames": n}
     people = [Subject(seed, number) for number in range(n_people)]
     names = [key([simulate_recording], **made, subject=who)[:16] for who in people]
     folder = cache_dir() / "recordings"
@@ -74,10 +76,10 @@ def _simulate(folder: Path, name: str, scenario: str, n_frames: int, subject: Su
 def data_note(recordings: Mapping[str, Recording]) -> str:
     """What recordings are, by their names, in the words of captions."""
     plural = "s" if len(recordings) > 1 else ""
-    if not all(read_simulation(recording) for recording in recordings.values()):
+    told = [one for one in map(read_simulation, recordings.values()) if one]
+    if len(told) < len(recordings):
         return f"recording{plural} {' and '.join(recordings)}"
-    scenarios = [read_simulation(recording)["scenario"] for recording in recordings.values()]
-    sensors = " or ".join(dict.fromkeys(name.partition("@")[2] or "D435" for name in scenarios))
+    sensors = " or ".join(dict.fromkeys(one["scenario"].partition("@")[2] or "D435" for one in told))
     if any(recording.mocap_path for recording in recordings.values()):
         sensors += " and motion capture"
     return f"simulated recording{plural} (rendered person, simulated {sensors})"
