@@ -126,11 +126,7 @@ def separation_table(separations: Mapping[str, Separation]) -> pd.DataFrame:
     Returns
     -------
     pd.DataFrame
-        A row per term and for their sum, of each detector: columns `detector`, `term`, `value` (metres).
+        A row per term, and last for their sum: columns `term`, and by detector metres.
     """
-    rows = [
-        {"detector": name, "term": term, "value": value}
-        for name, separation in separations.items()
-        for term, value in (separation.terms_m() | {"sum": separation.distance_m}).items()
-    ]
-    return pd.DataFrame(rows, columns=["detector", "term", "value"])
+    columns = {name: one.terms_m() | {"sum": one.distance_m} for name, one in separations.items()}
+    return pd.DataFrame(columns).rename_axis("term").reset_index()

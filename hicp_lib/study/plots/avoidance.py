@@ -118,22 +118,20 @@ def _ends(tables: Mapping[str, pd.DataFrame]) -> Iterator[str]:
 def separation_terms(separations: Mapping[str, Separation], note: str) -> Figure:
     """The terms of the protective separation distance as stacked bars, one per detector."""
     figure, axis = new_figure(1, 1, 8.0, 1.2 + 0.6 * max(len(separations), 1))
-    for place, separation in enumerate(separations.values()):
-        start = 0.0
-        for (term, value), colour in zip(separation.terms_m().items(), _TERM_COLOURS, strict=True):
-            axis.barh(place, 100 * value, left=100 * start, color=colour, label=term if place == 0 else None)
-            start += value
-        axis.text(100 * start + 1, place, f"{100 * start:.0f} cm", va="center")
+    table = separation_table(separations)
+    if separations:
+        terms_cm = 100 * table.set_index("term").drop("sum")
+        terms_cm.T.plot.barh(stacked=True, ax=axis, color=_TERM_COLOURS, width=0.8, legend=False)
+        axis.bar_label(axis.containers[-1], [f"{sum_cm:.0f} cm" for sum_cm in terms_cm.sum()], padding=4)
+        figure.legend(loc="outside lower center", ncols=2)
     axis.set_yticks(range(len(separations)), list(map(in_lines, separations)))
     axis.set_xlabel("protective separation distance (cm)")
     axis.margins(x=0.12)
-    if separations:
-        figure.legend(loc="outside lower center", ncols=2)
     sums = [f"{name} {100 * separation.distance_m:.0f} cm" for name, separation in separations.items()]
     return Figure(
         figure,
         "Terms of the separation that ISO 10218-2:2025 asks for; nothing here is a safety function. Data: "
         f"{note}.",
         f"Stacked bars: {in_words(sums)}.",
-        separation_table(separations),
+        table,
     )

@@ -33,7 +33,7 @@ def run() -> Run:
 def test_terms_of_the_separation_add_up():
     separations = {"mediapipe": Separation(0.2, 0.06, 0.02, 0.05)}
     terms = separation_terms(separations, "made up")
-    values_m = terms.table.set_index("term")["value"]
+    values_m = terms.table.set_index("term")["mediapipe"]
     assert values_m["sum"] == pytest.approx(separations["mediapipe"].distance_m)
     assert values_m.drop("sum").sum() == pytest.approx(values_m["sum"])
 
