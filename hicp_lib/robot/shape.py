@@ -1,4 +1,4 @@
-"""What the robot looks like: covers, joints, hands with fingers, face and camera, as triangles on its links."""
+"""What the robot looks like: covers, joints, hands with fingers, face, camera: triangles on its links."""
 
 import zipfile
 import zlib

@@ -146,8 +146,7 @@ def fit(sightings: pd.DataFrame) -> ErrorModel:
     lost = ~table.groupby(["run", "image"], sort=False)["found"].any()
     starts = lost & ~lost.groupby("run").shift(fill_value=False)
     burst = lost.sum() / max(starts.sum(), 1)
-    estimated = (np.array(values) for values in (shares, biases, lasting, passing))
-    return ErrorModel(*estimated, max(float(burst), 1.0))
+    return ErrorModel(*map(np.array, (shares, biases, lasting, passing)), burst_images=max(float(burst), 1.0))
 
 
 def _covariance(offsets_m: pd.DataFrame) -> np.ndarray:

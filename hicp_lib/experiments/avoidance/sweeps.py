@@ -121,8 +121,8 @@ def _run(variant: Variant, model: ErrorModel | None) -> dict:
     # The same errors and losses at every latency, as far as images are the same.
     drawn = partial(trial.subject.stream, trial.script)
     true = TrueKeypoints(variant.latency)
-    eyes = Modelled(model, variant.latency, drawn(variant.detector)) if model else true
-    eyes = Lossy(eyes, variant.lost_share, variant.burst_images, drawn("losses"))
+    whole = Modelled(model, variant.latency, drawn(variant.detector)) if model else true
+    eyes = Lossy(whole, variant.lost_share, variant.burst_images, drawn("losses"))
     cycles = simulate(trial, eyes, settings=settings_of(variant.gains))
     row = {"script": trial.script, "subject": trial.subject.number, "follow_m_s": trial.follow_m_s}
     row |= {"detector": variant.detector, "gains": variant.gains, "latency_s": variant.latency.total_s}

@@ -150,8 +150,8 @@ def _crop(imager: PlacedCamera, colour: PlacedCamera, settings: DepthCamera) -> 
     high_v = imager.cy_px + imager.fy_px * (colour.height_px - 1 - colour.cy_px) / colour.fy_px
     u0, v0 = max(0, int(low_u) - 4), max(0, int(low_v) - 4)
     u1, v1 = min(imager.width_px, int(high_u) + 5), min(imager.height_px, int(high_v) + 5)
-    centre = {"cx_px": imager.cx_px - u0, "cy_px": imager.cy_px - v0}
-    return u0, replace(imager, width_px=u1 - u0, height_px=v1 - v0, **centre)
+    cx_px, cy_px = imager.cx_px - u0, imager.cy_px - v0
+    return u0, replace(imager, width_px=u1 - u0, height_px=v1 - v0, cx_px=cx_px, cy_px=cy_px)
 
 
 def _measure(

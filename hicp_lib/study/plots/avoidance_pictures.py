@@ -106,7 +106,8 @@ def animation(run: Run, rate_hz: float = 5.0, dpi: int = 60) -> bytes:
     InputError
         If OpenCV was built without VP9.
     """
-    times_s = np.arange(*run.cycles["t_s"].iloc[[0, -1]], 1 / rate_hz).tolist()
+    first_s, last_s = run.cycles["t_s"].iloc[[0, -1]]
+    times_s = np.arange(first_s, last_s, 1 / rate_hz).tolist()
     with (
         tempfile.TemporaryDirectory() as folder,
         mpl.rc_context({"figure.constrained_layout.use": True, "font.size": 10}),
