@@ -146,7 +146,8 @@ def fit(sightings: pd.DataFrame) -> ErrorModel:
     lost = ~table.groupby(["run", "image"], sort=False)["found"].any()
     starts = lost & ~lost.groupby("run").shift(fill_value=False)
     burst = lost.sum() / max(starts.sum(), 1)
-    return ErrorModel(*map(np.array, (shares, biases, lasting, passing)), burst_images=max(float(burst), 1.0))
+    offsets = np.array(biases), np.array(lasting), np.array(passing)
+    return ErrorModel(np.array(shares), *offsets, max(float(burst), 1.0))
 
 
 def _covariance(offsets_m: pd.DataFrame) -> np.ndarray:
