@@ -53,7 +53,8 @@ def thresholds() -> pd.DataFrame:
     """The thresholds of the combination and what each was chosen on: columns `threshold, value, chosen`.
 
     "within .005" is the change of the AP of hands on Basic and Headless, "both bodies" are those of
-    `mediapipe-pose` and `movenet-thunder`; of seed 11, 100 scenes.
+    `mediapipe-pose` and `movenet-thunder`; of seed 11, 100 scenes of an earlier set of bodies: nobody there
+    is held out.
     """
     rules = [field for rule in (SquareRule, ArbitrationRule) for field in fields(rule)]
     rows = [(field.name, field.default, field.metadata["chosen"]) for field in rules]
