@@ -17,6 +17,11 @@ from hicp_lib.core.keypoints import FACE, HAND_LIMBS, INDEX, LEFT_HAND, N_KEYPOI
 from hicp_lib.core.memo import memoised
 
 MEASURES_FILE = DATA_DIR / "body_measures.npz"
+_WRISTS = [INDEX["left_wrist"], INDEX["right_wrist"]]
+_KNUCKLES = np.concatenate([hand[[5, 9, 13, 17]] for hand in (LEFT_HAND, RIGHT_HAND)])
+# Chosen on development people. The measured body is bare; and seen from the front, its hanging hands turn
+# their edges to the camera, others their backs.
+_SLEEVE_M, _BACK_OF_HAND_M = 0.010, 0.011
 
 
 _CHAINS = ("right_shoulder left_shoulder", "right_shoulder neck", "right_shoulder nose head_top",
@@ -63,7 +68,7 @@ class BodyMeasures:
     Attributes
     ----------
     below_skin_m : array, shape (136,)
-        How deep the keypoint lies below the surface that is seen from the front.
+        How deep the keypoint lies below the surface that is seen from the front, sleeves included.
     closest_m, farthest_m : array, shape (136, 136)
         Least and most distance between two keypoints.
     """
@@ -99,7 +104,10 @@ def load_measures(path: Path = MEASURES_FILE) -> BodyMeasures:
     """
     shapes = {"below_skin_mm": (136,), "closest_mm": (136, 136), "farthest_mm": (136, 136)}
     tables_mm = read_arrays(path, shapes, "the measures of the body model", "tools/measure_body.py")
-    return BodyMeasures(*(table_mm / 1000 for table_mm in tables_mm))
+    below_m, closest_m, farthest_m = (table_mm / 1000 for table_mm in tables_mm)
+    below_m[_WRISTS] += _SLEEVE_M
+    below_m[_KNUCKLES] = np.minimum(below_m[_KNUCKLES], _BACK_OF_HAND_M)
+    return BodyMeasures(below_m, closest_m, farthest_m)
 
 
 def read_arrays(path: Path, shapes: Mapping[str, tuple[int, ...]], what: str, tool: str) -> list[np.ndarray]:

@@ -8,13 +8,14 @@ import numpy as np
 
 from hicp_lib.core.camera import Camera, deproject
 from hicp_lib.core.images import inside
-from hicp_lib.core.keypoints import BODY, N_KEYPOINTS
+from hicp_lib.core.keypoints import BODY, INDEX, N_KEYPOINTS
 from hicp_lib.lifting.paper import has_depth
 
 _IS_BODY = np.isin(np.arange(N_KEYPOINTS), BODY)
 # Chosen on development people, as the costs in `limb_lengths` and `hand_shapes`: see `robust`.
 RADIUS_M = np.where(_IS_BODY, 0.022, 0.013)  # how far around a keypoint surfaces are looked at
 _SIGMA_M = np.where(_IS_BODY, 0.010, 0.008)  # depths that differ so much cost 1
+_SIGMA_M[[INDEX["left_wrist"], INDEX["right_wrist"]]] = 0.015
 _SAMPLES = 7  # per side of the neighbourhood
 _STEEP_M = 0.03  # a larger difference between the pixels on both sides is a depth step
 _ON_STEP = 1.0  # cost of a surface there

@@ -62,11 +62,6 @@ _AHEAD = np.array(
 )
 
 
-# Measured from the side of a hanging hand, knuckles lie deep; cameras see the back of a hand or its palm.
-_MOST_BELOW_M = np.full(N_KEYPOINTS, np.inf)
-_MOST_BELOW_M[np.concatenate([hand[[5, 9, 13, 17]] for hand in _HANDS.values()])] = 0.011
-
-
 def lift_robust(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera) -> Lifted:
     """Lift the keypoints of everyone in an image; this module's head says how.
 
@@ -131,7 +126,7 @@ def lift_in_steps(
     """
     depth_m = np.asarray(depth_m, np.result_type(depth_m, np.float32))
     paper = lift(keypoints_px, depth_m, intrinsics)
-    below_m = _below_skin_m()
+    below_m = load_measures().below_skin_m
     away_m = np.linalg.norm(paper.points_m, axis=2)
     lifted = {0: paper, 1: replace(paper, points_m=paper.points_m * (1 + below_m / away_m)[..., None])}
     for n in set(n_steps) - lifted.keys():
@@ -152,11 +147,6 @@ def lift_in_steps(
     return [lifted[n] for n in n_steps]
 
 
-def _below_skin_m() -> np.ndarray:
-    """How deep keypoints lie below what is seen, (136,)."""
-    return np.minimum(load_measures().below_skin_m, _MOST_BELOW_M)
-
-
 def _depths(
     found: np.ndarray, first_m: np.ndarray, pixels_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera
 ) -> tuple[np.ndarray, Candidates]:
@@ -168,7 +158,7 @@ def _depths(
     nearest_m, farthest_m = max(middle_m - _REACH_M, MIN_DEPTH_M), middle_m + _REACH_M
     # What is seen may be the wall: the neighbourhood is never smaller than at the person's middle.
     near_m = np.clip(np.fmin(first_m, middle_m), nearest_m, None)
-    candidates = depth_candidates(found, pixels_px, near_m, depth_m, intrinsics, _below_skin_m())
+    candidates = depth_candidates(found, pixels_px, near_m, depth_m, intrinsics, load_measures().below_skin_m)
     return np.arange(nearest_m, farthest_m, _GRID_M), candidates
 
 
@@ -201,7 +191,7 @@ def _deeper_end_on(points_m: np.ndarray, found: np.ndarray) -> np.ndarray:
     away_m, length_m = (np.linalg.norm(vectors, axis=1) for vectors in (joints_m, limbs_m))
     cosine = np.maximum((limbs_m * joints_m).sum(axis=1) / (length_m * away_m), 0)
     share = np.zeros(len(found))
-    share[rows] = _END_ON * cosine**4 * _below_skin_m()[found[rows]] / away_m
+    share[rows] = _END_ON * cosine**4 * load_measures().below_skin_m[found[rows]] / away_m
     return share
 
 

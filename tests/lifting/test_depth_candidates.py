@@ -14,14 +14,14 @@ from hicp_lib.lifting.depth_candidates import (
 )
 
 CAMERA = Camera(64, 48, 100.0, 100.0, 31.5, 23.5)
-WRIST, FINGER = INDEX["left_wrist"], INDEX["left_index_4"]
+WRIST, ELBOW, FINGER = INDEX["left_wrist"], INDEX["left_elbow"], INDEX["left_index_4"]
 
 
 def candidates(depth_m, cost) -> Candidates:
-    """Of wrists."""
+    """Of elbows."""
     rows = np.atleast_2d(np.array(depth_m, float))
     costs = np.broadcast_to(np.array(cost, float), rows.shape)
-    return Candidates(np.tile([0.0, 0.0, 1.0], (len(rows), 1)), rows, costs, np.full(len(rows), WRIST))
+    return Candidates(np.tile([0.0, 0.0, 1.0], (len(rows), 1)), rows, costs, np.full(len(rows), ELBOW))
 
 
 def around(keypoint, pixel_px, depth_m, below_m=0.0) -> Candidates:
@@ -58,7 +58,7 @@ def test_depths_are_refined_by_candidates_that_agree():
 
 
 @pytest.mark.parametrize(
-    ("keypoint", "sigma_m", "farthest"), [(WRIST, 0.010, (2 / 2.2) ** 2), (FINGER, 0.008, 1)]
+    ("keypoint", "sigma_m", "farthest"), [(WRIST, 0.015, (2 / 2.2) ** 2), (FINGER, 0.008, 1)]
 )
 def test_candidates_lie_around_the_keypoint(keypoint, sigma_m, farthest):
     """2.2 cm at a metre are 2.2 pixels; a finger's 1.3 cm are fewer, but no less than 2 are looked at."""

@@ -56,7 +56,20 @@ class StereoCamera(DepthCamera):
     hair_holes: float = 0.25
 
     def measure(self, true_px: np.ndarray, hair: np.ndarray, first_column: int, rng: Rng) -> np.ndarray:
-        """Depth (h, w) by matching: see `DepthCamera.measure`."""
+        """Depth by matching.
+
+        Parameters
+        ----------
+        true_px : array, shape (h, w), dtype float32
+        hair : array of bool, shape (h, w)
+        first_column : int
+        rng : numpy.random.Generator
+            These as of `DepthCamera.measure`.
+
+        Returns
+        -------
+        array, shape (h, w), dtype float32
+        """
         valid = true_px > 0
         measured_px = true_px
         if self.edge_px:

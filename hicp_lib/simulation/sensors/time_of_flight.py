@@ -63,7 +63,20 @@ class TimeOfFlightCamera(DepthCamera):
     hair_reflectivity: float = 0.1
 
     def measure(self, true_px: np.ndarray, hair: np.ndarray, first_column: int, rng: Rng) -> np.ndarray:
-        """Depth (h, w) by phase: see `DepthCamera.measure`."""
+        """Depth by phase.
+
+        Parameters
+        ----------
+        true_px : array, shape (h, w), dtype float32
+        hair : array of bool, shape (h, w)
+        first_column : int
+        rng : numpy.random.Generator
+            These as of `DepthCamera.measure`.
+
+        Returns
+        -------
+        array, shape (h, w), dtype float32
+        """
         depth_m = np.full(true_px.shape, np.nan, np.float32)
         np.divide(np.float32(self.focal_baseline), true_px, out=depth_m, where=true_px > 0)
         amplitude = np.where(hair, self.hair_reflectivity, self.reflectivity) * self._cosine(true_px)
