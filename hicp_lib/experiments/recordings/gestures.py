@@ -25,7 +25,7 @@ DISTANCE_M = 1.65  # of the person from the robot's root, along the floor
 TABLE_HEIGHT_M = 0.72
 TABLE_M = ((-0.6, 0.75), (0.6, 1.3))  # two corners of its top, (x, y)
 _LEGS = ("hip_flexion", "hip_abduction", "hip_rotation", "knee_flexion", "ankle_flexion")
-_HANDS, _HALF_FINGER_M = {"left": LEFT_HAND, "right": RIGHT_HAND}, 0.01
+_HANDS, _HALF_FINGER_M = {"left": LEFT_HAND, "right": RIGHT_HAND}, 0.02
 _LEANING_DEG = {"spine_flexion": 40.0, "neck_flexion": 0.0}
 _PALM_DOWN_DEG = {"forearm_supination": -70.0, "wrist_flexion": -15.0}
 _HIGH_DEG: Ranges = {
@@ -96,9 +96,15 @@ class Gestures:
         return self.at_ease()
 
     def _touch_table(self) -> Iterator[Move]:
-        """Come to the table, lean forward, one or both hands onto it."""
+        """Come to the table, lean forward, one or both hands onto it from above; and up again."""
         yield from self._walk(np.array([self.place_m[0], DISTANCE_M]))
-        yield from self._go(self._free(self._over_table))
+        down = self._free(self._over_table)
+        bent = {name: angle + 1.0 for name, angle in down.joints.items() if name.endswith("elbow_flexion")}
+        above = self._standing(down.joints | bent)
+        yield Move(0.6, above)
+        yield from self._go(down)
+        self.now = above
+        yield Move(0.4, above)
 
     def _over_table(self) -> Joints:
         joints = self.at_ease().joints | radians(_LEANING_DEG)

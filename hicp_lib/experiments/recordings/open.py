@@ -26,7 +26,7 @@ def open_people(
     ----------
     scenario : str
         "relative-upper", "relative-lower" or "mocap"; simulated when no folder is given.
-    recording : str, Path or sequence of them, optional
+    recording : str or Path or sequence of str, optional
         Folders of a lab's own recordings, one of each person.
     n_frames : int, optional
         How many frames of each, from the first; all of them when left out.
