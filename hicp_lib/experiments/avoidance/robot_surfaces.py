@@ -14,7 +14,19 @@ _GLOSS, _ROUGHNESS = 0.04, 0.35  # of painted covers
 
 
 def robot_surfaces(icub: ICub, posture: Posture, with_head: bool = False) -> list[Surface]:
-    """The robot in the world; without its head where that carries the camera that looks."""
+    """The robot in the world.
+
+    Parameters
+    ----------
+    icub : ICub
+    posture : Posture
+    with_head : bool, optional
+        Not where the head carries the camera that looks.
+
+    Returns
+    -------
+    list of Surface
+    """
     shape = robot_shape(icub, posture)
     vertices_m = transform(T_WORLD_ROOT, shape.vertices_m).astype(np.float32)
     normals = vertex_normals(vertices_m, shape.triangles)
