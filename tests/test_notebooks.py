@@ -31,7 +31,16 @@ STRIP = "strip it: .venv/bin/jupyter nbconvert --clear-output --inplace notebook
 # Tags of a cell that shows rows or arrays of the data, and of the figure that a reader changes first.
 SHOWING = LOOK_INSIDE, TRY_IT = "look-inside", "try-it"
 # Suffix of a parameter -> how its unit begins.
-UNITS = {"px": "px", "pixels": "px", "s": "s", "hz": "Hz", "deg": "deg", "m": "m", "score": "score"}
+UNITS = {
+    "px": "px",
+    "pixels": "px",
+    "s": "s",
+    "hz": "Hz",
+    "deg": "deg",
+    "m": "m",
+    "score": "score",
+    "m_s": "m/s",
+}
 WITHOUT_EQUATION = ["00_quickstart"]  # it computes nothing that one defines
 
 
@@ -110,7 +119,7 @@ def test_every_parameter_says_its_unit_or_values_and_what_to_try(path):
     for name, comment in described.items():
         said = re.fullmatch(r"\S.* \[(.+?)\](?:[;,].*)?; try (.+)\.", comment)
         assert said, f"{name}: expected `# What it is [unit or values]; try VALUE.`, not {comment!r}"
-        suffix = name.rpartition("_")[2]
+        suffix = "m_s" if name.endswith("_m_s") else name.rpartition("_")[2]
         assert said[1].startswith(UNITS.get(suffix, "")), f"{name}: expected [{UNITS.get(suffix)}, ...]"
         tried = ast.literal_eval(said[2])
         check_parameters(notebook, {name: tried}, "what to try")
