@@ -16,7 +16,7 @@ from hicp_lib.robot.segments import link_poses
 
 SHAPE_FILE = DATA_DIR / "icub_shape.npz"
 STEP_M = 2e-5  # vertices are stored as whole multiples of this
-_ON_HEAD = ("head head", "head neck_roll", "camera")
+_UNSEEN = ("head head", "head neck_roll", "camera", "root")
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +31,14 @@ class Shape:
         Outward.
     colours : array, shape (n, 3), dtype float32
         Linear RGB of every vertex.
-    on_head : array of bool, shape (n_triangles,)
-        Neck, head and the camera on it.
+    unseen : array of bool, shape (n_triangles,)
+        What the camera on the head does not see: that, neck, head, pelvis and legs.
     """
 
     vertices_m: np.ndarray
     triangles: np.ndarray
     colours: np.ndarray
-    on_head: np.ndarray
+    unseen: np.ndarray
 
 
 def robot_shape(icub: ICub, posture: Posture, mount: str = "tilted") -> Shape:
@@ -71,10 +71,10 @@ def robot_shape(icub: ICub, posture: Posture, mount: str = "tilted") -> Shape:
     T = np.array([poses[link] for link in stored["links"]])[stored["vertex_link"]]
     local_m = STEP_M * stored["vertices_20um"]
     vertices_m = np.einsum("nij,nj->ni", T[:, :3, :3], local_m) + T[:, :3, 3]
-    on_head = np.isin(stored["links"], _ON_HEAD)[stored["vertex_link"]]
+    unseen = np.isin(stored["links"], _UNSEEN)[stored["vertex_link"]]
     triangles = stored["triangles"].astype(np.int32)
     colours = stored["colours"][stored["vertex_colour"]]
-    return Shape(vertices_m.astype(np.float32), triangles, colours, on_head[triangles[:, 0]])
+    return Shape(vertices_m.astype(np.float32), triangles, colours, unseen[triangles[:, 0]])
 
 
 @memoised(2)

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
-from hicp_lib.core.keypoints import N_KEYPOINTS
+from hicp_lib.core.keypoints import HANDS, HEAD, N_KEYPOINTS, mirror
 from hicp_lib.experiments.avoidance.runs import IDEAL, Run
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.separation import ASSUMED, Brakes, Separation
@@ -14,7 +14,7 @@ from hicp_lib.simulation.body.identities import split_members
 from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.study.avoidance import sure_keypoints
 
-_COMES_NEAR = ("hand", "face", "scalp")  # regions of the body
+_NEARING = ((("hand",), np.r_[9, 10, HANDS]), (("face", "scalp"), HEAD))  # regions, and their keypoints
 _EVERY = 4  # of their vertices one is looked at
 
 
@@ -66,10 +66,11 @@ def separations_before(
 
 
 def beyond_keypoints_m(found: np.ndarray) -> float:
-    """How far the skin of hands and head reaches beyond the nearest of some keypoints.
+    """How far the skin of hands or head, which come nearest, reaches beyond the nearest of their keypoints.
 
     Our reading of the standard's intrusion distance for keypoints; over the adults of the body model that
-    everything is tuned on.
+    everything is tuned on. Hands or a head of which no keypoint is found have no part in it: nothing warns of
+    them.
 
     Parameters
     ----------
@@ -78,22 +79,24 @@ def beyond_keypoints_m(found: np.ndarray) -> float:
     Returns
     -------
     float
-        Infinite without keypoints.
+        Infinite without keypoints of either.
 
     Examples
     --------
-    >>> wrists = np.isin(np.arange(136), [0, 9, 10])  # and the nose
-    >>> round(beyond_keypoints_m(wrists), 1), round(beyond_keypoints_m(np.ones(136, bool)), 1)
+    >>> wrist, all_of_them = np.arange(136) == 9, np.ones(136, bool)
+    >>> round(beyond_keypoints_m(wrist), 1), round(beyond_keypoints_m(all_of_them), 1)
     (0.2, 0.1)
     """
-    if not found.any():
-        return np.inf
-    body = load_body()
-    skin = np.flatnonzero(body.in_regions(*_COMES_NEAR))[::_EVERY]
+    body, found = load_body(), found | found[mirror("halpe136")]
     people = [pose_body(body, name, {}) for name in split_members("development")["bodies"]]
-    return max(
-        float(cKDTree(person.keypoints_m[found]).query(person.vertices_m[skin])[0].max()) for person in people
-    )
+    gaps_m = [
+        cKDTree(person.keypoints_m[keypoints[found[keypoints]]]).query(person.vertices_m[skin])[0].max()
+        for regions, keypoints in _NEARING
+        for skin in [np.flatnonzero(body.in_regions(*regions))[::_EVERY]]
+        for person in people
+        if found[keypoints].any()
+    ]
+    return float(max(gaps_m, default=np.inf))
 
 
 def _found(runs: Sequence[Run], detector: str) -> np.ndarray:

@@ -13,15 +13,15 @@ from hicp_lib.simulation.rendering.surfaces import Hits, Look, Surface
 _GLOSS, _ROUGHNESS = 0.04, 0.35  # of painted covers
 
 
-def robot_surfaces(icub: ICub, posture: Posture, with_head: bool = False) -> list[Surface]:
+def robot_surfaces(icub: ICub, posture: Posture, whole: bool = False) -> list[Surface]:
     """The robot in the world.
 
     Parameters
     ----------
     icub : ICub
     posture : Posture
-    with_head : bool, optional
-        Not where the head carries the camera that looks.
+    whole : bool, optional
+        With what the camera on its own head does not see.
 
     Returns
     -------
@@ -29,8 +29,8 @@ def robot_surfaces(icub: ICub, posture: Posture, with_head: bool = False) -> lis
     """
     shape = robot_shape(icub, posture)
     vertices_m = transform(T_WORLD_ROOT, shape.vertices_m).astype(np.float32)
-    normals = vertex_normals(vertices_m, shape.triangles)
-    triangles = shape.triangles if with_head else shape.triangles[~shape.on_head]
+    triangles = shape.triangles if whole else shape.triangles[~shape.unseen]
+    normals = vertex_normals(vertices_m, triangles)
     return [Surface(Mesh(vertices_m, triangles, normals, shape.colours), _painted)]
 
 

@@ -1,7 +1,7 @@
 """How far a person is from the robot, exactly as the simulation has it: what avoidance is judged by.
 
 The robot is its taxels, and its arms as thick lines; the person is the skin of the body model, without
-clothes and hair. Fingers of the robot are not modelled.
+clothes and hair. The robot's fingers are left out.
 """
 
 import numpy as np

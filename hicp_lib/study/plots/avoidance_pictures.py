@@ -154,7 +154,7 @@ def _drawn(run: Run, frame: pd.Series) -> np.ndarray:
 
 def _draw_space(axis, run: Run, cycle: pd.Series, frame: pd.Series | None) -> None:
     posture = start_posture().moved("left", np.array([cycle[f"{joint}_rad"] for joint in ARM_JOINTS]))
-    robot = robot_surfaces(load_icub(), posture, with_head=True)
+    robot = robot_surfaces(load_icub(), posture, whole=True)
     axis.imshow(onlooker_view(moment_at(run, cycle["t_s"]).world([]), robot))
     activations = np.asarray(cycle["activations"])
     threatened = np.flatnonzero(activations > _THREATENED)

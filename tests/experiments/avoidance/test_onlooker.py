@@ -27,7 +27,7 @@ def seen_px(points_m: np.ndarray) -> np.ndarray:
 
 def test_the_robot_is_where_its_hand_is(moment):
     world, _ = moment
-    robot = robot_surfaces(load_icub(), start_posture(), with_head=True)
+    robot = robot_surfaces(load_icub(), start_posture(), whole=True)
     differs = np.abs(onlooker_view(world, robot).astype(int) - onlooker_view(world, [])).max(axis=-1) > 40
     hands_m = transform(T_WORLD_ROOT, np.array([HOME_M["left"], [-0.05, 0, 0.35]]))
     for u, v in seen_px(hands_m):  # its hand and its head
