@@ -82,7 +82,7 @@ def test_only_what_both_lift_is_compared():
 
 def test_coverage_is_of_depth_along_the_cameras_axis_and_by_reason(points, truth):
     errors = lifting_errors(points, truth, POSES)
-    assert errors["off_m"].max() < 0.1 and set(errors["reason"]) == {
+    assert errors["off_m"].max() < 0.2 and set(errors["reason"]) == {
         "lifted",
         "guessed",
     }  # the thumb is hidden
