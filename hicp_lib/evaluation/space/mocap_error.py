@@ -16,8 +16,8 @@ from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.cases import labelled
 from hicp_lib.evaluation.space.stability import POSITION, THRESHOLDS_M
-from hicp_lib.evaluation.statistics.resampling import weighted_median, with_interval
-from hicp_lib.evaluation.statistics.time_blocks import block_length, draw_blocks
+from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
+from hicp_lib.evaluation.statistics.time_blocks import block_length
 from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.qualisys import MotionCapture
 
@@ -223,7 +223,7 @@ def _cases(
     errors: pd.DataFrame, min_scores: Sequence[float], n_resamples: int, seed: int
 ) -> Iterator[tuple[tuple, pd.DataFrame, np.ndarray, np.ndarray]]:
     """Labels, rows, errors of what was found (n_frames,) and weights of frames, the same for all cases."""
-    weights = draw_blocks(errors["frame"].nunique(), _block_length(errors), n_resamples, seed)
+    weights = draw_counts(errors["frame"].nunique(), n_resamples, seed, _block_length(errors))
     for case, part in errors.groupby(_CASE, sort=False):
         part = part.sort_values("frame")
         for min_score in min_scores:

@@ -1,4 +1,4 @@
-"""Proportions of rows that are something, with intervals from drawing whole source images."""
+"""Proportions of rows that are something, with intervals from drawing people, then whole source images."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from hicp_lib.evaluation.statistics.design import smallest_difference
 from hicp_lib.evaluation.statistics.resampling import PERCENTILES, draw_counts, with_interval
 
 _TAIL = PERCENTILES[0] / 100  # what an interval leaves out on either side
@@ -15,12 +16,13 @@ _TAIL = PERCENTILES[0] / 100  # what an interval leaves out on either side
 def proportions(
     rows: pd.DataFrame, by: Sequence[str], of: str, n_resamples: int = 1000, seed: int = 0
 ) -> pd.DataFrame:
-    """Mean of a column per group of rows, with its 95 % bootstrap interval over source images.
+    """Mean of a column per group of rows, with its 95 % bootstrap interval.
 
     Parameters
     ----------
     rows : DataFrame
-        Has a column `source_image`; rows of one source image are drawn together.
+        Has a column `source_image`; rows of one source image are drawn together. With a column `subject`,
+        subjects are drawn, then source images of each.
     by : sequence of str
         Columns that make the groups.
     of : str
@@ -31,8 +33,9 @@ def proportions(
     Returns
     -------
     DataFrame
-        Columns `by, value, low, high, n` (rows), `n_images` (source images), groups in the order they first
-        occur; no interval from fewer than `MIN_DRAWN` source images.
+        Columns `by, value, low, high, n` (rows), `n_images` (source images) and, of rows with subjects,
+        `n_people`, groups in the order they first occur; no interval from fewer than `MIN_DRAWN` subjects,
+        or source images of one.
 
     Examples
     --------
@@ -41,12 +44,13 @@ def proportions(
     {'part': ['a', 'b'], 'value': [0.5, 1.0], 'n': [2, 1], 'n_images': [1, 1]}
     """
     rows = rows[rows[of].notna()]
+    units = ["source_image", "subject"] if "subject" in rows else ["source_image"]
     table = []
     for group, part in rows.groupby(list(by), sort=False, observed=True):
-        images = part["source_image"]
-        interval = mean_with_interval(part[of], images, n_resamples, seed)
-        table.append((*group, *interval, len(part), images.nunique()))
-    return pd.DataFrame(table, columns=[*by, "value", "low", "high", "n", "n_images"])
+        interval = mean_with_interval(part[of], part["source_image"], n_resamples, seed, part.get("subject"))
+        table.append((*group, *interval, len(part), *part[units].nunique()))
+    counts = ["n_images", "n_people"][: len(units)]
+    return pd.DataFrame(table, columns=[*by, "value", "low", "high", "n", *counts])
 
 
 def paired_differences(
@@ -57,7 +61,8 @@ def paired_differences(
     Parameters
     ----------
     rows : DataFrame
-        Has a column `source_image`; rows of one source image, group and value of `over` are averaged.
+        Has a column `source_image`; rows of one source image, group and value of `over` are averaged. With a
+        column `subject`, subjects are drawn, then source images of each.
     by : sequence of str
         Columns that make the groups.
     over : str
@@ -70,7 +75,8 @@ def paired_differences(
     Returns
     -------
     DataFrame
-        Columns `by`, then `over, other, pair` ("a less b"), `value, low, high, n_images`.
+        Columns `by`, then `over, other, pair` ("a less b"), `value, low, high, n_images` and, of rows with
+        subjects, `n_people, detectable` (`smallest_difference`).
 
     Examples
     --------
@@ -80,23 +86,35 @@ def paired_differences(
     [['l less r', -0.5], ['r less l', 0.5]]
     """
     table = []
+    units = ["source_image", "subject"] if "subject" in rows else ["source_image"]
     for group, part in rows.groupby(list(by), sort=False, observed=True):
-        values = part.pivot_table(of, "source_image", over)
+        values = part.pivot_table(of, units, over)
         for a, b in combinations(dict.fromkeys(part[over]), 2):
-            less = (values[a] - values[b]).dropna()
-            value, low, high = mean_with_interval(less, less.index, n_resamples, seed)
-            table.append((*group, a, b, f"{a} less {b}", value, low, high, len(less)))
-            table.append((*group, b, a, f"{b} less {a}", 0 - value, 0 - high, 0 - low, len(less)))
-    return pd.DataFrame(table, columns=[*by, over, "other", "pair", "value", "low", "high", "n_images"])
+            less = (values[a] - values[b]).dropna().rename("less").reset_index()
+            whose = less.get("subject")
+            interval = mean_with_interval(less["less"], less["source_image"], n_resamples, seed, whose)
+            value, low, high = interval
+            counts: list[float] = [len(less)]
+            if whose is not None:
+                counts += [whose.nunique(), smallest_difference(less.groupby(whose)["less"].mean())]
+            table.append((*group, a, b, f"{a} less {b}", *interval, *counts))
+            table.append((*group, b, a, f"{b} less {a}", 0 - value, 0 - high, 0 - low, *counts))
+    names = ["n_images", "n_people", "detectable"][: 2 * len(units) - 1]
+    return pd.DataFrame(table, columns=[*by, over, "other", "pair", "value", "low", "high", *names])
 
 
 def mean_with_interval(
-    values: ArrayLike, clusters: ArrayLike, n_resamples: int = 1000, seed: int = 0
+    values: ArrayLike,
+    clusters: ArrayLike,
+    n_resamples: int = 1000,
+    seed: int = 0,
+    subjects: ArrayLike | None = None,
 ) -> tuple[float, float, float]:
-    """Mean, and its 95 % percentile interval from drawing clusters.
+    """Mean, and its 95 % percentile interval from drawing subjects, then clusters of each.
 
     Flags that are all alike are alike in every draw; that does not make their share certain. There the
-    interval is the exact one of a share that is 0 or 1 (Clopper and Pearson), a cluster counting once.
+    interval is the exact one of a share that is 0 or 1 (Clopper and Pearson), a subject counting once, or a
+    cluster where there is one subject only.
 
     Parameters
     ----------
@@ -106,11 +124,13 @@ def mean_with_interval(
         Values of equal cluster are drawn together.
     n_resamples, seed : int, optional
         Number of bootstrap draws, and what they are drawn with.
+    subjects : array, shape (n,), optional
+        Whose each value is; all of one when left out.
 
     Returns
     -------
     value, low, high : float
-        NaN where there are no values; no interval from fewer than `MIN_DRAWN` clusters.
+        NaN where there are no values; no interval from fewer than `MIN_DRAWN` subjects, or clusters of one.
 
     Examples
     --------
@@ -120,11 +140,14 @@ def mean_with_interval(
     values = np.asarray(values)
     if not len(values):
         return np.nan, np.nan, np.nan
-    cluster, names = pd.factorize(np.asarray(clusters))
-    sums = np.bincount(cluster, weights=values.astype(float), minlength=len(names))
-    times = draw_counts(len(names), n_resamples, seed)
-    value, low, high = with_interval(times @ sums / (times @ np.bincount(cluster, minlength=len(names))))
+    subjects = np.zeros(len(values)) if subjects is None else subjects
+    units = pd.DataFrame({"subject": np.asarray(subjects), "cluster": np.asarray(clusters)})
+    cluster = units.groupby(["subject", "cluster"], sort=False).ngroup().to_numpy()
+    whose = units["subject"][np.unique(cluster, return_index=True)[1]]
+    times, n_people = draw_counts(whose, n_resamples, seed), whose.nunique()
+    sums = np.bincount(cluster, weights=values.astype(float))
+    value, low, high = with_interval(times @ sums / (times @ np.bincount(cluster)), n_people)
     if values.dtype == bool and value in (0, 1) and low == low:
-        reach = _TAIL ** (1 / len(names))
+        reach = _TAIL ** (1 / (n_people if n_people > 1 else len(whose)))
         low, high = (reach, 1.0) if value else (0.0, 1 - reach)
     return value, low, high

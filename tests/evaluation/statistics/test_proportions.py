@@ -50,3 +50,56 @@ def test_images_that_lack_one_of_a_pair_are_left_out_of_it():
     rows = pd.DataFrame({"view": 1, "who": list("aaab"), "source_image": [1, 1, 2, 1], "hit": [0, 1, 1, 1]})
     row = paired_differences(rows, ["view"], "who", "hit").iloc[0]
     assert (row["value"], row["n_images"]) == (-0.5, 1) and np.isnan(row["low"])
+
+
+def of_people(between: float, n_people: int = 12, seed: int = 0) -> pd.DataFrame:
+    """Ten images of each person in two ways; the second adds to the first what differs between people."""
+    rng, people = np.random.default_rng(seed), np.repeat(np.arange(n_people), 10)
+    first = rng.normal(size=len(people))
+    second = first + 1 + between * rng.normal(size=n_people)[people] + 0.1 * rng.normal(size=len(people))
+    rows = pd.DataFrame({"subject": people, "source_image": np.arange(len(people)), "view": "upper"})
+    return pd.concat([rows.assign(way="first", of=first), rows.assign(way="second", of=second)])
+
+
+def test_people_are_drawn_where_rows_say_whose_they_are():
+    rows = of_people(between=3.0)
+    table = proportions(rows, ["way"], "of").set_index("way").loc["second"]
+    frames = proportions(rows.drop(columns="subject"), ["way"], "of").set_index("way").loc["second"]
+    assert (table["n_people"], table["n_images"], table["n"]) == (12, 120, 120) and "n_people" not in frames
+    assert table["value"] == frames["value"]
+    assert table["high"] - table["low"] > 2 * (frames["high"] - frames["low"])
+
+
+def test_of_one_person_intervals_are_over_images():
+    rows = of_people(1.0, n_people=1)
+    alone = rows.drop(columns="subject")
+    pd.testing.assert_frame_equal(
+        proportions(rows, ["way"], "of").drop(columns="n_people"), proportions(alone, ["way"], "of")
+    )
+    less = paired_differences(rows, ["view"], "way", "of")
+    assert (less["n_people"] == 1).all() and less["detectable"].isna().all() and less["low"].notna().all()
+    pd.testing.assert_frame_equal(
+        less.drop(columns=["n_people", "detectable"]), paired_differences(alone, ["view"], "way", "of")
+    )
+
+
+def test_comparisons_say_what_difference_so_many_people_would_show():
+    for between in (0.3, 3.0):
+        less = paired_differences(of_people(between), ["view"], "way", "of").set_index("pair")
+        row = less.loc["second less first"]
+        assert (row["n_people"], row["n_images"]) == (12, 120)
+        assert row["detectable"] == less.loc["first less second", "detectable"]
+        assert 0.5 < row["detectable"] / (3.08 * between / np.sqrt(12)) < 1.6
+        assert row["low"] < 1 < row["high"]
+
+
+def test_images_of_equal_number_of_two_people_are_two():
+    people, images = np.repeat(np.arange(20), 2), np.tile([0, 1], 20)
+    apart = mean_with_interval(people % 2, images, subjects=people)
+    assert apart == mean_with_interval(people % 2, np.arange(40), subjects=people)
+
+
+def test_flags_that_are_alike_in_all_people_count_each_person_once():
+    never = np.zeros(120, bool)
+    high = mean_with_interval(never, np.arange(120), subjects=np.repeat(np.arange(12), 10))[2]
+    assert high == pytest.approx(1 - 0.025 ** (1 / 12))

@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN
-from hicp_lib.evaluation.statistics.time_blocks import block_length, draw_blocks
+from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN, draw_counts
+from hicp_lib.evaluation.statistics.time_blocks import block_length
 
 
 def autoregressive(rho: float, n: int, seed: int = 0) -> np.ndarray:
@@ -41,13 +41,13 @@ def test_gaps_and_missing_series_are_left_out():
 @given(st.integers(1, 60), st.integers(1, 20), st.integers(0, 100))
 def test_every_draw_has_as_many_frames_and_the_first_is_the_sample(n, length, seed):
     length = min(length, n)
-    counts = draw_blocks(n, length, 5, seed)
+    counts = draw_counts(n, 5, seed, length)
     n_drawn = 6 if -(-n // length) >= MIN_DRAWN else 1  # too few blocks tell nothing of the spread
     assert counts.shape == (n_drawn, n) and (counts[0] == 1).all() and (counts.sum(axis=1) == n).all()
 
 
 def test_frames_are_drawn_with_their_neighbours():
-    counts = draw_blocks(400, 40, 50, seed=0)[1:]
+    counts = draw_counts(400, 50, 0, 40)[1:]
     steps = (np.diff(counts, axis=1) != 0).sum(axis=1)
     # Ten blocks have at most twenty ends; frames drawn one by one would change almost everywhere.
     assert steps.max() <= 20
@@ -58,7 +58,7 @@ def test_intervals_of_lasting_errors_cover_the_mean_where_single_frames_do_not()
     for seed in range(60):
         series = autoregressive(0.9, 480, seed)[:, 0]
         for length in covered:
-            weights = draw_blocks(480, length, 200, seed)[1:]
+            weights = draw_counts(480, 200, seed, length)[1:]
             low, high = np.percentile(weights @ series / 480, [2.5, 97.5])
             covered[length] += low <= 0 <= high
     assert covered[40] > 45 and covered[1] < 35
@@ -78,7 +78,7 @@ def test_eight_frames_are_the_fewest_and_a_quarter_of_them_the_longest():
 
 
 def test_ten_blocks_are_drawn_again_and_nine_are_not():
-    assert len(draw_blocks(100, 10, 5, 0)) == 6 and len(draw_blocks(90, 10, 5, 0)) == 1
+    assert len(draw_counts(100, 5, 0, 10)) == 6 and len(draw_counts(90, 5, 0, 10)) == 1
 
 
 def test_a_single_pair_of_neighbours_counts_in_full():
@@ -89,3 +89,18 @@ def test_a_single_pair_of_neighbours_counts_in_full():
 
 def test_of_few_frames_every_one_is_a_block():
     assert [block_length(np.arange(n)[:, None] * 1.0) for n in (1, 3, 7)] == [1, 1, 1]
+
+
+def test_people_differ_and_that_makes_no_frames_alike():
+    """One person's frames after another's: independent within, apart between."""
+    people = np.repeat(np.arange(12), 40)
+    errors = np.random.default_rng(0).normal(size=(480, 3)) + 10.0 * people[:, None]
+    assert block_length(errors) > 40 and block_length(errors, people) <= 3
+
+
+def test_of_several_people_a_length_is_as_of_one():
+    series = np.concatenate([autoregressive(0.9, 480, seed) for seed in range(8)])
+    together = block_length(series, np.repeat(np.arange(8), 480))
+    alone = [block_length(autoregressive(0.9, 480, seed)) for seed in range(8)]
+    assert min(alone) <= together <= max(alone)
+    assert block_length(series[:480], np.zeros(480)) == alone[0]
