@@ -169,6 +169,15 @@ def test_without_wrists_the_whole_image_gives_hands_within_reach():
     assert roots(combine(body(no_wrists), looks="wrists").detect(image)) == [None, None]
 
 
+@pytest.mark.parametrize("options", [{}, {"looks": "image"}, {"arbitrate": False}])
+def test_side_by_side_finds_the_same(options):
+    image = image_with(LEFT_ROOT, RIGHT_ROOT, (350, 350), shape=(400, 700))
+    one, other = (combine(body(ARMS), side_by_side=both, **options) for both in (False, True))
+    found, same = one.detect(image), other.detect(image)
+    assert len(found) and np.array_equal(found.keypoints_px, same.keypoints_px, equal_nan=True)
+    assert one.settings == other.settings  # the answer is the same, so a kept one may be
+
+
 def test_unsure_wrists_count_as_not_given():
     hands = FakeHands()
     combine(body(ARMS, score=0.01), hands, looks="wrists").detect(image_with(LEFT_ROOT))
