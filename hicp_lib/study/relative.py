@@ -73,6 +73,19 @@ def subjects_of(views: Views) -> dict[str, np.ndarray]:
 def of_person(views: Views, found: Found, number: int) -> tuple[dict[str, Recording], dict]:
     """One person's recordings by view, and what was found in them by view and detector.
 
+    Parameters
+    ----------
+    views : mapping of str to sequence of Recording
+    found : mapping of (str, str) to sequence
+        By view and detector, of everybody.
+    number : int
+        Of the person, from 0 on.
+
+    Returns
+    -------
+    seen : dict of str to Recording
+    found : dict of (str, str) to list of Detections
+
     Raises
     ------
     InputError

@@ -37,7 +37,7 @@ class Observation:
     Attributes
     ----------
     moment : Moment
-    posture : Posture
+    posture : robot.posture.Posture
         The robot's.
     rgb : array, shape (480, 640, 3), dtype uint8
     detections : Detections

@@ -115,7 +115,7 @@ class Script:
         Without the person.
     appearance : Appearance
         The person's.
-    rest, ready : Posture
+    rest, ready : minimum_jerk.Posture
         How they are before, and from where they approach.
     touch : callable
         How they are when they touch the robot's hand, see `Reach`.

@@ -62,7 +62,7 @@ def random_stage(rng: Rng, split: str = HELD_OUT) -> Stage:
     --------
     >>> stage = random_stage(np.random.default_rng(0))
     >>> len(stage.people), (stage.camera.width_px, stage.camera.height_px)
-    (1, (480, 640))
+    (3, (640, 480))
     """
     first = draw_identity(rng, split)
     taken = first.draw("camera")

@@ -33,7 +33,7 @@ def test_pose_finds_rendered_people_to_a_few_pixels(weights, people):
         found = detector.detect(image)
         assert len(found) == 1
         errors = np.linalg.norm(found.keypoints_px[0, :13] - truth_px[:13], axis=1)
-        assert np.median(errors) < 10
+        assert np.median(errors) < 12
         # A swap of sides would be off by the width of the shoulders.
         assert errors[[5, 6]].max() < 0.3 * np.linalg.norm(truth_px[5] - truth_px[6])
 
