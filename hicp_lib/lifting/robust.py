@@ -24,12 +24,13 @@ the surfaces near them.
 A depth that no surface seen near the keypoint agrees with, or that no limb reaches, is *guessed*. What other
 depths would cost, taken for how unlikely they are, gives each depth its standard deviation.
 
-Measures of people come from the body model (`body_measures`, `hand_shapes`; development bodies only). The costs
-(there, and in `depth_candidates` and `limb_lengths`) were chosen before the D435 for the 95th percentile of
-errors first and medians second, on ten people of an earlier set of bodies (seeds 100 to 109), none of whom is in
-either split today; what sleeves add, what a cost says of likelihood and the caps of knuckles on eight development
-people (an earlier deal of them). A table of held-out people had been seen before the last two of these choices,
-which were made by development people alone. No other sensor had a part in it.
+Measures of people come from the body model (`body_measures`, `hand_shapes`; development bodies only). The
+costs (there, and in `depth_candidates` and `limb_lengths`) were chosen before the D435 for the 95th
+percentile of errors first and medians second, on ten people of an earlier set of bodies (seeds 100 to 109),
+none of whom is in either split today; what sleeves add, what a cost says of likelihood and the caps of
+knuckles on eight development people (an earlier deal of them). A table of held-out people had been seen
+before the last two of these choices, which were made by development people alone. No other sensor had a
+part in it.
 """
 
 from collections.abc import Iterator, Sequence
