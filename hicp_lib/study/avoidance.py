@@ -88,7 +88,7 @@ def over_people(table: pd.DataFrame, by: Sequence[str], of: str = "min_distance_
 def _wilson(k: int, n: int) -> tuple[float, float]:
     """Wilson's score interval of a share k/n."""
     centre, half = (k + Z**2 / 2) / (n + Z**2), Z / (n + Z**2) * np.sqrt(k * (n - k) / n + Z**2 / 4)
-    return centre - half, centre + half
+    return max(centre - half, 0.0), min(centre + half, 1.0)  # rounding may leave them
 
 
 def reasons(table: pd.DataFrame) -> pd.DataFrame:
