@@ -44,11 +44,11 @@ class ArbitrationRule:
         What sightings are worth, see `merge_duplicates`.
     """
 
-    same_hand: float = threshold(0.5, f"{SEED_11}: 0.35 and 0.7 within .005")
-    wrist_reach: float = threshold(1.0, f"{SEED_11}: 0.7 and 1.4 within .012")
-    elbow_reach: float = threshold(1.5, f"{SEED_11}: 2 the same, 1 within .014")
+    same_hand: float = threshold(0.5, f"{SEED_11}: 0.35 and 0.7 within .01")
+    wrist_reach: float = threshold(1.0, f"{SEED_11}: 0.7 and 1.4 within .01")
+    elbow_reach: float = threshold(1.5, f"{SEED_11}: 2 within .005, 1 within .01")
     shoulder_reach: float = threshold(2.5, f"{SEED_11}: 1.8 and 3.5 within .005")
-    alone: float = threshold(0.85, f"{SEED_11}: of hands seen once, 0.15 is the mean OKS")
+    alone: float = threshold(0.85, f"{SEED_11}: 0.7 and 0.95 within .005")
     scatter: float = threshold(4.0, f"{SEED_11}: 2 and 8 within .006")
 
 

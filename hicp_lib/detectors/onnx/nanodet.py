@@ -25,8 +25,8 @@ class NanoDet:
     Parameters
     ----------
     min_score : float
-        Of rendered people, none held out, in whole scenes (seed 11, earlier bodies) 0.3 finds 91 %, and 99 %
-        of its boxes are people's; 0.2 finds 95 %, of which one box in six is nobody's.
+        Of development people in 100 rendered scenes (seed 11) 0.3 finds 91 % (intersection over union of .5),
+        and 93 % of its boxes are people's; 0.2 finds 95 %, of whose boxes 22 % are nobody's.
     max_overlap : float
         Of two boxes that overlap more (intersection over union), the surer is kept.
     provider : str

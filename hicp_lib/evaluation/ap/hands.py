@@ -43,7 +43,7 @@ _STEPS: dict[str, dict] = {
 _CHOSEN = {
     "hands_num_hands": "two of one person and two of others in a square; no other was tried",
     "hands_min_score": f"{SEED_11_THUNDER}: 0.1 within .005",
-    "min_side_px": f"{SEED_11_THUNDER}: without it .013 less on Basic",
+    "min_side_px": f"{SEED_11_THUNDER}: without it .017 less on Headless",
     "looks": f"{SEED_11}: mirrored squares too: .01 to .02 more, for a third more looks",
 }
 INGREDIENTS: dict[str, dict] = dict(zip(_STEPS, accumulate(_STEPS.values(), or_), strict=True))
@@ -52,9 +52,8 @@ INGREDIENTS: dict[str, dict] = dict(zip(_STEPS, accumulate(_STEPS.values(), or_)
 def thresholds() -> pd.DataFrame:
     """The thresholds of the combination and what each was chosen on: columns `threshold, value, chosen`.
 
-    "within .005" is the change of the AP of hands on Basic and Headless, "both bodies" are those of
-    `mediapipe-pose` and `movenet-thunder`; of seed 11, 100 scenes of an earlier set of bodies: nobody there
-    is held out.
+    "within .005" is the change of the AP of hands on Basic and Headless, both body detectors are
+    `mediapipe-pose` and `movenet-thunder`; seed 11 stands for 100 scenes of development people.
     """
     rules = [field for rule in (SquareRule, ArbitrationRule) for field in fields(rule)]
     rows = [(field.name, field.default, field.metadata["chosen"]) for field in rules]
