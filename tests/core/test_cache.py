@@ -17,7 +17,7 @@ import pytest
 from hicp_lib.core import cache
 from hicp_lib.core.cache import LIBRARY_DIR, code, imports_of, key
 from hicp_lib.core.checkout import CHECKOUT
-from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.datafiles import DATA_DIR, REFERENCE_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.report.notebooks import read_notebooks
 from hicp_lib.report.run import Run
@@ -158,7 +158,9 @@ def test_200_random_changes_leave_no_stale_page(copy, monkeypatch):
         return {n.name: run_key(Run(n, n.defaults)) for n in read_notebooks(copy / "notebooks")}
 
     before, rng = keys(), random.Random(0)
-    files = [p for p in copy.rglob("*") if p.is_file() and p.stat().st_size]
+    reference = copy / "data" / REFERENCE_DIR.name
+    found = [p for p in copy.rglob("*") if p.is_file() and p.stat().st_size]
+    files = [p for p in found if reference not in p.parents]
     code_files = [p for p in files if p.suffix == ".py"]
     for path in [*rng.sample(code_files, 140), *rng.choices([p for p in files if p not in code_files], k=60)]:
         content = path.read_bytes()
@@ -176,6 +178,11 @@ def test_200_random_changes_leave_no_stale_page(copy, monkeypatch):
         else:
             must = set(before)  # every page prints the hashes of data and lock
         assert must <= stale, path
+    for path in rng.sample(
+        [p for p in found if p not in files], 5
+    ):  # what runs are compared with, no page reads
+        change_one_byte(path, rng)
+        assert keys() == before, path
 
 
 def changed_text(path: Path, content: bytes) -> bytes:
