@@ -24,6 +24,7 @@ import numpy as np
 
 from hicp_lib.core.environment import usable_cores, with_variables
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.extras import needs
 
 CLUSTER_VARIABLE = "HICP_DASK"
 Key = TypeVar("Key", bound=Hashable)
@@ -133,7 +134,8 @@ def run_jobs(
 
 def threads_beside() -> int:
     """How many threads of a cluster's worker do jobs, this one among them; 1 elsewhere."""
-    from distributed import get_worker
+    with needs("dask"):
+        from distributed import get_worker
 
     try:
         return get_worker().state.nthreads

@@ -133,11 +133,9 @@ def detect_images(
         If an image cannot be read, or the detector cannot be made.
     """
     workers = resolved(workers)
-    if not isinstance(workers, str):
-        workers = max(1, min(workers, len(paths)))
-    n_here = None if isinstance(workers, str) else workers
+    n_here = None if isinstance(workers, str) else max(1, min(workers, len(paths)))
     asked = name, options, n_here
-    detector = make_detector(name, **options)
+    detector = _runner(*asked).detector  # it looks, too, where the caller does the work
     boxes_px = boxes_px if getattr(detector, "takes_boxes", False) else None
     folder, kept, done = cache_folder(detector), {}, {}
 
@@ -154,14 +152,16 @@ def detect_images(
                 done[key] = result
 
     alike = partial(_identity, asked)
-    found = run_jobs(missing(), workers, "threads", alike=alike, named=paths.__getitem__)
+    found = run_jobs(missing(), n_here or workers, "threads", alike=alike, named=paths.__getitem__)
     # disable=None: no bar unless standard error is a terminal.
-    with tqdm(desc=name, total=len(paths), disable=None if progress else True) as bar:
-        for key, result in found:
-            write_result(kept[key], result)
-            done[key] = result
-            bar.update(len(done) - bar.n)
-    _made.__dict__.clear()
+    try:
+        with tqdm(desc=name, total=len(paths), disable=None if progress else True) as bar:
+            for key, result in found:
+                write_result(kept[key], result)
+                done[key] = result
+                bar.update(len(done) - bar.n)
+    finally:
+        _made.__dict__.clear()
     return {key: done[key] for key in paths}
 
 

@@ -16,6 +16,7 @@ from distributed import Client
 from distributed.client import ClosedClientError
 
 from hicp_lib.core import cluster
+from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import write_png
 from hicp_lib.detectors import registry
@@ -257,6 +258,13 @@ def test_who_is_not_there_is_said(slow, registered, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     told = refusal("tcp://127.0.0.1:9", registered)
     assert told.startswith("distributed is not installed") and told.endswith("pip install '.[dask]'")
+
+
+def test_a_missing_dask_is_told_before_the_cluster_is_asked(monkeypatch, tmp_path):
+    monkeypatch.setenv("HICP_CACHE", str(tmp_path))
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"^distributed is not installed.*\.\[dask\]'$"):
+        run.detect_images("movenet-lightning", {1: DATA_DIR / "photograph.jpg"}, "tcp://127.0.0.1:9")
 
 
 def test_differences_are_named_by_their_keys():
