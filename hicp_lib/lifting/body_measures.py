@@ -4,15 +4,12 @@ Measured on the body model by `tools/measure_body.py`, over the bodies for devel
 recording and nobody who is held out had a part in it.
 """
 
-import zipfile
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from hicp_lib.core.datafiles import DATA_DIR
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.datafiles import DATA_DIR, read_arrays
 from hicp_lib.core.keypoints import FACE, HAND_LIMBS, INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 from hicp_lib.core.memo import memoised
 
@@ -108,34 +105,6 @@ def load_measures(path: Path = MEASURES_FILE) -> BodyMeasures:
     below_m[_WRISTS] += _SLEEVE_M
     below_m[_KNUCKLES] = np.minimum(below_m[_KNUCKLES], _BACK_OF_HAND_M)
     return BodyMeasures(below_m, closest_m, farthest_m)
-
-
-def read_arrays(path: Path, shapes: Mapping[str, tuple[int, ...]], what: str, tool: str) -> list[np.ndarray]:
-    """Arrays of a file that a tool of this project made.
-
-    Parameters
-    ----------
-    path : Path
-        Of an NPZ file.
-    shapes : mapping of str to tuple of int
-        Shape of each array to read, by name; -1 where any length will do.
-    what, tool : str
-        What the file holds and what makes it, for the error's message.
-
-    Returns
-    -------
-    list of array
-
-    Raises
-    ------
-    InputError
-        If the file is missing or not such a file.
-    """
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            return [stored[name].reshape(shape) for name, shape in shapes.items()]
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: not {what} ({error}); run {tool}") from None
 
 
 def found_parents(found: np.ndarray) -> np.ndarray:

@@ -1,14 +1,11 @@
 """What the robot looks like: covers, joints, hands with fingers, face, camera: triangles on its links."""
 
-import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from hicp_lib.core.datafiles import DATA_DIR
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.datafiles import DATA_DIR, read_arrays
 from hicp_lib.core.memo import memoised
 from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
@@ -16,6 +13,8 @@ from hicp_lib.robot.segments import link_poses
 
 SHAPE_FILE = DATA_DIR / "icub_shape.npz"
 STEP_M = 2e-5  # vertices are stored as whole multiples of this
+_STORED = {"links": (-1,), "vertices_20um": (-1, 3), "vertex_link": (-1,), "triangles": (-1, 3)}
+_STORED |= {"vertex_colour": (-1,), "colours": (-1, 3)}
 _UNSEEN = ("head head", "head neck_roll", "camera", "root")
 
 
@@ -79,8 +78,5 @@ def robot_shape(icub: ICub, posture: Posture, mount: str = "tilted") -> Shape:
 
 @memoised(2)
 def _stored(path: Path = SHAPE_FILE) -> dict[str, np.ndarray]:
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            return {name: stored[name] for name in stored.files}
-    except (OSError, EOFError, ValueError, zipfile.BadZipFile, zlib.error) as error:
-        raise InputError(f"{path}: not the robot's shape ({error}); run tools/bake_robot.py") from None
+    arrays = read_arrays(path, _STORED, "the robot's shape", "tools/bake_robot.py")
+    return dict(zip(_STORED, arrays, strict=True))

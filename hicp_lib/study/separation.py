@@ -7,11 +7,12 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from hicp_lib.core.keypoints import HANDS, HEAD, N_KEYPOINTS, mirror
+from hicp_lib.core.memo import memoised
 from hicp_lib.experiments.avoidance.runs import IDEAL, Run
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.separation import ASSUMED, Brakes, Separation
 from hicp_lib.simulation.body.identities import split_members
-from hicp_lib.simulation.body.model import load_body, pose_body
+from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.study.avoidance import sure_keypoints
 
 _NEARING = ((("hand",), np.r_[9, 10, HANDS]), (("face", "scalp"), HEAD))  # regions, and their keypoints
@@ -87,8 +88,7 @@ def beyond_keypoints_m(found: np.ndarray) -> float:
     >>> round(beyond_keypoints_m(wrist), 1), round(beyond_keypoints_m(all_of_them), 1)
     (0.2, 0.1)
     """
-    body, found = load_body(), found | found[mirror("halpe136")]
-    people = [pose_body(body, name, {}) for name in split_members("development")["bodies"]]
+    body, people, found = load_body(), _development_people(), found | found[mirror("halpe136")]
     gaps_m = [
         cKDTree(person.keypoints_m[keypoints[found[keypoints]]]).query(person.vertices_m[skin])[0].max()
         for regions, keypoints in _NEARING
@@ -97,6 +97,12 @@ def beyond_keypoints_m(found: np.ndarray) -> float:
         if found[keypoints].any()
     ]
     return float(max(gaps_m, default=np.inf))
+
+
+@memoised()
+def _development_people() -> list[PosedBody]:
+    body = load_body()
+    return [pose_body(body, name, {}) for name in split_members("development")["bodies"]]
 
 
 def _found(runs: Sequence[Run], detector: str) -> np.ndarray:
