@@ -71,7 +71,7 @@ def clearances(metrics: pd.DataFrame, note: str) -> Figure:
 
 @in_style
 def sweep_curves(sweeps: Mapping[str, pd.DataFrame], note: str) -> Figure:
-    """Mean clearance of the first reach against what was swept, with its interval over people: a panel each.
+    """Mean least distance against what was swept, with its interval over people: a panel each.
 
     Parameters
     ----------
