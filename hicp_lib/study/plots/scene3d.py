@@ -66,8 +66,9 @@ def scene(
     axes = {f"{axis}axis": {"title": f"{axis} [m]", "backgroundcolor": "#FAFAFA"} for axis in "xyz"}
     figure.update_layout(
         scene={**axes, "aspectmode": "data", "camera": {"eye": _EYE}},
-        margin={"l": 0, "r": 0, "t": 0, "b": 0}, height=560, legend={"itemsizing": "constant", "y": 0.9},
-        template="plotly_white",
+        margin={"l": 0, "r": 0, "t": 0, "b": 0}, height=640, template="plotly_white",
+        # Below, where its long names leave the scene the width of a phone.
+        legend={"itemsizing": "constant", "orientation": "h", "y": 0, "yanchor": "top"},
     )  # fmt: skip
     return figure
 
