@@ -26,7 +26,8 @@ from hicp_lib.robot.skin import read_skin
 from hicp_lib.simulation.rendering.camera import project_world
 from hicp_lib.study.avoidance import SURE, sure_keypoints
 from hicp_lib.study.plots.avoidance import condition_colour
-from hicp_lib.study.plots.people import draw_people, picture_grid
+from hicp_lib.inspection.skeletons import draw_people
+from hicp_lib.study.plots.people import picture_grid
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 
 _THREATENED = 0.05  # activation from which a taxel is drawn
