@@ -1,0 +1,54 @@
+"""Videos in: one frame after the other."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hicp_lib.core.errors import InputError
+
+SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".webm")
+
+
+def count_frames(path: str | Path) -> int:
+    """How many frames a video says it has; 0 if it does not say.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    capture = cv2.VideoCapture(str(path))
+    try:
+        if not capture.isOpened():
+            raise InputError(f"{path}: is no video that OpenCV can read; give .mp4, .avi or .mov, or images")
+        return max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
+    finally:
+        capture.release()
+
+
+def read_frames(path: str | Path) -> Iterator[tuple[float, np.ndarray]]:
+    """The frames of a video, turned as players show them.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Yields
+    ------
+    time_s : float
+        From the start, as the file gives it.
+    image : array, shape (height, width, 3), dtype uint8
+        RGB.
+    """
+    capture = cv2.VideoCapture(str(path))
+    try:
+        while capture.grab():
+            time_s = capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3
+            decoded, bgr = capture.retrieve()
+            if not decoded:
+                return
+            yield time_s, cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+    finally:
+        capture.release()
