@@ -19,7 +19,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_bytes
 from hicp_lib.core.images import read_image, write_png
-from hicp_lib.core.keypoints import FACE, HANDS, LIMBS, NAMES
+from hicp_lib.core.keypoints import FACE, GROUPS, HANDS, LIMBS, N_KEYPOINTS, NAMES
 from hicp_lib.evaluation.ap.person_oks import person_oks
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.formats.detection_files import read_rows
@@ -85,7 +85,11 @@ def pictures(
     -------
     list of Picture
     """
-    oks = {} if annotations is None else {g: person_oks(annotations, found, g) for g in ("body", "hand")}
+    given = np.zeros(N_KEYPOINTS, bool)
+    for people in found.values():
+        given |= np.isfinite(people.keypoints_px).all(axis=-1).any(axis=0)
+    groups = [name for name, keypoints in GROUPS.items() if given[keypoints].any()]  # the detector's own
+    oks = {} if annotations is None else {name: person_oks(annotations, found, name) for name in groups}
     known = [
         Picture(
             path,
@@ -162,9 +166,7 @@ def write_pngs(chosen: list[Picture], out: Path, min_score: float) -> None:
         if picture.truth is not None:
             known = (picture.truth.visibility > 0).astype(float)
             image = draw_people(image, picture.truth.keypoints_px, known, _TRUTH_COLOUR)
-        image = draw_people(
-            image, picture.found.keypoints_px, picture.found.scores, _FOUND_COLOUR, min_score
-        )
+        image = draw_people(image, picture.found.keypoints_px, picture.found.scores, _FOUND_COLOUR, min_score)
         write_png(out / f"{rank:04}_{picture.path.stem}.png", image)
 
 
