@@ -1,11 +1,27 @@
-"""`hicp draw`: detections over their pictures."""
+"""`hicp inspect` and `hicp draw`: what files are, and what detections look like."""
 
+import json
 from pathlib import Path
 
 import click
 
 from hicp_lib.cli.options import PATH
 from hicp_lib.core.errors import InputError
+
+
+@click.command("inspect")
+@click.argument("path", type=PATH, metavar="FILE_OR_FOLDER")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def inspect_(path: Path, as_json: bool) -> int:
+    """Say what a file or a folder is: tool, layout, units, scores, times, counts, and what it needs.
+
+    Exit code 2 if it cannot be used.
+    """
+    from hicp_lib.inspection.inspect import inspect
+
+    facts = inspect(path)
+    click.echo(json.dumps(facts.as_dict(), indent=2) if as_json else "\n".join(facts.lines()))
+    return 2 if facts.problem else 0
 
 
 @click.command()

@@ -83,7 +83,9 @@ def pose_options(command):
 @click.option("--rate", type=click.FloatRange(min=0, min_open=True), help="Frames per second of a folder.")
 @click.option("--depth-scale", type=click.FloatRange(min=1), help="Depth units per metre of a folder.")
 @pose_options
-def import_(out, bag, color_topic, depth_topic, base_frame, joint_states, folder, rate, depth_scale, poses, mount):
+def import_(
+    out, bag, color_topic, depth_topic, base_frame, joint_states, folder, rate, depth_scale, poses, mount
+):
     """Make a recording in the folder OUT of what ROS, RealSense's or Open3D's tools saved.
 
     Without --poses, --base-frame or --joint-states the camera's own frame is the base frame.
