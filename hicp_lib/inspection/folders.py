@@ -8,6 +8,10 @@ from hicp_lib.inspection.facts import Facts
 from hicp_lib.inspection.json_files import inspect_json, inspect_predictions
 from hicp_lib.inspection.recordings import inspect_bag, inspect_recording
 
+_RESULTS = {
+    "alphapose-results.json": "alphapose", "coco_instances_results.json": "detectron2", "results.json": "coco",
+}  # fmt: skip
+_ONE_FILE_AN_IMAGE = {"people": "openpose", "instance_info": "mmpose", "keypoint_scores": "mmpose"}
 _CAMERA_FILES = ("intrinsic.json", "camera_intrinsic.json")
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff")
 
@@ -59,9 +63,8 @@ def _subsets(folder: Path) -> Facts:
         facts = _dataset(folder / name)
         says[name] = facts.says.get("people", facts.problem)
         notes += facts.notes
-    return Facts(
-        folder, "HiCP crops: Basic and Headless", says, notes, {"hicp detect": f"--dataset {folder}/basic"}
-    )
+    needs = {"hicp detect": "--dataset, one of the two"}
+    return Facts(folder, "HiCP crops: Basic and Headless", says, notes, needs)
 
 
 def _open3d(folder: Path) -> Facts:
@@ -71,36 +74,24 @@ def _open3d(folder: Path) -> Facts:
     if camera_file is None:
         return Facts(folder, "RGB-D folder", says, needs={"hicp record import": "intrinsic.json in it"})
     facts = inspect_json(camera_file)
-    content = read_json(camera_file)
-    missing = [
-        option for key, option in (("fps", "--rate"), ("depth_scale", "--depth-scale")) if key not in content
-    ]
+    content, options = read_json(camera_file), {"fps": "--rate", "depth_scale": "--depth-scale"}
+    missing = [option for key, option in options.items() if key not in content]
     if "fps" in content:
         says["times"] = f"{content['fps']} per second, as the file says"
     needs = {"hicp record import": f"--open3d, {', '.join([*missing, '--poses unless it stands still'])}"}
-    return Facts(
-        folder, "RGB-D folder of Open3D's tools", says | facts.says, facts.notes, needs, facts.problem
-    )
+    says |= facts.says
+    return Facts(folder, "RGB-D folder of Open3D's tools", says, facts.notes, needs, facts.problem)
 
 
 def _predictions(folder: Path, names: set[str]) -> Facts:
     for name in sorted(names):
         if name.endswith(".json"):
+            if name in _RESULTS:
+                return inspect_predictions(folder / name, _RESULTS[name])
             value = read_json(folder / name)
-            if isinstance(value, dict) and "people" in value:
-                return inspect_predictions(folder, "openpose")
-            if isinstance(value, dict) and "instance_info" in value or _is_mmpose(value):
-                return inspect_predictions(folder, "mmpose")
-            if name in ("alphapose-results.json", "coco_instances_results.json"):
-                return inspect_json(folder / name)
+            first = value[0] if isinstance(value, list) and value else value
+            for key, tool in _ONE_FILE_AN_IMAGE.items():
+                if isinstance(first, dict) and key in first:
+                    return inspect_predictions(folder, tool)
     listed = ", ".join(sorted(names)[:5]) or "nothing"
     raise InputError(f"{folder}: a folder of no kind that is known; it holds {listed}")
-
-
-def _is_mmpose(value: object) -> bool:
-    return (
-        isinstance(value, list)
-        and bool(value)
-        and isinstance(value[0], dict)
-        and "keypoint_scores" in value[0]
-    )

@@ -18,6 +18,7 @@ from hicp_lib.inspection.recordings import inspect_bag
 from hicp_lib.inspection.tables import inspect_detections_table, inspect_mocap, inspect_text
 
 _HEAD_BYTES = 8192
+_PRINTED = {*b"\t\r\n\f\x1a", *range(32, 256)}  # what texts are made of, in any code page
 
 
 def inspect(path: str | Path) -> Facts:
@@ -100,7 +101,7 @@ def _parquet(path: Path) -> Facts:
 def _network(path: Path) -> Facts:
     model = read_model(path, read_bytes(path, "expected an ONNX file"))
     said = {name: str(value)[:80] for name, value in list(model.metadata.items())[:5]}
-    says = {"operators": str(len(model.operators)), "first convolution": str(model.first_convolution), **said}
+    says = {"kinds of operators": str(len(model.operators)), **said}
     return Facts(path, "ONNX network", says, needs={"hicp detect": f"--detector NAME --model {path.name}"})
 
 
@@ -118,13 +119,16 @@ def _is_json(head: bytes) -> bool:
 
 
 def _is_video(head: bytes) -> bool:
-    return (
-        head[4:8] == b"ftyp" or head[:4] == b"\x1aE\xdf\xa3" or head[:4] == b"RIFF" and head[8:11] == b"AVI"
-    )
+    is_avi = head[:4] == b"RIFF" and head[8:11] == b"AVI"
+    return is_avi or head[4:8] == b"ftyp" or head[:4] == b"\x1aE\xdf\xa3"
 
 
 def _is_text(head: bytes) -> bool:
-    return b"\0" not in head
+    return not set(head) - _PRINTED
+
+
+def _is_c3d(head: bytes) -> bool:
+    return head[1:2] == b"\x50" and not _is_text(head[:512])
 
 
 _IMAGES = _begins(b"\x89PNG", b"\xff\xd8\xff", b"BM", b"II*\0", b"MM\0*")
@@ -133,11 +137,7 @@ _KINDS: list[tuple[Callable[[bytes], bool], str, Callable[[Path], Facts]]] = [
     (_is_video, "video", _video),
     (lambda head: _IMAGES(head) or head[8:12] == b"WEBP", "image", _image),
     (_begins(b"PAR1"), "Parquet table", _parquet),
-    (
-        lambda head: head[1:2] == b"\x50" and not _is_text(head[:512]),
-        "C3D",
-        lambda p: inspect_mocap(p, "C3D"),
-    ),
+    (_is_c3d, "C3D", lambda path: inspect_mocap(path, "C3D")),
     (_is_json, "", inspect_json),
     (_is_text, "", _text),
     (lambda head: True, "", _network),

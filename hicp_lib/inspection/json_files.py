@@ -10,6 +10,7 @@ from hicp_lib.core.files import read_json
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.annotations import read_annotations
 from hicp_lib.formats.importers.importing import READERS
+from hicp_lib.formats.units import refuse_fractions
 from hicp_lib.inspection.facts import Facts, about_people, about_scores
 from hicp_lib.mocap.registration import read_registration
 from hicp_lib.recordings.camera_file import read_distorted_camera
@@ -69,6 +70,7 @@ def inspect_predictions(path: Path, tool: str) -> Facts:
     """
     kind, origin = _RESULTS[tool]
     people = READERS[tool](path)
+    refuse_fractions(path, people.keypoints_px)
     known = np.isfinite(people.keypoints_px).all(axis=-1)
     layouts = ", ".join(f"{name} {n}" for name, n in people.conventions.items())
     says = {

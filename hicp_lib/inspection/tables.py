@@ -67,14 +67,12 @@ def inspect_mocap(path: Path, kind: str) -> Facts:
     """
     mocap = read_mocap(path)
     seen = np.isfinite(mocap.points_m).all(axis=-1)
-    low, high = (
-        (f(mocap.points_m[seen], axis=0) for f in (np.min, np.max)) if seen.any() else (np.nan, np.nan)
-    )
+    extent_m = np.ptp(mocap.points_m[seen], axis=0) if seen.any() else np.full(3, np.nan)
+    names = ", ".join(mocap.names[:12]) + (" ..." if len(mocap.names) > 12 else "")
     says = {
-        "markers": f"{len(mocap.names)}: {', '.join(mocap.names[:12])}{' ...' if len(mocap.names) > 12 else ''}",
+        "markers": f"{len(mocap.names)}: {names}",
         "frames": f"{len(mocap.times_s)}; markers seen in {100 * seen.mean():.1f} %",
-        "units": "metres once read; extent "
-        + " x ".join(f"{side:.2f}" for side in np.atleast_1d(high - low)),
+        "units": "metres once read; extent {:.2f} x {:.2f} x {:.2f}".format(*extent_m),
         "times": about_times(mocap.times_s, f"the system's own clock, {mocap.rate_hz:g} Hz stated"),
     }
     needs = {"the 3D error against motion capture": "a recording, with this file in its folder"}
@@ -128,7 +126,7 @@ def _trajectory(path: Path, n_columns: int, comment: str) -> Facts:
     moved_m = np.ptp(T_base_cam[:, :3, 3], axis=0)
     says = {
         "poses": f"{len(T_base_cam)}, camera to base; {n_columns} numbers in the first line",
-        "units": "metres; moved " + " x ".join(f"{side:.3f}" for side in moved_m),
+        "units": "metres; moved " + "{:.3f} x {:.3f} x {:.3f}".format(*moved_m),
         "times": about_times(times_s, "seconds"),
     }
     notes = [f"its first comment: {comment}"] if comment else []
