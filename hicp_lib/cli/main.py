@@ -133,7 +133,7 @@ def dataset_create(annotations: Path, images: Path, keypoint_map, out: Path, min
     counts = create_hicp(
         annotations, images, out, min_pixels, keypoint_map=keypoint_map, progress=sys.stderr.isatty()
     )
-    tell_notes(annotations, counts["notes"])
+    tell_notes(annotations, counts.get("notes", {}))
     click.echo(json.dumps(counts, indent=2))
 
 
@@ -243,7 +243,7 @@ def evaluate(
 
     people = read_annotations(annotations, keypoint_map)
     found = read_detections(detections, people)
-    tell_notes(annotations, people.notes)
+    tell_notes(annotations, people.notes, area)
     clusters = source_images(people)  # crops of one image are drawn together
     options = {"area": area} | ({"sigmas": sigmas} if sigmas else {})
     results = []

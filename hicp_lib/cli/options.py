@@ -1,6 +1,6 @@
 """Kinds of options that the `hicp` command's parts share."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -30,9 +30,19 @@ keypoint_map_option = click.option(
 )  # fmt: skip
 
 
-def tell_notes(path: Path, notes: Iterable[str]) -> None:
-    """Say on the error stream what a reader of the figures must know of a file."""
-    for note in notes:
+def tell_notes(path: Path, notes: Mapping[str, str], area: str = "segment") -> None:
+    """Say on the error stream what a reader of figures must know of a file; of areas, if they are used.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    notes : mapping of str to str
+        As of `hicp_lib.formats.annotations.Annotations`.
+    area : str, optional
+        As of `hicp_lib.evaluation.ap.options`.
+    """
+    for note in (note for about, note in notes.items() if about != "area" or area == "segment"):
         click.echo(f"{path}: {note}", err=True)
 
 

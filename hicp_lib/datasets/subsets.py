@@ -221,7 +221,7 @@ def create_hicp(
     Returns
     -------
     dict
-        As from `summary`; `notes` are those of the annotations.
+        As from `summary`; and `notes`, those of the annotations if any.
 
     Raises
     ------
@@ -241,7 +241,7 @@ def create_hicp(
     for subset in SUBSETS:
         path = out / subset / "annotations.json"
         write_annotations(path, crop_annotations(annotations, table, subset))
-    counts = summary(table) | {"notes": list(annotations.notes)}
+    counts = summary(table) | ({"notes": annotations.notes} if annotations.notes else {})
     write_json(out / "summary.json", counts, indent=2)
     return counts
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PureWindowsPath
 
 import numpy as np
@@ -35,7 +35,7 @@ from hicp_lib.formats.cropcoco import FLAG_OUTSIDE, OUTSIDE, outside_from_flags
 from hicp_lib.formats.json_validation import PART_KEYS, Rows, shown
 from hicp_lib.formats.layouts import KeypointMap, layouts_of
 from hicp_lib.formats.pairing import paired_images
-from hicp_lib.formats.units import outside_note, refuse_corners, refuse_fractions
+from hicp_lib.formats.units import corners_note, outside_note, refuse_fractions
 
 SEGMENT_OF_BOX = 0.53  # area of a person's segment over that of the box, as tools take it
 _LEAST_AREA, _MOST_AREA = 0.01, 2.0  # of a person, as a share of their box; another one stands for none
@@ -91,8 +91,9 @@ class Annotations:
         Per person, the further keys of its JSON object.
     category : PersonCategory
         Of people in the file.
-    notes : tuple of str
-        What a reader of the figures must know of the file: what was left out, assumed or is doubtful.
+    notes : dict of str to str
+        What a reader of the figures must know of the file, by what it is about: what was left out, assumed or
+        is doubtful.
 
     Examples
     --------
@@ -111,7 +112,7 @@ class Annotations:
     visibility: np.ndarray
     extras: list[dict]
     category: PersonCategory = PersonCategory()
-    notes: tuple[str, ...] = ()
+    notes: dict[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -197,12 +198,14 @@ def read_annotations(path: str | Path, keypoint_map: KeypointMap | None = None) 
     layouts, notes = layouts_of(f"{path}: keypoints of its category", category.keypoints, keypoint_map)
     rows, left_out = people_of(Rows.of(path, "annotations", data["annotations"]), category)
     people = _read_people(rows, images, layouts)
-    nameless = (
-        not category.keypoints and not keypoint_map and any(len(r["keypoints"]) == 51 for r in rows.rows)
-    )
-    guessed = "17 keypoints without names are taken for COCO's" if nameless else ""
-    notes = [note for note in (left_out, guessed, *notes, *people.notes) if note]
-    return replace(people, category=category, notes=tuple(notes))
+    if not category.keypoints and not keypoint_map and any(map(_is_bare_17, rows.rows)):
+        notes = {"names": "17 keypoints without names are taken for COCO's"}
+    notes = {"categories": left_out} | notes | people.notes
+    return replace(people, category=category, notes={about: note for about, note in notes.items() if note})
+
+
+def _is_bare_17(person: dict) -> bool:
+    return len(person["keypoints"]) == 3 * len(COCO_17) and PART_KEYS[0] not in person
 
 
 def _read_images(rows: Rows) -> dict[int, ImageInfo]:
@@ -244,10 +247,11 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Mapping[int,
     labelled = np.where((visibility > 0)[..., None], keypoints, np.nan)
     refuse_fractions(rows.path, labelled)
     refuse_fractions(rows.path, boxes.reshape(-1, 2, 2), "boxes")
-    refuse_corners(rows.path, boxes, labelled, sizes)
+    seen = boxes, labelled, sizes
+    notes = {"area": area_note, "boxes": corners_note(rows.path, *seen), "outside": outside_note(*seen)}
     return Annotations(
         images, ids, image_ids, boxes, areas, is_crowd, keypoints, visibility, rows.extras(_KNOWN_KEYS),
-        notes=(area_note, outside_note(boxes, labelled, sizes)),
+        notes=notes,
     )  # fmt: skip
 
 
@@ -264,8 +268,8 @@ def _areas(rows: Rows, boxes_px: np.ndarray, is_crowd: np.ndarray) -> tuple[np.n
     if not none.any():
         return areas, ""
     return areas, (
-        f"the area of {none.sum()} of {(~is_crowd).sum()} people is absent, 0 or far from their box's; "
-        f"{SEGMENT_OF_BOX} of the box is taken. To have one kind for all, give --area box or --area box53"
+        f"the area of {none.sum()} of {(~is_crowd).sum()} people is below a hundredth of their box, above "
+        f"twice or absent; {SEGMENT_OF_BOX} of the box is taken. For all alike, give --area box or box53"
     )
 
 

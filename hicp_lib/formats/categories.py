@@ -53,7 +53,8 @@ def person_category(path: Path, value: Any) -> PersonCategory:
         return PersonCategory()
     rows = Rows.of(path, "categories", value)
     ids = rows.unique_integers("id").tolist()
-    names = rows.column("name", lambda name: isinstance(name, str), "a name")
+    unnamed = {"default": _PEOPLE[0]} if len(ids) == 1 else {}
+    names = rows.column("name", lambda name: isinstance(name, str), "a name", **unnamed)
     keypoints = rows.column("keypoints", _are_names, "a list of names", default=None)
     people = [i for i, name in enumerate(names) if name.strip().lower() in _PEOPLE]
     people = [i for i in people if keypoints[i]] or people
@@ -97,7 +98,7 @@ def people_of(rows: Rows, category: PersonCategory) -> tuple[Rows, str]:
     for i, of in enumerate(rows.column("category_id", **default)):
         if type(of) is not int or of != category.id and of not in others:
             known = ", ".join(map(str, (category.id, *others)))
-            raise rows.error(i, f"category_id is {shown(of)}; expected one of the file's categories: {known}")
+            raise rows.error(i, f"category_id is {shown(of)}; the file's categories are {known}")
         if of == category.id:
             chosen.append(i)
         else:

@@ -86,7 +86,7 @@ def read_keypoint_map(path: str | Path) -> KeypointMap:
 
     Returns
     -------
-    dict of str to (str or None), or list of str
+    dict of str to str, or list of str
 
     Raises
     ------
@@ -107,7 +107,7 @@ def read_keypoint_map(path: str | Path) -> KeypointMap:
 
 def layouts_of(
     where: str, names: Sequence[str], keypoint_map: KeypointMap | None = None
-) -> tuple[dict[int, np.ndarray], list[str]]:
+) -> tuple[Mapping[int, np.ndarray], dict[str, str]]:
     """Where a file's keypoints belong, by the number of them that a person has.
 
     Parameters
@@ -123,7 +123,7 @@ def layouts_of(
     -------
     layouts : dict of int to array of int
         Number of keypoints -> their indices in Halpe-136, -1 where it has no counterpart.
-    notes : list of str
+    notes : dict of str to str
         What was left out, and what was taken for what.
 
     Raises
@@ -138,7 +138,7 @@ def layouts_of(
             )
         names, keypoint_map = keypoint_map, None
     if not names:
-        return BY_NUMBER, []
+        return BY_NUMBER, {}
     ours = _meanings(where, names, keypoint_map or {})
     indices = np.array([INDEX.get(name, -1) for name in ours])
     layouts = {len(names): indices}
@@ -180,14 +180,15 @@ def _meanings(where: str, names: Sequence[str], given: Mapping[str, str | None])
     return ours
 
 
-def _notes(names: Sequence[str], ours: list[str]) -> list[str]:
+def _notes(names: Sequence[str], ours: list[str]) -> dict[str, str]:
     out = [name for name, o in zip(names, ours, strict=True) if o == _NO_COUNTERPART]
     near = [
         f"{n} for {o}" for n, o in zip(names, ours, strict=True) if o in INDEX and _NEAR.search(_compact(n))
     ]
     absent = [name for name in COCO_NAMES if name not in ours]
-    return [
-        *([f"keypoints without a counterpart left out: {', '.join(out)}"] if out else []),
-        *([f"keypoints taken: {', '.join(near)}"] if near else []),
-        *([f"names no {', '.join(absent)}: the body is evaluated without"] if absent else []),
-    ]
+    notes = {
+        "dropped": out and f"keypoints without a counterpart left out: {', '.join(out)}",
+        "taken": near and f"keypoints taken: {', '.join(near)}",
+        "absent": absent and f"names no {', '.join(absent)}: the body is evaluated without",
+    }
+    return {about: note for about, note in notes.items() if note}

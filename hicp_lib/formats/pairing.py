@@ -31,7 +31,7 @@ def paired_images(rows: Rows, images: Mapping[int, ImageInfo]) -> np.ndarray:
 
     Returns
     -------
-    array of int64, shape (n,)
+    array of int, shape (n,)
         Image ids.
 
     Raises

@@ -10,6 +10,7 @@ _FRACTION = 1.5  # as large as fractions of an image get, when keypoints lie a l
 _LEAST_POINTS = 3  # fewer may lie at the corner of an image by chance
 _SLACK_PX = 1.0
 _FEW = 0.02  # of the labels, which lie outside their images in public data sets, too
+_CERTAIN = 10  # people, of whom none contradicts
 _MUCH = 0.25  # of a box's side: less from the image's corner, and its two readings are nearly one
 
 
@@ -35,18 +36,18 @@ def refuse_fractions(path: Path | str, points_px: np.ndarray, what: str = "keypo
     people = given.sum(axis=-1) >= min(_LEAST_POINTS, points_px.shape[-2])
     fractions = people & (small | ~given).all(axis=-1)
     if fractions.any() and 2 * fractions.sum() >= people.sum():
-        low = points_px[fractions][given[fractions]].min()
-        span = "[0, 1]" if low >= 0 else "[-1, 1]"
+        span = "[0, 1]" if points_px[fractions][given[fractions]].min() >= 0 else "[-1, 1]"
+        some = "" if fractions.sum() == people.sum() else f" of {fractions.sum()} of {people.sum()} people"
         raise InputError(
-            f"{path}: all coordinates of the {what} of {fractions.sum()} of {people.sum()} people lie in "
-            f"{span}; expected pixels, multiply them by the image's width and height"
+            f"{path}: {what}: all coordinates{some} lie in {span}; expected pixels, multiply by the image's "
+            "width and height"
         )
 
 
-def refuse_corners(
+def corners_note(
     path: Path | str, boxes_px: np.ndarray, keypoints_px: np.ndarray, sizes_px: np.ndarray
-) -> None:
-    """Refuse boxes that are x1, y1, x2, y2.
+) -> str:
+    """Refuse boxes that are x1, y1, x2, y2, and say where they could be.
 
     Parameters
     ----------
@@ -59,24 +60,31 @@ def refuse_corners(
     sizes_px : array, shape (n, 2)
         Width and height of their images.
 
+    Returns
+    -------
+    str
+        Empty where they cannot be corners.
+
     Raises
     ------
     InputError
-        If as corners all of them fit the images and the people, and as x, y, width, height they leave the
-        image, or three of them end far from their people.
+        If as corners all of them fit images and people, and as x, y, width, height most leave the image, or
+        ten end far beyond their people.
     """
     first, last = boxes_px[:, :2], boxes_px[:, 2:]
-    fits = ((last > first) & (last <= sizes_px + _SLACK_PX)).all(axis=-1)
-    for low, high in [(first - _SLACK_PX, last + _SLACK_PX)]:
-        within = (keypoints_px >= low[:, None]) & (keypoints_px <= high[:, None])
-        fits &= (within | np.isnan(keypoints_px)).all(axis=(1, 2))
+    low, high = (first - _SLACK_PX)[:, None], (last + _SLACK_PX)[:, None]
+    holds = ((keypoints_px >= low) & (keypoints_px <= high) | np.isnan(keypoints_px)).all(axis=(1, 2))
+    fits = holds & ((last > first) & (last <= sizes_px + _SLACK_PX)).all(axis=-1)
     far = (first > _MUCH * last).any(axis=-1)
-    leaves = far & (first + last > sizes_px + _SLACK_PX).any(axis=-1)
+    leaves = (first + last > sizes_px + _SLACK_PX).any(axis=-1) & far
     labelled = np.isfinite(keypoints_px).all(axis=-1).sum(axis=-1) >= _LEAST_POINTS
-    if fits[far].all() and (2 * leaves.sum() > far.sum() or (far & labelled).sum() >= _LEAST_POINTS):
-        raise InputError(
-            f"{path}: the boxes fit images and people as x1, y1, x2, y2 only; expected x, y, width, height"
-        )
+    n_far = int((far & labelled).sum())
+    if not fits[far].all() or not n_far and 2 * leaves.sum() <= far.sum():
+        return ""
+    if 2 * leaves.sum() > far.sum() or n_far >= _CERTAIN:
+        problem = "the boxes fit images and people as x1, y1, x2, y2 only"
+        raise InputError(f"{path}: bbox: {problem}; expected x, y, width, height")
+    return "the boxes would fit as x1, y1, x2, y2, too; they are read as x, y, width, height"
 
 
 def outside_note(boxes_px: np.ndarray, keypoints_px: np.ndarray, sizes_px: np.ndarray) -> str:
@@ -85,7 +93,7 @@ def outside_note(boxes_px: np.ndarray, keypoints_px: np.ndarray, sizes_px: np.nd
     Parameters
     ----------
     boxes_px, keypoints_px, sizes_px : array
-        As of `refuse_corners`.
+        As of `corners_note`.
     """
     ends = np.stack([boxes_px[:, :2], boxes_px[:, :2] + boxes_px[:, 2:]], axis=1)
     counts = []
