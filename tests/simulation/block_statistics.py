@@ -98,14 +98,15 @@ def textures_seen() -> list[np.ndarray]:
         "strands",
         "skin",
     )
-    made = [getattr(textures, name)() for name in (*plain, "dots")]
-    made += [
-        textures.stripes(0.35),
-        *(textures.checks(k) for k in range(3)),
-        *(textures.blobs(k) for k in range(3)),
+    made = [(getattr(textures, name),) for name in plain]
+    made += [(textures.dots, 0.16), (textures.stripes, 0.35)]
+    made += [(pattern, k) for pattern in (textures.checks, textures.blobs) for k in range(3)]
+    made += [*((textures.prints, k) for k in range(4)), (textures.picture, 3)]
+    return [
+        textures.sample(pattern, uv, footprint_m, *numbers).T
+        for pattern, *numbers in made
+        for footprint_m in (0.0002, 0.01)
     ]
-    made += [*(textures.prints(k) for k in range(4)), textures.picture(3)]
-    return [texture.sample(uv, footprint_m).T for texture in made for footprint_m in (0.0002, 0.01)]
 
 
 def styles_drawn() -> np.ndarray:
@@ -184,7 +185,7 @@ def cloths() -> list[np.ndarray]:
         [*f.colours.ravel(), f.pattern is None, f.weave_m, f.crease_m, f.roughness, f.gloss, f.fuzz]
         for f in made
     ]
-    return [*found, chest.T, np.array(numbers, float), np.column_stack(list(astuple(panels)))]
+    return [*found, chest.T, np.array(numbers, float), np.column_stack([*astuple(panels), fabrics._PANEL_RADII_M])]
 
 
 def shoes() -> list[np.ndarray]:

@@ -162,7 +162,7 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
     def look(hits: Hits) -> Look:
         c = dict(zip(COORDS, hits.coords, strict=True))
         uv = np.stack([c["y"] + 0.5 * c["x"], c["z"] + 0.3 * c["x"]])
-        blotches, pores, freckles = textures.skin().sample(uv, hits.footprint_m)
+        blotches, pores, freckles = textures.sample(textures.skin, uv, hits.footprint_m)
         flush = np.clip(c["flush"] * (1 + 0.25 * blotches) + 0.07 * blotches, -0.2, 1)
         flush *= 1 - 0.4 * complexion.tone
         albedo = column(tone) + (column(red) - column(tone)) * flush
@@ -210,7 +210,7 @@ def _paint_hair(complexion: Complexion, scalp: float, albedo, c, uv, footprint) 
     """Eyebrows, lashes, stubble and the hair's roots."""
     hair = column(complexion.hair) * 0.7
     slanted = np.stack([uv[0] + uv[1], uv[1] * 2 - uv[0]])
-    fibre = textures.strands().sample(slanted, footprint)[0]
+    fibre = textures.sample(textures.strands, slanted, footprint)[0]
     brow = complexion.brows * _step(c["brow_m"] + 0.0008 * fibre, -0.0026, 0.0008)
     lash = 0.85 * _step(c["lash_m"], -0.0008, 0.0006)
     roots = scalp * _step(c["hairline_m"] + 0.002 * fibre, -0.001, 0.006)
