@@ -6,7 +6,7 @@ import numpy as np
 
 from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.appearance import clothing, fabrics, footwear, hair, hair_styles, skin
-from hicp_lib.simulation.body.identities import Identity, is_woman, traits
+from hicp_lib.simulation.body.identities import PEOPLE, Identity, is_woman, traits
 from hicp_lib.simulation.body.model import REGIONS, Body, PosedBody, load_body, rest_shape
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.surfaces import Material, Surface
@@ -109,40 +109,27 @@ def appearance_of(identity: Identity, skirts: bool = True) -> Appearance:
     return Appearance(identity.body, complexion, style, worn, skirt, shoes, int(rng.integers(2**31)))
 
 
-# How often, and what of a top differs from `_PLAIN_TOP`: of several values one is drawn, in this order.
-_TOPS = {"tshirt": 0.34, "longsleeve": 0.2, "shirt": 0.2, "hoodie": 0.12, "tank": 0.06, "polo": 0.08}
-_PLAIN_TOP = {"end": 1.03, "sleeve": 2.0, "ease_m": 0.010, "thickness_m": 0.005}
-_TOP: dict[str, dict[str, float | list[float]]] = {
-    "tshirt": {"sleeve": [0.45, 0.55, 0.7], "ease_m": [0.008, 0.014, 0.02]},
-    "longsleeve": {"sleeve": [1.95, 1.9, 1.4], "thickness_m": [0.005, 0.008]},
-    "shirt": {"sleeve": [1.95, 1.95, 1.3, 0.6], "ease_m": 0.012, "opening": [0.06, 0.1]},
-    "hoodie": {"thickness_m": 0.011, "ease_m": 0.016, "end": 1.06, "opening": 0.05},
-    "tank": {"sleeve": 0.06, "ease_m": 0.006, "opening": 0.14, "thickness_m": 0.004},
-    "polo": {"sleeve": [0.5, 0.6], "opening": 0.06},
-}
 _TRIMS = {"polo": fabrics.Trim(0.025, 0.9), "shirt": fabrics.Trim(0.02, 1.0, "buttons")}
-_IS_PLAIN = {"hoodie": 0.9, "shirt": 0.3}  # how often it has no pattern; others: 0.6
-_BOTTOMS = {"jeans": (0.42, 0.45), "chinos": (0.28, 0.37), "shorts": (0.18, 0.18), "leggings": (0.12, 0.0)}
-"""How often women and men wear them."""
 
 
 def _outfit(rng: Rng, woman: bool, skirts: bool) -> tuple[list[Worn], Skirt | None]:
-    top = _top(rng, str(rng.choice(list(_TOPS), p=list(_TOPS.values()))), woman)
+    top = _top(rng, str(rng.choice(list(PEOPLE["tops"]), p=list(PEOPLE["tops"].values()))), woman)
     if not (woman and skirts and rng.random() < 0.22):
-        odds = [pair[0 if woman else 1] for pair in _BOTTOMS.values()]
-        return [top, _bottom(rng, str(rng.choice(list(_BOTTOMS), p=odds)))], None
+        odds = [pair[0 if woman else 1] for pair in PEOPLE["bottoms"].values()]
+        return [top, _bottom(rng, str(rng.choice(list(PEOPLE["bottoms"]), p=odds)))], None
     fabric = top.fabric if rng.random() < 0.4 else fabrics.random_fabric(rng, 0.6)
     skirt = Skirt(rng.uniform(0.38, 0.75), rng.uniform(0.05, 0.5), rng.uniform(0, 6), fabric)
     return [top, _bottom(rng, "leggings")] if rng.random() < 0.4 else [top], skirt
 
 
 def _top(rng: Rng, kind: str, woman: bool) -> Worn:
-    fabric = fabrics.random_fabric(rng, _IS_PLAIN.get(kind, 0.6))
+    fabric = fabrics.random_fabric(rng, PEOPLE["unpatterned"].get(kind, 0.6))
     if fabric.pattern is None and kind in ("tshirt", "longsleeve", "hoodie") and rng.random() < 0.5:
         fabric = replace(fabric, pattern=fabrics.printed(rng))
-    cut = _PLAIN_TOP | {"start": rng.choice([-0.16, -0.1, -0.05]), "opening": rng.choice([0.04, 0.07, 0.1])}
+    cut = PEOPLE["plain_top"] | {"start": rng.choice([-0.16, -0.1, -0.05])}
+    cut["opening"] = rng.choice([0.04, 0.07, 0.1])
     trim = fabrics.Trim(0.03, rng.choice([1.0, 0.9, 0.8]))
-    cut |= {name: rng.choice(x) if isinstance(x, list) else x for name, x in _TOP[kind].items()}
+    cut |= {name: rng.choice(x) if isinstance(x, list) else x for name, x in PEOPLE["top"][kind].items()}
     if kind == "hoodie":
         trim = fabrics.Trim(0.07, 0.88, rng.choice(["none", "zip"]))
     if woman and rng.random() < 0.5:

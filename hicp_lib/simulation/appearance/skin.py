@@ -8,19 +8,13 @@ from scipy.spatial import KDTree
 from hicp_lib.core.keypoints import FACE, HANDS
 from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.appearance.materials import hsv, linear
+from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.body.model import Body
 from hicp_lib.simulation.rendering import textures
 from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 
-# sRGB from the fairest to the darkest, evenly spaced on the scale of `Complexion.tone`.
-_TONES = linear([
-    [0.925, 0.755, 0.665], [0.895, 0.705, 0.590], [0.845, 0.640, 0.515], [0.765, 0.565, 0.430],
-    [0.620, 0.435, 0.325], [0.455, 0.310, 0.235], [0.320, 0.215, 0.170],
-])  # fmt: skip
-_IRISES = linear([[0.30, 0.18, 0.09], [0.20, 0.11, 0.06], [0.38, 0.50, 0.62], [0.40, 0.45, 0.30]])
-# Of hair that is neither dark nor grey: how often, hue, saturation, between what the value lies.
-_HAIR = ((0.4, 0.07, 0.55, (0.26, 0.38)), (0.25, 0.075, 0.55, (0.40, 0.55)),
-         (0.25, 0.105, 0.45, (0.62, 0.85)), (0.1, 0.045, 0.7, (0.45, 0.62)))  # fmt: skip
+_TONES, _IRISES = (linear(PEOPLE[name]) for name in ("skin_srgb", "irises_srgb"))
+_HAIR = PEOPLE["hair_hsv"]
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,8 @@ from hicp_lib.core.memo import memoised, plain_fields
 SPLITS = ("development", "held out")
 HELD_OUT = SPLITS[1]
 KINDS = ("clothes", "room", "lights", "poses", "camera")
+PEOPLE = read_json(DATA_DIR / "people.json")
+"""What people can do and how they look: joints, poses, hands, hair, clothes, skin; see data/README.md."""
 _read = memoised()(read_json)
 
 

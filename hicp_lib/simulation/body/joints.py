@@ -13,30 +13,17 @@ import numpy as np
 
 from hicp_lib.core.memo import memoised
 from hicp_lib.core.rotations import about, rotation
+from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.body.model import Pose
 
 Joints = dict[str, float]
 
 FINGERS = ("index", "middle", "ring", "little")
 
-_LIMB_LIMITS_DEG = {
-    "shoulder_flexion": (-60, 180), "shoulder_abduction": (-45, 180), "shoulder_rotation": (-90, 90),
-    "elbow_flexion": (0, 150), "forearm_supination": (-80, 80),
-    "wrist_flexion": (-70, 80), "wrist_deviation": (-30, 20),
-    "hip_flexion": (-30, 120), "hip_abduction": (-30, 45), "hip_rotation": (-45, 45),
-    "knee_flexion": (0, 135), "ankle_flexion": (-20, 50),
-    "thumb_base": (-25, 45), "thumb_spread": (-25, 50), "thumb_knuckle": (-15, 50), "thumb_end": (-15, 80),
-    **{f"{finger}_spread": (-20, 20) for finger in FINGERS},
-    **{f"{finger}_knuckle": (-20, 90) for finger in FINGERS},
-    **{f"{finger}_middle": (0, 100) for finger in FINGERS},
-    **{f"{finger}_end": (0, 80) for finger in FINGERS},
-}  # fmt: skip
-LIMITS_DEG: dict[str, tuple[float, float]] = {
-    "spine_flexion": (-25, 80), "spine_bend": (-35, 35), "spine_turn": (-45, 45),
-    "neck_flexion": (-45, 45), "neck_bend": (-45, 45), "neck_turn": (-60, 60),
-    "eye_pitch": (-25, 25), "eye_turn": (-35, 35),
-    **{f"{side}_{joint}": limits for side in ("left", "right") for joint, limits in _LIMB_LIMITS_DEG.items()},
-}  # fmt: skip
+_LIMB_LIMITS_DEG = PEOPLE["joints_deg"]["limb"]
+LIMITS_DEG: dict[str, tuple[float, float]] = PEOPLE["joints_deg"]["trunk"] | {
+    f"{side}_{joint}": limits for side in ("left", "right") for joint, limits in _LIMB_LIMITS_DEG.items()
+}
 """Range of every joint in degrees: the normal ranges of the American Academy of Orthopaedic
 Surgeons (Joint Motion: Method of Measuring and Recording, 1965), where it gives one; thumb, finger
 spread and eyes are estimates."""

@@ -8,7 +8,7 @@ import numpy as np
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.simulation.appearance.materials import hsv
 from hicp_lib.simulation.appearance.people import appearance_of, dress
-from hicp_lib.simulation.body.identities import HELD_OUT, Identity, draw_identity
+from hicp_lib.simulation.body.identities import HELD_OUT, PEOPLE, Identity, draw_identity
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
 from hicp_lib.simulation.rendering import lights
@@ -102,19 +102,12 @@ def _person(identity: Identity, place: tuple[float, float], number: int) -> tupl
     T_world_body = np.eye(4)
     T_world_body[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
     T_world_body[:2, 3] = place
-    kind = str(rng.choice(list(_POSES), p=list(_POSES.values())))
+    kind = str(rng.choice(list(PEOPLE["photographed"]), p=list(PEOPLE["photographed"].values())))
     if kind == "sitting" and appearance.skirt is not None:  # a skirt would have to drape over the seat
         kind = "standing"
     body = load_body()
     posed = pose_body(body, appearance.shape, sample_pose(rng, body, kind, appearance.shape), T_world_body)
     return posed, dress(appearance, posed, number) + ([stool(rng, posed)] if kind == "sitting" else [])
-
-
-# How often each kind of pose is photographed.
-_POSES = {
-    "standing": 0.14, "walking": 0.10, "reaching": 0.17, "reaching_both": 0.15, "pointing": 0.08,
-    "crossed": 0.06, "raised": 0.10, "hips": 0.07, "face": 0.07, "sitting": 0.06,
-}  # fmt: skip
 
 
 def _camera(rng: Rng, person: PosedBody) -> PlacedCamera:
