@@ -185,7 +185,12 @@ def cloths() -> list[np.ndarray]:
         [*f.colours.ravel(), f.pattern is None, f.weave_m, f.crease_m, f.roughness, f.gloss, f.fuzz]
         for f in made
     ]
-    return [*found, chest.T, np.array(numbers, float), np.column_stack([*astuple(panels), fabrics._PANEL_RADII_M])]
+    return [
+        *found,
+        chest.T,
+        np.array(numbers, float),
+        np.column_stack([*astuple(panels), fabrics._PANEL_RADII_M]),
+    ]
 
 
 def shoes() -> list[np.ndarray]:

@@ -90,7 +90,7 @@ def _cut_pattern(garment: Garment) -> Pattern:
     deep = field > 0.03
     return Pattern(
         cut=cut,
-        smoothing=_smoothing(g.neighbours(cut.triangles, len(cut.i))),
+        smoothing=g.smoothing(cut.triangles, len(cut.i)),
         distance=np.maximum(cut.apply(field.astype(np.float32)), 0),
         rim=g.boundary_edges(cut.triangles),
         hidden=deep[body.triangles].all(axis=1),
@@ -176,14 +176,6 @@ def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, 
     cloth = cloth + (heights * np.minimum(away / 0.01, 1.5))[:, None] * skin_normals
     away = np.maximum(0.6 * away, below + 0.003 * (below > 0))
     return _keep_away(pattern.smoothing @ cloth.astype(np.float32), skin, skin_normals, away)
-
-
-def _smoothing(neighbours: np.ndarray) -> sparse.csr_array:
-    """One step of smoothing as a matrix, from each vertex's neighbours (n, k)."""
-    n, k = neighbours.shape
-    rows = np.repeat(np.arange(n), k)
-    mean = sparse.csr_array((np.full(n * k, 1 / k, np.float32), (rows, neighbours.ravel())), shape=(n, n))
-    return sparse.csr_array(np.float32(0.4) * sparse.eye_array(n, dtype=np.float32) + np.float32(0.6) * mean)
 
 
 def _keep_away(cloth: np.ndarray, skin: np.ndarray, normals: np.ndarray, away: np.ndarray) -> np.ndarray:

@@ -77,26 +77,20 @@ class GBuffer:
         return pick(grid.reshape(len(grid), -1), self.pixels)
 
 
-@dataclass
-class Shading:
-    """What a G-buffer's n pixels are shaded by, see `surfaces.Look`; components first, (3, n) or (n,)."""
+@dataclass(kw_only=True)
+class Shading(Look):
+    """What a G-buffer's n pixels are shaded by: (3, n) or (n,) each, and their normals."""
 
     normals: np.ndarray
-    albedo: np.ndarray
-    glow: np.ndarray
-    height_m: np.ndarray
-    gloss: np.ndarray
-    roughness: np.ndarray
-    softness: np.ndarray
 
     def part(self, block: slice) -> "Shading":
         """Some of the pixels."""
-        return Shading(*(getattr(self, field.name)[..., block] for field in fields(self)))
+        return Shading(**{name: values[..., block] for name, values in vars(self).items()})
 
     def put(self, rows: np.ndarray, look: Look) -> None:
         """What one surface looks like at some of the pixels."""
-        for field in fields(look):
-            value, target = getattr(look, field.name), getattr(self, field.name)
+        for name, value in vars(look).items():
+            target = getattr(self, name)
             if target.ndim == 2 and np.ndim(value):
                 place(target, rows, value)
             elif np.ndim(value) or value:
@@ -122,11 +116,9 @@ def evaluate_materials(scene: RayScene, gbuffer: GBuffer, pixel_rad: float) -> S
     corners = np.ascontiguousarray(scene.triangles.take(gbuffer.triangle, axis=0).T, np.intp)
     second, third = gbuffer.barycentric.T
     weights = np.stack([1 - second - third, second, third])
-    shading = Shading(
-        _normals(scene, gbuffer, corners, weights),
-        *(np.zeros((3, n), np.float32) for _ in range(2)),
-        *(np.zeros(n, np.float32) for _ in range(4)),
-    )
+    colours = ("albedo", "glow")
+    empty = {f.name: np.zeros((3, n) if f.name in colours else n, np.float32) for f in fields(Look)}
+    shading = Shading(normals=_normals(scene, gbuffer, corners, weights), **empty)
     surface = gbuffer.surface.ravel().take(gbuffer.pixels)
     footprint_m = gbuffer.depth_m.ravel().take(gbuffer.pixels) * np.float32(pixel_rad)
     order = np.argsort(surface, kind="stable")

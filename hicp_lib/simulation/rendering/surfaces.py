@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,11 +56,11 @@ class Look:
     """
 
     albedo: np.ndarray
-    height_m: np.ndarray | float = 0.0
-    gloss: np.ndarray | float = 0.04
-    roughness: np.ndarray | float = 0.6
-    softness: np.ndarray | float = 0.0
-    glow: np.ndarray | float = 0.0
+    height_m: Any = 0.0
+    gloss: Any = 0.04
+    roughness: Any = 0.6
+    softness: Any = 0.0
+    glow: Any = 0.0
 
 
 Material = Callable[[Hits], Look]

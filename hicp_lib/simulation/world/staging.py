@@ -160,16 +160,9 @@ def _temperature(warm_to_cool: float) -> np.ndarray:
 
 def _sensor(rng: Rng) -> Sensor:
     tint = hsv(rng.random(), rng.uniform(0, 0.08), 1.0)
-    return Sensor(
-        white_balance=tint / tint.mean(),
-        exposure=float(np.exp(rng.normal(0.05, 0.18))),
-        blur_px=rng.uniform(0.35, 0.75),
-        vignette=rng.uniform(0.05, 0.35),
-        shot_noise=rng.uniform(0.006, 0.022),
-        read_noise=rng.uniform(0.001, 0.005),
-        contrast=rng.uniform(0.9, 1.4),
-        saturation=rng.uniform(0.8, 1.15),
-    )
+    exposure = float(np.exp(rng.normal(0.05, 0.18)))
+    others = {name: rng.uniform(*limits) for name, limits in PEOPLE["camera"].items()}
+    return Sensor(tint / tint.mean(), exposure, **others)
 
 
 def distance_m(camera: PlacedCamera, person: PosedBody) -> float:
