@@ -54,7 +54,7 @@ def wood_colour(rng: Rng) -> np.ndarray:
     return hsv(rng.uniform(0.055, 0.095), rng.uniform(0.3, 0.6), rng.uniform(0.3, 0.8))
 
 
-def plain(colour: np.ndarray, roughness: float = 0.5, gloss: float = 0.04) -> Material:
+def plain(colour: np.ndarray, roughness: float = 0.5, gloss: float = 0.04, glow: float = 0.0) -> Look:
     """One colour all over.
 
     Parameters
@@ -63,19 +63,14 @@ def plain(colour: np.ndarray, roughness: float = 0.5, gloss: float = 0.04) -> Ma
         Linear RGB.
     roughness, gloss : float, optional
         See `surfaces.Look`.
+    glow : float, optional
+        Light given off, as a share of the colour.
 
     Returns
     -------
-    callable
+    Look
     """
-    look = Look(column(colour), gloss=gloss, roughness=roughness)
-    return lambda hits: look
-
-
-def glowing(colour: np.ndarray, glow: float) -> Material:
-    """A lamp's shade."""
-    look = Look(column(colour), glow=column(glow * colour))
-    return lambda hits: look
+    return Look(column(colour), gloss=gloss, roughness=roughness, glow=glow and column(glow * colour))
 
 
 def mixed(

@@ -39,14 +39,8 @@ class Worn:
     collar: bool = False
 
 
-@dataclass(frozen=True)
-class Skirt:
-    """A skirt: its length, how much wider its hem is, the phase of its folds (radians), its fabric."""
-
-    length_m: float
-    flare: float
-    phase: float
-    fabric: fabrics.Fabric
+Skirt = tuple[float, float, float, fabrics.Fabric]
+"""Length (m), how much wider than the legs the hem is (a share), phase of its folds (radians), fabric."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +112,7 @@ def _outfit(rng: Rng, woman: bool, skirts: bool) -> tuple[list[Worn], Skirt | No
         odds = [pair[0 if woman else 1] for pair in PEOPLE["bottoms"].values()]
         return [top, _bottom(rng, str(rng.choice(list(PEOPLE["bottoms"]), p=odds)))], None
     fabric = top.fabric if rng.random() < 0.4 else fabrics.random_fabric(rng, 0.6)
-    skirt = Skirt(rng.uniform(0.38, 0.75), rng.uniform(0.05, 0.5), rng.uniform(0, 6), fabric)
+    skirt = (rng.uniform(0.38, 0.75), rng.uniform(0.05, 0.5), rng.uniform(0, 6), fabric)
     return [top, _bottom(rng, "leggings")] if rng.random() < 0.4 else [top], skirt
 
 
@@ -250,8 +244,9 @@ def _skin(appearance: Appearance, posed: PosedBody, paint, shown, part, person: 
 
 def _skirt(skirt: Skirt, body: Body, posed: PosedBody, panels: fabrics.Panels, person: int) -> Surface:
     hips = posed.rotations[body.bone_numbers["root"]]
-    mesh = clothing.skirt(posed, hips, skirt.length_m, skirt.flare, skirt.phase)
-    material = fabrics.cloth_material(skirt.fabric, panels, "", fabrics.Trim(0.02, 0.95))
+    *cut, fabric = skirt
+    mesh = clothing.skirt(posed, hips, *cut)
+    material = fabrics.cloth_material(fabric, panels, "", fabrics.Trim(0.02, 0.95))
     return _of_region("hips", mesh, material, person)
 
 

@@ -1,7 +1,6 @@
 """The G-buffer: geometry and material of what each pixel shows, where its ray met it."""
 
 from dataclasses import dataclass, fields
-from functools import partial
 
 import numpy as np
 
@@ -125,8 +124,13 @@ def evaluate_materials(scene: RayScene, gbuffer: GBuffer, pixel_rad: float) -> S
     bounds = np.searchsorted(surface, np.arange(len(scene.surfaces) + 1), sorter=order)
     for number in np.flatnonzero(np.diff(bounds)):
         rows = order[bounds[number] : bounds[number + 1]]
-        coords = partial(_coords, scene, int(number), corners, weights, rows)
-        shading.put(rows, scene.surfaces[number].material(Hits(footprint_m.take(rows), coords)))
+        material = scene.surfaces[number].material
+        if not isinstance(material, Look):
+            local = pick(corners, rows) - scene.first_vertex[number]
+            coords = np.ascontiguousarray(scene.surfaces[number].mesh.coords.T, np.float32)
+            seen = interpolate(coords, local, pick(weights, rows))
+            material = material(Hits(footprint_m.take(rows), seen))
+        shading.put(rows, material)
     return shading
 
 
@@ -137,10 +141,3 @@ def _normals(scene: RayScene, gbuffer: GBuffer, corners: np.ndarray, weights: np
     scale = 1 / np.maximum(np.sqrt(dot(normals, normals)), np.float32(1e-9))
     normals *= np.where(away, -scale, scale)
     return normals
-
-
-def _coords(scene: RayScene, number: int, corners, weights, rows: np.ndarray) -> np.ndarray:
-    """The coords of one surface's mesh, interpolated at some of the hits."""
-    local = pick(corners, rows) - scene.first_vertex[number]
-    coords = np.ascontiguousarray(scene.surfaces[number].mesh.coords.T, np.float32)
-    return interpolate(coords, local, pick(weights, rows))

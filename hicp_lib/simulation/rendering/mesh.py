@@ -178,8 +178,8 @@ def quad(corner_m: ArrayLike, u_m: ArrayLike, v_m: ArrayLike) -> Mesh:
     return Mesh(vertices, QUAD.astype(np.int32), normals, coords)
 
 
-# Corners (24, 3), normals (24, 3) and triangles (12, 3) of a unit cube, and which of the corners' numbers are u
-# and v. A face's corners go around in the order in which it looks outwards.
+# Corners (24, 3), normals (24, 3) and triangles (12, 3) of a unit cube, and which of the corners' numbers are
+# u and v. A face's corners go around in the order in which it looks outwards.
 _FACES = [(axis, side) for axis in range(3) for side in (0, 1)]
 _SQUARE = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float32)
 _CUBE = (

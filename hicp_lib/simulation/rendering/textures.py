@@ -70,7 +70,7 @@ def sample(
     if level.ndim == 0 or level.min() == level.max():
         return _lookup(texture, int(level.flat[0]), uv_m)
     result = np.empty((texture.levels[0].shape[2], uv_m.shape[1]), np.float32)
-    for number in np.flatnonzero(np.bincount(level)):
+    for number in np.flatnonzero(np.bincount(level)).tolist():
         rows = np.flatnonzero(level == number)
         place(result, rows, _lookup(texture, number, uv_m.take(rows, axis=1)))
     return result
@@ -93,7 +93,8 @@ def _lookup(texture: Texture, number: int, uv_m: np.ndarray) -> np.ndarray:
 @memoised()
 def _texture(pattern: Pattern, *numbers: float) -> Texture:
     period, width_m = pattern(*numbers)
-    tile, levels = np.atleast_3d(period).astype(np.float32), []
+    tile: np.ndarray = np.atleast_3d(period).astype(np.float32)
+    levels = []
     while True:
         levels.append(np.ascontiguousarray(np.pad(tile, ((0, 1), (0, 1), (0, 0)), mode="wrap")))
         if tile.shape[0] <= 2:

@@ -12,7 +12,7 @@ from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.body.model import Body, PosedBody, Shape, load_body, pose_body
 from hicp_lib.simulation.rendering.mesh import Mesh
 from hicp_lib.simulation.rendering.raycast import RayScene
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Surface
+from hicp_lib.simulation.rendering.surfaces import Look, Surface
 
 SIDES = {
     "shoulder": ((0.6, 0.8, 0), (-0.6, 0.8, 0)),  # outer side, one towards the front, one the back
@@ -32,6 +32,8 @@ CAMERA_MARKER_M = (0.0325, -0.0185, -0.008)
 """The marker on the depth camera in the colour camera's frame: in the middle of the D435's top. The
 colour camera lies 32.5 mm beside that middle, 12.5 mm below the top and 4 mm behind the front of the
 housing, which is 25 mm deep; the marker's own radius is 6 mm."""
+
+_UNSEEN = Look(np.zeros((3, 1)))  # these scenes are only for casting rays
 
 _BELOW_SHOULDER = 0.3  # of the way from shoulder to elbow
 
@@ -120,7 +122,7 @@ def body_scene(person: PosedBody, obstacles: tuple[Mesh, ...] = ()) -> RayScene:
     obstacles : tuple of Mesh, optional
     """
     skin = _bare(person, _coarse_triangles())
-    return RayScene([skin, *(Surface(mesh, _unseen) for mesh in obstacles)])
+    return RayScene([skin, *(Surface(mesh, _UNSEEN) for mesh in obstacles)])
 
 
 @memoised(1)
@@ -140,8 +142,4 @@ def _coarse_triangles() -> np.ndarray:
 
 def _bare(person: PosedBody, triangles: np.ndarray) -> Surface:
     no_coords = np.zeros((len(person.vertices_m), 0))
-    return Surface(Mesh(person.vertices_m, triangles, person.normals, no_coords), _unseen)
-
-
-def _unseen(hits: Hits) -> Look:
-    raise NotImplementedError("this scene is only for casting rays")
+    return Surface(Mesh(person.vertices_m, triangles, person.normals, no_coords), _UNSEEN)
