@@ -144,7 +144,8 @@ def hair_grown() -> list[np.ndarray]:
         hair_styles.Style(0.3, 0.3, tie="bun", n_locks=200),
         hair_styles.Style(0.07, 0.05, coil_m=0.007, n_locks=300),
     ]
-    grown = [hair.grow(style, BODY, rest, landmarks, rng) for style, rng in zip(styles, rngs(4), strict=True)]
+    head = hair.obstacles(BODY, rest, landmarks)
+    grown = [hair.grow(style, BODY, rest, head, rng) for style, rng in zip(styles, rngs(4), strict=True)]
     carried = hair.carry(grown[0], BODY, posed, heads, landmarks)
     return [*map(mesh, grown), mesh(carried), looks(hair.hair_material(np.array([0.2, 0.1, 0.05])), 4)]
 
@@ -189,7 +190,7 @@ def cloths() -> list[np.ndarray]:
         *found,
         chest.T,
         np.array(numbers, float),
-        np.column_stack([*astuple(panels), fabrics._PANEL_RADII_M]),
+        np.column_stack([panels[0], *panels[1].swapaxes(0, 1)[:2], fabrics._PANEL_RADII_M]),
     ]
 
 

@@ -13,24 +13,11 @@ from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 Rng = np.random.Generator
 
 
-@dataclass(frozen=True)
-class Panels:
-    """How a person's garments are laid out flat: axes of trunk and limbs at rest, body frame.
-
-    There is one row per panel: 0 trunk, 1 left arm, 2 right arm, 3 left leg, 4 right leg;
-    coordinates run along the axis and around it, from the front.
-
-    Attributes
-    ----------
-    origins_m : array, shape (5, 3)
-    axes, fronts : array, shape (5, 3)
-        Unit vectors, at right angles to each other.
-    """
-
-    origins_m: np.ndarray
-    axes: np.ndarray
-    fronts: np.ndarray
-
+Panels = tuple[np.ndarray, np.ndarray]
+"""How a person's garments are laid out flat, at rest in the body frame: origins in metres, (5, 3), and
+axis, front and side of each panel, (5, 3, 3), unit vectors at right angles to each other. 0 is the trunk,
+then come left arm, right arm, left leg and right leg; coordinates run along the axis and around it, from
+the front."""
 
 _PANEL_ENDS = (("mid_hip", "neck"), ("left_shoulder", "left_wrist"), ("right_shoulder", "right_wrist"),
                ("left_hip", "left_ankle"), ("right_hip", "right_ankle"))  # fmt: skip
@@ -45,7 +32,8 @@ def make_panels(landmarks_m: np.ndarray) -> Panels:
     forward = np.array([1.0, 0, 0])
     fronts = np.array([forward - axis * (forward @ axis) for axis in axes])
     fronts /= np.linalg.norm(fronts, axis=1, keepdims=True)
-    return Panels(np.array(starts), axes, fronts)
+    axes, fronts = axes.astype(np.float32), fronts.astype(np.float32)
+    return np.array(starts), np.stack([axes, fronts, np.cross(axes, fronts)], axis=1)
 
 
 def panel_coordinates(panels: Panels, coords: np.ndarray, limbs: str) -> tuple[np.ndarray, np.ndarray]:
@@ -76,9 +64,8 @@ def panel_coordinates(panels: Panels, coords: np.ndarray, limbs: str) -> tuple[n
     uv = np.empty((2, len(arm)), np.float32)
     for number in np.unique(panel):
         rows = np.flatnonzero(panel == number)
-        local = rest.take(rows, axis=1) - column(panels.origins_m[number])
-        axis, front = np.float32(panels.axes[number]), np.float32(panels.fronts[number])
-        side = np.cross(axis, front).astype(np.float32)
+        local = rest.take(rows, axis=1) - column(panels[0][number])
+        axis, front, side = panels[1][number]
         around = np.arctan2(side @ local, front @ local) * _PANEL_RADII_M[number]
         along = axis @ local
         if number == 0 and limbs:  # two flat panels, front and back, that bend round the sides
@@ -228,7 +215,7 @@ def cloth_material(fabric: Fabric, panels: Panels, limbs: str, trim: Trim) -> Ma
         For meshes with `clothing.put_on`'s coords.
     """
     base = column(fabric.colours[0])
-    extra = (np.float32(fabric.colours[1:3]) - np.float32(fabric.colours[:1])).T
+    extra: np.ndarray = (np.float32(fabric.colours[1:3]) - np.float32(fabric.colours[:1])).T
 
     def look(hits: Hits) -> Look:
         rest, distance = hits.coords[:3], hits.coords[6]

@@ -153,28 +153,22 @@ def part_of_vertices(body: Body) -> np.ndarray:
     return (body.regions + RIGHT * (body.vertices_m[0, :, 1] < 0)).astype(np.int16)
 
 
-@dataclass(frozen=True)
-class _Fitted:
-    """What stays the same of a person in all poses: sizes, where cloth is cut, paint and hair at rest."""
-
-    rest_m: np.ndarray
-    heads_m: np.ndarray
-    landmarks_m: np.ndarray
-    panels: fabrics.Panels
-    paint: np.ndarray
-    hair: g.Mesh | None
+@memoised(64)
+def _measured(shape: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, fabrics.Panels, hair.Obstacles]:
+    """Of a shape at rest: vertices, bone heads, keypoints, where cloth is laid out, what hair lies on."""
+    body = load_body()
+    rest, heads = rest_shape(body, shape)
+    landmarks = body.keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
+    return rest, heads, landmarks, fabrics.make_panels(landmarks), hair.obstacles(body, rest, landmarks)
 
 
 @memoised(4)  # those who are seen in many frames
-def _fit(appearance: Appearance) -> _Fitted:
+def _fit(appearance: Appearance) -> tuple[np.ndarray, g.Mesh | None]:
+    """What stays the same of a person in all poses: paint, and hair at rest."""
     body = load_body()
-    rest, heads = rest_shape(body, appearance.shape)
-    landmarks = body.keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
-    grown = None
-    if appearance.style is not None:
-        grown = hair.grow(appearance.style, body, rest, landmarks, np.random.default_rng(appearance.seed))
-    paint = skin.paint_coords(body, rest, landmarks)
-    return _Fitted(rest, heads, landmarks, fabrics.make_panels(landmarks), paint, grown)
+    rest, _, landmarks, _, head = _measured(appearance.shape)
+    paint, rng = skin.paint_coords(body, rest, landmarks), np.random.default_rng(appearance.seed)
+    return paint, hair.grow(appearance.style, body, rest, head, rng) if appearance.style else None
 
 
 @memoised()
@@ -205,29 +199,30 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
     list of Surface
         In the frame the person is posed in.
     """
-    body, fitted = load_body(), _fit(appearance)
+    body, (paint, grown) = load_body(), _fit(appearance)
+    rest, heads, landmarks, panels, _ = _measured(appearance.shape)
     part = part_of_vertices(body)[body.triangles[:, 0]]
     mouth, feet = _always_hidden()
     surfaces, hidden = [], mouth.copy()
-    layers = np.zeros(len(fitted.rest_m), np.float32)
+    layers = np.zeros(len(rest), np.float32)
     for worn in sorted(appearance.worn, key=lambda w: w.garment.kind):  # trousers before tops
-        mesh, source = clothing.put_on(worn.garment, posed, fitted.rest_m, worn.folds, layers)
+        mesh, source = clothing.put_on(worn.garment, posed, rest, worn.folds, layers)
         hidden |= clothing.cut_pattern(worn.garment).hidden
         limbs = _LIMBS[worn.garment.kind]
-        material = fabrics.cloth_material(worn.fabric, fitted.panels, limbs, worn.trim)
+        material = fabrics.cloth_material(worn.fabric, panels, limbs, worn.trim)
         surfaces.append(Surface(mesh, material, person, part[source]))
         if worn.collar:
             strip = clothing.collar(worn.garment, mesh, posed, 0.022, 0.02)
-            material = fabrics.cloth_material(worn.fabric, fitted.panels, "arms", fabrics.Trim(0.0))
+            material = fabrics.cloth_material(worn.fabric, panels, "arms", fabrics.Trim(0.0))
             surfaces.append(_of_region("neck", strip, material, person))
     if appearance.skirt is not None:
-        surfaces.append(_skirt(appearance.skirt, body, posed, fitted.panels, person))
+        surfaces.append(_skirt(appearance.skirt, body, posed, panels, person))
     if appearance.shoes is not None:
         hidden |= feet
         surfaces.append(_shoes(appearance.shoes, posed, person))
-    surfaces.insert(0, _skin(appearance, posed, fitted.paint, ~hidden, part, person))
-    if fitted.hair is not None:
-        carried = hair.carry(fitted.hair, body, posed, fitted.heads_m, fitted.landmarks_m)
+    surfaces.insert(0, _skin(appearance, posed, paint, ~hidden, part, person))
+    if grown is not None:
+        carried = hair.carry(grown, body, posed, heads, landmarks)
         surfaces.append(_of_region("scalp", carried, hair.hair_material(appearance.complexion.hair), person))
     return surfaces
 
