@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from hicp_lib.core.keypoints import INDEX
-from hicp_lib.core.memo import memoised, plain_fields
+from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.body.model import Body, PosedBody, load_body
 from hicp_lib.simulation.rendering import mesh as g
 
@@ -48,9 +48,6 @@ class Garment:
     ease_m: float = 0.012
     smoothing: int = 10
 
-    def __post_init__(self) -> None:
-        plain_fields(self)
-
 
 @dataclass(frozen=True)
 class Pattern:
@@ -79,13 +76,13 @@ class Pattern:
 def cut_pattern(garment: Garment) -> Pattern:
     """Cut a garment out of the body's surface."""
     # What it is made of does not change the cut.
-    return _cut_pattern(Garment(garment.kind, garment.start, garment.end, garment.sleeve, garment.opening))
+    return _cut_pattern(garment.kind, garment.start, garment.end, garment.sleeve, garment.opening)
 
 
 @memoised()
-def _cut_pattern(garment: Garment) -> Pattern:
+def _cut_pattern(kind: str, start: float, end: float, sleeve: float, opening: float) -> Pattern:
     body = load_body()
-    field = _FIELDS[garment.kind](body, garment)
+    field = _FIELDS[kind](body, start, end, sleeve, opening)
     cut = g.cut(body.triangles, field)
     deep = field > 0.03
     return Pattern(
@@ -97,21 +94,21 @@ def _cut_pattern(garment: Garment) -> Pattern:
     )
 
 
-def _top_field(body: Body, garment: Garment) -> np.ndarray:
+def _top_field(body: Body, start: float, end: float, sleeve: float, opening: float) -> np.ndarray:
     arm, torso = (body.field(name).astype(float) for name in ("arm", "torso"))
     rest = body.vertices_m[0]
     front = np.clip(rest[:, 0] / 0.08, 0, 1) * np.clip(1 - np.abs(rest[:, 1]) / 0.10, 0, 1)
-    trunk = np.minimum(torso - garment.start, garment.end - garment.opening * front.astype(float) - torso)
+    trunk = np.minimum(torso - start, end - opening * front.astype(float) - torso)
     on_arm = arm > 0
     trunk = np.where(on_arm, np.maximum(trunk, np.minimum(8 * arm, 0.5)), trunk)
-    field = np.minimum(trunk, np.where(on_arm, garment.sleeve - arm, 9))
+    field = np.minimum(trunk, np.where(on_arm, sleeve - arm, 9))
     allowed = body.in_regions("hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh")
     return np.where(allowed, field, -1)
 
 
-def _bottom_field(body: Body, garment: Garment) -> np.ndarray:
+def _bottom_field(body: Body, end: float, waist: float, *_: float) -> np.ndarray:
     arm, leg, torso = (body.field(name).astype(float) for name in ("arm", "leg", "torso"))
-    field = np.minimum(garment.end - torso, garment.start - leg)
+    field = np.minimum(waist - torso, end - leg)
     allowed = body.in_regions("hips", "torso", "thigh", "shin", "foot") & (arm == 0)
     return np.where(allowed, field, -1)
 

@@ -114,7 +114,13 @@ def paint_coords(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.
     flush = np.zeros(len(rest_m), np.float32)
     p = rest_m[head].astype(np.float32)
     face = landmarks_m[FACE].astype(np.float32)
-    flush[head] = _cheeks(p, face) + 0.9 * _bump(p, face[30], 0.014) + 0.6 * body.field("ear")[head]
+    # Cheeks lie below the outer corner of each eye, level with the nose.
+    left, right = 0.55 * face[45] + 0.45 * face[54], 0.55 * face[36] + 0.45 * face[48]
+    flush[head] = (
+        0.8 * (_bump(p, left, 0.028) + _bump(p, right, 0.028))
+        + 0.9 * _bump(p, face[30], 0.014)
+        + 0.6 * body.field("ear")[head]
+    )
     flush += _knuckles(body, rest_m, landmarks_m)
     return np.column_stack([rest_m, painted, flush]).astype(np.float32)
 
@@ -130,12 +136,6 @@ def _painted(body: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _bump(points: np.ndarray, centre: np.ndarray, width_m: float) -> np.ndarray:
     return np.exp(-((points - centre) ** 2).sum(axis=1) / width_m**2)
-
-
-def _cheeks(points: np.ndarray, face: np.ndarray) -> np.ndarray:
-    # Below the outer corner of each eye, level with the nose.
-    left, right = 0.55 * face[45] + 0.45 * face[54], 0.55 * face[36] + 0.45 * face[48]
-    return 0.8 * (_bump(points, left, 0.028) + _bump(points, right, 0.028))
 
 
 def _knuckles(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.ndarray:

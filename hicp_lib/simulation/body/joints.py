@@ -29,10 +29,8 @@ Surgeons (Joint Motion: Method of Measuring and Recording, 1965), where it gives
 spread and eyes are estimates."""
 
 # How a movement of several bones is shared among them, from the first to the last.
-_SPINE_SHARES = {"spine05": 0.15, "spine04": 0.2, "spine03": 0.25, "spine02": 0.2, "spine01": 0.2}
-_NECK_SHARES = {"neck01": 0.25, "neck02": 0.2, "neck03": 0.2, "head": 0.35}
+_SHARES = PEOPLE["movement_shares"]
 # The shoulder girdle goes along with an arm that is raised beyond this.
-_GIRDLE_SHARES = {"clavicle": 0.12, "shoulder01": 0.22}
 _GIRDLE_FROM_RAD = np.radians(25.0)
 # Left limbs in the reference stance: tilt and direction of the arm, and the hinge the thumb bends about.
 ARM_TILT_RAD = np.radians(9.0)
@@ -139,8 +137,8 @@ def _trunk(angles: Joints) -> dict[str, np.ndarray]:
         bend, flexion, turn = (angles.get(f"{part}_{kind}", 0.0) for kind in ("bend", "flexion", "turn"))
         return np.array([-bend, flexion, turn])
 
-    pose = {bone: share * vector("spine") for bone, share in _SPINE_SHARES.items()}
-    pose |= {bone: share * vector("neck") for bone, share in _NECK_SHARES.items()}
+    pose = {bone: share * vector("spine") for bone, share in _SHARES["spine"].items()}
+    pose |= {bone: share * vector("neck") for bone, share in _SHARES["neck"].items()}
     eye = np.array([0.0, angles.get("eye_pitch", 0.0), angles.get("eye_turn", 0.0)])
     return pose | {"eye.L": eye, "eye.R": eye}
 
@@ -169,9 +167,9 @@ def _with_girdle(swing: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
     if angle <= _GIRDLE_FROM_RAD or length < 1e-9:
         return {}, swing
     beyond = axis / length * (angle - _GIRDLE_FROM_RAD)
-    girdle = {bone: share * beyond for bone, share in _GIRDLE_SHARES.items()}
+    girdle = {bone: share * beyond for bone, share in _SHARES["girdle"].items()}
     # All turn about the same axis, so the shares simply add up.
-    return girdle, rotation(-sum(_GIRDLE_SHARES.values()) * beyond) @ swing
+    return girdle, rotation(-sum(_SHARES["girdle"].values()) * beyond) @ swing
 
 
 def _hand(limb: dict[str, float]) -> dict[str, np.ndarray]:

@@ -160,11 +160,6 @@ def _from_whole(x: np.ndarray) -> np.ndarray:
     return np.abs(np.mod(x + 0.5, 1) - 0.5)
 
 
-def _symmetric(profile: np.ndarray, combine: np.ufunc) -> np.ndarray:
-    """A pattern (n, n) that is the same along both axes."""
-    return combine(profile[:, None], profile[None, :])
-
-
 def cloud() -> Tile:
     """Smooth noise of all sizes, two independent channels; 1 m."""
     return np.dstack([noise(_rng(k), 1.6, 2) for k in (1, 2)]), 1.0
@@ -256,16 +251,12 @@ def stripes(duty: float) -> Tile:
 def checks(kind: int) -> Tile:
     """Gingham, tartan or window pane: weights of (second, third) colour; one period per metre."""
     t = (np.arange(256) + 0.5) / 256
-    second = np.zeros((256, 256))
-    if kind == 0:
-        first = _symmetric((t < 0.5) * 0.5, np.add)
-    elif kind == 1:
-        first = _symmetric(0.5 * ((np.abs(t - 0.3) < 0.17) | (np.abs(t - 0.8) < 0.04)), np.add)
-        lines = 0.55 * (np.abs(t - 0.3) < 0.025) + 0.4 * (np.abs(t - 0.65) < 0.02)
-        second = _symmetric(lines, np.maximum)
-    else:
-        first = _symmetric(0.9 * (np.abs(t - 0.5) < 0.03), np.maximum)
-    return np.dstack([first, second]), 1.0
+    lines = 0.55 * (np.abs(t - 0.3) < 0.025) + 0.4 * (np.abs(t - 0.65) < 0.02)
+    tartan = (np.abs(t - 0.3) < 0.17) | (np.abs(t - 0.8) < 0.04)
+    pane = 0.9 * (np.abs(t - 0.5) < 0.03)
+    band, line = ((t < 0.5, 0 * t), (tartan, lines), (0 * t, pane))[kind]
+    weights = [np.add.outer(0.5 * band, 0.5 * band), np.maximum.outer(line, line)]
+    return np.dstack(weights[::-1] if kind == 2 else weights), 1.0
 
 
 def dots(radius: float) -> Tile:

@@ -12,7 +12,7 @@ from hicp_lib.simulation.body.identities import HELD_OUT, PEOPLE, Identity, draw
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
 from hicp_lib.simulation.rendering import lights
-from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at, project_world
+from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at
 from hicp_lib.simulation.rendering.colour_sensor import Sensor
 from hicp_lib.simulation.rendering.render import World
 from hicp_lib.simulation.rendering.surfaces import Surface
@@ -163,8 +163,3 @@ def _sensor(rng: Rng) -> Sensor:
     exposure = float(np.exp(rng.normal(0.05, 0.18)))
     others = {name: rng.uniform(*limits) for name, limits in PEOPLE["camera"].items()}
     return Sensor(tint / tint.mean(), exposure, **others)
-
-
-def distance_m(camera: PlacedCamera, person: PosedBody) -> float:
-    """Depth of the middle of a person's keypoints, along the camera's z axis."""
-    return float(np.median(project_world(camera, person.keypoints_m)[1]))
