@@ -6,12 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from hicp_lib.core.keypoints import INDEX
-from hicp_lib.simulation.appearance.materials import any_colour, hsv, linear
+from hicp_lib.simulation.appearance.materials import Rng, any_colour, hsv, linear
 from hicp_lib.simulation.rendering import textures
 from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
-
-Rng = np.random.Generator
-
 
 Panels = tuple[np.ndarray, np.ndarray]
 """How a person's garments are laid out flat, at rest in the body frame: origins in metres, (5, 3), and

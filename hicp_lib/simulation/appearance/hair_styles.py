@@ -2,11 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from hicp_lib.simulation.body.identities import PEOPLE
-
-Rng = np.random.Generator
+from hicp_lib.simulation.body.identities import PEOPLE, Rng
 
 
 @dataclass(frozen=True)

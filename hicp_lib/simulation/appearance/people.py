@@ -6,12 +6,10 @@ import numpy as np
 
 from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.appearance import clothing, fabrics, footwear, hair, hair_styles, skin
-from hicp_lib.simulation.body.identities import PEOPLE, Identity, is_woman, traits
+from hicp_lib.simulation.body.identities import PEOPLE, Identity, Rng, is_woman, traits
 from hicp_lib.simulation.body.model import REGIONS, Body, PosedBody, load_body, rest_shape
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.surfaces import Material, Surface
-
-Rng = np.random.Generator
 
 # Body parts as the renderer numbers them: the body's regions, then the same on the right side.
 RIGHT = len(REGIONS)

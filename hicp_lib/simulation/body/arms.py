@@ -10,13 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from hicp_lib.simulation.body.hands import sample_hand
-from hicp_lib.simulation.body.identities import PEOPLE
+from hicp_lib.simulation.body.identities import PEOPLE, Rng
 from hicp_lib.simulation.body.joints import Joints, pose_from_joints, radians
 from hicp_lib.simulation.body.model import Body, pose_bones
 from hicp_lib.simulation.body.reach import reach
 from hicp_lib.simulation.body.self_collision import CollisionModel
 
-Rng = np.random.Generator
 Range = tuple[float, float]
 Ranges = dict[str, Range]
 

@@ -18,6 +18,8 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
 from hicp_lib.core.memo import memoised, plain_fields
 
+Rng = np.random.Generator
+
 SPLITS = ("development", "held out")
 HELD_OUT = SPLITS[1]
 KINDS = ("clothes", "room", "lights", "poses", "camera")

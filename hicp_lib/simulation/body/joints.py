@@ -20,9 +20,12 @@ Joints = dict[str, float]
 
 FINGERS = ("index", "middle", "ring", "little")
 
-_LIMB_LIMITS_DEG = PEOPLE["joints_deg"]["limb"]
-LIMITS_DEG: dict[str, tuple[float, float]] = PEOPLE["joints_deg"]["trunk"] | {
-    f"{side}_{joint}": limits for side in ("left", "right") for joint, limits in _LIMB_LIMITS_DEG.items()
+_LIMBS = {limb: tuple(ranges) for limb, ranges in PEOPLE["limb_joints_deg"].items()}
+LIMITS_DEG: dict[str, tuple[float, float]] = PEOPLE["trunk_joints_deg"] | {
+    f"{side}_{joint}": limits
+    for side in ("left", "right")
+    for ranges in PEOPLE["limb_joints_deg"].values()
+    for joint, limits in ranges.items()
 }
 """Range of every joint in degrees: the normal ranges of the American Academy of Orthopaedic
 Surgeons (Joint Motion: Method of Measuring and Recording, 1965), where it gives one; thumb, finger
@@ -197,11 +200,3 @@ def _leg(limb: dict[str, float]) -> dict[str, np.ndarray]:
 
 
 _BONES = {"arm": _arm, "hand": _hand, "leg": _leg}
-_LIMBS = {
-    limb: tuple(joint for joint in _LIMB_LIMITS_DEG if joint.split("_")[0] in parts)
-    for limb, parts in (
-        ("arm", ("shoulder", "elbow", "forearm", "wrist")),
-        ("hand", ("thumb", *FINGERS)),
-        ("leg", ("hip", "knee", "ankle")),
-    )
-}

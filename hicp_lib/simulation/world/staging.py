@@ -8,7 +8,7 @@ import numpy as np
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.simulation.appearance.materials import hsv
 from hicp_lib.simulation.appearance.people import appearance_of, dress
-from hicp_lib.simulation.body.identities import HELD_OUT, PEOPLE, Identity, draw_identity
+from hicp_lib.simulation.body.identities import HELD_OUT, PEOPLE, Identity, Rng, draw_identity
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
 from hicp_lib.simulation.rendering import lights
@@ -18,8 +18,6 @@ from hicp_lib.simulation.rendering.render import World
 from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.world.furniture import stool
 from hicp_lib.simulation.world.room import Room, make_room
-
-Rng = np.random.Generator
 
 
 @dataclass(frozen=True)
