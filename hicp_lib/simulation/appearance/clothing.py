@@ -82,7 +82,10 @@ def cut_pattern(garment: Garment) -> Pattern:
 @memoised()
 def _cut_pattern(kind: str, start: float, end: float, sleeve: float, opening: float) -> Pattern:
     body = load_body()
-    field = _FIELDS[kind](body, start, end, sleeve, opening)
+    if kind == "top":
+        field = _top_field(body, start, end, sleeve, opening)
+    else:
+        field = _bottom_field(body, start, end)
     cut = g.cut(body.triangles, field)
     deep = field > 0.03
     return Pattern(
@@ -106,14 +109,11 @@ def _top_field(body: Body, start: float, end: float, sleeve: float, opening: flo
     return np.where(allowed, field, -1)
 
 
-def _bottom_field(body: Body, end: float, waist: float, *_: float) -> np.ndarray:
+def _bottom_field(body: Body, end: float, waist: float) -> np.ndarray:
     arm, leg, torso = (body.field(name).astype(float) for name in ("arm", "leg", "torso"))
     field = np.minimum(waist - torso, end - leg)
     allowed = body.in_regions("hips", "torso", "thigh", "shin", "foot") & (arm == 0)
     return np.where(allowed, field, -1)
-
-
-_FIELDS = {"top": _top_field, "bottom": _bottom_field}
 
 
 def put_on(

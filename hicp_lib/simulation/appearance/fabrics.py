@@ -211,8 +211,8 @@ def cloth_material(fabric: Fabric, panels: Panels, limbs: str, trim: Trim) -> Ma
     callable
         For meshes with `clothing.put_on`'s coords.
     """
-    base = column(fabric.colours[0])
-    extra: np.ndarray = (np.float32(fabric.colours[1:3]) - np.float32(fabric.colours[:1])).T
+    colours: np.ndarray = fabric.colours.astype(np.float32)
+    base, extra = colours[:1].T, (colours[1:] - colours[:1]).T
 
     def look(hits: Hits) -> Look:
         rest, distance = hits.coords[:3], hits.coords[6]
