@@ -23,14 +23,12 @@ _PANEL_RADII_M = np.array([0.15, 0.06, 0.06, 0.085, 0.085], np.float32)  # how t
 
 def make_panels(landmarks_m: np.ndarray) -> Panels:
     """Panels for a person with these keypoints at rest, shape (136, 3)."""
-    starts, ends = ([landmarks_m[INDEX[pair[k]]] for pair in _PANEL_ENDS] for k in (0, 1))
-    axes = np.array([(b - a) / np.linalg.norm(b - a) for a, b in zip(starts, ends, strict=True)])
+    starts, ends = (landmarks_m[[INDEX[pair[k]] for pair in _PANEL_ENDS]] for k in (0, 1))
+    axes = np.array([axis / np.linalg.norm(axis) for axis in ends - starts])
     axes[0] = [0, 0, 1]
-    forward = np.array([1.0, 0, 0])
-    fronts = np.array([forward - axis * (forward @ axis) for axis in axes])
-    fronts /= np.linalg.norm(fronts, axis=1, keepdims=True)
-    axes, fronts = axes.astype(np.float32), fronts.astype(np.float32)
-    return np.array(starts), np.stack([axes, fronts, np.cross(axes, fronts)], axis=1)
+    fronts = [1.0, 0, 0] - axes.astype(float) * axes[:, :1]
+    fronts = (fronts / np.linalg.norm(fronts, axis=1, keepdims=True)).astype(np.float32)
+    return starts, np.stack([axes, fronts, np.cross(axes, fronts)], axis=1)
 
 
 def panel_coordinates(panels: Panels, coords: np.ndarray, limbs: str) -> tuple[np.ndarray, np.ndarray]:

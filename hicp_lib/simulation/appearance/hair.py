@@ -73,8 +73,8 @@ def obstacles(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> Obstac
 def _radii(offset: np.ndarray) -> np.ndarray:
     row, column = (x.astype(int) for x in _place(offset))
     radius = np.zeros(_GRID)
-    cells = np.clip(row, 0, _GRID[0] - 1) * _GRID[1] + column % _GRID[1]
-    np.maximum.at(radius.ravel(), cells, np.linalg.norm(offset, axis=1))
+    cells = np.clip(row, 0, _GRID[0] - 1), column % _GRID[1]
+    np.maximum.at(radius, cells, np.linalg.norm(offset, axis=1))
     while not radius.all():  # directions no vertex lies in take their neighbours'
         padded = np.pad(radius, ((1, 1), (0, 0)), mode="edge")
         around = [np.roll(radius, s, axis=1) for s in (-1, 1)] + [padded[2:], padded[:-2]]
@@ -88,9 +88,8 @@ def _columns(trunk_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     cells = ((trunk_m[:, 1:] - corner) / _CELL_M).astype(int)
     shape = tuple(cells.max(axis=0) + 1)
     back, front = np.full(shape, _FAR_M), np.full(shape, -_FAR_M)
-    numbers = cells[:, 0] * shape[1] + cells[:, 1]
-    np.minimum.at(back.ravel(), numbers, trunk_m[:, 0])
-    np.maximum.at(front.ravel(), numbers, trunk_m[:, 0])
+    np.minimum.at(back, tuple(cells.T), trunk_m[:, 0])
+    np.maximum.at(front, tuple(cells.T), trunk_m[:, 0])
     kernel = np.ones((3, 3))
     return corner, cv2.erode(back, kernel), cv2.dilate(front, kernel)
 
