@@ -134,18 +134,9 @@ def flicker_rates(table: pd.DataFrame, note: str) -> Figure:
     figure, axes = new_figure(1, len(measures), 9.0, 1.3 + 0.55 * len(detectors), sharey=True)
     cases = {case: rows.set_index("detector") for case, rows in table.groupby(["tracks", "measure"])}
     for axis, measure in zip(axes, measures, strict=True):
-        for k, tracks in ((1, "as detected"), (0, "filtered")):
-            for y, detector in enumerate(detectors):
-                case, colour = cases[tracks, measure].loc[[detector]], detector_colour(detector)
-                fill = colour if tracks == "as detected" else "white"
-                pen = {
-                    "xerr": marks.whiskers(case),
-                    "fmt": detector_marker(detector),
-                    "color": colour,
-                    "mfc": fill,
-                    "capsize": 2,
-                }
-                axis.errorbar(case["value"], y + marks.offset(k, 2, 0.26), **pen)
+        for y, (name, pen) in enumerate(marks.detector_dots(detectors).items()):
+            marks.dots(axis, cases["as detected", measure].loc[[name]], y + 0.13, **pen)
+            marks.dots(axis, cases["filtered", measure].loc[[name]], y - 0.13, **pen | {"mfc": "white"})
         axis.set(xlabel=measure, xlim=(0, None), ylim=(-0.5, len(detectors) - 0.5))
     axes[0].set(yticks=range(len(detectors)), yticklabels=list(map(in_lines, detectors)))
     lag_ms = 1000 * cases["filtered", "latency [s]"]["value"]

@@ -8,8 +8,7 @@ from hicp_lib.study.plots.palette import TRUTH_COLOUR
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _COLOURS = {"paper": "#D55E00", "robust": "#0072B2"}
-_FILLED = {"fmt": "o"}
-_MARKS = {"total": _FILLED, "alone": _FILLED, "gain": {"fmt": "D", "mfc": "white"}}
+_HOLLOW = {"fmt": "D", "mfc": "white"}
 _TOTALS_APART = 0.5  # rows
 
 
@@ -32,10 +31,10 @@ def error_budget(table: pd.DataFrame, paper: pd.DataFrame, note: str) -> Figure:
     for axis, part in zip(axes[0], parts, strict=True):
         for (method, kind), of in table[table["part"] == part].groupby(["method", "kind"], sort=False):
             y = of["source"].map(rows) + marks.offset(methods.index(method), len(methods), 0.3)
-            reach_cm = 100 * marks.whiskers(of, "value_m", "low_m", "high_m")
-            pen = {"color": _COLOURS[method], "markersize": 5, "elinewidth": 1}
-            label = f"{method} lifting, {'gained without' if kind == 'gain' else 'alone'}"
-            axis.errorbar(100 * of["value_m"], y, xerr=reach_cm, label=label, **pen, **_MARKS[kind])
+            is_gain, bounds = kind == "gain", ("value_m", "low_m", "high_m")
+            label = f"{method} lifting, {'gained without' if is_gain else 'alone'}"
+            pen = {"color": _COLOURS[method], "label": label} | (_HOLLOW if is_gain else {})
+            marks.dots(axis, of, y, bounds, 100, **pen)
         if AGAINST_MOCAP in rows:
             theirs_cm = 100 * paper.loc[paper["keypoint"].str.endswith(part), "median_m"]
             y = [rows[AGAINST_MOCAP]] * len(theirs_cm)

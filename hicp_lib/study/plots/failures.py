@@ -13,7 +13,7 @@ from hicp_lib.evaluation.failures.placed_keypoints import STATES
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.evaluation import GROUP_TITLES
-from hicp_lib.study.plots.palette import detector_colour, detector_marker
+from hicp_lib.study.plots.palette import detector_colour
 from hicp_lib.study.plots.people import draw_detections, draw_rings, draw_truth, picture_grid
 from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
 
@@ -68,16 +68,15 @@ def class_precision(table: pd.DataFrame, note: str) -> Figure:
     groups, detectors = (list(rows[name].unique()) for name in ("group", "detector"))
     names = [name for name in CLASSES if name in set(rows["class"])]
     size = 4.8 * len(groups) + 1, 1.3 + (0.1 + 0.16 * len(detectors)) * len(names)
-    step = 0.8 / len(detectors)
     figure, axes = new_figure(1, len(groups), *size, sharey=True, squeeze=False)
-    for axis, group in zip(axes[0], groups, strict=True):
-        of_group = rows[rows["group"] == group]
-        for (detector, metric), part in of_group.groupby(["detector", "metric"], sort=False):
-            below = marks.offset(detectors.index(detector), len(detectors), step) + 0.4 * step * (
-                metric == "AR"
-            )
-            y = part["class"].map(names.index) + below
-            _dots(axis, part, y, detector, filled=metric == "AP", label=f"{detector}, {metric}")
+    pens = {
+        f"{name}, {metric}": pen | fill | {"label": f"{name}, {metric}"}
+        for name, pen in marks.detector_dots(detectors).items()
+        for metric, fill in (("AP", {}), ("AR", {"mfc": "white"}))
+    }
+    cases = rows.assign(case=rows["detector"] + ", " + rows["metric"])
+    for axis, of_group, group in marks.facets(axes, cases, "group"):
+        marks.dots_in_rows(axis, of_group, "class", "case", names, pens)
         _say_too_few(axis, names, set(of_group.loc[of_group["value"].isna(), "class"]))
         axis.set(xlabel="AP (filled), AR (open)", xlim=(-0.02, 1.02), title=GROUP_TITLES.get(group, group))
     counts = rows[rows["group"] == groups[0]].drop_duplicates("class").set_index("class")["n_people"]
@@ -100,21 +99,6 @@ def _say_too_few(axis, names: list[str], few: set[str]) -> None:
     for y, name in enumerate(names):
         if name in few:
             axis.text(0.02, y, "too few to judge", va="center", fontsize=8, color="#666666", bbox=behind)
-
-
-def _dots(axis, rows: pd.DataFrame, y, detector: str, filled: bool = True, label: str = "") -> None:
-    colour = detector_colour(detector)
-    pen = {"color": colour, "mfc": colour if filled else "white", "label": label or detector}
-    value = rows["value"].astype(float)
-    axis.errorbar(value, y, xerr=marks.whiskers(rows), fmt=detector_marker(detector), capsize=2, ms=5, **pen)
-
-
-def _dots_in_rows(axis, table: pd.DataFrame, names: list[str], detectors: list[str]) -> None:
-    """Each detector's dots in the rows of a chart, beside each other."""
-    for k, detector in enumerate(detectors):
-        part = table[table["detector"] == detector]
-        beside = marks.offset(k, len(detectors), 0.8 / len(detectors))
-        _dots(axis, part, part["row"].map(names.index) + beside, detector)
 
 
 def _detector_panels(table: pd.DataFrame, width_in: float, height_in: float, **shared):
@@ -163,7 +147,8 @@ def head_change(table: pd.DataFrame, note: str) -> Figure:
     """Change of the hit rate of each keypoint when the head is cut off; from `change_per_keypoint`."""
     names, detectors = (list(table[name].unique()) for name in ("keypoint", "detector"))
     figure, axis = new_figure(1, 1, 7.5, 1.2 + (0.1 + 0.1 * len(detectors)) * len(names))
-    _dots_in_rows(axis, table.rename(columns={"change": "value", "keypoint": "row"}), names, detectors)
+    pens, change = marks.detector_dots(detectors), ("change", "low", "high")
+    marks.dots_in_rows(axis, table, "keypoint", "detector", names, pens, bounds=change)
     axis.axvline(0, color="#444444", lw=1)
     marks.name_rows(axis, [name.replace("_", " ") for name in names])
     axis.set(xlabel="change of the share of keypoints hit, without the head")
@@ -206,8 +191,8 @@ def false_presence(table: pd.DataFrame, note: str) -> Figure:
     names, detectors, decisions = (list(rows[name].unique()) for name in ("row", "detector", "decision"))
     size = 4.4 * max(len(decisions), 1) + 1, 1.5 + (0.1 + 0.13 * len(detectors)) * len(names)
     figure, axes = new_figure(1, max(len(decisions), 1), *size, sharey=True, squeeze=False)
-    for axis, of_panel, _, decision in marks.facets(axes, rows.assign(one=0), "one", "decision"):
-        _dots_in_rows(axis, of_panel, names, detectors)
+    for axis, of_panel, decision in marks.facets(axes, rows, "decision"):
+        marks.dots_in_rows(axis, of_panel, "row", "detector", names, marks.detector_dots(detectors))
         axis.set(xlim=(-0.02, 1.02), xlabel="share that is given all the same", title=decision)
     marks.name_rows(axes[0, 0], names)
     marks.legend_below(figure, axes, ncols=2)

@@ -131,11 +131,16 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
         for _, row in rows.groupby(["part", "detector"], sort=False):
             _draw_spread_and_bias(axis, row)
         axis.set(xscale="log", yscale="log", title=view, xlabel=_SPREAD)
-        for scale in (axis.xaxis, axis.yaxis):
-            _plain_ticks(scale)
+        for scale in (axis.xaxis, axis.yaxis):  # at 1, 2 and 5, written as plain numbers
+            scale.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            scale.set_major_formatter("{x:g}")
+            scale.set_minor_locator(NullLocator())
         axis.axline((1, 1), (2, 2), color="#888888", lw=1, ls="--")
     axes[0, 0].set(ylabel=_BIAS)
-    _part_legend(figure, axes[0, 0], table["detector"].unique())
+    shapes = {name: {"marker": marker, "ls": ""} for name, marker in _PART_MARKERS.items()}
+    sides = {"left": {"marker": "o", "ls": ""}, "right": {"marker": "o", "ls": "", "mfc": "white"}}
+    marks.add_keys(axes[0, 0], table["detector"].unique(), shapes | sides)
+    marks.legend_below(figure, axes[0, 0], ncols=5)
     worse = table.assign(mostly=np.where(table["bias_m"] > table["spread_m"], "bias", "spread"))
     counts = worse.groupby(["detector", "mostly"], sort=False).size()
     said = series_text(counts, "{0} {2} with more {1}")
@@ -145,13 +150,6 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
         f"Whiskers: {intervals_over(table)}: {note}."
     )
     return Figure(figure, caption, f"Scatter of spread and bias on logarithmic axes. Parts: {said}.", table)
-
-
-def _plain_ticks(axis) -> None:
-    """Ticks of a logarithmic axis at 1, 2 and 5, written as plain numbers."""
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_locator(NullLocator())
 
 
 def _draw_spread_and_bias(axis, row: pd.DataFrame) -> None:
@@ -165,11 +163,3 @@ def _draw_spread_and_bias(axis, row: pd.DataFrame) -> None:
     }
     pen = {"color": colour, "mfc": colour if side == "left" else "white", "markersize": 8, "elinewidth": 0.7}
     axis.errorbar(x_cm, y_cm, fmt=_PART_MARKERS[kind], **reach_cm, **pen)
-
-
-def _part_legend(figure, axis, detectors: Sequence[str]) -> None:
-    colours = marks.detector_lines(axis, detectors)
-    shapes = [{"marker": marker, "ls": ""} for marker in _PART_MARKERS.values()]
-    sides = [{"marker": "o", "ls": ""}, {"marker": "o", "ls": "", "mfc": "white"}]
-    others = marks.legend_lines(axis, [*_PART_MARKERS, "left", "right"], [*shapes, *sides])
-    figure.legend(handles=[*colours, *others], loc="outside lower center", ncols=5, fontsize=9)
