@@ -19,6 +19,7 @@ from hicp_lib.evaluation.space import mocap_error
 from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_errors, sigma_coverage, summary
 from hicp_lib.evaluation.space.occlusion import joint_occlusion
 from hicp_lib.evaluation.space.stability import POSITION, position_array
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.lifting.robust import METHODS
 from hicp_lib.lifting.table import lift_found
 from hicp_lib.mocap.registration import Registration
@@ -185,7 +186,7 @@ def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame)
 
 
 def medians_under(
-    registered: Sequence[Registered], points: Sequence[pd.DataFrame], n_resamples: int = 1000, seed: int = 0
+    registered: Sequence[Registered], points: Sequence[pd.DataFrame], draws: Draws = Draws()
 ) -> pd.DataFrame:
     """What the choice of the registration does to the median errors of elbows and wrists.
 
@@ -195,8 +196,8 @@ def medians_under(
         Of each person.
     points : sequence of pd.DataFrame
         The first of `lift_frames`, of each.
-    n_resamples, seed : int
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws
+        Of the bootstrap.
 
     Returns
     -------
@@ -204,16 +205,15 @@ def medians_under(
         Column `registration`, then as from `median_errors`, score above 0.1; the exact transform, where it is
         known, comes last.
     """
-    errors: dict[str, tuple[list, list]] = {}
+    errors, least = dict[str, tuple[list, list]](), mocap_error.MIN_SCORES[-1:]
     for one, lifted in zip(registered, points, strict=True):
         exact = [] if one.exact is None else [Registration("exact", one.exact)]
         for fit in [*one.fits, *exact]:
             tables, n_frames = errors.setdefault(fit.method, ([], []))
             tables.append(mocap_error.mocap_errors(lifted, one.reference(fit, mocap_error.TABLE_JOINTS)))
             n_frames.append(len(one.recording))
-    draws = (mocap_error.MIN_SCORES[-1:], n_resamples, seed)
     medians = [
-        labelled(mocap_error.median_errors(over_people(*of), *draws), registration=method)
+        labelled(mocap_error.median_errors(over_people(*of), least, draws), registration=method)
         for method, of in errors.items()
     ]
     return pd.concat(medians, ignore_index=True)

@@ -15,6 +15,7 @@ from hicp_lib.evaluation.cases import labelled, over_people
 from hicp_lib.evaluation.space.error_sources import true_detections
 from hicp_lib.evaluation.space.mocap_error import MIN_SCORES, TABLE_JOINTS, median_errors, mocap_errors
 from hicp_lib.evaluation.space.stability import POSITION
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.lifting.table import lift_pixels
 from hicp_lib.recordings.recording import Recording, read_truth
 from hicp_lib.study.plots.palette import PERFECT
@@ -38,11 +39,7 @@ def perfect_detections(recording: Recording) -> dict[str, list[Detections]]:
 
 
 def medians_by_radius(
-    registered: Sequence[Registered],
-    points: Sequence[pd.DataFrame],
-    radii_m: Sequence[float],
-    n_resamples: int,
-    seed: int,
+    registered: Sequence[Registered], points: Sequence[pd.DataFrame], radii_m: Sequence[float], draws: Draws
 ) -> pd.DataFrame:
     """Median errors of the paper's lifting by the size of the neighbourhood that it takes depth from.
 
@@ -54,8 +51,8 @@ def medians_by_radius(
         As from `hicp_lib.lifting.table.lift_found`, of each; of some frames, to save time.
     radii_m : sequence of float
         Half the sides of the neighbourhood.
-    n_resamples, seed : int
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws
+        Of the bootstrap.
 
     Returns
     -------
@@ -73,6 +70,6 @@ def medians_by_radius(
             errors.append(mocap_errors(at, reference))
     n_frames, tables = [len(one.recording) for one in registered], []
     for radius_m, errors in zip(radii_m, by_radius, strict=True):
-        medians = median_errors(over_people(errors, n_frames), MIN_SCORES[-1:], n_resamples, seed)
+        medians = median_errors(over_people(errors, n_frames), MIN_SCORES[-1:], draws)
         tables.append(labelled(medians, radius_m=radius_m))
     return pd.concat(tables, ignore_index=True)

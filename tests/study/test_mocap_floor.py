@@ -7,6 +7,7 @@ import pytest
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.keypoints import BODY, INDEX
 from hicp_lib.evaluation.space.mocap_error import MARKERS, TABLE_JOINTS
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.mocap.registration import Registration
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import TRUTH_FILE, Recording, open_recording
@@ -55,7 +56,7 @@ def test_a_neighbourhood_wider_than_the_limb_takes_the_wall(recording):
     mocap = MotionCapture(times_s, names, np.broadcast_to(markers_m, (len(times_s), 8, 3)), 100.0)
     registered = Registered(recording, mocap, 0.0, [Registration("given", np.eye(4))], None, pd.DataFrame())
     people = [registered, registered], [points, points[points["frame"] == 0]]
-    table = medians_by_radius(*people, (0.010, 0.040), n_resamples=10, seed=0)
+    table = medians_by_radius(*people, (0.010, 0.040), draws=Draws(10, 0))
     table = table[table["keypoint"] == "left_wrist"]
     assert table["radius_m"].tolist() == [0.010, 0.040] and set(table["method"]) == {"paper"}
     assert table["median_m"].tolist() == pytest.approx([0.0, 1.0], abs=0.01)

@@ -15,6 +15,7 @@ from hicp_lib.evaluation.ap.bootstrap import Samples, difference, intervals, res
 from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate
 from hicp_lib.evaluation.ap.person_oks import person_oks
 from hicp_lib.evaluation.cases import Found, Truth, all_cases, per_case
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import Annotations, source_images
 
 # All groups an average precision is given for: hands as one object, and every hand by itself.
@@ -23,7 +24,7 @@ GROUPS_OF_OBJECTS = (*GROUPS, "each hand")
 Drawn = Mapping[tuple[str, str, str], tuple[Evaluation, Samples]]
 
 
-def compare(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+def compare(truth: Truth, found: Found, draws: Draws = Draws()) -> pd.DataFrame:
     """AP and AR of every detector on every subset, for the groups of keypoints it gives.
 
     Parameters
@@ -32,24 +33,19 @@ def compare(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) 
         By subset.
     found : Found
         By image id, of every subset and detector.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
     DataFrame
         Columns `subset, group, labelled, detector, metric, value, low, high, n_people`.
     """
-    return metric_table(draw_cases(truth, found, n_resamples, seed))
+    return metric_table(draw_cases(truth, found, draws))
 
 
 def draw_cases(
-    truth: Truth,
-    found: Found,
-    n_resamples: int = 1000,
-    seed: int = 0,
-    groups: Sequence[str] = tuple(GROUPS),
-    **options: Any,
+    truth: Truth, found: Found, draws: Draws = Draws(), groups: Sequence[str] = tuple(GROUPS), **options: Any
 ) -> dict[tuple[str, str, str], tuple[Evaluation, Samples]]:
     """Every case evaluated, as it is and on draws of source images: what `metric_table` and `pairs` read.
 
@@ -62,8 +58,8 @@ def draw_cases(
         By subset.
     found : Found
         By image id, of every subset and detector.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
     groups : sequence of str, optional
         Keys of `options.OBJECTS` that are looked at, where a detector gives such keypoints.
     **options : str
@@ -78,7 +74,7 @@ def draw_cases(
     for subset, group in dict.fromkeys((subset, group) for subset, _, group in cases):
         detectors = [case[1] for case in cases if case[::2] == (subset, group)]
         evaluations = [evaluate(truth[subset], found[subset, d], group, **options) for d in detectors]
-        samples = resample(evaluations, n_resamples, seed, source_images(truth[subset]))
+        samples = resample(evaluations, draws, source_images(truth[subset]))
         for detector, evaluation, sample in zip(detectors, evaluations, samples, strict=True):
             drawn[subset, detector, group] = evaluation, sample
     return {case: drawn[case] for case in cases}

@@ -11,6 +11,7 @@ from hicp_lib.evaluation.failures.false_confidence import SURE
 from hicp_lib.evaluation.failures.placed_keypoints import landed, placed_keypoints
 from hicp_lib.evaluation.failures.presence import PART_OF, Presence, declared
 from hicp_lib.evaluation.statistics.proportions import proportions
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import Annotations, source_images
 
 # What counts as given: the paper's threshold on scores as they come, or on what they are worth.
@@ -19,12 +20,7 @@ _FIRST_OF_PAIRS = 5  # the keypoints before are the head's
 
 
 def false_presence(
-    truth: Truth,
-    found: Found,
-    placed: pd.DataFrame,
-    source: Annotations,
-    n_resamples: int = 1000,
-    seed: int = 0,
+    truth: Truth, found: Found, placed: pd.DataFrame, source: Annotations, draws: Draws = Draws()
 ) -> pd.DataFrame:
     """How often parts of people that are outside the picture are given inside it.
 
@@ -41,8 +37,8 @@ def false_presence(
         `placed_keypoints.placed_keypoints` of them.
     source : Annotations
         What the crops were made from.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they and the halves are drawn with.
+    draws : Draws, optional
+        Of the bootstrap; its seed draws the halves too.
 
     Returns
     -------
@@ -51,7 +47,7 @@ def false_presence(
         parts outside), `low, high` (95 %, over source images), `n` (parts outside), `n_images, n_found`
         (those of people whom a detection fits; of the others none is given).
     """
-    calibrated = declared(truth, found, Presence.fit(placed, seed))
+    calibrated = declared(truth, found, Presence.fit(placed, draws.seed))
     kinds = {SURE: placed, PRESENCE_CUT: placed_keypoints(truth, calibrated, source)}
     missing = {subset: _missing(with_outside(people, source)) for subset, people in truth.items()}
     keys = ["subset", "detector", "image_id", "unit"]
@@ -67,7 +63,7 @@ def false_presence(
     parts["given"] = parts["given"].eq(True)
     by = ["subset", "detector", "part", "decision"]
     n_found = parts.groupby(by)["found"].sum().rename("n_found").reset_index()
-    return proportions(parts, by, "given", n_resamples, seed).merge(n_found, on=by)
+    return proportions(parts, by, "given", draws).merge(n_found, on=by)
 
 
 def _missing(people: Annotations) -> pd.DataFrame:

@@ -25,6 +25,7 @@ from hicp_lib.evaluation.ap.metric_table import Drawn, draw_cases
 from hicp_lib.evaluation.calibration.curves import Calibration, split_half
 from hicp_lib.evaluation.cases import Found, Truth
 from hicp_lib.evaluation.failures.placed_keypoints import landed, placed_keypoints
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import Annotations, source_images
 
 # Of each of the 17 keypoints, the part of the body: the head, or what a pair of keypoints is called.
@@ -128,7 +129,7 @@ def declared(truth: Truth, found: Found, presence: Presence | None = None) -> Fo
 
 
 def extended_table(
-    truth: Truth, found: Found, source: Annotations, drawn: Drawn, n_resamples: int = 1000, seed: int = 0
+    truth: Truth, found: Found, source: Annotations, drawn: Drawn, draws: Draws = Draws()
 ) -> pd.DataFrame:
     """AP of bodies by OKS and by extended OKS, with every given keypoint present and with a decision.
 
@@ -142,8 +143,8 @@ def extended_table(
         What the crops were made from.
     drawn : Drawn
         From `draw_cases` of the same.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they and the halves are drawn with.
+    draws : Draws, optional
+        Of the bootstrap; its seed draws the halves too.
 
     Returns
     -------
@@ -151,7 +152,7 @@ def extended_table(
         Columns `subset, detector, measure` (of `MEASURES`), `value, low, high, n_people`; the last measure is
         the third less the second, on the same draws.
     """
-    presence = Presence.fit(placed_keypoints(truth, found, source), seed)
+    presence = Presence.fit(placed_keypoints(truth, found, source), draws.seed)
     runs = {
         (subset, f"{detector}, {way}"): run
         for way, runs in {
@@ -161,7 +162,7 @@ def extended_table(
         for (subset, detector), run in runs.items()
     }
     known = {subset: with_outside(people, source) for subset, people in truth.items()}
-    counted = draw_cases(known, runs, n_resamples, seed, groups=["body"], outside="count")
+    counted = draw_cases(known, runs, draws, groups=["body"], outside="count")
     rows = []
     for subset, detector in found:
         if (subset, detector, "body") in drawn:

@@ -5,12 +5,10 @@ Rows are per image, for `hicp_lib.evaluation.statistics.proportions`: shares wit
 of detectors or of parts on the same images.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 import pandas as pd
 
-from hicp_lib.evaluation.space.stability import CASE, MIN_SCORE, PARTS, Parts, cases, own_medians
+from hicp_lib.evaluation.space.stability import CASE, PARTS, LiftedViews, Parts, own_medians
 
 WITHIN_M = 0.05
 FOUND, NEAR_MEDIAN, NEAR_TRUTH = "found", "within 5 cm of the median", "within 5 cm of the truth"
@@ -22,24 +20,12 @@ ALL_PARTS: Parts = {**PARTS, **_ARMS, **_ANY}
 """An arm is an elbow or a wrist, as in `hicp_lib.datasets.visibility`."""
 
 
-def sightings(
-    points: pd.DataFrame,
-    subjects: Mapping[str, np.ndarray],
-    truth: Mapping[str, pd.DataFrame] | None = None,
-    min_score: float = MIN_SCORE,
-) -> pd.DataFrame:
+def sightings(lifted: LiftedViews) -> pd.DataFrame:
     """Of every part in every image, whether it is found and what share of its keypoints is near.
 
     Parameters
     ----------
-    points : DataFrame
-        What was lifted, as `hicp_lib.evaluation.space.stability` says.
-    subjects : mapping of str to array, shape (n_frames,)
-        Whose each image is, by view.
-    truth : mapping of str to DataFrame, optional
-        By view, a table with `frame, keypoint` and `x_m, y_m, z_m`.
-    min_score : float, optional
-        Keypoints above it count.
+    lifted : LiftedViews
 
     Returns
     -------
@@ -50,15 +36,14 @@ def sightings(
         the truth.
     """
     tables = []
-    for case, part, found_m, true_m in cases(points, subjects, truth, min_score, ALL_PARTS):
+    for case, part, whose, found_m, true_m in lifted.cases(ALL_PARTS):
         seen = np.isfinite(found_m[..., 0])
         values = {FOUND: seen.any(axis=1).astype(float)}
-        references = {NEAR_MEDIAN: own_medians(found_m, subjects[case[0]])} | (
-            {} if true_m is None else {NEAR_TRUTH: true_m}
-        )
+        references = {NEAR_MEDIAN: own_medians(found_m, whose)}
+        references |= {} if true_m is None else {NEAR_TRUTH: true_m}
         for name, reference_m in references.items():
             values[name] = (np.linalg.norm(found_m - reference_m, axis=-1) <= WITHIN_M).mean(axis=1)
-        of_rows = (*case, part, subjects[case[0]], np.arange(len(seen)))
+        of_rows = (*case, part, whose, np.arange(len(seen)))
         labels = dict(zip([*CASE, "part", "subject", "source_image"], of_rows, strict=True))
         tables += [pd.DataFrame(labels | {"measure": name, "value": of}) for name, of in values.items()]
     return pd.concat(tables, ignore_index=True)[[*ROW, "subject", "source_image", "value"]]

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.evaluation.space.sightings import ALL_PARTS, ROW
-from hicp_lib.evaluation.space.stability import MIN_SCORE, cases, of_each
-from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
+from hicp_lib.evaluation.space.stability import LiftedViews, of_each
+from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, weighted_median, with_interval
 
 NEAR_M, NEAR_RAD = 0.05, float(np.radians(5))
 """Views are nearly equal whose cameras are no further apart, in place and in direction."""
@@ -39,34 +39,23 @@ def similar_pairs(T_base_cam: np.ndarray) -> np.ndarray:
     """
     places_m, turns = T_base_cam[:, :3, 3], T_base_cam[:, :3, :3]
     apart_m = np.linalg.norm(places_m[:, None] - places_m, axis=-1)
-    cosine = (
-        np.einsum("iab,jab->ij", turns, turns) - 1
-    ) / 2  # of the angle of the turn from one to the other
+    cosine = (np.einsum("iab,jab->ij", turns, turns) - 1) / 2  # of the angle of the turn between the two
     return np.argwhere(np.triu((apart_m <= NEAR_M) & (cosine >= np.cos(NEAR_RAD)), 1))
 
 
 def similar_views(
-    points: pd.DataFrame,
-    T_base_cam: Mapping[str, np.ndarray],
-    subjects: Mapping[str, np.ndarray],
-    min_score: float = MIN_SCORE,
-    n_resamples: int = 1000,
-    seed: int = 0,
+    lifted: LiftedViews, T_base_cam: Mapping[str, np.ndarray], draws: Draws = Draws()
 ) -> pd.DataFrame:
     """How often a part comes or goes between nearly equal views, and how far it moves in the base frame.
 
     Parameters
     ----------
-    points : DataFrame
-        As of `hicp_lib.evaluation.space.stability`.
+    lifted : LiftedViews
+        Views of one subject make pairs.
     T_base_cam : mapping of str to array, shape (n, 4, 4)
         Camera poses, by view.
-    subjects : mapping of str to array, shape (n,)
-        Whose each image is, by view; views of one subject make pairs.
-    min_score : float, optional
-        Keypoints above it count.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -78,19 +67,19 @@ def similar_views(
     """
     rows: list[tuple] = []
     pairs = {view: similar_pairs(poses).T for view, poses in T_base_cam.items()}
-    for case, part, found_m, _ in cases(points, subjects, None, min_score, ALL_PARTS):
-        whose, (a, b) = subjects[case[0]], pairs[case[0]]
+    for case, part, whose, found_m, _ in lifted.cases(ALL_PARTS):
+        a, b = pairs[case[0]]
         a, b = a[whose[a] == whose[b]], b[whose[a] == whose[b]]
-        together = _drawn_together(draw_counts(whose, n_resamples, seed), whose, a, b)
+        together = _drawn_together(draw_counts(whose, draws), whose, a, b)
         seen = np.isfinite(found_m[..., 0]).any(axis=1)
         either = seen[a] | seen[b]
         with np.errstate(invalid="ignore"):
             rate = together @ (seen[a] != seen[b]) / (together @ either)
         moves_m = pd.DataFrame(np.linalg.norm(found_m[a] - found_m[b], axis=-1)).median(axis=1).to_numpy()
         moved, moved_m = np.isfinite(moves_m), weighted_median(moves_m, together)
-        for measure, draws, count in (("flicker rate", rate, either), ("moves [m]", moved_m, moved)):
+        for measure, drawn, count in (("flicker rate", rate, either), ("moves [m]", moved_m, moved)):
             n_people = len(set(whose[a[count]]))
-            interval = with_interval(draws, n_people if n_people > 1 or len(set(whose)) == 1 else 0)
+            interval = with_interval(drawn, n_people if n_people > 1 or len(set(whose)) == 1 else 0)
             rows.append((*case, part, measure, *interval, count.sum(), n_people))
     return pd.DataFrame(rows, columns=[*ROW, "value", "low", "high", "n", "n_people"])
 

@@ -10,7 +10,7 @@ Percentiles that fit many people would make the intervals of few too narrow, so 
 """
 
 from statistics import NormalDist
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -23,40 +23,54 @@ PERCENTILES = (2.5, 97.5)  # of 95 % intervals
 MIN_DRAWN = 10  # a percentile interval from fewer covers far less than 95 %, and from one nothing
 
 
-def draw_counts(frames: int | ArrayLike, n_resamples: int, seed: int, block_length: int = 1) -> np.ndarray:
+class Draws(NamedTuple):
+    """The draws of a bootstrap.
+
+    Attributes
+    ----------
+    n : int
+        How many.
+    seed : int
+        What they are drawn with.
+    """
+
+    n: int = 1000
+    seed: int = 0
+
+
+def draw_counts(frames: int | ArrayLike, draws: Draws, block_length: int = 1) -> np.ndarray:
     """How often each frame is drawn.
 
     Parameters
     ----------
     frames : int or array, shape (n,)
         Number of frames of one subject, or whose each frame is; those of a subject in the order of time.
-    n_resamples : int
-        Number of draws. None are made of fewer than `MIN_DRAWN` subjects, or of one with fewer blocks of
-        frames: there is no interval.
-    seed : int
-        Of the draws.
+    draws : Draws
+        None are made of fewer than `MIN_DRAWN` subjects, or of one with fewer blocks of frames: there is no
+        interval.
     block_length : int, optional
         Frames that are drawn together; cut to a subject's frames.
 
     Returns
     -------
-    array of int, shape (1 + n_resamples, n)
+    array of int, shape (1 + draws.n, n)
         The first row is the sample itself, each once. A subject that is drawn gives as many frames as it has:
         blocks that start anywhere, the last one cut.
 
     Examples
     --------
-    >>> draw_counts(3, 1000, seed=0)
+    >>> draw_counts(3, Draws())
     array([[1, 1, 1]])
-    >>> draw_counts(np.repeat(np.arange(10), 2), 1000, seed=0).sum(axis=1).min()
+    >>> draw_counts(np.repeat(np.arange(10), 2), Draws()).sum(axis=1).min()
     np.int64(20)
     """
     whose = np.zeros(frames) if isinstance(frames, int | np.integer) else np.asarray(frames)
-    return _draw_counts(tuple(pd.factorize(whose)[0].tolist()), n_resamples, seed, block_length)
+    return _draw_counts(tuple(pd.factorize(whose)[0].tolist()), draws, block_length)
 
 
 @memoised(4)
-def _draw_counts(subjects: tuple[int, ...], n_resamples: int, seed: int, block_length: int) -> np.ndarray:
+def _draw_counts(subjects: tuple[int, ...], draws: tuple[int, int], block_length: int) -> np.ndarray:
+    n_resamples, seed = draws
     rng, sizes = np.random.default_rng(seed), np.bincount(subjects)
     n_units = len(sizes) if len(sizes) > 1 else -(-len(subjects) // block_length)
     n_resamples = n_resamples if n_units >= MIN_DRAWN else 0

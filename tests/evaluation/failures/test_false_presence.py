@@ -5,6 +5,7 @@ import pytest
 from hicp_lib.core.detections import Detections
 from hicp_lib.evaluation.failures.false_presence import DECISIONS, false_presence
 from hicp_lib.evaluation.failures.placed_keypoints import placed_keypoints
+from hicp_lib.evaluation.statistics.resampling import Draws
 from tests.evaluation.failures.test_presence import N_PEOPLE, NAME, study
 
 
@@ -15,14 +16,14 @@ def shares(truth, found, source, **options):
 
 
 def test_heads_put_into_the_picture_are_invented_and_those_beyond_it_are_not():
-    table = shares(*study(0.8, lambda i: i % 4 == 0), n_resamples=50)
+    table = shares(*study(0.8, lambda i: i % 4 == 0), draws=Draws(50))
     assert table.loc[DECISIONS[0], "value"] == 0.25
     assert table.loc[DECISIONS[0], "low"] < 0.25 < table.loc[DECISIONS[0], "high"]
     assert (table["n_found"] == N_PEOPLE).all()
 
 
 def test_a_score_below_the_threshold_invents_nothing_and_none_seen_is_not_never():
-    row = shares(*study(0.2, lambda i: True), n_resamples=50).loc[DECISIONS[0]]
+    row = shares(*study(0.2, lambda i: True), draws=Draws(50)).loc[DECISIONS[0]]
     assert (row["value"], row["low"]) == (0, 0) and row["high"] == pytest.approx(1 - 0.025 ** (1 / N_PEOPLE))
 
 

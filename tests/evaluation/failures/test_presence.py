@@ -12,6 +12,7 @@ from hicp_lib.evaluation.ap.metric_table import draw_cases
 from hicp_lib.evaluation.calibration.curves import Calibration
 from hicp_lib.evaluation.failures.placed_keypoints import placed_keypoints
 from hicp_lib.evaluation.failures.presence import MEASURES, PART_OF, Presence, declared, extended_table
+from hicp_lib.evaluation.statistics.resampling import Draws
 from tests.evaluation.made_people import CROP, POINTS, make_annotations
 
 N_PEOPLE = 40
@@ -68,8 +69,8 @@ def test_a_keypoint_outside_the_picture_declares_itself_absent():
 
 def test_extended_ap_falls_with_invented_heads_and_the_decision_brings_it_back():
     truth, found, source = study(0.8, lambda i: True)
-    drawn = draw_cases(truth, found, 20, 0)
-    table = extended_table(truth, found, source, drawn, 20, 0).set_index("measure")
+    drawn = draw_cases(truth, found, Draws(20))
+    table = extended_table(truth, found, source, drawn, Draws(20)).set_index("measure")
     assert list(table.index) == list(MEASURES) and (table["n_people"] == N_PEOPLE).all()
     plain, given, decided, gained = table["value"]
     assert plain == decided == pytest.approx(1) and given < 0.7

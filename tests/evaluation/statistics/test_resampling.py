@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
+from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, weighted_median, with_interval
 
 some_values = arrays(float, st.integers(1, 12), elements=st.one_of(st.just(np.nan), st.floats(-5, 5)))
 
@@ -28,13 +28,13 @@ def test_draws_may_have_values_of_their_own():
 
 
 def test_the_first_draw_is_the_sample_and_every_draw_as_large():
-    counts = draw_counts(17, 50, seed=3)
+    counts = draw_counts(17, Draws(50, 3))
     assert counts.shape == (51, 17) and (counts[0] == 1).all() and (counts.sum(axis=1) == 17).all()
-    assert (draw_counts(17, 50, seed=3) == counts).all() and counts[1:].std() > 0
+    assert (draw_counts(17, Draws(50, 3)) == counts).all() and counts[1:].std() > 0
 
 
 def test_a_handful_says_nothing_about_its_own_spread():
-    times = draw_counts(9, 50, seed=3)
+    times = draw_counts(9, Draws(50, 3))
     assert times.tolist() == [[1] * 9]
     value, low, high = with_interval(times @ np.arange(9) / times.sum(axis=1))
     assert value == 4 and np.isnan([low, high]).all()
@@ -49,27 +49,27 @@ def test_intervals_are_percentiles_of_the_draws_that_count():
 
 def test_the_interval_of_a_mean_is_as_wide_as_theory_says():
     values = np.random.default_rng(1).normal(size=400)
-    weights = draw_counts(400, 2000, seed=0)
+    weights = draw_counts(400, Draws(2000))
     _, low, high = with_interval(weights @ values / 400)
     np.testing.assert_allclose(high - low, 2 * 1.96 * values.std() / 20, rtol=0.06)
 
 
 def test_ten_images_are_drawn_again():
-    assert draw_counts(10, 50, seed=3).shape == (51, 10)
+    assert draw_counts(10, Draws(50, 3)).shape == (51, 10)
 
 
 def test_one_subject_is_drawn_frame_by_frame():
     """The multinomial draws of before there were subjects, and the blocks'."""
     drawn = np.random.default_rng(3).multinomial(17, np.full(17, 1 / 17), size=50)
-    assert (draw_counts(17, 50, seed=3)[1:] == drawn).all()
-    assert (draw_counts(["only"] * 17, 50, seed=3)[1:] == drawn).all()
-    assert (draw_counts(np.full(40, 7), 5, 1, 3) == draw_counts(40, 5, 1, 3)).all()
+    assert (draw_counts(17, Draws(50, 3))[1:] == drawn).all()
+    assert (draw_counts(["only"] * 17, Draws(50, 3))[1:] == drawn).all()
+    assert (draw_counts(np.full(40, 7), Draws(5, 1), 3) == draw_counts(40, Draws(5, 1), 3)).all()
 
 
 @pytest.mark.parametrize("length", [1, 3])
 def test_people_are_drawn_and_with_each_as_many_frames_as_there_are(length):
     people = np.array(list("abcdefghijkl") * 6)
-    counts = draw_counts(people, 400, 0, length)
+    counts = draw_counts(people, Draws(400), length)
     of_each = np.stack([counts[:, people == name].sum(axis=1) for name in "abcdefghijkl"], axis=1)
     assert (of_each % 6 == 0).all() and (of_each[0] == 6).all() and (of_each.sum(axis=1) == 72).all()
     assert of_each[1:].min() == 0 and of_each.max() >= 18  # nobody, and somebody three times
@@ -78,8 +78,8 @@ def test_people_are_drawn_and_with_each_as_many_frames_as_there_are(length):
 
 
 def test_nine_people_say_nothing_of_people_however_many_their_frames():
-    assert len(draw_counts(np.repeat(np.arange(9), 50), 20, 0)) == 1
-    assert len(draw_counts(np.repeat(np.arange(10), 2), 20, 0)) == 21
+    assert len(draw_counts(np.repeat(np.arange(9), 50), Draws(20))) == 1
+    assert len(draw_counts(np.repeat(np.arange(10), 2), Draws(20))) == 21
 
 
 @pytest.mark.parametrize("n_people, between, least, most", [
@@ -90,13 +90,13 @@ def test_nine_people_say_nothing_of_people_however_many_their_frames():
 ])  # fmt: skip
 def test_intervals_over_people_cover_the_mean(n_people, between, least, most):
     rng, people = np.random.default_rng(n_people), np.repeat(np.arange(n_people), 10)
-    weights = draw_counts(people, 500, 0)
+    weights = draw_counts(people, Draws(500))
     covered = alone = 0
     for _ in range(300):
         values = between * rng.normal(size=n_people)[people] + rng.normal(size=len(people))
         _, low, high = with_interval(weights @ values / len(people), n_people)
         covered += low <= 0 <= high
-        _, low, high = with_interval(draw_counts(len(people), 500, 0) @ values / len(people))
+        _, low, high = with_interval(draw_counts(len(people), Draws(500)) @ values / len(people))
         alone += low <= 0 <= high
     assert least <= covered / 300 <= most
     assert (alone / 300 < 0.7) == (between > 0)  # as if the frames were all of different people

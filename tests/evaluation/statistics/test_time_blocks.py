@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN, draw_counts
+from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN, Draws, draw_counts
 from hicp_lib.evaluation.statistics.time_blocks import block_length
 
 
@@ -41,13 +41,13 @@ def test_gaps_and_missing_series_are_left_out():
 @given(st.integers(1, 60), st.integers(1, 20), st.integers(0, 100))
 def test_every_draw_has_as_many_frames_and_the_first_is_the_sample(n, length, seed):
     length = min(length, n)
-    counts = draw_counts(n, 5, seed, length)
+    counts = draw_counts(n, Draws(5, seed), length)
     n_drawn = 6 if -(-n // length) >= MIN_DRAWN else 1  # too few blocks tell nothing of the spread
     assert counts.shape == (n_drawn, n) and (counts[0] == 1).all() and (counts.sum(axis=1) == n).all()
 
 
 def test_frames_are_drawn_with_their_neighbours():
-    counts = draw_counts(400, 50, 0, 40)[1:]
+    counts = draw_counts(400, Draws(50), 40)[1:]
     steps = (np.diff(counts, axis=1) != 0).sum(axis=1)
     # Ten blocks have at most twenty ends; frames drawn one by one would change almost everywhere.
     assert steps.max() <= 20
@@ -58,7 +58,7 @@ def test_intervals_of_lasting_errors_cover_the_mean_where_single_frames_do_not()
     for seed in range(60):
         series = autoregressive(0.9, 480, seed)[:, 0]
         for length in covered:
-            weights = draw_counts(480, 200, seed, length)[1:]
+            weights = draw_counts(480, Draws(200, seed), length)[1:]
             low, high = np.percentile(weights @ series / 480, [2.5, 97.5])
             covered[length] += low <= 0 <= high
     assert covered[40] > 45 and covered[1] < 35
@@ -78,7 +78,7 @@ def test_eight_frames_are_the_fewest_and_a_quarter_of_them_the_longest():
 
 
 def test_ten_blocks_are_drawn_again_and_nine_are_not():
-    assert len(draw_counts(100, 5, 0, 10)) == 6 and len(draw_counts(90, 5, 0, 10)) == 1
+    assert len(draw_counts(100, Draws(5), 10)) == 6 and len(draw_counts(90, Draws(5), 10)) == 1
 
 
 def test_a_single_pair_of_neighbours_counts_in_full():
