@@ -19,8 +19,13 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.cases import labelled
 from hicp_lib.evaluation.space.stability import POSITION, THRESHOLDS_M
 from hicp_lib.evaluation.statistics.design import smallest_difference
-from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, weighted_median, with_interval
-from hicp_lib.evaluation.statistics.time_blocks import block_length
+from hicp_lib.evaluation.statistics.resampling import (
+    Draws,
+    block_length,
+    draw_counts,
+    weighted_median,
+    with_interval,
+)
 from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.qualisys import MotionCapture
 

@@ -7,8 +7,8 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.evaluation.failures.error_kinds import all_errors
 from hicp_lib.evaluation.failures.false_confidence import MEASURES, paper_remarks, scores_by_state
-from hicp_lib.evaluation.failures.false_presence import false_presence
 from hicp_lib.evaluation.failures.placed_keypoints import from_the_cut, landed, placed_keypoints
+from hicp_lib.evaluation.failures.presence import false_presence
 from hicp_lib.evaluation.failures.without_head import hallucinated_heads
 from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.study.plots import failures as draw

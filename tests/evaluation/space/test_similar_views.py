@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from hicp_lib.core.rotations import about
-from hicp_lib.evaluation.space.similar_views import similar_pairs, similar_views
+from hicp_lib.evaluation.space.sightings import similar_pairs, similar_views
 from hicp_lib.evaluation.space.stability import LiftedViews
 from hicp_lib.evaluation.statistics.resampling import Draws
 from tests.evaluation.still_person import alone, make_points
