@@ -5,8 +5,8 @@ Rows are per image, for `hicp_lib.evaluation.statistics.proportions`: shares wit
 of detectors or of parts on the same images.
 
 Nearly equal views of still people differ in nothing but the camera's pose, and in that by little, so an
-answer that follows what is seen stays: `similar_views` is `hicp_lib.evaluation.space.flicker` for views that are no
-sequence. In its bootstrap people are drawn, and views of each, and with them the pairs they make.
+answer that follows what is seen stays: `similar_views` is `hicp_lib.evaluation.space.flicker` for views that
+are no sequence. In its bootstrap people are drawn, and views of each, and with them the pairs they make.
 """
 
 from collections.abc import Mapping
