@@ -39,7 +39,7 @@ def drawn():
         case: {i: Detections.none() if i < n else make_detections(points[i]) for i in range(N)}
         for case, n in lost.items()
     }
-    return draw_cases(*same_people(truth, found), 200, groups=["body"])
+    return draw_cases(*same_people(truth, found), Draws(200), groups=["body"])
 
 
 def test_each_share_is_what_is_lost_where_it_was_made(drawn):
