@@ -131,11 +131,8 @@ def absent_weights(detector: str) -> list[str]:
     ([], [])
     """
     parts = set(detector.removeprefix(COMBINED).split("+"))
-    return [
-        weight.name
-        for weight in registry().values()
-        if parts & set(weight.used_by) and not weight.path.is_file()
-    ]
+    used = [weight for weight in registry().values() if parts & set(weight.used_by)]
+    return [weight.name for weight in used if not weight.path.is_file()]
 
 
 def without_absent(

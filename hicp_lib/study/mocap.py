@@ -180,9 +180,8 @@ def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame)
     # Speeds are the same in any frame: no registration is needed yet.
     means = mocap_error.marker_means(mocap, mocap.times_s, np.eye(4), mocap_error.TABLE_JOINTS)
     means_m = means[POSITION].to_numpy(float).reshape(len(mocap.times_s), len(mocap_error.TABLE_JOINTS), 3)
-    return clock_offset(
-        recording.times_s, np.concatenate(seen_m, axis=1), mocap.times_s, np.tile(means_m, (1, len(cases), 1))
-    )
+    tiled_m = np.tile(means_m, (1, len(cases), 1))
+    return clock_offset(recording.times_s, np.concatenate(seen_m, axis=1), mocap.times_s, tiled_m)
 
 
 def medians_under(

@@ -84,9 +84,8 @@ class Combined:
         self._squares = SquareRule()
         self._rule = ArbitrationRule() if agreement else ArbitrationRule(alone=0, scatter=0)
         self.takes_boxes = getattr(body, "takes_boxes", False)
-        self.settings: dict[str, Any] = {
-            kind: {"name": part.name, **part.settings} for kind, part in self.parts.items()
-        }
+        parts = self.parts.items()
+        self.settings: dict[str, Any] = {kind: {"name": part.name, **part.settings} for kind, part in parts}
         self.settings |= {"looks": sorted(self._looks), "arbitrate": arbitrate, "min_side_px": min_side_px}
         self.settings |= {"squares": asdict(self._squares), "rule": asdict(self._rule)}
 

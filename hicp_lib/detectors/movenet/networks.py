@@ -115,6 +115,5 @@ class MoveNetMultiPose:
         people = rows[0][rows[0, :, 55] >= self._min_person_score].astype(float)
         keypoints = people[:, :51].reshape(-1, 17, 3)
         positions_px = fitted.to_image_px(keypoints[..., 1::-1] * self._side_px)
-        return Detections.of_parts(
-            positions_px, np.clip(keypoints[..., 2], 0, 1), np.clip(people[:, 55], 0, 1), "coco17"
-        )
+        scores = np.clip(keypoints[..., 2], 0, 1)
+        return Detections.of_parts(positions_px, scores, np.clip(people[:, 55], 0, 1), "coco17")

@@ -128,9 +128,7 @@ class KeypointRcnn:
     def _roles(self, outputs: list[np.ndarray]) -> dict[str, np.ndarray]:
         """What is there of `_ROLES`; exports differ in order and names, ranks and sizes tell them apart."""
         floats = [output.astype(float) for output in outputs if output.dtype.kind == "f"]
-        fitting = {
-            name: [output for output in floats if _fits(output.shape, tail)] for name, tail in _ROLES.items()
-        }
+        fitting = {name: [one for one in floats if _fits(one.shape, tail)] for name, tail in _ROLES.items()}
         roles = {name: found[0] for name, found in fitting.items() if found}
         self._check([role.shape for role in roles.values()], outputs)
         if len({len(role) for role in roles.values()}) != 1:

@@ -166,9 +166,8 @@ def join_as_released(
 
 def _begin_alone(people: list[_Person], part: int, peaks: list[np.ndarray]) -> None:
     taken = {person.peaks.get(part) for person in people}
-    people += [
-        _Person({part: peak}, 1, value) for peak, value in enumerate(peaks[part][:, 2]) if peak not in taken
-    ]
+    new = [(peak, value) for peak, value in enumerate(peaks[part][:, 2]) if peak not in taken]
+    people += [_Person({part: peak}, 1, value) for peak, value in new]
 
 
 def _complete(people: list[_Person], a: int, b: int, limbs: list[Limb]) -> None:

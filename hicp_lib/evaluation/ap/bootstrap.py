@@ -91,9 +91,8 @@ def resample(
     rng = np.random.default_rng(draws.seed)
     n_draws = draws.n if n >= MIN_DRAWN else 0
     weights = [np.bincount(rng.integers(n, size=n), minlength=n)[cluster] for _ in range(n_draws)]
-    return [
-        _samples(e.matches, [w[place] for w in weights]) for e, place in zip(evaluations, places, strict=True)
-    ]
+    pairs = zip(evaluations, places, strict=True)
+    return [_samples(e.matches, [w[place] for w in weights]) for e, place in pairs]
 
 
 def _samples(matches: cocoeval.Matches, weights: Sequence[np.ndarray]) -> Samples:

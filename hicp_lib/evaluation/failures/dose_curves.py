@@ -96,9 +96,8 @@ def observed_doses(truth: Truth, folders: Mapping[str, Path], source: Annotation
     DataFrame
         Columns `subset, image_id, keypoint` and those of `OBSERVED` (NaN where not known).
     """
-    distances = {
-        int(i): extra.get("distance_m", np.nan) for i, extra in zip(source.ids, source.extras, strict=True)
-    }
+    extras = zip(source.ids.tolist(), source.extras, strict=True)
+    distances = {i: extra.get("distance_m", np.nan) for i, extra in extras}
     tables = []
     for subset, of_subset in truth.items():
         people = of_subset.take(~of_subset.is_crowd)

@@ -95,9 +95,8 @@ def fixed(path: Path = CLAIMS_FILE) -> dict[str, Any]:
     content = read_json(path)
     recorded = content["recorded"]
     sha256 = digest([content["tables"], content["claims"]])
-    since = (
-        recorded["day"] if sha256 == recorded["sha256"] else f"changed after version {recorded['version']}"
-    )
+    changed = f"changed after version {recorded['version']}"
+    since = recorded["day"] if sha256 == recorded["sha256"] else changed
     if sha256 == recorded["sha256"] and git("rev-parse", "--is-shallow-repository") == "false":
         commits = git("log", f"-S{sha256}", "--format=commit %h of %cs", "--", str(path))
         since = commits.splitlines()[-1] if commits else since

@@ -26,9 +26,8 @@ def ingredients(table: pd.DataFrame, note: str) -> Figure:
     """
     variants, bodies = list(table["variant"].unique()), list(table["body"].unique())
     height_in = 0.7 + (0.7 + 0.36 * len(variants)) * len(bodies)
-    figure, axes = new_figure(
-        len(bodies), len(_MEASURES), 10.5, height_in, sharey=True, sharex="col", squeeze=False
-    )
+    shape = len(bodies), len(_MEASURES)
+    figure, axes = new_figure(*shape, 10.5, height_in, sharey=True, sharex="col", squeeze=False)
     pens = {name: {"color": SUBSET_COLOURS.get(name), "label": name} for name in table["subset"].unique()}
     for row, body in zip(axes, bodies, strict=True):
         for axis, measure in zip(row, _MEASURES, strict=True):

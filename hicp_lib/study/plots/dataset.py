@@ -197,9 +197,8 @@ def crop_sizes(table: pd.DataFrame, min_pixels: int, note: str) -> Figure:
     axis.legend(loc="best")
     share = float((sizes >= min_pixels).mean())
     caption = f"Sizes of the crops and the limit of {min_pixels:,} pixels (dashed): {note}."
-    alt = (
-        f"Histogram of crop sizes; {share:.0%} reach the limit, the median is {np.median(sizes):,.0f} pixels."
-    )
+    said = f"{share:.0%} reach the limit, the median is {np.median(sizes):,.0f} pixels"
+    alt = f"Histogram of crop sizes; {said}."
     return Figure(figure, caption, alt, pd.DataFrame({"pixels": sizes}))
 
 

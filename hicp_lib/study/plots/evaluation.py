@@ -91,9 +91,8 @@ def _scatter_detector(axis, rows: pd.DataFrame, detector: str) -> None:
 def _describe_best(table: pd.DataFrame) -> str:
     rows = table[(table["metric"] == "AP") & table["value"].notna()]
     best = rows.loc[rows.groupby(["subset", "group"], sort=False)["value"].idxmax()]
-    said = series_text(
-        best.set_index(["detector", "subset", "group"])["value"], "{0} with {3:.2f} on {1} {2}"
-    )
+    values = best.set_index(["detector", "subset", "group"])["value"]
+    said = series_text(values, "{0} with {3:.2f} on {1} {2}")
     return f"Scatter of average precision against average recall. Highest average precision: {said}."
 
 

@@ -59,9 +59,8 @@ def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: fl
         axis.set(xticks=_BOX_CM, xticklabels=map(str, _BOX_CM))
         marks.name_rows(axis, labels)
         axis.label_outer()
-    medians_cm = (
-        100 * found[found["keypoint"].isin(joints)].groupby(_LINE[:2], sort=False)["error_m"].median()
-    )
+    shown = found[found["keypoint"].isin(joints)]
+    medians_cm = 100 * shown.groupby(_LINE[:2], sort=False)["error_m"].median()
     said = series_text(medians_cm, "{}, {} lifting, {:.1f} cm")
     caption = (
         f"Distance of lifted joints (score above {min_score:g}) from the mean of their two markers: box "
@@ -184,9 +183,8 @@ def error_budget(table: pd.DataFrame, paper: pd.DataFrame, note: str) -> Figure:
         axis.axvline(0, color="#888888", lw=0.8)
     axes[0, 0].set(yticks=[*rows.values()], yticklabels=[*rows], ylim=(max(rows.values()) + 0.6, -0.6))
     marks.legend_below(figure, axes, ncols=5)
-    theirs = (
-        f", against motion capture beside the medians of the paper's {in_words(paper['detector'].unique())}"
-    )
+    named = in_words(paper["detector"].unique())
+    theirs = f", against motion capture beside the medians of the paper's {named}"
     beside = theirs if AGAINST_MOCAP in rows else ""
     caption = (
         f"Error of keypoints by source, {table['n_people'].max()} people. Filled: all else true; hollow: "
