@@ -10,21 +10,19 @@ import numpy as np
 from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
 
-_UPPER_ARM_M, _FOREARM_M, _HAND_M, _FINGERS_M = 0.035, 0.03, 0.025, 0.036
 _TIPS_M = 0.075  # from the origin of the hand's link along its x axis to the fingertips
+_ARM = (
+    ("upper_arm", "shoulder_pitch", "upper_arm", 0.035),
+    ("forearm", "elbow", "forearm", 0.03),
+    ("hand", "forearm", "hand", 0.025),
+    ("fingers", "hand", "tips", 0.036),
+)
 _CAPSULES = (
     ("torso", "root", "head torso", 0.07),
     ("shoulders", "left shoulder_pitch", "right shoulder_pitch", 0.05),
     ("neck", "head torso", "head neck_roll", 0.03),
     ("head", "head neck_roll", "head head", 0.06),
-    ("left_upper_arm", "left shoulder_pitch", "left upper_arm", _UPPER_ARM_M),
-    ("left_forearm", "left elbow", "left forearm", _FOREARM_M),
-    ("left_hand", "left forearm", "left hand", _HAND_M),
-    ("left_fingers", "left hand", "left tips", _FINGERS_M),
-    ("right_upper_arm", "right shoulder_pitch", "right upper_arm", _UPPER_ARM_M),
-    ("right_forearm", "right elbow", "right forearm", _FOREARM_M),
-    ("right_hand", "right forearm", "right hand", _HAND_M),
-    ("right_fingers", "right hand", "right tips", _FINGERS_M),
+    *((f"{s}_{part}", f"{s} {a}", f"{s} {b}", r_m) for s in ("left", "right") for part, a, b, r_m in _ARM),
 )
 """Part, chain and link where it begins and where it ends, radius in metres; fingers with the thumb."""
 

@@ -114,7 +114,7 @@ def _similarities(
     other_side = _OTHER_SIDE[keypoints]
     sides = np.where((other_side != keypoints)[:, None], people.keypoints_px[:, other_side], np.nan)
     places = people.keypoints_px[:, keypoints], sides
-    terms = [oks_terms(at_px, points, people.areas_px2, sigmas) for at_px in places]
+    terms = [oks_terms(points - at_px, people.areas_px2, sigmas) for at_px in places]
     yield from (term[person] for term in terms)
     others = np.arange(len(people)) != person
     yield np.maximum(*terms)[others].max(axis=0, initial=0.0)

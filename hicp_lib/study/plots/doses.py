@@ -19,9 +19,7 @@ _LABELS = {
     "resolution": "height of the picture [px]",
     "upper part": "share of the height seen, from above",
     "lower part": "share of the height seen, from below",
-    "share of keypoints in the picture": "share of keypoints in the picture",
     "picture": "size of the picture [px, square root of its area]",
-    "share of keypoints hidden": "share of keypoints hidden",
     "distance to the border": "distance to the border [of the shorter side]",
     "brightness": "mean brightness [of 255]",
 }
