@@ -44,9 +44,8 @@ def ingredients(table: pd.DataFrame, note: str) -> Figure:
     ends = table[table["variant"].isin([variants[0], variants[-1]])]
     said = series_text(ends.set_index(["body", "variant", "subset"])["AP"], "{0}, {1}: {3:.2f} on {2}")
     caption = (
-        "What each step buys: average precision of hands, how much of it the step adds on the same crops, "
-        "and the share of labelled hands found, with 95 % bootstrap intervals over source images; a row of "
-        f"panels for the bodies of each detector: {note}."
+        "What each step buys: average precision of hands, what the step adds, hands found; panels by whose "
+        f"the bodies are; 95 % bootstrap intervals over source images: {note}."
     )
     alt = f"Dots with whiskers per step, for the bodies of {in_words(bodies)}. Average precision, {said}."
     return Figure(figure, caption, alt, table)

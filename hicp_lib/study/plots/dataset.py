@@ -98,10 +98,7 @@ def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
         axis.set(xticks=[], yticks=[], xlim=(left - 0.5, right - 0.5), ylim=(bottom - 0.5, top - 0.5))
         axis.set_title(f"person {row['annotation_id']}", fontsize=9)
         axis.grid(False)
-    caption = (
-        "How Headless is made, on real rows of the data: extent and centre of the head's keypoints (red), "
-        f"of the other body keypoints (green), and the cut (dashed). {note}"
-    )
+    caption = f"How Headless is made: the head (red), the body below it (green), the cut (dashed). {note}"
     alt = (
         f"{len(table)} people with a red box around the head, a green box around the body and a dashed cut "
         f"between them; the removed sides are {in_words(map(str, table['cut_side']))}."

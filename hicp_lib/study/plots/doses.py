@@ -76,11 +76,7 @@ def dose_curves(table: pd.DataFrame, group: str) -> Figure:
             axis.set_xscale("log")
             axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
-    caption = (
-        "Detection against dose, one thing varied and the rest fixed: average precision (solid) and the "
-        "share of visible keypoints hit (dotted), with 95 % bootstrap intervals over people. Rendered "
-        "people."
-    )
+    caption = "AP (solid) and visible keypoints hit (dotted), with 95 % intervals over rendered people."
     lows = rows[rows["measure"] == "AP"].groupby(["detector", "dose"], sort=False)["value"].min()
     said = series_text(lows, "{0} {2:.2f} for {1}")
     return Figure(figure, caption, f"Curves per dose. Lowest average precision: {said}.", table)
@@ -94,10 +90,7 @@ def observed_curves(table: pd.DataFrame, note: str) -> Figure:
     labels = {subset: f", {subset}" for subset in subsets}
     figure, axes = _dose_panels(table, "subset", styles, labels, "share of hits")
     marks.legend_below(figure, axes[0, 0], ncols=3)
-    caption = (
-        "Share of labelled body keypoints hit, by fifths of what the data set happens to hold of each "
-        f"dose, with 95 % bootstrap intervals over source images: {note}."
-    )
+    caption = f"Share of body keypoints hit by fifths of each dose; 95 % intervals over images: {note}."
     spread = table.groupby(["detector", "dose"], sort=False)["value"].agg(np.ptp)
     said = series_text(spread, "{0} {2:.2f} for {1}")
     return Figure(figure, caption, f"Curves per dose. Range of the hit rate: {said}.", table)

@@ -107,10 +107,7 @@ def loss_without_head(table: pd.DataFrame, data_note: str) -> Figure:
     drops = rows.pivot_table(index=["detector", "group"], columns="subset", values="value", sort=False)
     change = drops.get("headless", np.nan) - drops.get("basic", np.nan)
     said = series_text(change.dropna(), "{} {} {:+.2f}")
-    caption = (
-        "What removing the head costs: average precision on Basic (filled) and Headless (open) for each "
-        f"detector, with 95 % bootstrap intervals, on {data_note}."
-    )
+    caption = f"Average precision on Basic (filled) and Headless (open), 95 % intervals, on {data_note}."
     alt = f"Average precision with and without the head. Change per detector: {said}."
     return Figure(figure, caption, alt, rows)
 
@@ -183,10 +180,7 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
             medians.append(f"{detector} {np.median(oks):.2f} ({subset} {group})")
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
     marks.legend_below(figure, axes, ncols=_legend_columns(table["detector"].unique()))
-    caption = (
-        f"Share of annotated people whose best-fitting detection reaches a given OKS, on {data_note}; "
-        "a person nobody found counts with OKS 0."
-    )
+    caption = f"Share of people whose best detection reaches an OKS, 0 where there is none, on {data_note}."
     return Figure(figure, caption, f"Curves per detector. Median OKS: {in_words(medians)}.", table)
 
 
@@ -230,7 +224,5 @@ def time_per_image(table: pd.DataFrame, machine_note: str) -> Figure:
     axis.set(xlabel="time per image [ms]", xlim=(0, None))
     pairs = zip(detectors, samples, strict=True)
     medians = [f"{name} {np.median(times):.0f} ms" for name, times in pairs if len(times)]
-    caption = (
-        f"Time to detect people in one image, {machine_note}: box 25–75 %, whiskers 5–95 %, line the median."
-    )
+    caption = f"Time per image, {machine_note}: box 25–75 %, whiskers 5–95 %, line the median."
     return Figure(figure, caption, f"Box plot of detection times; medians: {in_words(medians)}.", table)

@@ -82,10 +82,7 @@ def class_precision(table: pd.DataFrame, note: str) -> Figure:
     counts = rows[rows["group"] == groups[0]].drop_duplicates("class").set_index("class")["n_people"]
     marks.name_rows(axes[0, 0], [f"{name} ({counts.get(name, 0)})" for name in names])
     marks.legend_below(figure, axes, ncols=2)
-    caption = (
-        "Average precision and recall (OKS .5:.95) by what the picture shows, with the number of people "
-        f"whose body counts; all subsets together; 95 % bootstrap intervals over source images: {note}."
-    )
+    caption = f"AP and AR (OKS .5:.95) by what is seen; 95 % intervals over source images: {note}."
     best = rows.query("group == 'body' and metric == 'AP'").dropna(subset="value")
     best = best.sort_values("value", ascending=False).groupby("class").head(1)
     said = series_text(best.set_index(["detector", "class"])["value"], "{0} {2:.2f} for {1}")
@@ -135,10 +132,7 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
     marks.legend_below(figure, axes)
     worst = table[(table["kind"] == "miss") & table["share"].notna()]
     said = series_text(worst.set_index(["detector", by])["share"], "{0} {2:.2f} on {1}")
-    caption = (
-        "What becomes of labelled keypoints, by the kinds of error of Ronchi and Perona, and those that "
-        f"are not given or belong to people who are not found: {note}."
-    )
+    caption = f"What becomes of labelled keypoints, by the kinds of error of Ronchi and Perona: {note}."
     return Figure(figure, caption, f"Stacked bars per {by}. Shares of misses: {said}.", table)
 
 
@@ -154,10 +148,7 @@ def head_change(table: pd.DataFrame, note: str) -> Figure:
     axis.set(xlabel="change of the share of keypoints hit, without the head")
     marks.legend_below(figure, axis, ncols=2)
     said = series_text(table.groupby("detector", sort=False)["change"].mean(), "{} {:+.2f}")
-    caption = (
-        "Without the head: change of the share of keypoints hit, on the same keypoints of the same people, "
-        f"with 95 % bootstrap intervals over source images: {note}."
-    )
+    caption = f"Change of the share of keypoints hit, same people; 95 % intervals over source images: {note}."
     return Figure(figure, caption, f"Dots per keypoint and detector. Mean change: {said}.", table)
 
 
@@ -175,10 +166,7 @@ def hallucinated_heads(table: pd.DataFrame, note: str) -> Figure:
     figure.colorbar(dots, ax=axes, label="score", shrink=0.8)
     marks.legend_below(figure, axes)
     said = series_text((table["below"] < 0).groupby(table["detector"], sort=False).mean())
-    caption = (
-        "Noses, eyes and ears given in pictures whose head was cut off (square: the picture, turned so "
-        f"that the cut is above), coloured by score: {note}."
-    )
+    caption = f"Noses, eyes, ears given where the head was cut off (square: the picture, cut above): {note}."
     return Figure(figure, caption, f"Scatter of places. Share put beyond the cut: {said}.", table)
 
 
@@ -199,9 +187,8 @@ def false_presence(table: pd.DataFrame, note: str) -> Figure:
     heads = rows[(rows["part"] == "head") & (rows["subset"] == "headless")]
     said = series_text(heads.set_index(["detector", "decision"])["value"], "{0} {2:.2f} ({1})")
     caption = (
-        "Parts of people that are outside the picture (their number in brackets): the share that a detector "
-        "gives inside it, by what counts as given, with 95 % bootstrap intervals over source images; a head "
-        f"is given when one of its five keypoints is: {note}."
+        "Share of parts outside the picture (how many: in brackets) that are given inside it, by what counts "
+        f"as given, with 95 % intervals over source images; a head by any of its five keypoints: {note}."
     )
     return Figure(figure, caption, f"Dots per part and detector. Heads that were cut off: {said}.", table)
 
@@ -224,9 +211,8 @@ def scores_by_state(table: pd.DataFrame, note: str) -> Figure:
     top = table[table["state"] == "outside"].groupby("detector", sort=False).tail(1)
     said = series_text(top.set_index(["detector", "score"])["value"], "{0} {2:.2f} at {1:.2f}")
     caption = (
-        "What a score is worth by where the keypoint truly is: share of hits per fifth of the score, for "
-        "keypoints that are visible, hidden, and outside the picture, with 95 % bootstrap intervals over "
-        f"source images: {note}."
+        "Share of hits per fifth of the score, for keypoints visible, hidden and outside the picture, with "
+        f"95 % bootstrap intervals over source images: {note}."
     )
     alt = f"Curves of hits against score. Highest scores outside the picture: {said}."
     return Figure(figure, caption, alt, table)

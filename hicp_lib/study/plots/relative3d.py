@@ -145,9 +145,8 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
     counts = worse.groupby(["detector", "mostly"], sort=False).size()
     said = series_text(counts, "{0} {2} with more {1}")
     caption = (
-        "Stability against accuracy: median distance of the images to their median position, and how far "
-        "that position is from the true one; above the dashed line a keypoint is more off than unsteady. "
-        f"Whiskers: {intervals_over(table)}: {note}."
+        "Median distance of the images to their median position, and of that to the truth; above the dashed "
+        f"line a keypoint is more off than unsteady. Whiskers: {intervals_over(table)}: {note}."
     )
     return Figure(figure, caption, f"Scatter of spread and bias on logarithmic axes. Parts: {said}.", table)
 
