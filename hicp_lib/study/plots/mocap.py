@@ -93,10 +93,6 @@ def _spaced(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _lifting(table: pd.DataFrame) -> str:
-    return f"{in_words(dict.fromkeys(table['method']))} lifting"
-
-
 @in_style
 def trajectories(
     errors: pd.DataFrame, times_s: np.ndarray, keypoint: str, min_score: float, note: str
@@ -139,7 +135,7 @@ def trajectories(
         f"The {name} over time in the robot's base frame: motion capture (line, interrupted where a marker "
         f"was missing) and lifted keypoints with a score above {min_score:g}; points more than "
         f"{100 * _OUT_OF_RANGE_M:.0f} cm beyond the line's range are not shown{_floor(errors)}: "
-        f"{_lifting(errors)}, {note}."
+        f"{in_words(dict.fromkeys(errors['method']))} lifting, {note}."
     )
     counts = found[found["error_m"].notna()].groupby("detector", sort=False).size()
     alt = f"Three curves over time. The {name} was found by {series_text(counts, '{} in {} frames')}."
