@@ -1,4 +1,4 @@
-"""Frames of a simulated recording, and what makes them one: truth and joints as tables, settings, the lists."""
+"""Frames of a simulated recording, and what makes them one: tables of truth and joints, settings, lists."""
 
 from dataclasses import asdict
 from pathlib import Path

@@ -72,10 +72,9 @@ def simulate_recording(
     stamp = {"scenario": name, **who, "version": key([simulate_recording])}
     keep_parts(out, frames.PARTS_DIR, stamp, ["rgb/*", "depth/*", f"{EXACT_DEPTH_DIR}/*", *_MOCAP_FILES])
     missing = [k for k in range(n) if not frames.part_path(out, k).exists()]
-    todo: list[tuple[str, Callable]] = [
-        (str(frames.part_path(Path(), k)), partial(record_one, name=name, subject=subject, k=k))
-        for k in missing
-    ]
+    one = partial(record_one, name=name, subject=subject)
+    todo: list[tuple[str, Callable]]
+    todo = [(str(frames.part_path(Path(), k)), partial(one, k=k)) for k in missing]
     if plan.capture is not None and not _is_captured(out, n):  # the longest first
         capture = partial(_capture_all, name=name, subject=subject, n=int(n))
         todo.insert(0, (str(Path(frames.PARTS_DIR, frames.MOCAP_PART)), capture))
