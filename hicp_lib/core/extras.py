@@ -40,4 +40,6 @@ def require(extra: str, *modules: str) -> None:
 
 
 def _missing(module: str, extra: str) -> MissingPartError:
-    return MissingPartError(f"{module} is not installed; in hicp's checkout run: pip install '.[{extra}]'")
+    return MissingPartError(
+        f"{module} is not installed, and this needs it; in hicp's checkout run: pip install '.[{extra}]'"
+    )

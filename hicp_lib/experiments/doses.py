@@ -194,13 +194,9 @@ def _part(base: Picture, share: float, from_above: bool) -> Picture:
     left, above, right, below = map(int, crop)
     shown = inside(base.keypoints_px, (left, above, right, below))
     window = slice(above, below), slice(left, right)
-    return replace(
-        base,
-        image=base.image[window],
-        mask=base.mask[window],
-        keypoints_px=base.keypoints_px - [left, above],
-        visibility=np.where(shown, base.visibility, 0),
-    )
+    image, mask, visible = base.image[window], base.mask[window], np.where(shown, base.visibility, 0)
+    moved_px = base.keypoints_px - [left, above]
+    return replace(base, image=image, mask=mask, keypoints_px=moved_px, visibility=visible)
 
 
 def _bounds(mask: np.ndarray) -> np.ndarray:

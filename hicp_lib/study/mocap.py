@@ -246,9 +246,6 @@ def ablation(people: Sequence[Person]) -> tuple[pd.DataFrame, pd.DataFrame] | No
 
     None where true positions are not known.
     """
-    errors = [
-        lifting_errors(person.stepwise, truth, person.recording.T_base_cam)
-        for person in people
-        if (truth := read_truth(person.recording)) is not None
-    ]
+    known = [(one, truth) for one in people if (truth := read_truth(one.recording)) is not None]
+    errors = [lifting_errors(one.stepwise, truth, one.recording.T_base_cam) for one, truth in known]
     return (summary(pd.concat(errors)), sigma_coverage(pd.concat(errors))) if errors else None

@@ -28,13 +28,8 @@ _SHORT_PX, _LONG_PX = 800, 1333
 _FAMILIES = ("detectron2", "torchvision")
 _MAX_EXPONENT = 80.0  # exp() of more is no number
 # What comes out of the network, by shape behind the number of people; None stands for any size.
-_ROLES: dict[str, tuple[int | None, ...]] = {
-    "boxes": (4,),
-    "scores": (),
-    "keypoints": (_N_KEYPOINTS, 3),
-    "logits": (_N_KEYPOINTS,),
-    "maps": (_N_KEYPOINTS, None, None),
-}
+_ROLES: dict[str, tuple[int | None, ...]] = {"boxes": (4,), "scores": (), "logits": (_N_KEYPOINTS,)}
+_ROLES |= {"keypoints": (_N_KEYPOINTS, 3), "maps": (_N_KEYPOINTS, None, None)}
 # What fills a fixed input beside the image: the mean colour, 0 once the network has normalised it.
 _FILL = (124, 116, 104)
 

@@ -18,15 +18,8 @@ from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import blob
 from hicp_lib.detectors.onnx.session import OnnxModel
 
-CONVENTIONS = {
-    14: "crowdpose14",
-    17: "coco17",
-    21: "right_hand21",
-    26: "halpe26",
-    68: "halpe68_noface",
-    133: "wholebody133",
-    136: "halpe136",
-}
+CONVENTIONS = {14: "crowdpose14", 17: "coco17", 21: "right_hand21", 26: "halpe26", 68: "halpe68_noface"}
+CONVENTIONS |= {133: "wholebody133", 136: "halpe136"}
 # Sets that networks are published for and that have no place among Halpe's points.
 _STRANGERS = {15: "MPI's body", 16: "MPII's body", 98: "WFLW's face", 106: "LaPa's face", 308: "Goliath"}
 _MAX_BATCH = 16

@@ -97,10 +97,8 @@ def resample(
 
 def _samples(matches: cocoeval.Matches, weights: Sequence[np.ndarray]) -> Samples:
     block = max(1, _BLOCK // max(1, len(matches.image_rows)))
-    parts = [
-        cocoeval.metrics(*cocoeval.precision_recall(matches, np.stack(weights[i : i + block])))
-        for i in range(0, len(weights), block)
-    ]
+    blocks = (np.stack(weights[i : i + block]) for i in range(0, len(weights), block))
+    parts = [cocoeval.metrics(*cocoeval.precision_recall(matches, of_block)) for of_block in blocks]
     return {name: np.concatenate([np.zeros(0), *(part[name] for part in parts)]) for name in cocoeval.METRICS}
 
 

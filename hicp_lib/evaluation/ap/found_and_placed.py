@@ -31,15 +31,10 @@ def found_and_placed(people: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFra
     """
     by = ["subset", "group", "detector"]
     is_found = people["oks"] >= MATCH_OKS
-    measures = {
-        FOUND: is_found.astype(float),
-        OKS_OF_FOUND: people["oks"].where(is_found),
-        WELL_PLACED: (people["oks"] >= _WELL_PLACED_OKS).astype(float).where(is_found),
-    }
-    tables = [
-        proportions(people.assign(value=values), by, "value", draws).assign(what=what)
-        for what, values in measures.items()
-    ]
+    well = (people["oks"] >= _WELL_PLACED_OKS).astype(float).where(is_found)
+    measures = {FOUND: is_found.astype(float), OKS_OF_FOUND: people["oks"].where(is_found), WELL_PLACED: well}
+    valued = ((what, people.assign(value=values)) for what, values in measures.items())
+    tables = [proportions(rows, by, "value", draws).assign(what=what) for what, rows in valued]
     everyone = tables[0][by].merge(pd.DataFrame({"what": list(measures)}), how="cross")
     table = everyone.merge(pd.concat(tables), how="left", on=[*by, "what"])
     return table.fillna({"n": 0, "n_images": 0}).astype({"n": int, "n_images": int})

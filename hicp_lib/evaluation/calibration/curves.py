@@ -164,20 +164,15 @@ def calibration_study(
 
 def calibration_table(calibrations: Mapping[tuple[str, str], Calibration]) -> pd.DataFrame:
     """Calibrations to be saved: columns `detector, group, score, rate`, a row per corner of a curve."""
-    rows = [
-        (*case, score, rate)
-        for case, calibration in calibrations.items()
-        for score, rate in zip(calibration.scores, calibration.rates, strict=True)
-    ]
+    points = ((case, zip(its.scores, its.rates, strict=True)) for case, its in calibrations.items())
+    rows = [(*case, *point) for case, of_case in points for point in of_case]
     return pd.DataFrame(rows, columns=["detector", "group", "score", "rate"])
 
 
 def calibrations_of(table: pd.DataFrame) -> dict[tuple[str, str], Calibration]:
     """Calibrations by (detector, group) from a saved `calibration_table`."""
-    return {
-        case: Calibration(rows["score"].to_numpy(), rows["rate"].to_numpy())
-        for case, rows in table.groupby(["detector", "group"], sort=False)
-    }
+    cases = table.groupby(["detector", "group"], sort=False)
+    return {case: Calibration(rows["score"].to_numpy(), rows["rate"].to_numpy()) for case, rows in cases}
 
 
 def _errors(kinds: Mapping[str, pd.DataFrame], draws: Draws) -> Iterator[float]:

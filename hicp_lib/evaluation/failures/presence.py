@@ -237,10 +237,9 @@ def _missing(people: Annotations) -> pd.DataFrame:
     """The parts that are outside the picture: columns `image_id, source_image, part, unit`."""
     people = people.take(~people.is_crowd)
     flags, sources = people.visibility[:, COCO_17], source_images(people)
-    seen, gone = (
-        np.column_stack([of[:, :_FIRST_OF_PAIRS].any(axis=1), of[:, _FIRST_OF_PAIRS:]])
-        for of in (flags > 0, flags < 0)
-    )
+    n = _FIRST_OF_PAIRS
+    paired = (np.column_stack([of[:, :n].any(axis=1), of[:, n:]]) for of in (flags > 0, flags < 0))
+    seen, gone = paired
     who, unit = np.nonzero(gone & ~seen)
     image_ids = people.image_ids[who].tolist()
     of_image = {"image_id": image_ids, "source_image": [sources[i] for i in image_ids]}

@@ -162,7 +162,5 @@ def _measures(tracks_px: np.ndarray, times_s: np.ndarray) -> dict[str, tuple[np.
     jumps = np.linalg.norm(np.diff(tracks_px, n=2, axis=0), axis=-1) / np.sqrt(6)
     jumped = np.isfinite(jumps) & close[1:] & close[:-1]
     at_s = np.broadcast_to(times_s[:, None], given.shape)
-    return {
-        "flicker rate": ((given[1:] != given[:-1])[either], at_s[1:][either]),
-        "jitter [px]": (jumps[jumped], at_s[2:][jumped]),
-    }
+    changes = (given[1:] != given[:-1])[either]
+    return {"flicker rate": (changes, at_s[1:][either]), "jitter [px]": (jumps[jumped], at_s[2:][jumped])}

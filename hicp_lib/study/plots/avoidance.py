@@ -34,10 +34,8 @@ def clearances(metrics: pd.DataFrame, note: str) -> Figure:
     """
     shown = {"reach_m": "in the first reach", "min_distance_m": "until they leave"}
     tables = {of: over_people(metrics, ["detector", "gains"], of) for of in shown}
-    conditions = [
-        row.detector + (f", {row.gains}" if row.detector != NO_AVOIDANCE else "")
-        for row in tables["reach_m"].itertuples()
-    ]
+    gains = [f", {row.gains}" * (row.detector != NO_AVOIDANCE) for row in tables["reach_m"].itertuples()]
+    conditions = list(tables["reach_m"]["detector"] + gains)
     figure, axes = new_figure(1, 2, 10.0, 1.6 + 0.42 * len(conditions), sharey=True, sharex=True)
     for axis, (of, title) in zip(axes, shown.items(), strict=True):
         for place, ((detector, _), mine) in enumerate(metrics.groupby(["detector", "gains"], sort=False)):

@@ -22,12 +22,8 @@ from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, s
 
 _TRUTH_COLOUR = "#F0E442"
 _EDGES = ("left", "top", "right", "bottom")
-_PARTS = {
-    **{NAMES[i].replace("_", " "): [i] for i in COCO_17},
-    "face (68)": FACE,
-    "left hand (21)": LEFT_HAND,
-    "right hand (21)": RIGHT_HAND,
-}
+_PARTS = {NAMES[i].replace("_", " "): [i] for i in COCO_17}
+_PARTS |= {"face (68)": FACE, "left hand (21)": LEFT_HAND, "right hand (21)": RIGHT_HAND}
 
 
 def with_truth(annotations: Annotations, images_dir: str | Path, image_id: int) -> np.ndarray:

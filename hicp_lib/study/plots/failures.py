@@ -19,10 +19,7 @@ from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new
 
 _TRUTH_COLOUR = "#39D353"
 _ONE_CROP = ["subset", "image_id", "annotation_id"]
-_WORST = (
-    "The worst cases, by rule: the surest mistakes, and people whom no detection fits although much of them "
-    "is visible"
-)
+_WORST = "The worst cases: the surest mistakes, and people in sight whom no detection fits"
 _KIND_COLOURS = ("#1B9E4B", "#9BD3A0", "#0072B2", "#CC79A7", "#D5272D", "#BDBDBD", "#5F5F5F")
 _KIND_STYLES = {kind: {"color": colour} for kind, colour in zip(KINDS, _KIND_COLOURS, strict=True)}
 _STATE_STYLES = dict(zip(STATES, (("-", "o"), ("--", "s"), (":", "^"), (":", "x")), strict=True))

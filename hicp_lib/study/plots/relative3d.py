@@ -156,10 +156,8 @@ def _draw_spread_and_bias(axis, row: pd.DataFrame) -> None:
     side, kind = row["part"].iloc[0].split()
     colour = detector_colour(row["detector"].iloc[0])
     x_cm, y_cm = 100 * row["spread_m"], 100 * row["bias_m"]
-    reach_cm = {
-        "xerr": 100 * marks.whiskers(row, "spread_m", "spread_m_low", "spread_m_high"),
-        "yerr": 100 * marks.whiskers(row, "bias_m", "bias_m_low", "bias_m_high"),
-    }
+    spread, bias = ((name, f"{name}_low", f"{name}_high") for name in ("spread_m", "bias_m"))
+    reach_cm = {"xerr": 100 * marks.whiskers(row, *spread), "yerr": 100 * marks.whiskers(row, *bias)}
     pen = {"color": colour, "mfc": colour if side == "left" else "white", "markersize": 8, "elinewidth": 0.7}
     axis.errorbar(x_cm, y_cm, fmt=_PART_MARKERS[kind], **reach_cm, **pen)
 
