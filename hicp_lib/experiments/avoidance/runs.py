@@ -25,6 +25,7 @@ from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.results import identity
 from hicp_lib.experiments.avoidance import closed_loop as loop
+from hicp_lib.experiments.avoidance.closed_loop import Latency, Trial
 from hicp_lib.experiments.avoidance.error_model import in_sight
 from hicp_lib.experiments.avoidance.head_camera import HeadCamera, ImageCache, Observation
 from hicp_lib.experiments.avoidance.reaching import Moment
@@ -60,9 +61,9 @@ class Job:
         Of keypoints that a detector found, "robust" or "paper".
     """
 
-    trial: loop.Trial
+    trial: Trial
     condition: str
-    latency: loop.Latency = loop.Latency()
+    latency: Latency = Latency()
     lifting: str = "robust"
 
     @property
