@@ -176,13 +176,10 @@ def _smaller(base: Picture, scale: float) -> Picture:
         return base
     size = round(_WIDTH_PX * scale), round(_HEIGHT_PX * scale)
     factor = np.array(size) / [_WIDTH_PX, _HEIGHT_PX]
-    return Picture(
-        cv2.resize(base.image, size, interpolation=cv2.INTER_AREA),
-        cv2.resize(base.mask.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.5,
-        (base.keypoints_px + 0.5) * factor - 0.5,
-        base.visibility,
-        base.area_px2 * factor.prod(),
-    )
+    image = cv2.resize(base.image, size, interpolation=cv2.INTER_AREA)
+    mask = cv2.resize(base.mask.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.5
+    keypoints_px = (base.keypoints_px + 0.5) * factor - 0.5
+    return Picture(image, mask, keypoints_px, base.visibility, base.area_px2 * factor.prod())
 
 
 def _part(base: Picture, share: float, from_above: bool) -> Picture:

@@ -197,15 +197,9 @@ def _input_size(model: OnnxModel, given: list[int] | None) -> tuple[tuple[int, i
     if len(shape) != 4 or shape[1] not in (None, 3):
         raise model.refusal("expected crops of a fixed size, (n, 3, h, w)")
     read, metadata = (shape[3], shape[2]), model.told.metadata
-    whole = {
-        why: size
-        for why, size in (
-            ("read from the file", _size(read)),
-            ("told by its metadata", _size([metadata.get("input_w"), metadata.get("input_h")])),
-            ("option input_size_px", _size(given or [])),
-        )
-        if size is not None
-    }
+    told = [metadata.get("input_w"), metadata.get("input_h")]
+    sizes = {"read from the file": read, "told by its metadata": told, "option input_size_px": given or []}
+    whole = {why: size for why, sides in sizes.items() if (size := _size(sides)) is not None}
     if given is not None and "option input_size_px" not in whole:
         raise InputError(f"input_size_px {given}: expected width and height in pixels, as in [192, 256]")
     if not whole:

@@ -29,14 +29,7 @@ _BODY_25_LIMBS = {
     (14, 19): (40, 41), (19, 20): (42, 43), (14, 21): (44, 45), (11, 22): (46, 47), (22, 23): (48, 49),
     (11, 24): (50, 51),
 }  # fmt: skip
-BODY_25 = PartModel(
-    convention="openpose_body25",
-    n_parts=25,
-    pairs=np.array(list(_BODY_25_LIMBS)),
-    fields=np.array(list(_BODY_25_LIMBS.values())),
-    completing=frozenset({18, 19}),
-    uncounted=frozenset(range(19, 25)),
-)
+BODY_25 = PartModel.of("openpose_body25", 25, _BODY_25_LIMBS, frozenset({18, 19}), frozenset(range(19, 25)))
 # By the number of heat maps, background included, and of fields.
 _PART_MODELS = {(19, 38): COCO_18, (26, 52): BODY_25}
 
@@ -125,11 +118,8 @@ def _split(
 ) -> tuple[np.ndarray, np.ndarray, PartModel]:
     """Heat maps (n_parts, h, w), fields and what they are, from one output or one of each, in any order."""
     cells = input_shape[0] // STRIDE, input_shape[1] // STRIDE
-    by_channels = {
-        output.shape[1]: np.nan_to_num(output[0])
-        for output in outputs
-        if output.ndim == 4 and output.shape[0] == 1 and output.shape[2:] == cells
-    }
+    fitting = [out for out in outputs if out.ndim == 4 and out.shape[0] == 1 and out.shape[2:] == cells]
+    by_channels = {out.shape[1]: np.nan_to_num(out[0]) for out in fitting}
     for (n_maps, n_fields), part_model in _PART_MODELS.items():
         if n_maps + n_fields in by_channels:
             maps = by_channels[n_maps + n_fields]

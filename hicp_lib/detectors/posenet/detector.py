@@ -179,9 +179,8 @@ class PoseNetMobileNet:
         blob = cv2.dnn.blobFromImage(square, 1 / 127.5, mean=(127.5, 127.5, 127.5))
         outputs = self._model.run_named(blob)
         # Of each vector all y come first, then all x.
-        to_child, to_parent, offsets = (
-            np.moveaxis(outputs[name].reshape(2, -1, *outputs[name].shape[2:])[::-1], 0, -1)
-            for name in ("displacement_fwd", "displacement_bwd", "offset")
-        )
+        names = ("displacement_fwd", "displacement_bwd", "offset")
+        paired = (outputs[name].reshape(2, -1, *outputs[name].shape[2:]) for name in names)
+        to_child, to_parent, offsets = (np.moveaxis(of_both[::-1], 0, -1) for of_both in paired)
         heat = 1 / (1 + np.exp(-outputs["heatmap"][0]))
         return Maps(heat, offsets, to_child, to_parent, STRIDE_PX)

@@ -39,11 +39,8 @@ def compare_classes(truth: Truth, found: Found, draws: Draws = Draws()) -> pd.Da
     ids = classes["image_id"] * len(truth) + classes["subset"].map(list(truth).index)
     by_class = {name: set(ids[classes["class"] == name]) for name in CLASSES}
     parts = {name: people.of_images(images) for name, images in by_class.items() if images}
-    cases = {
-        (name, detector): {i: of_image for i, of_image in run.items() if i in by_class[name]}
-        for name in parts
-        for detector, run in detections.items()
-    }
+    pairs_of = ((name, detector, run) for name in parts for detector, run in detections.items())
+    cases = {(name, d): {i: run[i] for i in run if i in by_class[name]} for name, d, run in pairs_of}
     drawn = draw_cases(parts, cases, draws)
     own = metric_table(drawn)
     less = pairs(drawn).merge(own[["subset", "group", "detector", "metric", "n_people"]])

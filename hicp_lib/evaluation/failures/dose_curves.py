@@ -24,14 +24,8 @@ from hicp_lib.formats.annotations import Annotations
 
 MEASURES = ("AP", "visible keypoints hit", "hidden keypoints hit")
 N_BINS = 5
-OBSERVED = {
-    "share of keypoints in the picture": "",
-    "distance": "m",
-    "picture": "px",
-    "share of keypoints hidden": "",
-    "distance to the border": "of the picture",
-    "brightness": "of 255",
-}
+OBSERVED: tuple[str, ...] = ("share of keypoints in the picture", "distance", "picture")
+OBSERVED += ("share of keypoints hidden", "distance to the border", "brightness")
 
 
 def by_level(annotations: Annotations) -> dict[tuple[str, float], Annotations]:
@@ -62,11 +56,8 @@ def dose_curves(
         keypoints): 95 % bootstrap intervals over people.
     """
     truth = {str(key): people for key, people in by_level(annotations).items()}
-    cases = {
-        (name, detector): {i: run[i] for i in people.images}
-        for detector, run in found.items()
-        for name, people in truth.items()
-    }
+    runs = ((name, d, run, its) for d, run in found.items() for name, its in truth.items())
+    cases = {(name, detector): {i: run[i] for i in its.images} for name, detector, run, its in runs}
     ap = compare(truth, cases, draws).query("metric == 'AP'")
     ap = ap.rename(columns={"n_people": "n"}).assign(measure="AP")
     errors = all_errors(truth, cases)

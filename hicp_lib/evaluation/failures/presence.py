@@ -158,14 +158,8 @@ def extended_table(
         the third less the second, on the same draws.
     """
     presence = Presence.fit(placed_keypoints(truth, found, source), draws.seed)
-    runs = {
-        (subset, f"{detector}, {way}"): run
-        for way, runs in {
-            "given": declared(truth, found),
-            "decided": declared(truth, found, presence),
-        }.items()
-        for (subset, detector), run in runs.items()
-    }
+    ways = {"given": declared(truth, found), "decided": declared(truth, found, presence)}
+    runs = {(s, f"{d}, {way}"): run for way, its in ways.items() for (s, d), run in its.items()}
     known = {subset: with_outside(people, source) for subset, people in truth.items()}
     counted = draw_cases(known, runs, draws, groups=["body"], outside="count")
     rows = []

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib.patches
 import numpy as np
@@ -22,7 +23,7 @@ from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, s
 
 _TRUTH_COLOUR = "#F0E442"
 _EDGES = ("left", "top", "right", "bottom")
-_PARTS = {NAMES[i].replace("_", " "): [i] for i in COCO_17}
+_PARTS: dict[str, Any] = {NAMES[i].replace("_", " "): [i] for i in COCO_17}
 _PARTS |= {"face (68)": FACE, "left hand (21)": LEFT_HAND, "right hand (21)": RIGHT_HAND}
 
 
