@@ -70,7 +70,7 @@ def oks(
     array, shape (...)
         In [0, 1].
     """
-    offsets_px, unlabelled = found_px - truth_px, ~labelled.any(axis=-1, keepdims=True)
+    offsets_px, unlabelled = found_px - truth_px, ~np.any(labelled, axis=-1, keepdims=True)
     if unlabelled.any():
         corner, size = boxes_px[..., None, :2], boxes_px[..., None, 2:]
         outside_px = np.maximum(corner - size - found_px, 0) + np.maximum(found_px - (corner + 2 * size), 0)

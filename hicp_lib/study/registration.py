@@ -181,8 +181,8 @@ def registration_readings(
     InputError
         If fewer than three clicks have a depth, or the camera has no marker.
     """
-    known = [(k, one) for k, one in enumerate(people) if one.exact is not None]
-    tables = [_drawn_readings(one, one.exact, n_images, noise_px, n_draws, seed + k) for k, one in known]
+    known = [(seed + k, one, one.exact) for k, one in enumerate(people) if one.exact is not None]
+    tables = [_drawn_readings(one, exact, n_images, noise_px, n_draws, drawn) for drawn, one, exact in known]
     if not tables:
         return None
     of_reading = pd.concat(tables).groupby("reading", sort=False)

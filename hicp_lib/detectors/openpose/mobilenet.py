@@ -25,7 +25,13 @@ _COCO_18_LIMBS = {
     (11, 12): (8, 9), (12, 13): (10, 11), (1, 0): (28, 29), (0, 14): (30, 31), (14, 16): (34, 35),
     (0, 15): (32, 33), (15, 17): (36, 37), (2, 16): (18, 19), (5, 17): (26, 27),
 }  # fmt: skip
-COCO_18 = PartModel.of("openpose_coco18", 18, _COCO_18_LIMBS, frozenset({17, 18}))
+COCO_18 = PartModel(
+    convention="openpose_coco18",
+    n_parts=18,
+    pairs=np.array(list(_COCO_18_LIMBS)),
+    fields=np.array(list(_COCO_18_LIMBS.values())),
+    completing=frozenset({17, 18}),
+)
 
 
 def check_height(net_height_px: int) -> None:

@@ -11,8 +11,6 @@ the parabola through the logarithms of its neighbours, exact for the Gaussians t
 cheaper. And two people are merged when a limb joins them and they have no part in common.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -45,11 +43,6 @@ class PartModel:
     fields: np.ndarray
     completing: frozenset[int] = frozenset()
     uncounted: frozenset[int] = frozenset()
-
-    @classmethod
-    def of(cls, convention: str, n_parts: int, limbs: dict, *rules: frozenset[int]) -> PartModel:
-        """Limbs are the channels of their fields by their pair of parts, `rules` the last two attributes."""
-        return cls(convention, n_parts, np.array(list(limbs)), np.array(list(limbs.values())), *rules)
 
 
 @dataclass(frozen=True)

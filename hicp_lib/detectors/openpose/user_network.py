@@ -29,7 +29,14 @@ _BODY_25_LIMBS = {
     (14, 19): (40, 41), (19, 20): (42, 43), (14, 21): (44, 45), (11, 22): (46, 47), (22, 23): (48, 49),
     (11, 24): (50, 51),
 }  # fmt: skip
-BODY_25 = PartModel.of("openpose_body25", 25, _BODY_25_LIMBS, frozenset({18, 19}), frozenset(range(19, 25)))
+BODY_25 = PartModel(
+    convention="openpose_body25",
+    n_parts=25,
+    pairs=np.array(list(_BODY_25_LIMBS)),
+    fields=np.array(list(_BODY_25_LIMBS.values())),
+    completing=frozenset({18, 19}),
+    uncounted=frozenset(range(19, 25)),
+)
 # By the number of heat maps, background included, and of fields.
 _PART_MODELS = {(19, 38): COCO_18, (26, 52): BODY_25}
 

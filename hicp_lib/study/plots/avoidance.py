@@ -1,6 +1,7 @@
 """Figures of avoidance: clearances of people, and against what is swept; separation's terms."""
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import pandas as pd
 
@@ -44,8 +45,8 @@ def clearances(metrics: pd.DataFrame, note: str) -> Figure:
                 at_cm, label = 100 * mine.loc[mine["script"] == script, of], None if place else script
                 pen = {"s": 22, "alpha": 0.45, "color": colour, "lw": 0, "marker": marker, "label": label}
                 axis.scatter(at_cm, [place + 0.18] * len(at_cm), **pen)
-            bar = {"fmt": "|", "ms": 12, "mew": 2.5, "capsize": 0, "elinewidth": 2, "color": colour}
-            marks.dots(axis, tables[of].iloc[[place]], place - 0.15, factor=100, **bar)
+            bar: dict[str, Any] = {"fmt": "|", "ms": 12, "mew": 2.5, "capsize": 0, "elinewidth": 2}
+            marks.dots(axis, tables[of].iloc[[place]], place - 0.15, factor=100, color=colour, **bar)
         for mark_m in MARKS_M:
             axis.axvline(100 * mark_m, color="#888888", lw=1, ls=":")
         axis.set(title=title, xlabel="least distance (cm)")
