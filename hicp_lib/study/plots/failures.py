@@ -79,7 +79,7 @@ def class_precision(table: pd.DataFrame, note: str) -> Figure:
     counts = rows[rows["group"] == groups[0]].drop_duplicates("class").set_index("class")["n_people"]
     marks.name_rows(axes[0, 0], [f"{name} ({counts.get(name, 0)})" for name in names])
     marks.legend_below(figure, axes, ncols=2)
-    caption = f"AP and AR (OKS .5:.95) by what is seen; 95 % intervals over source images: {note}."
+    caption = f"AP, AR by what is seen (people in brackets), all subsets, 95 % intervals over images: {note}."
     best = rows.query("group == 'body' and metric == 'AP'").dropna(subset="value")
     best = best.sort_values("value", ascending=False).groupby("class").head(1)
     said = series_text(best.set_index(["detector", "class"])["value"], "{0} {2:.2f} for {1}")
@@ -145,7 +145,7 @@ def head_change(table: pd.DataFrame, note: str) -> Figure:
     axis.set(xlabel="change of the share of keypoints hit, without the head")
     marks.legend_below(figure, axis, ncols=2)
     said = series_text(table.groupby("detector", sort=False)["change"].mean(), "{} {:+.2f}")
-    caption = f"Change of the share of keypoints hit, same people; 95 % intervals over source images: {note}."
+    caption = f"Share of hits without the head less that with it, 95 % intervals over source images: {note}."
     return Figure(figure, caption, f"Dots per keypoint and detector. Mean change: {said}.", table)
 
 
