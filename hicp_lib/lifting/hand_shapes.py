@@ -20,7 +20,7 @@ import numpy as np
 from hicp_lib.core.datafiles import DATA_DIR, read_arrays
 from hicp_lib.core.keypoints import HAND_LIMBS, LEFT_HAND, RIGHT_HAND
 from hicp_lib.core.memo import memoised
-from hicp_lib.core.quaternions import matrices_from_quaternions
+from hicp_lib.core.rotations import matrices_from_quaternions
 
 SHAPES_FILE = DATA_DIR / "hand_shapes.npz"
 PALM = np.array([0, 5, 9, 13, 17])
