@@ -147,7 +147,7 @@ def depth_costs(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
     place = np.clip(nearest + np.arange(-reach, reach + 1)[:, None], 0, len(beyond_m) - 1)
     apart = (beyond_m[place] - depth_m) / candidates.sigma_m[keypoint]
     flat = keypoint * len(beyond_m) + place
-    np.minimum.at(costs.reshape(-1), flat.ravel(), (apart * apart + cost).ravel())  # fast in 1D alone
+    np.minimum.at(costs.reshape(-1), flat.ravel(), (apart * apart + cost).ravel())  # fast in one dimension
     return costs[:, 1:-1]
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.lib.stride_tricks import as_strided
+from numpy.lib.stride_tricks import sliding_window_view
 
 from hicp_lib.core.keypoints import LEFT_HAND
 from hicp_lib.lifting.body_measures import LEVELS, BodyMeasures, found_parents
@@ -115,8 +115,9 @@ def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> tuple[np.nd
     costs = padded[:, widest // 2 :][:, :g]  # a view: what is added here is seen by those further in
     told = []
     for some in limbs[::-1]:
-        ends = padded[some.end, (widest - some.costs.shape[1]) // 2 :]
-        near = (_rows_shifted(ends, some.costs.shape, 1) + some.costs).min(axis=1)
+        width = some.costs.shape[1]
+        ends = padded[some.end, (widest - width) // 2 :][:, : g + width - 1]
+        near = (sliding_window_view(ends, g, axis=1) + some.costs).min(axis=1)
         told.append(np.minimum(near, costs[some.end].min(axis=1)[:, None] + _MOST_LONG))
         np.add.at(costs, some.begin, told[-1])
     chosen = costs.argmin(axis=1)  # which counts for those that hang on none
@@ -128,10 +129,11 @@ def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> tuple[np.nd
         is_near = near.min(axis=1) <= ends.min(axis=1) + _MOST_LONG
         chosen[some.end] = np.where(is_near, begin + near.argmin(axis=1) - width // 2, ends.argmin(axis=1))
         rest = costs[some.begin] - told_of
-        # Sums by step and depth of the beginning; each row begins one to the left of the last for the end's.
+        # Sums by step and depth of the beginning; by the end's, each row begins one to the left of the last.
         total = np.full((n, width, g + width - 1), np.inf, np.float32)
         np.add(some.costs, rest[:, None], out=total[:, :, width // 2 :][:, :, :g])
-        near = _rows_shifted(total[:, :, width - 1 :], some.costs.shape, -1).min(axis=1)
+        total = total.reshape(n, -1)[:, width - 1 :][:, : width * (g + width - 2)]
+        near = total.reshape(n, width, -1)[:, :, :g].min(axis=1)
         costs[some.end] = ends + np.minimum(near, rest.min(axis=1)[:, None] + _MOST_LONG)
     return chosen, costs
 
@@ -156,13 +158,6 @@ def out_of_reach(chosen: np.ndarray, limbs: Sequence[Limbs]) -> np.ndarray:
         cost = some.costs[np.arange(len(begin)), np.clip(step, 0, last), begin]
         is_out[some.end] = (step < 0) | (step > last) | (cost >= _MOST_LONG)
     return is_out
-
-
-def _rows_shifted(values: np.ndarray, shape: tuple[int, ...], step: int) -> np.ndarray:
-    """A view of n rows, or n times w, by which w of each begin one further right or left than the last."""
-    along = values.strides[-1]
-    down = step * along if values.ndim == 2 else values.strides[1] + step * along
-    return as_strided(values, shape, (values.strides[0], down, along))
 
 
 def _limits(pairs: np.ndarray, measures: BodyMeasures) -> np.ndarray:
