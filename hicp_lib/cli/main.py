@@ -239,6 +239,7 @@ def evaluate(
     from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals
     from hicp_lib.evaluation.ap.evaluate import evaluate as evaluate_detections
     from hicp_lib.evaluation.ap.options import definitions
+    from hicp_lib.evaluation.statistics.resampling import Draws
     from hicp_lib.formats.annotations import read_annotations, read_detections, source_images
 
     people = read_annotations(annotations, keypoint_map)
@@ -249,7 +250,7 @@ def evaluate(
     results = []
     for of_group, way in definitions(people, group):
         evaluation = evaluate_detections(people, found, of_group, **way, **options)
-        metrics = bootstrap_intervals(evaluation, seed=seed, clusters=clusters).items()
+        metrics = bootstrap_intervals(evaluation, Draws(seed=seed), clusters).items()
         rows = {name: _finite(dict(zip(("value", "low", "high"), of, strict=True))) for name, of in metrics}
         results.append(_finite(evaluation.row()) | {"metrics": rows, "seed": seed})
     if as_json:

@@ -15,8 +15,8 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, read_json, write_bytes
 from hicp_lib.formats.json_validation import is_number, shown
 from hicp_lib.recordings.camera_file import read_distorted_camera
-from hicp_lib.recordings.rectification import rectify
 from hicp_lib.recordings.recording import check_columns
+from hicp_lib.recordings.rectification import rectify
 from hicp_lib.recordings.tum import read_poses
 from hicp_lib.recordings.writer import JPEG_QUALITY, Poses, refuse_used_folder, write_index
 

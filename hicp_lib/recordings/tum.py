@@ -13,7 +13,7 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import atomic_path, write_bytes
-from hicp_lib.core.quaternions import matrices_from_quaternions, quaternions_from_matrices
+from hicp_lib.core.rotations import matrices_from_quaternions, quaternions_from_matrices
 
 MAX_DIFFERENCE_S = 0.02  # images and poses further apart in time do not belong together
 _UNIT_TOLERANCE = 0.01  # a quaternion's length may differ from 1 by this much: files are rounded

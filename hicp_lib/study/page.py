@@ -44,11 +44,8 @@ if TYPE_CHECKING:
 SCHEMA_VERSION = 1
 PLOTLY_MIME = "application/vnd.plotly.v1+json"
 _SVG_STYLE: dict[Any, Any] = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
-_SAVE_OPTIONS: dict[str, dict[str, Any]] = {
-    "png": {},
-    "svg": {"metadata": {"Date": None}},
-    "webp": {"pil_kwargs": {"quality": 88, "method": 4}},
-}
+_SAVE_OPTIONS: dict[str, dict[str, Any]] = {"png": {}, "svg": {"metadata": {"Date": None}}}
+_SAVE_OPTIONS |= {"webp": {"pil_kwargs": {"quality": 88, "method": 4}}}
 
 
 class Study:

@@ -137,11 +137,8 @@ def detections_grid(
     """
     detectors = list(next(iter(pictures.values()))[1])
     columns = len(detectors) if len(pictures) > 1 else min(len(detectors), 2)
-    drawn = [
-        draw_detections(image, found[d], d, min_score)
-        for image, found in pictures.values()
-        for d in detectors
-    ]
+    shown = [(image, found[d], d) for image, found in pictures.values() for d in detectors]
+    drawn = [draw_detections(*one, min_score) for one in shown]
     seen = [f"{d} {sum(len(found[d]) > 0 for _, found in pictures.values())}" for d in detectors]
     return picture_grid(
         [drawn[start : start + columns] for start in range(0, len(drawn), columns)],

@@ -12,6 +12,7 @@ from hicp_lib.core.images import write_png
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.detectors.registry import DETECTORS, default_detector_names
 from hicp_lib.evaluation.ap.found_and_placed import found_and_placed
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.study.plots import evaluation, people
 from hicp_lib.study.plots.palette import DETECTOR_STYLES, detector_colour
 from hicp_lib.study.plots.style import Figure, in_words
@@ -75,7 +76,7 @@ def test_found_and_placed_are_side_by_side_for_who_is_found(oks):
         )
         for subset, of in (("basic", [0.9, 0.9]), ("headless", oks))
     ]
-    table = found_and_placed(pd.concat(parts), 10)
+    table = found_and_placed(pd.concat(parts), Draws(10))
     figure = evaluation.found_and_placed(table, "made-up people")
     found, placed = ([line.get_xdata()[0] for line in axis.get_lines() if line.get_marker() == "o"
                       and len(line.get_xdata()) == 1] for axis in figure.figure.axes)  # fmt: skip

@@ -3,7 +3,7 @@
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.files import read_json
 from hicp_lib.core.keypoints import TO_HALPE
-from hicp_lib.study.plots.layouts import layouts
+from hicp_lib.study.plots.dataset import layouts
 
 
 def test_every_layout_has_a_person_with_the_points_that_have_a_counterpart():

@@ -1,7 +1,6 @@
 """What JupyterLab writes when a notebook of the study is saved: its cells as edited, nothing of a run.
 
-`tools/jupyter/jupyter_server_config.json` names the hook. The outputs stay in the browser; what they say
-lies in `results/`.
+The outputs stay in the browser; what they say lies in `results/`.
 """
 
 from pathlib import Path
@@ -39,3 +38,6 @@ def strip_study_notebook(model: dict[str, Any], path: str, contents_manager: Any
         cell["metadata"] = kept
         if cell["cell_type"] == "code":
             cell |= {"outputs": [], "execution_count": None}
+
+
+c.ContentsManager.pre_save_hook = strip_study_notebook  # noqa: F821

@@ -6,8 +6,7 @@ import pytest
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.registry import default_detector_names
 from hicp_lib.report import book, build
-from hicp_lib.report.build import make_report
-from hicp_lib.report.lacking import absent_weights, without_absent
+from hicp_lib.report.build import absent_weights, make_report, without_absent
 from hicp_lib.report.run import Children
 from tests.report.tiny_study import FINISH, START, pretend_to_execute, write_notebook
 

@@ -3,15 +3,14 @@
 import numpy as np
 import pytest
 
-from hicp_lib.robot import self_filter
+from hicp_lib.robot import segments
 from hicp_lib.robot.posture import Posture
-from hicp_lib.robot.segments import Segment, body_segments
-from hicp_lib.robot.self_filter import MARGIN_M, filter_self, self_distance_m
+from hicp_lib.robot.segments import MARGIN_M, Segment, body_segments, filter_self, self_distance_m
 
 
 def test_points_on_the_arm_go_and_others_stay(icub, home):
-    segments = body_segments(icub, home)
-    forearm = next(segment for segment in segments if segment.part == "left_forearm")
+    parts = body_segments(icub, home)
+    forearm = next(segment for segment in parts if segment.part == "left_forearm")
     middle = (forearm.start_m + forearm.end_m) / 2
     across = np.cross(forearm.end_m - forearm.start_m, [0, 0, 1.0])
     across /= np.linalg.norm(across)
@@ -61,6 +60,6 @@ def test_limbs_run_between_the_origins_of_links(icub, home):
 
 def test_a_limb_without_length_is_a_ball(icub, home, monkeypatch):
     ball = Segment("head", np.zeros(3), np.zeros(3), 0.06)
-    monkeypatch.setattr(self_filter, "body_segments", lambda icub, posture: [ball])
+    monkeypatch.setattr(segments, "body_segments", lambda icub, posture: [ball])
     gaps_m = self_distance_m(icub, home, np.array([[0.1, 0, 0], [0, -0.03, 0]]))
     np.testing.assert_allclose(gaps_m, [0.04, -0.03])

@@ -8,9 +8,12 @@ from types import SimpleNamespace
 import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from traitlets.config.loader import PyFileConfigLoader
 
 from hicp_lib.core.checkout import CHECKOUT
-from hicp_lib.report.saving import strip_study_notebook
+
+CONFIG = PyFileConfigLoader("jupyter_server_config.py", str(CHECKOUT / "tools" / "jupyter")).load_config()
+strip_study_notebook = CONFIG.ContentsManager.pre_save_hook
 
 
 @pytest.fixture
