@@ -9,7 +9,8 @@ figures, and the SHA-256 of each photograph. Nothing of the study was ever tuned
 
 - `metrics.parquet`: AP of bodies, by subset and detector, with intervals over photographs;
 - `draws.parquet`: that AP on each draw of photographs, the same for all detectors;
-- `people.parquet`: everybody who is looked at, and how well each detector finds them;
+- `head_loss.parquet`: its change without the head, on the people who are in both subsets;
+- `people.parquet`: size and labels of everybody who is looked at;
 - `images.parquet`: SHA-256, data set, people of every photograph;
 - `provenance.json`: version, commit, settings.
 """
@@ -26,7 +27,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.datafiles import REFERENCE_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_file, write_json
 from hicp_lib.core.keypoints import COCO_17
@@ -36,6 +36,7 @@ from hicp_lib.detectors.runtime.results import detections_of
 from hicp_lib.detectors.runtime.run import time_dataset
 from hicp_lib.evaluation.ap import metric_table
 from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
+from hicp_lib.study.photographs import FOLDER, people_table
 from hicp_lib.study.provenance import git_state
 
 # Annotations of photographs of people, and the folder of their images. Of photographs that two data sets
@@ -57,7 +58,6 @@ SOURCES = {
 DRAWN = {"2D_virtual_human", "3D_virtual_human"}  # folders of Human-Art that hold no photographs
 MIN_PIXELS = 4000  # of a crop: a fifth of the study's, as people are smaller here
 MIN_LABELLED = 4  # points of COCO's 17, of a person who is looked at
-OUT = REFERENCE_DIR / "photographs"
 
 
 def join(data: Path, images_dir: Path) -> tuple[Annotations, pd.DataFrame]:
@@ -98,27 +98,6 @@ def find(folder: Path, name: str) -> Path | None:
     return same[0] if len(same) == 1 else None
 
 
-def people_table(truth: dict, oks: pd.DataFrame) -> pd.DataFrame:
-    """Everybody in the crops: size, labels, and OKS of bodies by every detector."""
-    rows = []
-    for subset, people in truth.items():
-        own = people.take(~people.is_crowd)
-        flags = own.visibility[:, COCO_17]
-        rows.append(
-            pd.DataFrame(
-                {
-                    "subset": subset, "annotation_id": own.ids, "height_px": own.boxes_px[:, 3],
-                    "n_labelled": (flags > 0).sum(axis=1), "n_occluded": (flags == 1).sum(axis=1),
-                    "n_others": [int((people.image_ids == i).sum()) - 1 for i in own.image_ids],
-                }
-            )
-        )  # fmt: skip
-    bodies = oks[oks["group"] == "body"].pivot(
-        index=["subset", "annotation_id"], columns="detector", values="oks"
-    )
-    return pd.concat(rows).merge(bodies.add_prefix("oks ").reset_index(), on=["subset", "annotation_id"])
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("checkout", type=Path, help="of github.com/open-mmlab/mmpose")
@@ -137,15 +116,18 @@ def main() -> None:
         runs = {(s, d): time_dataset(d, of) for s, of in folders.items() for d in names}
     found = {case: detections_of(run) for case, run in runs.items()}
     drawn = metric_table.draw_cases(truth, found, groups=["body"])
-    OUT.mkdir(parents=True, exist_ok=True)
+    FOLDER.mkdir(parents=True, exist_ok=True)
     metrics = metric_table.metric_table(drawn)
-    metrics[metrics["metric"].isin(["AP", "AR"])].to_parquet(OUT / "metrics.parquet", index=False)
+    metrics[metrics["metric"].isin(["AP", "AR"])].to_parquet(FOLDER / "metrics.parquet", index=False)
     draws = {f"{subset} {detector}": samples["AP"] for (subset, detector, _), (_, samples) in drawn.items()}
-    pd.DataFrame(draws).round(4).astype(np.float32).to_parquet(OUT / "draws.parquet", index=False)
-    people_table(truth, metric_table.people_oks(truth, found)).to_parquet(OUT / "people.parquet", index=False)
-    images.to_parquet(OUT / "images.parquet", index=False)
+    pd.DataFrame(draws).round(4).astype(np.float32).to_parquet(FOLDER / "draws.parquet", index=False)
+    people_table(truth).to_parquet(FOLDER / "people.parquet", index=False)
+    same = metric_table.same_people(truth, found)
+    loss = metric_table.head_loss(metric_table.draw_cases(*same, groups=["body"]))
+    loss.to_parquet(FOLDER / "head_loss.parquet", index=False)
+    images.to_parquet(FOLDER / "images.parquet", index=False)
     settings = {"min_pixels": MIN_PIXELS, "min_labelled": MIN_LABELLED, "detectors": names}
-    write_json(OUT / "provenance.json", {"settings": settings, "git": git_state()}, indent=1)
+    write_json(FOLDER / "provenance.json", {"settings": settings, "git": git_state()}, indent=1)
     print(metrics[metrics["metric"] == "AP"].round(3).to_string(index=False))
 
 
