@@ -60,7 +60,8 @@ def read_checked(path: str | Path) -> bytes | None:
     (b'kept', None)
     """
     try:
-        content = Path(path).read_bytes()
+        with open(path, "rb") as file:  # pathlib takes as long again
+            content = file.read()
     except OSError:
         return None
     stated, payload = content[:32], content[32:]
@@ -86,7 +87,8 @@ def read_bytes(path: str | Path, expected: str) -> bytes:
         If it cannot be read.
     """
     try:
-        return Path(path).read_bytes()
+        with open(path, "rb") as file:
+            return file.read()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); {expected}") from None
 

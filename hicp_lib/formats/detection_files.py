@@ -117,8 +117,8 @@ def result_rows(image_id: int, facts: Mapping[str, Any], found: Detections) -> I
     ValueError
         For a score that is no number.
     """
-    given = np.isfinite(found.keypoints_px).all(axis=-1, keepdims=True)
-    triples = np.where(given, np.dstack([found.keypoints_px, found.scores]), 0.0)
+    triples = np.concatenate([found.keypoints_px, found.scores[..., None]], axis=-1)
+    triples[~np.isfinite(found.keypoints_px).all(axis=-1)] = 0.0
     if not (np.isfinite(triples).all() and np.isfinite(found.person_scores).all()):
         raise ValueError(f"image {image_id}: a score is not a finite number")
     for flat, score in zip(triples.reshape(len(found), -1), found.person_scores.tolist(), strict=True):
