@@ -20,9 +20,20 @@ import click
 from hicp_lib import __version__
 from hicp_lib.cli.calibration import calibration
 from hicp_lib.cli.models import models
-from hicp_lib.cli.options import PATH, detector_options, given, people_option, tell_assumed, worker_options
+from hicp_lib.cli.options import (
+    PATH,
+    detector_options,
+    given,
+    keypoint_map_option,
+    people_option,
+    tell_assumed,
+    tell_notes,
+    worker_options,
+)
 from hicp_lib.cli.recordings import lift, record
 from hicp_lib.core.errors import InputError
+
+_ANNOTATIONS = "COCO's layout; keypoints by their names, or 17, 26, 133 or 136 of them."
 
 
 def main() -> NoReturn:
@@ -109,15 +120,19 @@ def dataset() -> None:
 
 
 @dataset.command("create")
-@click.option("--annotations", type=PATH, required=True, help="Annotations in Halpe's layout.")
+@click.option("--annotations", type=PATH, required=True, help=_ANNOTATIONS)
 @click.option("--images", type=PATH, required=True, help="Folder of the images.")
+@keypoint_map_option
 @click.option("--out", type=PATH, required=True, help="Where basic/ and headless/ are written.")
 @click.option("--min-pixels", default=20_000, show_default=True, type=click.IntRange(min=1))
-def dataset_create(annotations: Path, images: Path, out: Path, min_pixels: int) -> None:
+def dataset_create(annotations: Path, images: Path, keypoint_map, out: Path, min_pixels: int) -> None:
     """Cut people out of annotated images: Basic, and Headless without their heads."""
     from hicp_lib.datasets.subsets import create_hicp
 
-    counts = create_hicp(annotations, images, out, min_pixels=min_pixels, progress=sys.stderr.isatty())
+    counts = create_hicp(
+        annotations, images, out, min_pixels, keypoint_map=keypoint_map, progress=sys.stderr.isatty()
+    )
+    tell_notes(annotations, counts.get("notes", {}))
     click.echo(json.dumps(counts, indent=2))
 
 
@@ -167,15 +182,18 @@ def detect(
 @click.option("--format", "kind", required=True, help="openpose, alphapose, mmpose, detectron2 or coco.")
 @click.option("--predictions", type=PATH, required=True, help="The folder or file the tool wrote.")
 @click.option("--annotations", type=PATH, required=True, help="Annotations of the images the tool saw.")
+@keypoint_map_option
 @click.option("--out", type=PATH, required=True, help="COCO keypoint results to write.")
 @click.option("--score-scale", type=float, help="Divides keypoint scores; the format's own if not given.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
-def import_(kind: str, predictions: Path, annotations: Path, out: Path, score_scale, as_json: bool) -> None:
+def import_(
+    kind: str, predictions: Path, annotations: Path, keypoint_map, out: Path, score_scale, as_json: bool
+) -> None:
     """Read the predictions another tool wrote."""
     from hicp_lib.formats.annotations import read_annotations, write_detections
     from hicp_lib.formats.importers.importing import import_predictions
 
-    imported = import_predictions(kind, predictions, read_annotations(annotations), score_scale)
+    imported = import_predictions(kind, predictions, read_annotations(annotations, keypoint_map), score_scale)
     write_detections(out, imported.detections, imported.extras)
     summary = imported.summary
     click.echo(json.dumps(asdict(summary), indent=2) if as_json else "\n".join(summary.lines()))
@@ -197,20 +215,21 @@ def export(detections: Path, kind: str, layout: str, annotations: Path | None, o
     click.echo(f"{out}: {n} people")
 
 
-_LEAST_AREA = 0.01  # of a person, as a share of their box; a smaller one stands for none
-
-
 @hicp.command()
-@click.option("--annotations", type=PATH, required=True, help="Annotations in Halpe's layout.")
+@click.option("--annotations", type=PATH, required=True, help=_ANNOTATIONS)
 @click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
+@keypoint_map_option
 @click.option("--group", default="body", show_default=True, help="body (17 points) or hand (42; and each).")
 @click.option("--sigmas", help="halpe or wholebody; else halpe, of each hand wholebody.")
-@click.option("--area", default="segment", show_default=True, help="segment, box, box53 or source.")
+@click.option(
+    "--area", default="segment", show_default=True, help="segment, box, box53 (0.53 x box) or source."
+)
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the bootstrap.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def evaluate(
-    annotations: Path, detections: Path, group: str, sigmas: str | None, area: str, seed: int, as_json
-) -> None:
+    annotations: Path, detections: Path, keypoint_map, group: str, sigmas: str | None, area: str, seed: int,
+    as_json: bool,
+) -> None:  # fmt: skip
     """Average precision and recall by OKS, with 95 % bootstrap intervals over images.
 
     Over all labelled keypoints, and over the visible ones only; with those outside the picture, by extended
@@ -221,13 +240,9 @@ def evaluate(
     from hicp_lib.evaluation.ap.options import definitions
     from hicp_lib.formats.annotations import read_annotations, read_detections, source_images
 
-    people = read_annotations(annotations)
+    people = read_annotations(annotations, keypoint_map)
     found = read_detections(detections, people)
-    counted = people.take(~people.is_crowd)
-    n_tiny = int((counted.areas_px2 < _LEAST_AREA * counted.boxes_px[:, 2:].prod(axis=1)).sum())
-    if n_tiny and area == "segment":
-        said = f"the area of {n_tiny} of {len(counted)} people is below a hundredth of their box"
-        click.echo(f"{annotations}: {said}, so OKS forgives hardly an error; give --area box", err=True)
+    tell_notes(annotations, people.notes, area)
     clusters = source_images(people)  # crops of one image are drawn together
     options = {"area": area} | ({"sigmas": sigmas} if sigmas else {})
     results = []

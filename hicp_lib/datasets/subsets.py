@@ -32,6 +32,7 @@ from hicp_lib.core.images import Box, inside, read_image, write_png
 from hicp_lib.core.keypoints import HEAD
 from hicp_lib.datasets.crops import TRUNK, crop_people, headless_cut, image_name, n_pixels, whole_pixel_boxes
 from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
+from hicp_lib.formats.layouts import KeypointMap
 
 SUBSETS = ("basic", "headless")
 _Crop = tuple[Path, Box]  # the file to write, and what of the image goes into it
@@ -195,6 +196,7 @@ def create_hicp(
     min_pixels: int = 20_000,
     headless_min_pixels: int = 1,
     progress: bool = False,
+    keypoint_map: KeypointMap | None = None,
 ) -> dict:
     """Write the dataset folders out/basic and out/headless, and out/summary.json.
 
@@ -204,7 +206,7 @@ def create_hicp(
     Parameters
     ----------
     annotations_path : str or Path
-        COCO, COCO-WholeBody or Halpe annotations.
+        Annotations in COCO's layout.
     images_dir : str or Path
         Folder of the annotated images.
     out : str or Path
@@ -213,11 +215,13 @@ def create_hicp(
         As of `plan`.
     progress : bool, optional
         Whether a bar is shown.
+    keypoint_map : mapping or sequence, optional
+        As of `read_annotations`.
 
     Returns
     -------
     dict
-        As from `summary`.
+        As from `summary`; and `notes`, those of the annotations if any.
 
     Raises
     ------
@@ -225,7 +229,7 @@ def create_hicp(
         For malformed annotations, missing or wrongly sized images, or an `out` in use for something else.
     """
     out, images_dir = Path(out), Path(images_dir)
-    annotations = read_annotations(annotations_path)
+    annotations = read_annotations(annotations_path, keypoint_map)
     table = plan(annotations, min_pixels, headless_min_pixels)
     boxes = {subset: crop_boxes(table, subset) for subset in SUBSETS}
     _claim(out, _digest(table, boxes, images_dir))
@@ -237,7 +241,7 @@ def create_hicp(
     for subset in SUBSETS:
         path = out / subset / "annotations.json"
         write_annotations(path, crop_annotations(annotations, table, subset))
-    counts = summary(table)
+    counts = summary(table) | ({"notes": annotations.notes} if annotations.notes else {})
     write_json(out / "summary.json", counts, indent=2)
     return counts
 

@@ -6,7 +6,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -14,12 +14,13 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES, TO_HALPE, to_halpe
+from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES, TO_HALPE
 
 # Beyond any image and any detector's raw output, and small enough for squares and products.
 MAX_ABS = 1e9
 MAX_INTEGER = 2**53  # every JSON reader has them exact up to here
 CONVENTIONS = {17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"}
+BY_NUMBER = {n: TO_HALPE[convention] for n, convention in CONVENTIONS.items()}
 # COCO-WholeBody files spread their 133 keypoints over five keys, in this order.
 PART_KEYS = ("foot_kpts", "face_kpts", "lefthand_kpts", "righthand_kpts")
 _REQUIRED = object()
@@ -43,6 +44,8 @@ class Rows:
         The objects.
     name_key : str
         Key that tells a reader which row is meant ("id", or "image_id").
+    numbers_in_file : sequence of int, optional
+        Where each stands in the file's list; as here if left out.
 
     Examples
     --------
@@ -58,6 +61,7 @@ class Rows:
     label: str
     rows: list[dict]
     name_key: str = "id"
+    numbers_in_file: Sequence[int] | None = None
 
     @classmethod
     def of(cls, path: Path, label: str, value: Any, name_key: str = "id") -> Rows:
@@ -89,7 +93,12 @@ class Rows:
         """The error for row i."""
         name = self.rows[i].get(self.name_key)
         named = f" ({self.name_key} {name})" if type(name) is int and abs(name) <= MAX_INTEGER else ""
-        return InputError(f"{self.path}: {self.label}[{i}]{named}: {problem}")
+        number = i if self.numbers_in_file is None else self.numbers_in_file[i]
+        return InputError(f"{self.path}: {self.label}[{number}]{named}: {problem}")
+
+    def take(self, chosen: Sequence[int]) -> Rows:
+        """Some of them, which messages name by their place in the file."""
+        return replace(self, rows=[self.rows[i] for i in chosen], numbers_in_file=chosen)
 
     def column(
         self, key: str, valid: _Check = lambda _: True, expected: str = "", default: Any = _REQUIRED
@@ -142,18 +151,23 @@ class Rows:
         values = self.column(key, lambda v: isinstance(v, list) and len(v) == n, f"[{', '.join(names)}]")
         return self.finite(values, n, lambda j: f"{key}[{j}] ({names[j]})")
 
-    def keypoints(self) -> np.ndarray:
-        """Triples (x, y, v) in the Halpe-136 order, zeros where the file's convention has no such keypoint.
+    def keypoints(self, layouts: Mapping[int, np.ndarray] = BY_NUMBER) -> np.ndarray:
+        """Triples (x, y, v) in the Halpe-136 order, zeros where the file's layout has no such keypoint.
 
-        Accepts 17 (COCO), 26 (Halpe body), 133 (COCO-WholeBody, also spread over its five keys) and 136
-        (Halpe) keypoints, row by row.
+        Parameters
+        ----------
+        layouts : mapping of int to array of int, optional
+            By the number of a row's keypoints, their indices in Halpe-136.
 
         Returns
         -------
         array, shape (n, 136, 3)
         """
-        lists = dict(enumerate(self._keypoint_lists()))
-        return self.points("keypoints", lists, CONVENTIONS)[0]
+        values = np.zeros((len(self.rows), N_KEYPOINTS, 3))
+        lists = dict(enumerate(self._keypoint_lists(layouts)))
+        for n, indices in layouts.items():
+            self._place(values, "keypoints", lists, n, indices)
+        return values
 
     def points(
         self, key: str, lists: Mapping[int, list], conventions: Mapping[int, str], width: int = 3
@@ -178,16 +192,24 @@ class Rows:
         found : Counter
             Rows by convention.
         """
-        values, found = np.zeros((len(self.rows), N_KEYPOINTS, width)), Counter[str]()
-        for n, convention in conventions.items():
-            chosen = {i: numbers for i, numbers in lists.items() if len(numbers) == width * n}
-            if chosen:
-                found[convention] = len(chosen)
-                names = _triples_namer(key, convention) if width == 3 else lambda j: f"{key}[{j}]"
-                numbers = self.finite(list(chosen.values()), width * n, names, list(chosen))
-                points = to_halpe(numbers.reshape(-1, n, width), convention, axis=-2, fill=0.0)
-                values[list(chosen)] = points
-        return values, found
+        values = np.zeros((len(self.rows), N_KEYPOINTS, width))
+        counts = {
+            convention: self._place(values, key, lists, n, TO_HALPE[convention])
+            for n, convention in conventions.items()
+        }
+        return values, +Counter(counts)
+
+    def _place(
+        self, values: np.ndarray, key: str, lists: Mapping[int, list], n: int, indices: np.ndarray
+    ) -> int:
+        """Put the lists of n keypoints where they belong in `values`; how many there are."""
+        width = values.shape[-1]
+        chosen = {i: numbers for i, numbers in lists.items() if len(numbers) == width * n}
+        if chosen:
+            names = _triples_namer(key, indices) if width == 3 else lambda j: f"{key}[{j}]"
+            points = self.finite(list(chosen.values()), width * n, names, list(chosen)).reshape(-1, n, width)
+            values[np.ix_(list(chosen), indices[indices >= 0])] = points[:, indices >= 0]
+        return len(chosen)
 
     def conventions(self) -> list[str]:
         """Per row, the convention its keypoints come in, a key of `hicp_lib.core.keypoints.TO_HALPE`."""
@@ -203,15 +225,19 @@ class Rows:
                 raise self.error(i, "a further key holds NaN, infinity or too deep a nesting") from None
         return extras
 
-    def _keypoint_lists(self) -> list[list]:
-        """Each row's keypoints in one list; its length is one of `CONVENTIONS`, times 3."""
+    def _keypoint_lists(self, layouts: Collection[int] = CONVENTIONS) -> list[list]:
+        """Each row's keypoints in one list; its length is one of `layouts`, times 3."""
         lists = self.column("keypoints", lambda v: isinstance(v, list), "a list of x, y, v per keypoint")
         for i, row in enumerate(self.rows):
-            if len(lists[i]) == 51 and all(isinstance(row.get(key), list) for key in PART_KEYS):
+            if (
+                len(lists[i]) == 51
+                and 133 in layouts
+                and all(isinstance(row.get(key), list) for key in PART_KEYS)
+            ):
                 lists[i] = list(chain(lists[i], *(row[key] for key in PART_KEYS)))
             n = len(lists[i])
-            if n % 3 or n // 3 not in CONVENTIONS:
-                counts = ", ".join(map(str, CONVENTIONS))
+            if n % 3 or n // 3 not in layouts:
+                counts = ", ".join(map(str, layouts))
                 raise self.error(i, f"keypoints has {n} numbers; expected 3 per keypoint, of {counts}")
         return lists
 
@@ -256,8 +282,8 @@ def _is_finite(value: Any) -> bool:
     return type(value) in (int, float) and abs(value) <= MAX_ABS
 
 
-def _triples_namer(key: str, convention: str) -> Callable[[int], str]:
-    names = [NAMES[i] if i >= 0 else "other" for i in TO_HALPE[convention]]
+def _triples_namer(key: str, indices: np.ndarray) -> Callable[[int], str]:
+    names = [NAMES[i] if i >= 0 else "other" for i in indices]
     return lambda j: f"{key}[{j}] ({names[j // 3]} {'xyv'[j % 3]})"
 
 

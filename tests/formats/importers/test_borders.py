@@ -78,7 +78,7 @@ def test_coordinates_up_to_one_are_no_pixels(tmp_path, images, lowest, highest, 
     write_openpose(tmp_path / "o", {NAMES[785]: [make_person(points_px=points)]})
     with pytest.raises(InputError, match=f"all coordinates lie in {span}; expected pixels"):
         import_predictions("openpose", tmp_path / "o", images)
-    points[101] = 1.01
+    points[101] = 1.51
     write_openpose(tmp_path / "p", {NAMES[785]: [make_person(points_px=points)]})
     assert len(import_predictions("openpose", tmp_path / "p", images).detections[785]) == 1
 
