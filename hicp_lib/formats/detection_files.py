@@ -8,7 +8,7 @@
 The bytes follow from the detections and their order alone.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
 SUFFIXES = (".json", ".csv", ".parquet")
 _IMAGES_AT_ONCE = 1000  # of a table; a group of rows of Parquet
 _OF_PERSON = ["person", "person_score", "keypoint", "u_px", "v_px", "score"]
-Write = Callable[[int, Mapping[str, Any], Detections], None]
+_Append = Callable[..., None]
 
 
 def refuse_other_suffix(path: str | Path) -> None:
@@ -45,7 +45,7 @@ def refuse_other_suffix(path: str | Path) -> None:
 
 
 @contextmanager
-def open_detections(path: str | Path) -> Iterator[Write]:
+def open_detections(path: str | Path) -> Iterator[_Append]:
     """Write a file of detections, whole or not at all.
 
     Parameters
@@ -56,7 +56,8 @@ def open_detections(path: str | Path) -> Iterator[Write]:
     Yields
     ------
     callable
-        Takes, of one image after the other, its id, what is known of it, and the people in it.
+        Takes, of one image after the other, its id, what is known of it, the people in it, and if there are
+        any, further keys of each person's object in JSON.
 
     Raises
     ------
@@ -68,23 +69,23 @@ def open_detections(path: str | Path) -> Iterator[Write]:
     with atomic_path(path) as temporary:
         if kind == ".json":
             with json_list(temporary) as append:
-                yield lambda image_id, facts, found: append(*result_rows(image_id, facts, found))
+                yield lambda *image: append(*result_rows(*image))
             return
         with _csv(temporary) if kind == ".csv" else _parquet(temporary) as append_table:
             images: list[tuple] = []
 
-            def write(*image: Any) -> None:
+            def write(image_id: int, facts: Mapping, found: Detections, extras: object = None) -> None:
                 if len(images) == _IMAGES_AT_ONCE:
-                    append_table(_columns(images))
+                    append_table(_table(images))
                     images.clear()
-                images.append(image)
+                images.append((image_id, facts, found))
 
             yield write
-            append_table(_columns(images))
+            append_table(_table(images))
 
 
 @contextmanager
-def json_list(path: Path) -> Iterator[Callable[..., None]]:
+def json_list(path: Path) -> Iterator[_Append]:
     """Write a list in JSON, item by item.
 
     Parameters
@@ -109,64 +110,85 @@ def json_list(path: Path) -> Iterator[Callable[..., None]]:
         file.write(b"]\n" if before != b"[" else b"[]\n")
 
 
-def result_rows(image_id: int, facts: Mapping[str, Any], found: Detections) -> Iterator[dict]:
-    """The people of an image as COCO keypoint results; `facts` are further keys of each.
+def result_rows(
+    image_id: int,
+    facts: Mapping[str, Any],
+    found: Detections,
+    extras: Sequence[dict] | None = None,
+    keypoints: np.ndarray | slice = slice(None),
+) -> Iterator[dict]:
+    """The people of an image as COCO keypoint results, with arrays in them.
+
+    Parameters
+    ----------
+    image_id : int
+    facts : mapping of str to object
+        Further keys of each.
+    found : Detections
+    extras : sequence of dict, optional
+        Further keys of one each.
+    keypoints : array of int or slice, optional
+        Which of the 136, all if left out.
+
+    Yields
+    ------
+    dict
 
     Raises
     ------
     ValueError
         For a score that is no number.
     """
-    triples = np.concatenate([found.keypoints_px, found.scores[..., None]], axis=-1)
-    triples[~np.isfinite(found.keypoints_px).all(axis=-1)] = 0.0
+    points = found.keypoints_px[:, keypoints]
+    triples = np.concatenate([points, found.scores[:, keypoints, None]], axis=-1)
+    triples[~np.isfinite(points).all(axis=-1)] = 0.0
     if not (np.isfinite(triples).all() and np.isfinite(found.person_scores).all()):
         raise ValueError(f"image {image_id}: a score is not a finite number")
-    for flat, score in zip(triples.reshape(len(found), -1), found.person_scores.tolist(), strict=True):
-        yield {"image_id": image_id, **facts, "category_id": 1, "keypoints": flat, "score": score}
+    flat = triples.reshape(len(found), 3 * points.shape[1])
+    for of, score, extra in zip(flat, found.person_scores.tolist(), extras or [{}] * len(found), strict=True):
+        yield {**extra, "image_id": image_id, **facts, "category_id": 1, "keypoints": of, "score": score}
 
 
 @contextmanager
-def _csv(path: Path) -> Iterator[Callable[[dict], None]]:
+def _csv(path: Path) -> Iterator[_Append]:
     with open(path, "w", encoding="utf-8", newline="") as file:
-        yield lambda columns: pd.DataFrame(columns).to_csv(file, index=False, header=file.tell() == 0)
+        yield lambda table: table.to_csv(file, index=False, header=file.tell() == 0)
 
 
 @contextmanager
-def _parquet(path: Path) -> Iterator[Callable[[dict], None]]:
-    import pyarrow
+def _parquet(path: Path) -> Iterator[_Append]:
+    from pyarrow import Table
     from pyarrow.parquet import ParquetWriter
 
     with ExitStack() as stack:
-        writers = []
+        writers: list[ParquetWriter] = []
 
-        def append(columns: dict) -> None:
-            table = pyarrow.table(columns)
+        def append(table: pd.DataFrame) -> None:
+            group = Table.from_pandas(table, preserve_index=False).replace_schema_metadata()
             if not writers:
-                writers.append(stack.enter_context(ParquetWriter(path, table.schema)))
-            writers[0].write_table(table)
+                writers.append(stack.enter_context(ParquetWriter(path, group.schema)))
+            writers[0].write_table(group)
 
         yield append
 
 
-def _columns(images: list[tuple]) -> dict[str, Any]:
-    """Rows of a table, a keypoint each, of images as `open_detections` takes them."""
+def _table(images: list[tuple]) -> pd.DataFrame:
+    """A row for each keypoint of images, ids, facts and people."""
     founds = [found for _, _, found in images] or [Detections.none()]
     points, scores, person_scores = (
         np.concatenate([getattr(found, name) for found in founds])
         for name in ("keypoints_px", "scores", "person_scores")
     )
-    facts = pd.DataFrame(
-        [{"image_id": image_id, **known} for image_id, known, _ in images] or {"image_id": []}
-    )
-    # Texts are that also where there is no row: Parquet asks for the same type in every group.
-    facts = facts.convert_dtypes(convert_integer=False, convert_floating=False)
     of_image = np.repeat(np.arange(len(founds)), list(map(len, founds)))
     person = np.concatenate([np.arange(len(found)) for found in founds])
     rows, keypoints = np.nonzero(np.isfinite(points).all(axis=-1))
+    known = [{"image_id": image_id, **facts} for image_id, facts, _ in images] or {"image_id": np.zeros(0, int)}
+    # Texts are that also where there is no row: Parquet asks for the same type in every group.
+    facts = pd.DataFrame(known).convert_dtypes(convert_integer=False, convert_floating=False)
     of_person = person[rows], person_scores[rows], np.array(NAMES)[keypoints]
-    u_px, v_px = points[rows, keypoints].T
-    named = zip(_OF_PERSON, (*of_person, u_px, v_px, scores[rows, keypoints]), strict=True)
-    return {name: facts[name].to_numpy()[of_image[rows]] for name in facts} | dict(named)
+    values = (*of_person, *points[rows, keypoints].T, scores[rows, keypoints])
+    table = facts.iloc[of_image[rows]].reset_index(drop=True)
+    return table.assign(**dict(zip(_OF_PERSON, values, strict=True))).astype({"keypoint": "string"})
 
 
 def read_rows(path: Path) -> Any:

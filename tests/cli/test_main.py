@@ -38,9 +38,18 @@ def mistake(capsys, *arguments: str) -> str:
         (["report", "-p", "sed", "1"], "-p sed: no notebook has such a parameter; known are"),
         (["detect", "--out", "x.json"], "Missing option '--detector'"),
         (["detect", "--detector", "x", "--out", "x.json"], "Give either --dataset DIR or --images DIR"),
-        (["detect", "--detector", "x", "--images", "/nowhere", "--out", "x.json"], "/nowhere: is not a folder"),
-        (["detect", "--detector", "x", "--images", ".", "--out", "x.xml"], "ends in '.xml'; expected .json, .csv"),
-        (["detect", "--detector", "x", "--images", ".", "--out", "x"], "x: ends in 'no suffix'; expected .json"),
+        (
+            ["detect", "--detector", "x", "--images", "/nowhere", "--out", "x.json"],
+            "/nowhere: is not a folder",
+        ),
+        (
+            ["detect", "--detector", "x", "--images", ".", "--out", "x.xml"],
+            "ends in '.xml'; expected .json, .csv",
+        ),
+        (
+            ["detect", "--detector", "x", "--images", ".", "--out", "x"],
+            "x: ends in 'no suffix'; expected .json",
+        ),
         (["scenes", "render", "out", "--n", "0"], "0 is not in the range x>=1"),
         (["evaluate", "--annotations", "/no.json", "--detections", "x"], "/no.json: cannot be read"),
         (["dataset", "create", "--annotations", "/no.json", "--images", ".", "--out", "x"], "/no.json: "),

@@ -55,7 +55,9 @@ def test_what_is_read_is_what_was_written(tmp_path, suffix, at_once, monkeypatch
 def test_nobody_is_an_answer(tmp_path, suffix, images, monkeypatch):
     monkeypatch.setattr(detection_files, "_IMAGES_AT_ONCE", 2)
     write(tmp_path / f"d{suffix}", images)
-    assert [row["image_id"] for row in read_rows(tmp_path / f"d{suffix}")] == [3] * any(map(len, images.values()))
+    assert [row["image_id"] for row in read_rows(tmp_path / f"d{suffix}")] == [3] * any(
+        map(len, images.values())
+    )
 
 
 def test_a_table_is_tidy_and_its_columns_say_their_units(tmp_path):

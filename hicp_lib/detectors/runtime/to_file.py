@@ -1,7 +1,6 @@
 """People in a folder of images, a data set or a video, written to a file as they are found."""
 
 import os
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import atomic_path
+from hicp_lib.core.files import atomic_path, natural_order
 from hicp_lib.core.video import SUFFIXES as VIDEO_SUFFIXES
 from hicp_lib.core.video import count_frames, read_frames
 from hicp_lib.detectors.runtime.results import Timed
@@ -21,7 +20,6 @@ from hicp_lib.formats.annotations import read_annotations
 from hicp_lib.formats.detection_files import json_list, open_detections
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff")
-_DIGITS = 20  # of the longest number in a name whose order counts
 
 
 @dataclass(frozen=True)
@@ -90,22 +88,11 @@ def open_pictures(source: Path) -> Pictures:
     names = [entry.name for entry in os.scandir(source) if entry.name.lower().endswith(IMAGE_SUFFIXES)]
     if not names:
         raise InputError(f"{source}: holds no images; expected files such as 000001.jpg or photo.png")
-    names = sorted(sorted(names), key=natural_order)
+    names.sort(key=natural_order)
     stems = [os.path.splitext(name)[0] for name in names]
     numbers = {int(stem) for stem in stems if stem.isascii() and stem.isdigit()}
     ids = map(int, stems) if len(numbers) == len(names) else range(1, len(names) + 1)
     return _of_files(source, source, dict(zip(ids, names, strict=True)))
-
-
-def natural_order(name: str) -> str:
-    """What names are sorted by so that the numbers in them are in their order.
-
-    Examples
-    --------
-    >>> sorted(["b10.png", "b9.png", "a.png"], key=natural_order)
-    ['a.png', 'b9.png', 'b10.png']
-    """
-    return re.sub("[0-9]+", lambda number: number[0].zfill(_DIGITS), name)
 
 
 def open_dataset(folder: Path) -> Pictures:
