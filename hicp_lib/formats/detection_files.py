@@ -182,9 +182,10 @@ def _table(images: list[tuple]) -> pd.DataFrame:
     of_image = np.repeat(np.arange(len(founds)), list(map(len, founds)))
     person = np.concatenate([np.arange(len(found)) for found in founds])
     rows, keypoints = np.nonzero(np.isfinite(points).all(axis=-1))
-    known = [{"image_id": image_id, **facts} for image_id, facts, _ in images] or {"image_id": np.zeros(0, int)}
+    known = [{"image_id": image_id, **facts} for image_id, facts, _ in images]
     # Texts are that also where there is no row: Parquet asks for the same type in every group.
-    facts = pd.DataFrame(known).convert_dtypes(convert_integer=False, convert_floating=False)
+    facts = pd.DataFrame(known or {"image_id": np.zeros(0, int)})
+    facts = facts.convert_dtypes(convert_integer=False, convert_floating=False)
     of_person = person[rows], person_scores[rows], np.array(NAMES)[keypoints]
     values = (*of_person, *points[rows, keypoints].T, scores[rows, keypoints])
     table = facts.iloc[of_image[rows]].reset_index(drop=True)

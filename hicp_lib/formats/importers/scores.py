@@ -5,8 +5,8 @@ equal; the tool's own score stays beside it. This makes ranges equal, not meanin
 not 0.3 of another.
 
 A detector has one scale, whatever the highest score in a folder is: 1, or where scores pass that it is asked
-for. OpenPose's confidences lie in [0, 1]; AlphaPose's heat-map maxima and Detectron2's softmax mass can pass 1
-by a little. MMPose's can be those of RTMW, which reach about 10, and so can plain COCO results.
+for. OpenPose's confidences lie in [0, 1]; AlphaPose's heat-map maxima and Detectron2's softmax mass can pass
+1 by a little. MMPose's can be those of RTMW, which reach about 10, and so can plain COCO results.
 """
 
 from hicp_lib.core.errors import InputError
