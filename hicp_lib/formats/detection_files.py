@@ -218,7 +218,7 @@ def read_rows(path: Path) -> Any:
     triples[people.ngroup(), keypoints.astype(int)] = table[["u_px", "v_px", "score"]]
     rest = people.first().reset_index().drop(columns=["person", "keypoint", "u_px", "v_px", "score"])
     rows = rest.rename(columns={"person_score": "score"}).to_dict("records")
-    flat = triples.reshape(len(rows), -1).tolist()
+    flat = triples.reshape(len(rows), 3 * N_KEYPOINTS).tolist()
     return [row | {"keypoints": keypoints} for row, keypoints in zip(rows, flat, strict=True)]
 
 
