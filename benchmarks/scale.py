@@ -25,7 +25,7 @@ from timing import Comparison, processor_s, run
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import write_png
 from hicp_lib.detectors import registry
-from hicp_lib.detectors.runtime.to_file import Found, detect_to_file, open_pictures
+from hicp_lib.detectors.runtime.to_file import detect_to_file, open_pictures
 from hicp_lib.detectors.weights import default as default_weights
 
 WORKERS = (1, 2, 4, 8)
@@ -60,9 +60,9 @@ def fresh_cache(weights: Path) -> Iterator[Path]:
 def detect_seconds(name: str, images: Path, out: Path, workers: int | str = 1) -> tuple[float, float, float]:
     """Wall time, processor time of this process and its children, and of this process alone; of an image."""
     start_s = time.perf_counter(), processor_s(), time.process_time()
-    found: Found = detect_to_file(name, open_pictures(images), out, print, workers=workers, progress=False)
+    _, n_images, _ = detect_to_file(name, open_pictures(images), out, print, workers=workers, progress=False)
     end_s = time.perf_counter(), processor_s(), time.process_time()
-    wall_s, all_s, own_s = (np.subtract(end_s, start_s) / found.n_images).tolist()
+    wall_s, all_s, own_s = (np.subtract(end_s, start_s) / n_images).tolist()
     return wall_s, all_s, own_s
 
 

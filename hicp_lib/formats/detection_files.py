@@ -111,12 +111,9 @@ def json_list(path: Path) -> Iterator[_Append]:
 
 
 def result_rows(
-    image_id: int,
-    facts: Mapping[str, Any],
-    found: Detections,
-    extras: Sequence[dict] | None = None,
+    image_id: int, facts: Mapping[str, Any], found: Detections, extras: Sequence[dict] | None = None,
     keypoints: np.ndarray | slice = slice(None),
-) -> Iterator[dict]:
+) -> Iterator[dict]:  # fmt: skip
     """The people of an image as COCO keypoint results, with arrays in them.
 
     Parameters
@@ -204,20 +201,19 @@ def read_rows(path: Path) -> Any:
         return read_json(path)
     refuse_other_suffix(path)
     try:
-        read = pd.read_parquet if path.suffix == ".parquet" else _read_csv
-        table = read(path)
-    except (OSError, ValueError) as error:  # pyarrow's and pandas' own are among these
-        raise InputError(f"{path}: cannot be read as a table ({one_line(error)})") from None
-    if absent := [name for name in ["image_id", *_OF_PERSON] if name not in table]:
-        raise InputError(f"{path}: has no column {absent[0]!r}; expected a table that hicp detect wrote")
-    keypoints = table["keypoint"].map(INDEX)
-    if keypoints.isna().any():
-        raise InputError(f"{path}: keypoint {table['keypoint'][keypoints.isna()].iloc[0]!r} is not known")
-    people = table.groupby(["image_id", "person"], sort=False)
+        table = _read_csv(path) if path.suffix == ".csv" else pd.read_parquet(path)
+        keypoints = [INDEX[name] for name in table["keypoint"]]
+        values = table[["u_px", "v_px", "score"]].to_numpy(float)
+        if table.duplicated(["image_id", "person", "keypoint"]).any():
+            raise ValueError("a keypoint of a person twice")
+        people = table.groupby(["image_id", "person"], sort=False, dropna=False)
+        first = people[["person_score", *table.columns.intersection(["file_name"])]].first()
+    except (KeyError, OSError, TypeError, ValueError) as error:  # pyarrow's and pandas' own are among these
+        problem = f"{type(error).__name__}: {one_line(error)}"
+        raise InputError(f"{path}: is no table that hicp detect wrote ({problem})") from None
     triples = np.zeros((people.ngroups, N_KEYPOINTS, 3))
-    triples[people.ngroup(), keypoints.astype(int)] = table[["u_px", "v_px", "score"]]
-    rest = people.first().reset_index().drop(columns=["person", "keypoint", "u_px", "v_px", "score"])
-    rows = rest.rename(columns={"person_score": "score"}).to_dict("records")
+    triples[people.ngroup(), keypoints] = values
+    rows = first.rename(columns={"person_score": "score"}).reset_index().to_dict("records")
     flat = triples.reshape(len(rows), 3 * N_KEYPOINTS).tolist()
     return [row | {"keypoints": keypoints} for row, keypoints in zip(rows, flat, strict=True)]
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.video import count_frames, read_frames
+from hicp_lib.core.video import open_video
 
 CODECS = {".avi": "MJPG", ".mp4": "mp4v", ".mov": "mp4v"}
 
@@ -25,8 +25,9 @@ def write_video(path, n: int = 6, rate_hz: float = 12.5) -> None:
 def test_frames_come_in_order_with_their_times(tmp_path, suffix):
     path = tmp_path / f"clip{suffix}"
     write_video(path)
-    assert count_frames(path) == 6
-    times_s, frames = zip(*read_frames(path), strict=True)
+    n_frames, read = open_video(path)
+    assert n_frames == 6
+    times_s, frames = zip(*read, strict=True)
     assert times_s == pytest.approx(np.arange(6) / 12.5)
     for i, frame in enumerate(frames):
         assert frame.shape == (48, 64, 3)
@@ -38,4 +39,4 @@ def test_what_is_no_video_is_refused(tmp_path):
     path = tmp_path / "clip.mp4"
     path.write_bytes(b"no video")
     with pytest.raises(InputError, match=r"clip\.mp4: is no video"):
-        count_frames(path)
+        open_video(path)

@@ -13,7 +13,7 @@ Sources: MMPose's inferencer, `split_instances`, and `CocoMetric` ("bbox_keypoin
 """
 
 from collections import Counter
-from itertools import chain
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +21,8 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
-from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.importers.people import FileRows, People, json_files, split
-from hicp_lib.formats.json_validation import BY_NUMBER, CONVENTIONS, Rows, shown
+from hicp_lib.formats.json_validation import CONVENTIONS, Rows, shown
 from hicp_lib.formats.layouts import layouts_of
 
 _KNOWN_KEYS = {"keypoints", "keypoint_scores", "bbox"}
@@ -50,9 +49,17 @@ def read_mmpose(path: Path) -> People:
     """
     files = json_files(path, (".json",), "the folder MMPoseInferencer wrote with pred_out_dir")
     read = {file: _instances(file) for file in files.values()}
-    sources = [name.removeprefix(_SAVED) if read[file][1] else name for name, file in files.items()]
-    rows, source_of = FileRows.joined(path, "instances", {file: people for file, (people, _) in read.items()})
-    triples, conventions = _triples(rows)
+    sources = [n.removeprefix(_SAVED) if read[file][1] is not None else n for n, file in files.items()]
+    of_models = {names for _, names in read.values() if names}
+    if len(of_models) > 1:
+        raise InputError(f"{path}: keypoint_id2name differs from file to file; import each model by itself")
+    layouts, _ = layouts_of(f"{path}: keypoint_id2name", next(iter(of_models), ()))
+    joined, source_of = FileRows.joined(
+        path, "instances", {file: people for file, (people, _) in read.items()}
+    )
+    rows = replace(joined, rows=[row | {"keypoints": _flat(joined, i)} for i, row in enumerate(joined.rows)])
+    triples = rows.keypoints(layouts)
+    conventions = Counter(CONVENTIONS.get(len(row["keypoints"]) // 3, "by their names") for row in rows.rows)
     keypoints, scores = split(triples, triples[..., 2] > 0)
     counted = scores > _COUNTED_FROM
     means = np.where(counted, scores, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
@@ -63,60 +70,28 @@ def read_mmpose(path: Path) -> People:
     )  # fmt: skip
 
 
-def _instances(file: Path) -> tuple[list[dict], bool]:
-    """Who is in a file, and whether a demo wrote it."""
-    data = read_json(file)
-    saved = isinstance(data, dict) and "instance_info" in data
-    rows = Rows.of(file, "instances", data["instance_info"] if saved else data).rows
+def _instances(file: Path) -> tuple[list[dict], tuple[str, ...] | None]:
+    """Who is in a file, and of a demo's, the names of their keypoints if it has them."""
+    data, names = read_json(file), None
+    if isinstance(data, dict) and "instance_info" in data:
+        meta = data.get("meta_info")
+        named = meta.get("keypoint_id2name") if isinstance(meta, dict) else None
+        names = tuple(str(named.get(str(i))) for i in range(len(named))) if isinstance(named, dict) else ()
+        data = data["instance_info"]
+    rows = Rows.of(file, "instances", data).rows
     if rows and "instances" in rows[0]:
         raise InputError(f"{file}: holds the frames of a video; run MMPose on the images, one file each")
-    meta = data.get("meta_info") if saved else None
-    named = meta.get("keypoint_id2name") if isinstance(meta, dict) else None
-    if isinstance(named, dict) and named:
-        rows = _in_halpe_order(file, rows, [str(named.get(str(i))) for i in range(len(named))])
-    return rows, saved
+    return rows, names
 
 
-def _in_halpe_order(file: Path, rows: list[dict], names: list[str]) -> list[dict]:
-    """People whose keypoints have names; as they are where they come as their number says."""
-    n, indices = len(names), layouts_of(f"{file}: meta_info: keypoint_id2name", names)[0][len(names)]
-    if np.array_equal(indices, BY_NUMBER.get(n, [])):
-        return rows
-    ordered = []
-    for k, row in enumerate(rows):
-        points, scores = [[0.0, 0.0]] * N_KEYPOINTS, [0.0] * N_KEYPOINTS
-        for key, of in (("keypoints", points), ("keypoint_scores", scores)):
-            if not isinstance(row.get(key), list) or len(row[key]) != n:
-                problem = f"{key} is {shown(row.get(key))}; expected one per name, {n}"
-                raise InputError(f"{file}: instances[{k}]: {problem}")
-            for i, value in zip(indices.tolist(), row[key], strict=True):
-                if i >= 0:
-                    of[i] = value
-        ordered.append(row | {"keypoints": points, "keypoint_scores": scores})
-    return ordered
-
-
-def _triples(rows: FileRows) -> tuple[np.ndarray, Counter[str]]:
-    scores = rows.column("keypoint_scores")
-    points = rows.column("keypoints", _is_points, "one [x, y] per keypoint")
-    flat = {i: _flat(rows, i, *both) for i, both in enumerate(zip(points, scores, strict=True))}
-    positions, conventions = rows.points("keypoints", flat, CONVENTIONS, width=2)
-    values, _ = rows.points("keypoint_scores", dict(enumerate(scores)), CONVENTIONS, width=1)
-    return np.concatenate([positions, values], axis=-1), conventions
-
-
-def _is_points(value: Any) -> bool:
-    return isinstance(value, list) and set(map(type, value)) == {list} and set(map(len, value)) == {2}
-
-
-def _flat(rows: FileRows, i: int, points: list, scores: Any) -> list:
-    """One person's [[x, y], ...] as a flat list, once the number of them and of the scores is right."""
-    if len(points) not in CONVENTIONS:
-        counts = ", ".join(map(str, CONVENTIONS))
-        raise rows.error(i, f"keypoints has {len(points)} points; expected a whole person's {counts}")
+def _flat(rows: FileRows, i: int) -> list:
+    """One person's x, y, score of each keypoint in one list."""
+    points, scores = (rows.rows[i].get(key) for key in ("keypoints", "keypoint_scores"))
+    if not isinstance(points, list) or not all(isinstance(xy, list) and len(xy) == 2 for xy in points):
+        raise rows.error(i, f"keypoints is {shown(points)}; expected one [x, y] per keypoint")
     if not isinstance(scores, list) or len(scores) != len(points):
         raise rows.error(i, f"keypoint_scores is {shown(scores)}; expected {len(points)} numbers")
-    return list(chain.from_iterable(points))
+    return [value for (x, y), score in zip(points, scores, strict=True) for value in (x, y, score)]
 
 
 def _extras(rows: FileRows) -> list[dict]:

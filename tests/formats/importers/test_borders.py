@@ -32,7 +32,9 @@ def people(highest: float = 0.5, named_by="stem", sources=("a",)) -> People:
 @pytest.mark.parametrize("format", ["openpose", "alphapose", "detectron2"])
 def test_scores_of_formats_that_rtmw_does_not_write_may_pass_1_a_little(format):
     assert score_scale(format, people(1.0)) == score_scale(format, people(2.0)) == 1
-    with pytest.raises(InputError, match="go up to 2.1; give --score-scale, the score that is to become 1, the"):
+    with pytest.raises(
+        InputError, match="go up to 2.1; give --score-scale, the score that is to become 1, the"
+    ):
         score_scale(format, people(2.1))
 
 
@@ -43,7 +45,9 @@ def test_rtmws_scale_is_never_taken_for_another_in_the_next_folder(format):
     for highest in (np.nextafter(1.0, 2), 1.6, 4.0, 20.0):
         with pytest.raises(InputError, match="10 if RTMW wrote them"):
             score_scale(format, people(highest))
-    with pytest.raises(InputError, match="go up to 20.5; give --score-scale, the score that is to become 1, the"):
+    with pytest.raises(
+        InputError, match="go up to 20.5; give --score-scale, the score that is to become 1, the"
+    ):
         score_scale(format, people(20.5))
 
 

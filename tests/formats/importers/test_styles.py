@@ -136,7 +136,7 @@ def test_saved_predictions_are_read_by_their_names(tmp_path, images, order):
 
 def test_names_that_say_nothing_are_refused(tmp_path, images):
     saved(tmp_path, make_person(), [f"point {i}" for i in range(17)])
-    with pytest.raises(InputError, match="results_000000000785.json: meta_info: .*not understood: 'point 0'"):
+    with pytest.raises(InputError, match="keypoint_id2name: not understood: 'point 0'"):
         import_predictions("mmpose", tmp_path, images)
 
 
@@ -144,7 +144,7 @@ def test_another_number_than_that_of_names_is_refused(tmp_path, images):
     saved(tmp_path, make_person(), LAYOUTS["coco17"][::-1])
     (file,) = tmp_path.iterdir()
     rewrite(file, lambda data: data["instance_info"][0]["keypoint_scores"].pop())
-    with pytest.raises(InputError, match=r"instances\[0\]: keypoint_scores is a list of 16; expected .* 17"):
+    with pytest.raises(InputError, match=r"instances\[0\]: keypoint_scores is a list of 16; expected 17"):
         import_predictions("mmpose", tmp_path, images)
 
 
