@@ -24,8 +24,7 @@ from hicp_lib.core.files import atomic_path, read_json
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
 
 SUFFIXES = (".json", ".csv", ".parquet")
-_IMAGES_AT_ONCE = 1000  # of a table; a group of rows of Parquet
-_OF_PERSON = ["person", "person_score", "keypoint", "u_px", "v_px", "score"]
+_PEOPLE_AT_ONCE = 1000  # of a table; a group of rows of Parquet
 _Append = Callable[..., None]
 
 
@@ -65,23 +64,11 @@ def open_detections(path: str | Path) -> Iterator[_Append]:
         As `refuse_other_suffix`.
     """
     refuse_other_suffix(path)
-    kind = Path(path).suffix
-    with atomic_path(path) as temporary:
-        if kind == ".json":
-            with json_list(temporary) as append:
-                yield lambda *image: append(*result_rows(*image))
-            return
-        with _csv(temporary) if kind == ".csv" else _parquet(temporary) as append_table:
-            images: list[tuple] = []
-
-            def write(image_id: int, facts: Mapping, found: Detections, extras: object = None) -> None:
-                if len(images) == _IMAGES_AT_ONCE:
-                    append_table(_table(images))
-                    images.clear()
-                images.append((image_id, facts, found))
-
-            yield write
-            append_table(_table(images))
+    is_json = Path(path).suffix == ".json"
+    with atomic_path(path) as temporary, json_list(temporary) if is_json else _table(temporary) as append:
+        yield lambda image_id, facts, found, extras=None: append(
+            *result_rows(image_id, facts, found, extras if is_json else None)
+        )
 
 
 @contextmanager
@@ -98,16 +85,17 @@ def json_list(path: Path) -> Iterator[_Append]:
         Takes the next items, JSON-able, or with arrays.
     """
     with open(path, "wb") as file:
-        before = b"["
+        file.write(b"[")
+        between = b""
 
         def append(*items: object) -> None:
-            nonlocal before
+            nonlocal between
             for item in items:
-                file.write(before + orjson.dumps(item, option=orjson.OPT_SERIALIZE_NUMPY))
-                before = b",\n"
+                file.write(between + orjson.dumps(item, option=orjson.OPT_SERIALIZE_NUMPY))
+                between = b",\n"
 
         yield append
-        file.write(b"]\n" if before != b"[" else b"[]\n")
+        file.write(b"]\n")
 
 
 def result_rows(
@@ -147,46 +135,51 @@ def result_rows(
 
 
 @contextmanager
-def _csv(path: Path) -> Iterator[_Append]:
-    with open(path, "w", encoding="utf-8", newline="") as file:
-        yield lambda table: table.to_csv(file, index=False, header=file.tell() == 0)
+def _table(path: Path) -> Iterator[_Append]:
+    """Write people as rows of a table, a group at a time."""
+    waiting: list[dict] = []
+    with ExitStack() as stack:
+        write = _append_csv(path) if path.suffix == ".csv" else _append_parquet(path, stack)
+
+        def append(*people: dict) -> None:
+            if len(waiting) >= _PEOPLE_AT_ONCE:
+                write(_by_keypoint(waiting))
+                waiting.clear()
+            waiting.extend(people)
+
+        yield append
+        write(_by_keypoint(waiting))
 
 
-@contextmanager
-def _parquet(path: Path) -> Iterator[_Append]:
+def _append_csv(path: Path) -> _Append:
+    return lambda table: table.to_csv(path, mode="a", index=False, header=not path.stat().st_size)
+
+
+def _append_parquet(path: Path, stack: ExitStack) -> _Append:
     from pyarrow import Table
     from pyarrow.parquet import ParquetWriter
 
-    with ExitStack() as stack:
-        writers: list[ParquetWriter] = []
+    writers: list[ParquetWriter] = []
 
-        def append(table: pd.DataFrame) -> None:
-            group = Table.from_pandas(table, preserve_index=False).replace_schema_metadata()
-            if not writers:
-                writers.append(stack.enter_context(ParquetWriter(path, group.schema)))
-            writers[0].write_table(group)
+    def append(table: pd.DataFrame) -> None:
+        group = Table.from_pandas(table, preserve_index=False).replace_schema_metadata()
+        if not writers:
+            writers.append(stack.enter_context(ParquetWriter(path, group.schema)))
+        writers[0].write_table(group)
 
-        yield append
+    return append
 
 
-def _table(images: list[tuple]) -> pd.DataFrame:
-    """A row for each keypoint of images, ids, facts and people."""
-    founds = [found for _, _, found in images] or [Detections.none()]
-    points, scores, person_scores = (
-        np.concatenate([getattr(found, name) for found in founds])
-        for name in ("keypoints_px", "scores", "person_scores")
-    )
-    of_image = np.repeat(np.arange(len(founds)), list(map(len, founds)))
-    person = np.concatenate([np.arange(len(found)) for found in founds])
-    rows, keypoints = np.nonzero(np.isfinite(points).all(axis=-1))
-    known = [{"image_id": image_id, **facts} for image_id, facts, _ in images]
-    # Texts are that also where there is no row: Parquet asks for the same type in every group.
-    facts = pd.DataFrame(known or {"image_id": np.zeros(0, int)})
-    facts = facts.convert_dtypes(convert_integer=False, convert_floating=False)
-    of_person = person[rows], person_scores[rows], np.array(NAMES)[keypoints]
-    values = (*of_person, *points[rows, keypoints].T, scores[rows, keypoints])
-    table = facts.iloc[of_image[rows]].reset_index(drop=True)
-    return table.assign(**dict(zip(_OF_PERSON, values, strict=True))).astype({"keypoint": "string"})
+def _by_keypoint(people: list[dict]) -> pd.DataFrame:
+    """People as of `result_rows`, all of an image one after the other, as a row for each keypoint."""
+    triples = np.array([row.pop("keypoints") for row in people]).reshape(-1, N_KEYPOINTS, 3)
+    table = pd.DataFrame(people or {"image_id": np.zeros(0, int), "category_id": 1, "score": 0.0})
+    table.insert(table.columns.get_loc("score"), "person", table.groupby("image_id").cumcount())
+    rows, keypoints = np.nonzero(triples.any(axis=-1))
+    table = table.drop(columns="category_id").rename(columns={"score": "person_score"}).iloc[rows]
+    u_px, v_px, scores = triples[rows, keypoints].T
+    names = pd.array(np.array(NAMES)[keypoints], dtype="string")
+    return table.assign(keypoint=names, u_px=u_px, v_px=v_px, score=scores)
 
 
 def read_rows(path: Path) -> Any:

@@ -33,7 +33,7 @@ def write(path, images=IMAGES):
 @pytest.mark.parametrize("at_once", [1, 2, 3, 4, 1000])
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_what_is_read_is_what_was_written(tmp_path, suffix, at_once, monkeypatch):
-    monkeypatch.setattr(detection_files, "_IMAGES_AT_ONCE", at_once)
+    monkeypatch.setattr(detection_files, "_PEOPLE_AT_ONCE", at_once)
     path = tmp_path / f"d{suffix}"
     write(path)
     rows = read_rows(path)
@@ -53,7 +53,7 @@ def test_what_is_read_is_what_was_written(tmp_path, suffix, at_once, monkeypatch
 @pytest.mark.parametrize("images", [{}, {1: made(0, 0)}, {i: made(int(i == 3), 0) for i in range(4)}])
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_nobody_is_an_answer(tmp_path, suffix, images, monkeypatch):
-    monkeypatch.setattr(detection_files, "_IMAGES_AT_ONCE", 2)
+    monkeypatch.setattr(detection_files, "_PEOPLE_AT_ONCE", 2)
     write(tmp_path / f"d{suffix}", images)
     assert [row["image_id"] for row in read_rows(tmp_path / f"d{suffix}")] == [3] * any(
         map(len, images.values())

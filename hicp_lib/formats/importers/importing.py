@@ -203,18 +203,10 @@ def _summary(
     outside = given & ~inside(points, (0, 0, *sizes_px.T[..., None]))
     n_mentioned = sum(image is not None for image in matched)
     n_with = len(set(people.source_of[rows].tolist()))
+    unmatched = tuple(str(s) for s, image in zip(people.sources, matched, strict=True) if image is None)
+    low, middle, high = np.quantile(raw[given], [0, 0.5, 1]).tolist() if given.any() else (0.0, 0.0, 0.0)
+    n, counts = len(annotations.images), (int((raw > scale).sum()), int(given.sum()), int(outside.sum()))
     return Summary(
-        format=format,
-        n_images=len(annotations.images),
-        n_with_people=n_with,
-        n_without_people=n_mentioned - n_with,
-        n_not_mentioned=len(annotations.images) - n_mentioned,
-        unmatched=tuple(str(s) for s, image in zip(people.sources, matched, strict=True) if image is None),
-        n_people=len(rows),
-        conventions=dict(people.conventions),
-        score_range=tuple(np.quantile(raw[given], [0, 0.5, 1]).tolist()) if given.any() else (0.0, 0.0, 0.0),
-        score_scale=float(scale),
-        n_cut=int((raw > scale).sum()),
-        n_keypoints=int(given.sum()),
-        n_outside=int(outside.sum()),
-    )
+        format, n, n_with, n_mentioned - n_with, n - n_mentioned, unmatched, len(rows),
+        dict(people.conventions), (low, middle, high), float(scale), *counts,
+    )  # fmt: skip

@@ -15,7 +15,6 @@ Sources: MMPose's inferencer, `split_instances`, and `CocoMetric` ("bbox_keypoin
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -97,16 +96,10 @@ def _flat(rows: FileRows, i: int) -> list:
 def _extras(rows: FileRows) -> list[dict]:
     """What else is written, the box as COCO has it."""
     extras = rows.extras(_KNOWN_KEYS)
-    for i, row in enumerate(rows.rows):
-        if "bbox" in row:
-            x1, y1, x2, y2 = _corners(rows, i, row["bbox"])
-            extras[i]["bbox"] = [x1, y1, x2 - x1, y2 - y1]
+    for i, box in ((i, row["bbox"]) for i, row in enumerate(rows.rows) if "bbox" in row):
+        corners = box[0] if isinstance(box, list) and len(box) == 1 else box
+        if not isinstance(corners, list) or len(corners) != 4:
+            raise rows.error(i, f"bbox is {shown(corners)}; expected [[x1, y1, x2, y2]]")
+        x1, y1, x2, y2 = rows.finite([corners], 4, lambda j: f"bbox[{j}]", [i])[0].tolist()
+        extras[i]["bbox"] = [x1, y1, x2 - x1, y2 - y1]
     return extras
-
-
-def _corners(rows: FileRows, i: int, box: Any) -> list[float]:
-    if isinstance(box, list) and len(box) == 1:
-        box = box[0]
-    if not isinstance(box, list) or len(box) != 4:
-        raise rows.error(i, f"bbox is {shown(box)}; expected [[x1, y1, x2, y2]]")
-    return rows.finite([box], 4, lambda j: f"bbox[{j}]", [i])[0].tolist()
