@@ -1,6 +1,7 @@
 """A folder, a data set, a video to a file: in order, in little memory, whatever a picture holds."""
 
 import json
+import weakref
 
 import numpy as np
 import pandas as pd
@@ -151,3 +152,15 @@ def test_a_kept_result_that_goes_while_it_waits_is_told(folder, tmp_path):
     waiting = run.OrderedDict({0: run._Waiting("a.png", tmp_path, tmp_path / "gone.bin")})
     ((_, answer),) = run._in_order(waiting)
     assert isinstance(answer, InputError) and "gone.bin: was removed" in str(answer)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_what_was_handed_on_is_forgotten(workers):
+    images = {i: np.full((8, 9, 3), i, np.uint8) for i in range(200)}
+    for _ in ("found", "kept"):
+        given, most = [], 0
+        for _, result in run.detect_each("counting", images.items(), workers=workers):
+            given.append(weakref.ref(result))
+            most = max(most, sum(of() is not None for of in given))
+        assert len(given) == 200 and most <= 3
+    assert Counting.calls == 200
