@@ -168,9 +168,11 @@ def detect(
     pictures = open_pictures(source) if dataset_dir is None else open_dataset(source)
     options = {"workers": workers, "strict": strict} | given(**chosen)
     lines = click.echo if by_image else None
-    found = detect_to_file(detector, pictures, out, partial(click.echo, err=True), lines, **options)
-    passed_over = f"; {found.n_broken} could not be read" if found.n_broken else ""
-    click.echo(f"{out}: {found.n_people} people in {found.n_images} images{passed_over}")
+    n_people, n_images, n_broken = detect_to_file(
+        detector, pictures, out, partial(click.echo, err=True), lines, **options
+    )
+    passed_over = f"; {n_broken} could not be read" * bool(n_broken)
+    click.echo(f"{out}: {n_people} people in {n_images} images{passed_over}")
     if source.is_dir():
         images = shlex.quote(str(source if dataset_dir is None else source / "images"))
         page = shlex.quote(str(out.with_suffix(".html")))

@@ -14,6 +14,7 @@ import logging
 import math
 import tempfile
 import threading
+import time
 import traceback
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator
@@ -39,6 +40,7 @@ Key = TypeVar("Key", bound=Hashable)
 Answer = TypeVar("Answer")
 # How long to wait for the scheduler, and for workers where there are none.
 PATIENCE_S = 30.0
+_ANEW_S = 1.0  # when to look again how many workers there are
 _LOGGERS = ("distributed", "distributed.client", "tornado.application", "asyncio")
 
 
@@ -173,8 +175,14 @@ def _spread(
         some = list(futures)
         return _patiently(client, lambda s: wait(some, timeout=s, return_when="FIRST_COMPLETED").done)
 
+    asked_s, n_threads = -math.inf, 0
+
     def n_most() -> float:
-        return 2 * sum(client.nthreads().values()) or math.inf
+        nonlocal asked_s, n_threads
+        # To ask the scheduler takes as long as to give a job away.
+        if not n_threads or time.monotonic() > asked_s + _ANEW_S:
+            asked_s, n_threads = time.monotonic(), sum(client.nthreads().values())
+        return 2 * n_threads or math.inf
 
     with _explained(address, client):
         for key, future in as_they_come(jobs, submit, first_ones, n_most):

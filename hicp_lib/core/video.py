@@ -11,8 +11,19 @@ from hicp_lib.core.errors import InputError
 SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".webm")
 
 
-def count_frames(path: str | Path) -> int:
-    """How many frames a video says it has; 0 if it does not say.
+def open_video(path: str | Path) -> tuple[int, Iterator[tuple[float, np.ndarray]]]:
+    """The frames of a video, turned as players show them.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    n_frames : int
+        How many it says it has; 0 if it does not say.
+    frames : iterator of (float, array of shape (height, width, 3))
+        Time in seconds, as the file gives it, and the image, RGB, uint8.
 
     Raises
     ------
@@ -20,35 +31,15 @@ def count_frames(path: str | Path) -> int:
         If it cannot be read.
     """
     capture = cv2.VideoCapture(str(path))
-    try:
-        if not capture.isOpened():
-            raise InputError(f"{path}: is no video that OpenCV can read; give .mp4, .avi or .mov, or images")
-        return max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT)))
-    finally:
-        capture.release()
+    if not capture.isOpened():
+        raise InputError(f"{path}: is no video that OpenCV can read; give .mp4, .avi or .mov, or images")
 
-
-def read_frames(path: str | Path) -> Iterator[tuple[float, np.ndarray]]:
-    """The frames of a video, turned as players show them.
-
-    Parameters
-    ----------
-    path : str or Path
-
-    Yields
-    ------
-    time_s : float
-        From the start, as the file gives it.
-    image : array, shape (height, width, 3), dtype uint8
-        RGB.
-    """
-    capture = cv2.VideoCapture(str(path))
-    try:
+    def frames() -> Iterator[tuple[float, np.ndarray]]:
         while capture.grab():
             time_s = capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3
             decoded, bgr = capture.retrieve()
             if not decoded:
                 return
             yield time_s, cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
-    finally:
-        capture.release()
+
+    return max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT))), frames()

@@ -8,7 +8,7 @@
 The bytes follow from the detections and their order alone.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,8 @@ from hicp_lib.core.files import atomic_path, read_json
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
 
 SUFFIXES = (".json", ".csv", ".parquet")
-_IMAGES_AT_ONCE = 1000  # of a table; a group of rows of Parquet
-_OF_PERSON = ["person", "person_score", "keypoint", "u_px", "v_px", "score"]
-Write = Callable[[int, Mapping[str, Any], Detections], None]
+_PEOPLE_AT_ONCE = 1000  # of a table; a group of rows of Parquet
+_Append = Callable[..., None]
 
 
 def refuse_other_suffix(path: str | Path) -> None:
@@ -45,7 +44,7 @@ def refuse_other_suffix(path: str | Path) -> None:
 
 
 @contextmanager
-def open_detections(path: str | Path) -> Iterator[Write]:
+def open_detections(path: str | Path) -> Iterator[_Append]:
     """Write a file of detections, whole or not at all.
 
     Parameters
@@ -56,7 +55,8 @@ def open_detections(path: str | Path) -> Iterator[Write]:
     Yields
     ------
     callable
-        Takes, of one image after the other, its id, what is known of it, and the people in it.
+        Takes, of one image after the other, its id, what is known of it, the people in it, and if there are
+        any, further keys of each person's object in JSON.
 
     Raises
     ------
@@ -64,27 +64,15 @@ def open_detections(path: str | Path) -> Iterator[Write]:
         As `refuse_other_suffix`.
     """
     refuse_other_suffix(path)
-    kind = Path(path).suffix
-    with atomic_path(path) as temporary:
-        if kind == ".json":
-            with json_list(temporary) as append:
-                yield lambda image_id, facts, found: append(*result_rows(image_id, facts, found))
-            return
-        with _csv(temporary) if kind == ".csv" else _parquet(temporary) as append_table:
-            images: list[tuple] = []
-
-            def write(*image: Any) -> None:
-                if len(images) == _IMAGES_AT_ONCE:
-                    append_table(_columns(images))
-                    images.clear()
-                images.append(image)
-
-            yield write
-            append_table(_columns(images))
+    is_json = Path(path).suffix == ".json"
+    with atomic_path(path) as temporary, json_list(temporary) if is_json else _table(temporary) as append:
+        yield lambda image_id, facts, found, extras=None: append(
+            *result_rows(image_id, facts, found, extras if is_json else None)
+        )
 
 
 @contextmanager
-def json_list(path: Path) -> Iterator[Callable[..., None]]:
+def json_list(path: Path) -> Iterator[_Append]:
     """Write a list in JSON, item by item.
 
     Parameters
@@ -97,76 +85,101 @@ def json_list(path: Path) -> Iterator[Callable[..., None]]:
         Takes the next items, JSON-able, or with arrays.
     """
     with open(path, "wb") as file:
-        before = b"["
+        file.write(b"[")
+        between = b""
 
         def append(*items: object) -> None:
-            nonlocal before
+            nonlocal between
             for item in items:
-                file.write(before + orjson.dumps(item, option=orjson.OPT_SERIALIZE_NUMPY))
-                before = b",\n"
+                file.write(between + orjson.dumps(item, option=orjson.OPT_SERIALIZE_NUMPY))
+                between = b",\n"
 
         yield append
-        file.write(b"]\n" if before != b"[" else b"[]\n")
+        file.write(b"]\n")
 
 
-def result_rows(image_id: int, facts: Mapping[str, Any], found: Detections) -> Iterator[dict]:
-    """The people of an image as COCO keypoint results; `facts` are further keys of each.
+def result_rows(
+    image_id: int, facts: Mapping[str, Any], found: Detections, extras: Sequence[dict] | None = None,
+    keypoints: np.ndarray | slice = slice(None),
+) -> Iterator[dict]:  # fmt: skip
+    """The people of an image as COCO keypoint results, with arrays in them.
+
+    Parameters
+    ----------
+    image_id : int
+    facts : mapping of str to object
+        Further keys of each.
+    found : Detections
+    extras : sequence of dict, optional
+        Further keys of one each.
+    keypoints : array of int or slice, optional
+        Which of the 136, all if left out.
+
+    Yields
+    ------
+    dict
 
     Raises
     ------
     ValueError
         For a score that is no number.
     """
-    given = np.isfinite(found.keypoints_px).all(axis=-1, keepdims=True)
-    triples = np.where(given, np.dstack([found.keypoints_px, found.scores]), 0.0)
+    points = found.keypoints_px[:, keypoints]
+    triples = np.concatenate([points, found.scores[:, keypoints, None]], axis=-1)
+    triples[~np.isfinite(points).all(axis=-1)] = 0.0
     if not (np.isfinite(triples).all() and np.isfinite(found.person_scores).all()):
         raise ValueError(f"image {image_id}: a score is not a finite number")
-    for flat, score in zip(triples.reshape(len(found), -1), found.person_scores.tolist(), strict=True):
-        yield {"image_id": image_id, **facts, "category_id": 1, "keypoints": flat, "score": score}
+    flat = triples.reshape(len(found), 3 * points.shape[1])
+    for of, score, extra in zip(flat, found.person_scores.tolist(), extras or [{}] * len(found), strict=True):
+        yield {**extra, "image_id": image_id, **facts, "category_id": 1, "keypoints": of, "score": score}
 
 
 @contextmanager
-def _csv(path: Path) -> Iterator[Callable[[dict], None]]:
-    with open(path, "w", encoding="utf-8", newline="") as file:
-        yield lambda columns: pd.DataFrame(columns).to_csv(file, index=False, header=file.tell() == 0)
-
-
-@contextmanager
-def _parquet(path: Path) -> Iterator[Callable[[dict], None]]:
-    import pyarrow
-    from pyarrow.parquet import ParquetWriter
-
+def _table(path: Path) -> Iterator[_Append]:
+    """Write people as rows of a table, a group at a time."""
+    waiting: list[dict] = []
     with ExitStack() as stack:
-        writers = []
+        write = _append_csv(path) if path.suffix == ".csv" else _append_parquet(path, stack)
 
-        def append(columns: dict) -> None:
-            table = pyarrow.table(columns)
-            if not writers:
-                writers.append(stack.enter_context(ParquetWriter(path, table.schema)))
-            writers[0].write_table(table)
+        def append(*people: dict) -> None:
+            if len(waiting) >= _PEOPLE_AT_ONCE:
+                write(_by_keypoint(waiting))
+                waiting.clear()
+            waiting.extend(people)
 
         yield append
+        write(_by_keypoint(waiting))
 
 
-def _columns(images: list[tuple]) -> dict[str, Any]:
-    """Rows of a table, a keypoint each, of images as `open_detections` takes them."""
-    founds = [found for _, _, found in images] or [Detections.none()]
-    points, scores, person_scores = (
-        np.concatenate([getattr(found, name) for found in founds])
-        for name in ("keypoints_px", "scores", "person_scores")
-    )
-    facts = pd.DataFrame(
-        [{"image_id": image_id, **known} for image_id, known, _ in images] or {"image_id": []}
-    )
-    # Texts are that also where there is no row: Parquet asks for the same type in every group.
-    facts = facts.convert_dtypes(convert_integer=False, convert_floating=False)
-    of_image = np.repeat(np.arange(len(founds)), list(map(len, founds)))
-    person = np.concatenate([np.arange(len(found)) for found in founds])
-    rows, keypoints = np.nonzero(np.isfinite(points).all(axis=-1))
-    of_person = person[rows], person_scores[rows], np.array(NAMES)[keypoints]
-    u_px, v_px = points[rows, keypoints].T
-    named = zip(_OF_PERSON, (*of_person, u_px, v_px, scores[rows, keypoints]), strict=True)
-    return {name: facts[name].to_numpy()[of_image[rows]] for name in facts} | dict(named)
+def _append_csv(path: Path) -> _Append:
+    return lambda table: table.to_csv(path, mode="a", index=False, header=not path.stat().st_size)
+
+
+def _append_parquet(path: Path, stack: ExitStack) -> _Append:
+    from pyarrow import Table
+    from pyarrow.parquet import ParquetWriter
+
+    writers: list[ParquetWriter] = []
+
+    def append(table: pd.DataFrame) -> None:
+        group = Table.from_pandas(table, preserve_index=False).replace_schema_metadata()
+        if not writers:
+            writers.append(stack.enter_context(ParquetWriter(path, group.schema)))
+        writers[0].write_table(group)
+
+    return append
+
+
+def _by_keypoint(people: list[dict]) -> pd.DataFrame:
+    """People as of `result_rows`, all of an image one after the other, as a row for each keypoint."""
+    triples = np.array([row.pop("keypoints") for row in people]).reshape(-1, N_KEYPOINTS, 3)
+    table = pd.DataFrame(people or {"image_id": np.zeros(0, int), "category_id": 1, "score": 0.0})
+    table.insert(table.columns.get_loc("score"), "person", table.groupby("image_id").cumcount())
+    rows, keypoints = np.nonzero(triples.any(axis=-1))
+    table = table.drop(columns="category_id").rename(columns={"score": "person_score"}).iloc[rows]
+    u_px, v_px, scores = triples[rows, keypoints].T
+    names = pd.array(np.array(NAMES)[keypoints], dtype="string")
+    return table.assign(keypoint=names, u_px=u_px, v_px=v_px, score=scores)
 
 
 def read_rows(path: Path) -> Any:
@@ -181,21 +194,20 @@ def read_rows(path: Path) -> Any:
         return read_json(path)
     refuse_other_suffix(path)
     try:
-        read = pd.read_parquet if path.suffix == ".parquet" else _read_csv
-        table = read(path)
-    except (OSError, ValueError) as error:  # pyarrow's and pandas' own are among these
-        raise InputError(f"{path}: cannot be read as a table ({one_line(error)})") from None
-    if absent := [name for name in ["image_id", *_OF_PERSON] if name not in table]:
-        raise InputError(f"{path}: has no column {absent[0]!r}; expected a table that hicp detect wrote")
-    keypoints = table["keypoint"].map(INDEX)
-    if keypoints.isna().any():
-        raise InputError(f"{path}: keypoint {table['keypoint'][keypoints.isna()].iloc[0]!r} is not known")
-    people = table.groupby(["image_id", "person"], sort=False)
+        table = _read_csv(path) if path.suffix == ".csv" else pd.read_parquet(path)
+        keypoints = [INDEX[name] for name in table["keypoint"]]
+        values = table[["u_px", "v_px", "score"]].to_numpy(float)
+        if table.duplicated(["image_id", "person", "keypoint"]).any():
+            raise ValueError("a keypoint of a person twice")
+        people = table.groupby(["image_id", "person"], sort=False, dropna=False)
+        first = people[["person_score", *table.columns.intersection(["file_name"])]].first()
+    except (KeyError, OSError, TypeError, ValueError) as error:  # pyarrow's and pandas' own are among these
+        problem = f"{type(error).__name__}: {one_line(error)}"
+        raise InputError(f"{path}: is no table that hicp detect wrote ({problem})") from None
     triples = np.zeros((people.ngroups, N_KEYPOINTS, 3))
-    triples[people.ngroup(), keypoints.astype(int)] = table[["u_px", "v_px", "score"]]
-    rest = people.first().reset_index().drop(columns=["person", "keypoint", "u_px", "v_px", "score"])
-    rows = rest.rename(columns={"person_score": "score"}).to_dict("records")
-    flat = triples.reshape(len(rows), -1).tolist()
+    triples[people.ngroup(), keypoints] = values
+    rows = first.rename(columns={"person_score": "score"}).reset_index().to_dict("records")
+    flat = triples.reshape(len(rows), 3 * N_KEYPOINTS).tolist()
     return [row | {"keypoints": keypoints} for row, keypoints in zip(rows, flat, strict=True)]
 
 

@@ -117,11 +117,11 @@ def read_result(path: Path) -> Timed | None:
     payload = read_checked(path)
     if payload is None:
         return None
-    (time_ms, workers), rows = np.split(np.frombuffer(payload).copy(), [2])
-    rows = rows.reshape(-1, _N_COLUMNS)
+    values = np.frombuffer(payload).copy()
+    rows = values[2:].reshape(-1, _N_COLUMNS)
     keypoints_px = rows[:, : 2 * N_KEYPOINTS].reshape(-1, N_KEYPOINTS, 2)
     found = Detections(keypoints_px, rows[:, 2 * N_KEYPOINTS : -1], rows[:, -1])
-    return Timed(found, float(time_ms), int(workers))
+    return Timed(found, float(values[0]), int(values[1]))
 
 
 def write_result(path: Path, result: Timed) -> None:

@@ -168,14 +168,9 @@ class _Waiting:
 
 
 def detect_each(
-    name: str,
-    images: Iterable[tuple[Key, Image]],
-    workers: Workers = None,
-    progress: bool = True,
-    boxes_px: Mapping[Key, np.ndarray] | None = None,
-    n_images: int | None = None,
-    **options,
-) -> Iterator[tuple[Key, Timed | InputError]]:
+    name: str, images: Iterable[tuple[Key, Image]], workers: Workers = None, progress: bool = True,
+    boxes_px: Mapping[Key, np.ndarray] | None = None, n_images: int | None = None, **options,
+) -> Iterator[tuple[Key, Timed | InputError]]:  # fmt: skip
     """People in one image after the other; what was handed on is not held any more.
 
     Parameters
@@ -233,8 +228,9 @@ def detect_each(
             for key, found in run_jobs(jobs(), n_here or workers, "threads", alike=alike, named=named):
                 if isinstance(found, Timed):
                     write_result(waiting[key].kept, found)
-                if found is not None:
-                    waiting[key].found = found if isinstance(found, Timed) else InputError(found)
+                    waiting[key].found = waiting[key].kept if len(waiting) > _MOST_WAITING else found
+                elif found is not None:
+                    waiting[key].found = InputError(found)
                 for done in _in_order(waiting):
                     bar.update()
                     yield done

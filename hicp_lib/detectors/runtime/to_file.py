@@ -1,7 +1,6 @@
 """People in a folder of images, a data set or a video, written to a file as they are found."""
 
 import os
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
@@ -12,16 +11,17 @@ import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import atomic_path
+from hicp_lib.core.files import atomic_path, natural_order
 from hicp_lib.core.video import SUFFIXES as VIDEO_SUFFIXES
-from hicp_lib.core.video import count_frames, read_frames
-from hicp_lib.detectors.runtime.results import Timed
+from hicp_lib.core.video import open_video
 from hicp_lib.detectors.runtime.run import Image, boxes_by_image, detect_each
 from hicp_lib.formats.annotations import read_annotations
 from hicp_lib.formats.detection_files import json_list, open_detections
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff")
-_DIGITS = 20  # of the longest number in a name whose order counts
+
+
+Facts = dict[str, Any]  # what is known of an image: `file_name`, or of a frame `frame` and `time_s`
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,8 @@ class Pictures:
     ----------
     source : Path
         The folder or video, for messages.
-    images : iterable of (int, path or array)
-        By image id.
-    facts : callable
-        What is known of an image once it was drawn, by its id: `file_name`, or of a frame `frame` and
-        `time_s`.
+    images : iterable of (int, dict, path or array)
+        Image ids, what is known of each, and the images.
     n_images : int or None
         How many it should be; None if that is not known.
     boxes_px : mapping of int to array, optional
@@ -44,25 +41,9 @@ class Pictures:
     """
 
     source: Path
-    images: Iterable[tuple[int, Image]]
-    facts: Callable[[int], dict[str, Any]]
+    images: Iterable[tuple[int, Facts, Image]]
     n_images: int | None
     boxes_px: Mapping[int, np.ndarray] | None = None
-
-
-@dataclass
-class Found:
-    """What came out.
-
-    Attributes
-    ----------
-    n_images, n_people, n_broken : int
-        Images that were looked at, people in them, and images that could not be read.
-    """
-
-    n_images: int = 0
-    n_people: int = 0
-    n_broken: int = 0
 
 
 def open_pictures(source: Path) -> Pictures:
@@ -77,35 +58,19 @@ def open_pictures(source: Path) -> Pictures:
         If it is neither.
     """
     if source.suffix.lower() in VIDEO_SUFFIXES:
-        times_s: dict[int, float] = {}
-
-        def frames() -> Iterator[tuple[int, np.ndarray]]:
-            for i, (times_s[i], image) in enumerate(read_frames(source)):
-                yield i, image
-
-        facts = lambda i: {"frame": i, "time_s": times_s.pop(i)}  # noqa: E731
-        return Pictures(source, frames(), facts, count_frames(source) or None)
+        n_frames, frames = open_video(source)
+        images = ((i, {"frame": i, "time_s": time_s}, frame) for i, (time_s, frame) in enumerate(frames))
+        return Pictures(source, images, n_frames or None)
     if not source.is_dir():
         raise InputError(f"{source}: is not a folder; give the folder that holds the images, or a video")
     names = [entry.name for entry in os.scandir(source) if entry.name.lower().endswith(IMAGE_SUFFIXES)]
     if not names:
         raise InputError(f"{source}: holds no images; expected files such as 000001.jpg or photo.png")
-    names = sorted(sorted(names), key=natural_order)
+    names.sort(key=natural_order)
     stems = [os.path.splitext(name)[0] for name in names]
     numbers = {int(stem) for stem in stems if stem.isascii() and stem.isdigit()}
     ids = map(int, stems) if len(numbers) == len(names) else range(1, len(names) + 1)
-    return _of_files(source, source, dict(zip(ids, names, strict=True)))
-
-
-def natural_order(name: str) -> str:
-    """What names are sorted by so that the numbers in them are in their order.
-
-    Examples
-    --------
-    >>> sorted(["b10.png", "b9.png", "a.png"], key=natural_order)
-    ['a.png', 'b9.png', 'b10.png']
-    """
-    return re.sub("[0-9]+", lambda number: number[0].zfill(_DIGITS), name)
+    return Pictures(source, _files(source, zip(ids, names, strict=True)), len(names))
 
 
 def open_dataset(folder: Path) -> Pictures:
@@ -117,24 +82,18 @@ def open_dataset(folder: Path) -> Pictures:
         If the annotations are absent or malformed.
     """
     annotations = read_annotations(folder / "annotations.json")
-    names = {i: image.file_name for i, image in annotations.images.items()}
-    return _of_files(folder, folder / "images", names, boxes_by_image(annotations))
+    names = [(i, image.file_name) for i, image in annotations.images.items()]
+    return Pictures(folder, _files(folder / "images", names), len(names), boxes_by_image(annotations))
 
 
-def _of_files(source: Path, folder: Path, names: dict[int, str], boxes_px: Mapping | None = None) -> Pictures:
-    images = ((i, f"{folder}{os.sep}{name}") for i, name in names.items())
-    return Pictures(source, images, lambda i: {"file_name": names[i]}, len(names), boxes_px)
+def _files(folder: Path, names: Iterable[tuple[int, str]]) -> Iterator[tuple[int, Facts, Image]]:
+    return ((i, {"file_name": name}, f"{folder}{os.sep}{name}") for i, name in names)
 
 
 def detect_to_file(
-    name: str,
-    pictures: Pictures,
-    out: Path,
-    tell: Callable[[str], None],
-    by_image: Callable[[str], None] | None = None,
-    strict: bool = False,
-    **options,
-) -> Found:
+    name: str, pictures: Pictures, out: Path, tell: Callable[[str], None],
+    by_image: Callable[[str], None] | None = None, strict: bool = False, **options,
+) -> tuple[int, int, int]:  # fmt: skip
     """Find people and write them, image by image; a picture that cannot be read is passed over.
 
     Beside `out`, `OUT.images.json` names all images, also those with nobody, and tells of those that could
@@ -158,38 +117,41 @@ def detect_to_file(
 
     Returns
     -------
-    Found
+    n_people, n_images, n_broken : int
+        People found, images they were looked for in, and images that could not be read.
 
     Raises
     ------
     InputError
         If no image can be read, or one where `strict`; and as of `detect_each`.
     """
-    total, n = Found(), pictures.n_images
-    each = detect_each(name, pictures.images, boxes_px=pictures.boxes_px, n_images=n, **options)
+    n_people = n_images = n_broken = 0
+    n, known = pictures.n_images, dict[int, Facts]()
+    images = (known.update({i: facts}) or (i, image) for i, facts, image in pictures.images)
+    each = detect_each(name, images, boxes_px=pictures.boxes_px, n_images=n, **options)
     with ExitStack() as stack:
         write = stack.enter_context(open_detections(out))
-        temporary = stack.enter_context(atomic_path(out.with_suffix(".images.json")))
-        append = stack.enter_context(json_list(temporary))
+        listed = stack.enter_context(atomic_path(out.with_suffix(".images.json")))
+        append = stack.enter_context(json_list(listed))
         for image_id, found in stack.enter_context(closing(each)):
-            facts = pictures.facts(image_id)
-            if isinstance(found, Timed):
-                append({"id": image_id, **facts})
-                write(image_id, facts, found.detections)
-                total.n_images, total.n_people = total.n_images + 1, total.n_people + len(found.detections)
-                if by_image is not None:
-                    by_image(_line(image_id, facts, found.detections))
-            elif strict:
-                raise found
-            else:
+            facts = known.pop(image_id)
+            if isinstance(found, InputError):
+                if strict:
+                    raise found
                 append({"id": image_id, **facts, "error": str(found)})
-                total.n_broken += 1
                 tell(str(found))
-        if not total.n_images:
+                n_broken += 1
+                continue
+            append({"id": image_id, **facts})
+            write(image_id, facts, found.detections)
+            if by_image is not None:
+                by_image(_line(image_id, facts, found.detections))
+            n_images, n_people = n_images + 1, n_people + len(found.detections)
+        if not n_images:
             raise InputError(f"{pictures.source}: none of its {n or 0} images can be read")
-    if n not in (None, total.n_images + total.n_broken):
-        tell(f"{pictures.source}: says {n} frames, {total.n_images} could be decoded; it may be cut off")
-    return total
+    if n not in (None, n_images + n_broken):
+        tell(f"{pictures.source}: says {n} frames, {n_images} could be decoded; it may be cut off")
+    return n_people, n_images, n_broken
 
 
 def _line(image_id: int, facts: Mapping[str, Any], people: Detections) -> str:

@@ -46,9 +46,9 @@ def match_images(people: People, images: dict[int, ImageInfo]) -> list[int | Non
                 f"{people.path}: {first[image]!r} and {source!r} both belong to the image "
                 f"{images[image].file_name}; leave the predictions of one run only"
             )
-    if not first:
+    if people.sources and not first:
         example = next(iter(images.values())).file_name if images else "no image"
-        its_example = repr(people.sources[0])[:80] if people.sources else "none"
+        its_example = repr(people.sources[0])[:80]
         raise InputError(
             f"{people.path}: none of its {len(people.sources)} images is annotated; it has {its_example}, "
             f"the annotations {example}; give the annotations of the images the tool saw"
@@ -81,7 +81,7 @@ def _image_of(
         by_number = [] if people.named_by == "id" else tables[_last_number].get(source, [])
         candidates = sorted({*by_number, *([source] if source in images else [])})
     elif people.named_by == "stem":
-        candidates = tables[_stem].get(source, [])
+        candidates = tables[_stem].get(source) or tables[_name].get(source, [])
     else:
         path = _path(source)
         candidates = next((tables[k][k(path)] for k in (str, _name, _stem) if k(path) in tables[k]), [])
