@@ -83,7 +83,7 @@ def import_open3d(
     rate_hz: float | None = None,
     depth_units_per_m: float | None = None,
 ) -> tuple[int, list[str]]:
-    """Import `color/`, `depth/` and `intrinsic.json` (or `camera_intrinsic.json`), as Open3D's recorders write.
+    """Import `color/`, `depth/` and `intrinsic.json` or `camera_intrinsic.json`, as Open3D's recorders do.
 
     Distortion that the file tells is undone. Frames are in the order of the numbers in their names.
 
