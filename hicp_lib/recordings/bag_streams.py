@@ -33,6 +33,8 @@ class Stream:
         Of depth in whole numbers.
     taken_s : dict of int to float
         When images were taken, by the time of recording in nanoseconds, where their headers do not say it.
+    notes : list of str
+        What a user must know of them.
     """
 
     topic: str
@@ -41,6 +43,7 @@ class Stream:
     pixels_px: np.ndarray | None
     units_per_m: float
     taken_s: dict[int, float]
+    notes: list[str]
 
 
 def find_streams(bag: Bag, topics: Topics) -> list[Stream]:
@@ -133,14 +136,20 @@ def _stream(bag: Bag, topic: str) -> Stream:
     camera, *distortion = _camera(bag, topic, frame)
     unit = bag.first(f"{match[2]}/option/Depth_Units/value") if match else None
     units_per_m = round(1 / float(unit.data), 3) if unit else _MM_PER_M
-    taken_s = {}
-    for _, recorded_ns, message in bag.messages(f"{frame}/image/metadata"):
-        if hasattr(
-            message, "data"
-        ):  # newer releases of librealsense write text, and headers of another clock
-            taken_s[recorded_ns] = float(_fields(message.data)["timestamp"]) / 1e3
     pixels_px = undistortion(f"{bag.path}: {topic}", camera, *distortion)
-    return Stream(topic, frame, camera, pixels_px, units_per_m, taken_s)
+    notes = [] if pixels_px is None else ["distortion undone"]
+    said = {
+        ns: _fields(of.data) for _, ns, of in bag.messages(f"{frame}/image/metadata") if hasattr(of, "data")
+    }
+    taken_s = {
+        ns: float(of["timestamp"]) / 1000 for ns, of in said.items()
+    }  # headers have another clock there
+    numbers = {int(of["Frame number"]) for of in said.values()}
+    if lost := max(numbers, default=0) - min(numbers, default=1) + 1 - len(numbers):
+        notes.append(f"{lost} of {lost + len(numbers)} frames were lost while recording")
+    if domains := {of["timestamp_domain"] for of in said.values()} - {"Global Time", "System Time"}:
+        notes.append(f"times are of the camera's own clock ({', '.join(domains)}), not the computer's")
+    return Stream(topic, frame, camera, pixels_px, units_per_m, taken_s, notes)
 
 
 def _camera(bag: Bag, topic: str, frame: str) -> tuple[Camera, str, np.ndarray]:

@@ -61,7 +61,7 @@ def import_bag(
         writer = RecordingWriter(out, color.camera, depth.units_per_m)
         T_color_depth = _alignment(bag, color, depth)
         notes += [f"{depth.topic}: aligned to {color.topic}"] if T_color_depth is not None else []
-        notes += [f"{stream.topic}: distortion undone" for stream in streams if stream.pixels_px is not None]
+        notes += [f"{stream.topic}: {note}" for stream in streams for note in stream.notes]
         times_s, rows = _pairs(bag, color, depth, notes)
         if base_frame is not None:
             T_base_cam = frame_poses(bag, read_links(bag), base_frame.strip("/"), color.frame, times_s)

@@ -18,6 +18,8 @@ from hicp_lib.recordings.writer import Poses, refuse_used_folder
 
 _N_JOINTS = 6
 Size = tuple[int, int]
+Mode = tuple[int, int, int]
+"""Width and height, and frames per second."""
 
 
 def record_camera(
@@ -80,12 +82,19 @@ def record_camera(
             rows.extend(map(read_joints_line, joint_lines or ()))
         except InputError as error:
             problems.append(error)
-        is_over.set()
+            is_over.set()
 
     if joint_lines is not None:
         Thread(target=read, daemon=True).start()
     try:
-        _record_bag(rs, bag, {"color": color_px, "depth": depth_px}, rate_hz, duration_s, is_over, device)
+        _record(
+            rs,
+            device,
+            bag,
+            {"color": (*color_px, rate_hz), "depth": (*depth_px, rate_hz)},
+            is_over,
+            duration_s,
+        )
     except RuntimeError as error:
         raise InputError(f"{bag}: RealSense: {one_line(error)}") from None
     try:
@@ -143,22 +152,16 @@ def _joint_poses(rows: list[tuple[float, list[float]]], mount: str) -> Poses:
     return times_s, load_icub().T_root_camera(np.radians(np.array(angles_deg)[first]), mount)
 
 
-def _record_bag(
-    rs: Any,
-    bag: Path,
-    sizes_px: dict[str, Size],
-    rate_hz: int,
-    duration_s: float | None,
-    is_over: Event,
-    device: Any,
+def _record(
+    rs: Any, device: Any, bag: Path, modes: dict[str, Mode], is_over: Event, duration_s: float | None
 ) -> None:
     devices = rs.context().query_devices() if device is None else [device]
     if len(devices) == 0:
         raise InputError("no RealSense is connected; see what rs-enumerate-devices lists")
     recorder, sensors = rs.recorder(str(bag), devices[0]), []
     try:
-        for stream, size_px in sizes_px.items():
-            sensor, profile = _profile(rs, recorder, stream, size_px, rate_hz)
+        for stream, mode in modes.items():
+            sensor, profile = _profile(rs, recorder, stream, mode)
             if sensor.supports(rs.option.global_time_enabled):
                 sensor.set_option(rs.option.global_time_enabled, 1)
             sensor.open(profile)
@@ -173,7 +176,7 @@ def _record_bag(
             sensor.close()
 
 
-def _profile(rs: Any, device: Any, stream: str, size_px: Size, rate_hz: int) -> tuple[Any, Any]:
+def _profile(rs: Any, device: Any, stream: str, mode: Mode) -> tuple[Any, Any]:
     """The sensor that has a stream, and its profile of that size and rate."""
     wanted = (rs.stream.color, rs.format.rgb8) if stream == "color" else (rs.stream.depth, rs.format.z16)
     known = {}
@@ -182,7 +185,11 @@ def _profile(rs: Any, device: Any, stream: str, size_px: Size, rate_hz: int) -> 
             if (profile.stream_type(), profile.format()) == wanted:
                 video = profile.as_video_stream_profile()
                 known[video.width(), video.height(), video.fps()] = sensor, profile
-    if (*size_px, rate_hz) not in known:
-        sizes = ", ".join("{}x{} at {}".format(*of) for of in sorted(known)) or "none"
-        raise InputError(f"the camera has no {stream} of {size_px} pixels at {rate_hz} Hz; it has {sizes}")
-    return known[*size_px, rate_hz]
+    if mode not in known:
+        modes = ", ".join(map(_shown, sorted(known))) or "none"
+        raise InputError(f"the camera has no {stream} of {_shown(mode)}; it has {modes}")
+    return known[mode]
+
+
+def _shown(mode: Mode) -> str:
+    return "{}x{} at {} Hz".format(*mode)

@@ -36,7 +36,9 @@ class Messages:
         sequence = {"seq": 0} if self.is_ros1 else {}
         return self.of("std_msgs/msg/Header", stamp=stamp, frame_id=frame, **sequence)
 
-    def image(self, time_s: float, frame: str, encoding: str, values: np.ndarray, padding: int = 0, big=False):
+    def image(
+        self, time_s: float, frame: str, encoding: str, values: np.ndarray, padding: int = 0, big=False
+    ):
         rows = values.reshape(len(values), -1).astype(values.dtype.newbyteorder(">" if big else "<"))
         data = np.pad(rows.view(np.uint8), ((0, 0), (0, padding)), constant_values=77)
         return self.of(
@@ -52,7 +54,12 @@ class Messages:
     def info(self, frame: str, D=(), model: str = "plumb_bob", matrix=K, size=(WIDTH, HEIGHT), P=None):
         roi = {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0, "do_rectify": False}
         P = P or [*matrix[:3], 0, *matrix[3:6], 0, *matrix[6:], 0]
-        arrays = {"d": np.array(D, float), "k": np.array(matrix), "r": np.eye(3).ravel(), "p": np.array(P, float)}
+        arrays = {
+            "d": np.array(D, float),
+            "k": np.array(matrix),
+            "r": np.eye(3).ravel(),
+            "p": np.array(P, float),
+        }
         return self.of(
             "sensor_msgs/msg/CameraInfo", header=self.header(1, frame), width=size[0], height=size[1],
             distortion_model=model, binning_x=0, binning_y=0,
@@ -61,7 +68,9 @@ class Messages:
         )  # fmt: skip
 
     def tf(self, time_s: float, parent: str, frame: str, xyz, xyzw=(0.0, 0, 0, 1)):
-        names = [f"geometry_msgs/msg/{name}" for name in ("Vector3", "Quaternion", "Transform", "TransformStamped")]
+        names = [
+            f"geometry_msgs/msg/{name}" for name in ("Vector3", "Quaternion", "Transform", "TransformStamped")
+        ]
         translation = self.of(names[0], **dict(zip("xyz", map(float, xyz), strict=True)))
         rotation = self.of(names[1], **dict(zip("xyzw", map(float, xyzw), strict=True)))
         moved = self.of(names[2], translation=translation, rotation=rotation)

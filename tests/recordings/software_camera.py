@@ -25,7 +25,14 @@ def _stream(kind, uid: int, pixels, bytes_per_px: int, size, focal_px: float, mo
     intrinsics.fx, intrinsics.fy = focal_px, focal_px + 1
     intrinsics.ppx, intrinsics.ppy = size[0] / 2 - 0.5, size[1] / 2
     intrinsics.model, intrinsics.coeffs = model, coefficients
-    stream.type, stream.index, stream.uid, stream.fps, stream.bpp, stream.fmt = kind, 0, uid, 30, bytes_per_px, pixels
+    stream.type, stream.index, stream.uid, stream.fps, stream.bpp, stream.fmt = (
+        kind,
+        0,
+        uid,
+        30,
+        bytes_per_px,
+        pixels,
+    )
     stream.width, stream.height = size
     stream.intrinsics = intrinsics
     return stream
@@ -47,9 +54,9 @@ class SoftwareCamera:
         extrinsics.rotation, extrinsics.translation = list(R_COLOR_DEPTH.T.ravel()), T_COLOR_DEPTH_M
         self.profiles[0].register_extrinsics_to(self.profiles[1], extrinsics)
 
-    def feed(self, n: int) -> None:
-        """`n` frames, depth 1 ms before colour; they arrive when they do."""
-        for k in range(n):
+    def feed(self, n: int, lost: tuple[int, ...] = ()) -> None:
+        """`n` frames less those lost, depth 1 ms before colour; they arrive when they do."""
+        for k in sorted({*range(n)} - {*lost}):
             depth = np.full(DEPTH_PX[::-1], PLANE_UNITS, np.uint16)
             color = np.full((*COLOR_PX[::-1], 3), (200, 20, 10 * k), np.uint8)
             for sensor, profile, pixels, early_s in zip(

@@ -21,10 +21,10 @@ from tests.recordings.ros_bags import (
     COLOR,
     DEPTH,
     HEIGHT,
-    K,
     KINDS,
     OPTICAL,
     WIDTH,
+    K,
     depth_mm,
     png,
     rgb,
@@ -68,16 +68,24 @@ def quantised_depth(m, t, k):
     return m.compressed(t, OPTICAL, "32FC1; compressedDepth", header + png(values))
 
 
+def in_metres(m, t, k):
+    return m.image(t, OPTICAL, "32FC1", depth_mm(k).astype(np.float32) / 1000)
+
+
+def of_png(form):
+    return lambda m, t, k: m.compressed(t, OPTICAL, form, png(rgb(k)[..., ::-1]))
+
+
 @pytest.mark.parametrize(
     ("changes", "tolerance_m"),
     [
         ({"color": lambda m, t, k: m.image(t, OPTICAL, "bgr8", rgb(k)[..., ::-1].copy(), padding=5)}, 1e-6),
         ({"color": lambda m, t, k: m.image(t, OPTICAL, "rgba8", np.dstack([rgb(k), rgb(k)[..., 0]]))}, 1e-6),
-        ({"color": lambda m, t, k: m.compressed(t, OPTICAL, "rgb8; png compressed bgr8", png(rgb(k)[..., ::-1]))}, 1e-6),
-        ({"color": lambda m, t, k: m.compressed(t, OPTICAL, "png", png(rgb(k)[..., ::-1]))}, 1e-6),
+        ({"color": of_png("rgb8; png compressed bgr8")}, 1e-6),
+        ({"color": of_png("png")}, 1e-6),
         ({"depth": lambda m, t, k: m.image(t, OPTICAL, "16UC1", depth_mm(k), padding=6)}, 1e-6),
         ({"depth": lambda m, t, k: m.image(t, OPTICAL, "mono16", depth_mm(k), big=True)}, 1e-6),
-        ({"depth": lambda m, t, k: m.image(t, OPTICAL, "32FC1", depth_mm(k).astype(np.float32) / 1000)}, 1e-6),
+        ({"depth": in_metres}, 1e-6),
         ({"depth": compressed_depth, "depth_topic": DEPTH + "/compressedDepth"}, 1e-6),
         ({"depth": quantised_depth, "depth_topic": DEPTH + "/compressedDepth"}, 0.012),
     ],
@@ -105,7 +113,9 @@ def test_no_depth_is_none(tmp_path):
 def twin(write, m):
     for k in range(4):
         write(COLOR + "/compressed", m.compressed(100 + k / 10, OPTICAL, "jpeg", png(rgb(9)[..., ::-1])), 102)
-        write("/camera/infra1/image_rect_raw", m.image(100 + k / 10, "ir", "mono8", rgb(k)[..., 0].copy()), 102)
+        write(
+            "/camera/infra1/image_rect_raw", m.image(100 + k / 10, "ir", "mono8", rgb(k)[..., 0].copy()), 102
+        )
         write("/camera/depth/image_rect_raw", m.image(100 + k / 10, "depth", "16UC1", depth_mm(k) + 9), 102)
 
 
@@ -123,7 +133,9 @@ def second(write, m):
 
 def test_what_is_there_twice_is_asked_for(tmp_path):
     bag = write_bag(tmp_path, more=second)
-    with pytest.raises(InputError, match=f"2 topics are of color; give one by --color-topic.*{COLOR} .rgb8.*/other"):
+    with pytest.raises(
+        InputError, match=f"2 topics are of color; give one by --color-topic.*{COLOR} .rgb8.*/other"
+    ):
         import_bag(bag, tmp_path / "r")
     with pytest.raises(InputError, match="2 topics are of depth; give one by --depth-topic"):
         import_bag(bag, tmp_path / "r", topics=(COLOR, None))
@@ -144,9 +156,9 @@ def test_what_is_there_twice_is_asked_for(tmp_path):
         ({"info": {"frame": OPTICAL, "D": [0.1, 0, 0, 0], "model": ""}}, "distortion without a model"),
         ({"color": lambda m, t, k: m.image(t, OPTICAL, "bayer_rggb8", rgb(k)[..., 0].copy())}, "bayer_rggb8"),
         ({"depth": lambda m, t, k: m.image(t, "depth", "16UC1", depth_mm(k))}, "is not aligned"),
-        ({"depth": lambda m, t, k: m.image(t + 9, OPTICAL, "16UC1", depth_mm(k))}, "no image of depth is within"),
+        ({"depth": lambda m, t, k: m.image(t + 9, OPTICAL, "16UC1", depth_mm(k))}, "no image of depth is"),
         ({"n": 0}, "0 topics are of color"),
-        ({"color": lambda m, t, k: m.compressed(t, OPTICAL, "jpeg", b"x" * (k > 0) or png(rgb(0)))}, "damaged"),
+        ({"color": lambda m, t, k: m.compressed(t, OPTICAL, "png", b"x" if k else png(rgb(0)))}, "damaged"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_right_is_refused(tmp_path, changes, expected):
@@ -219,7 +231,9 @@ def test_depth_of_another_camera_is_aligned_by_the_transforms(tmp_path):
         write("/tf_static", m.tf(0, "link", "depth_optical", (0.2, 0, -0.3)), 102)
 
     changes = {"depth": in_depth_frame, "depth_topic": "/camera/depth/image_raw", "more": more}
-    recording, notes = imported(tmp_path, write_bag(tmp_path, depth_info={"frame": "depth_optical"}, **changes))
+    recording, notes = imported(
+        tmp_path, write_bag(tmp_path, depth_info={"frame": "depth_optical"}, **changes)
+    )
     assert any("aligned to" in note for note in notes)
     depth_m = read_depth_m(recording, 0)
     np.testing.assert_allclose(depth_m[np.isfinite(depth_m)], 1.2, atol=1e-6)
@@ -244,7 +258,10 @@ def test_poses_are_those_of_the_transforms(tmp_path):
 @pytest.mark.parametrize(
     ("more", "expected"),
     [
-        (moving, "no transforms lead from 'color_optical' to 'odom'; frames there are: base, body, color_optical"),
+        (
+            moving,
+            "no transforms lead from 'color_optical' to 'odom'; frames there are: base, body, color_optical",
+        ),
         (lambda write, m: [write("/tf", m.tf(1, p, "b", (0, 0, 0)), 1) for p in "ac"], "b is in a and in c"),
         (lambda write, m: write("/tf", m.tf(1, "odom", OPTICAL, (0, 0, 0)), 1), "no pose is within 0.02 s"),
     ],

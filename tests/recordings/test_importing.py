@@ -207,7 +207,9 @@ def test_images_of_another_size_and_damaged_ones_are_refused(saved, tmp_path, ki
 COEFFICIENTS = [-0.3, 0.1, 0.001, -0.002, 0.0]
 
 
-@pytest.mark.parametrize("model", ["inverse_brown_conrady", "Brown Conrady", "distortion.brown_conrady", "plumb_bob"])
+@pytest.mark.parametrize(
+    "model", ["inverse_brown_conrady", "Brown Conrady", "distortion.brown_conrady", "plumb_bob"]
+)
 def test_distortion_is_undone(saved, tmp_path, model):
     """Depth of a slope seen through the lens: what an ideal camera sees is the slope where the ray goes."""
     column, row = np.meshgrid(np.arange(32.0), np.arange(24.0))
@@ -233,7 +235,10 @@ def test_distortion_is_undone(saved, tmp_path, model):
         ({"distortion_model": "kannala_brandt4", "coeffs": [0.1, 0, 0, 0]}, "distortion kannala_brandt4"),
         ({"distortion_model": "plumb_bob", "D": [0.1, 0]}, "4, 5 or 8 numbers"),
         ({"k1": 0.1, "k2": 0.0}, "expected a distortion_model and one list"),
-        ({"dist_coeffs": [0.1, 0, 0, 0], "coeffs": [0.2, 0, 0, 0]}, "expected a distortion_model and one list"),
+        (
+            {"dist_coeffs": [0.1, 0, 0, 0], "coeffs": [0.2, 0, 0, 0]},
+            "expected a distortion_model and one list",
+        ),
         ({"distortion": {"model": "x"}}, "expected a distortion_model and one list"),
         ({"coeffs": [0.1, "a"]}, "expected a distortion_model and one list"),
     ],

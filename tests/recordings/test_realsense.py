@@ -59,11 +59,21 @@ def test_a_bag_of_older_releases_is_imported_and_aligned(tmp_path):
 
 def test_a_recording_is_made_of_what_the_camera_gives(tmp_path, camera):
     n, notes = record(tmp_path, camera, Thread(target=camera.feed, args=(5,)))
-    assert n == 5 and any("distortion undone" in note for note in notes)
+    assert n == 5 and [note.rpartition(": ")[2].split(" to ")[0] for note in notes] == [
+        "aligned",
+        "distortion undone",
+    ]
     check_wall(tmp_path / "r", 5)
     (tmp_path / "r").rename(tmp_path / "moved")
     with pytest.raises(InputError, match="r.db3: is there already"):
         record_camera(tmp_path / "r", device=camera.device)
+
+
+def test_lost_frames_are_counted(tmp_path, camera):
+    feeder = Thread(target=camera.feed, args=(6,), kwargs={"lost": (2, 3)})
+    _, notes = record(tmp_path, camera, feeder)
+    assert sum("2 of 6 frames were lost while recording" in note for note in notes) == 2
+    assert len(open_recording(tmp_path / "r")) == 4
 
 
 def record(tmp_path, camera, feeder, lines=None, wait=None):
@@ -80,7 +90,9 @@ def record(tmp_path, camera, feeder, lines=None, wait=None):
 
     realsense.Event = Started
     try:
-        return record_camera(tmp_path / "r", None, lines, "level", (40, 30), (32, 24), 30, device=camera.device)
+        return record_camera(
+            tmp_path / "r", None, lines, "level", (40, 30), (32, 24), 30, device=camera.device
+        )
     finally:
         realsense.Event = original
 
@@ -109,7 +121,9 @@ def test_joints_that_stream_in_are_poses(tmp_path, camera):
 
 
 def test_a_line_of_joints_that_is_none_is_told_and_the_bag_is_kept(tmp_path, camera):
-    with pytest.raises(InputError, match="joints: expected lines of six.*'1 2 x'.*what was recorded is in .*r.db3"):
+    with pytest.raises(
+        InputError, match="joints: expected lines of six.*'1 2 x'.*what was recorded is in .*r.db3"
+    ):
         record(tmp_path, camera, Thread(target=camera.feed, args=(2,)), ["1 2 x\n"])
     assert import_bag(tmp_path / "r.db3", tmp_path / "r")[0] == 2
 
@@ -126,7 +140,7 @@ def test_lines_without_a_time_have_that_of_their_arrival(monkeypatch):
 
 
 def test_sizes_that_a_camera_lacks_and_no_camera_are_told(tmp_path, camera):
-    with pytest.raises(InputError, match=r"no color of \(640, 480\) pixels at 30 Hz; it has 40x30 at 30"):
+    with pytest.raises(InputError, match="no color of 640x480 at 30 Hz; it has 40x30 at 30 Hz"):
         record_camera(tmp_path / "r", device=camera.device)
     with pytest.raises(InputError, match="no RealSense is connected"):
         record_camera(tmp_path / "s")
