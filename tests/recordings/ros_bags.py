@@ -43,7 +43,8 @@ class Messages:
         data = np.pad(rows.view(np.uint8), ((0, 0), (0, padding)), constant_values=77)
         return self.of(
             "sensor_msgs/msg/Image", header=self.header(time_s, frame), height=values.shape[0],
-            width=values.shape[1], encoding=encoding, is_bigendian=int(big), step=data.shape[1], data=data.ravel(),
+            width=values.shape[1], encoding=encoding, is_bigendian=int(big), step=data.shape[1],
+            data=data.ravel(),
         )  # fmt: skip
 
     def compressed(self, time_s: float, frame: str, form: str, content: bytes):
