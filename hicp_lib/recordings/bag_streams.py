@@ -174,7 +174,7 @@ def _camera(bag: Bag, topic: str, frame: str) -> tuple[Camera, str, np.ndarray]:
     if info is None:
         raise InputError(f"{bag.path}: {topic}: has no CameraInfo beside it; record its camera_info too")
     K, D, P = (getattr(info, key, getattr(info, key.upper(), None)) for key in "kdp")
-    is_rectified = "rect" in topic.rpartition("/image")[2]
+    is_rectified = re.search("(?<![a-z])rect", topic.rpartition("/image")[2])
     fx, fy, cx, cy = (P[0], P[5], P[2], P[6]) if is_rectified else (K[0], K[4], K[2], K[5])
     if min(fx, fy) <= 0:
         raise InputError(f"{bag.path}: {topic}: its CameraInfo is not calibrated (focal length {fx:g})")

@@ -82,7 +82,11 @@ def _alignment(bag: Bag, color: Stream, depth: Stream) -> np.ndarray | None:
     """The depth camera's coordinates to the colour camera's; None where depth is aligned already."""
     if color.frame == depth.frame:
         cameras = (list(vars(stream.camera).values()) for stream in (color, depth))
-        return None if np.allclose(*cameras, rtol=0, atol=_SAME_PX) else np.eye(4)
+        if np.allclose(*cameras, rtol=0, atol=_SAME_PX):
+            return None
+        if color.frame:
+            return np.eye(4)
+        raise InputError(f"{bag.path}: {depth.topic} has another camera than colour, and neither has a frame")
     links = realsense_links(bag) or read_links(bag)
     try:
         return frame_poses(bag, links, color.frame, depth.frame, np.zeros(1))[0]
@@ -98,6 +102,8 @@ def _pairs(bag: Bag, color: Stream, depth: Stream, notes: list[str]) -> tuple[np
     a, b = associate(color_s, depth_s, half_period_s)
     if len(a) == 0:
         raise InputError(f"{bag.path}: no image of depth is within {half_period_s:.3f} s of one of colour")
+    if (apart_s := np.abs(color_s[a] - depth_s[b]).max()) > MAX_DIFFERENCE_S:
+        notes.append(f"{depth.topic}: up to {apart_s:.3f} s from its colour")
     for stream, n in ((color, len(color_s)), (depth, len(depth_s))):
         if n > len(a):
             notes.append(f"{stream.topic}: {n - len(a)} of {n} images have no partner and are left out")

@@ -11,7 +11,7 @@ import numpy as np
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 KINDS = ("ros1", "sqlite3", "mcap")
 WIDTH, HEIGHT = 32, 24
@@ -26,8 +26,11 @@ class Messages:
     def __init__(self, kind: str):
         self.is_ros1 = kind == "ros1"
         self.store = get_typestore(Stores.ROS1_NOETIC if self.is_ros1 else Stores.ROS2_HUMBLE)
+        if self.is_ros1:
+            definition = "geometry_msgs/TransformStamped[] transforms"
+            self.store.register(get_types_from_msg(definition, "tf2_msgs/msg/TFMessage"))
 
-    def of(self, name: str, **fields):
+    def of(self, name: str, /, **fields):
         return self.store.types[name](**fields)
 
     def header(self, time_s: float, frame: str):

@@ -146,6 +146,18 @@ def test_what_is_there_twice_is_asked_for(tmp_path):
     assert read_depth_m(recording, 0)[0, 0] == pytest.approx(1.509)
 
 
+unframed = {
+    "color": lambda m, t, k: m.image(t, "", "rgb8", rgb(k)),
+    "depth": lambda m, t, k: m.image(t, "", "16UC1", depth_mm(k)),
+}
+
+
+def test_depth_further_than_a_recording_allows_is_told(tmp_path):
+    bag = write_bag(tmp_path, depth=lambda m, t, k: m.image(t + 0.03, OPTICAL, "16UC1", depth_mm(k)))
+    recording, notes = imported(tmp_path, bag)
+    assert len(recording) == 4 and ["up to 0.034 s from its colour" in note for note in notes] == [True]
+
+
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
@@ -157,6 +169,7 @@ def test_what_is_there_twice_is_asked_for(tmp_path):
         ({"color": lambda m, t, k: m.image(t, OPTICAL, "bayer_rggb8", rgb(k)[..., 0].copy())}, "bayer_rggb8"),
         ({"depth": lambda m, t, k: m.image(t, "depth", "16UC1", depth_mm(k))}, "is not aligned"),
         ({"depth": lambda m, t, k: m.image(t + 9, OPTICAL, "16UC1", depth_mm(k))}, "no image of depth is"),
+        (unframed | {"info": {"frame": ""}, "depth_info": {"frame": "", "matrix": [9.0, *K[1:]]}}, "neither has"),
         ({"n": 0}, "0 topics are of color"),
         ({"color": lambda m, t, k: m.compressed(t, OPTICAL, "png", b"x" if k else png(rgb(0)))}, "damaged"),
     ],
@@ -189,9 +202,7 @@ K1 = [-0.3, 0.1, 0.001, -0.002, 0.0]
 
 
 def test_distortion_is_undone(tmp_path):
-    distorted = np.zeros((HEIGHT, WIDTH), np.uint16)
-    distorted[:, :16] = 1000
-    distorted[:, 16:] = 2000
+    distorted = np.tile(1000 + 50 * np.arange(WIDTH, dtype=np.uint16), (HEIGHT, 1))
     matrix = np.reshape(K, (3, 3))
 
     def depth(m, t, k):
@@ -228,7 +239,7 @@ def in_depth_frame(m, t, k):
 def test_depth_of_another_camera_is_aligned_by_the_transforms(tmp_path):
     def more(write, m):
         write("/tf_static", m.tf(0, "link", OPTICAL, (0.1, 0, 0)), 102)
-        write("/tf_static", m.tf(0, "link", "depth_optical", (0.2, 0, -0.3)), 102)
+        write("/tf_static", m.tf(0, "link", "depth_optical", (0.5, 0, -0.3)), 102)
 
     changes = {"depth": in_depth_frame, "depth_topic": "/camera/depth/image_raw", "more": more}
     recording, notes = imported(
@@ -237,7 +248,7 @@ def test_depth_of_another_camera_is_aligned_by_the_transforms(tmp_path):
     assert any("aligned to" in note for note in notes)
     depth_m = read_depth_m(recording, 0)
     np.testing.assert_allclose(depth_m[np.isfinite(depth_m)], 1.2, atol=1e-6)
-    left = 15.5 + 30 * ((0 - 0.5 - 15.5) / 30 * 1.5 + 0.1) / 1.2  # of the depth image, in colour
+    left = 15.5 + 30 * ((0 - 0.5 - 15.5) / 30 * 1.5 + 0.4) / 1.2  # of the depth image, in colour
     assert np.isnan(depth_m[12, : int(left)]).all() and np.isfinite(depth_m[12, int(left) + 1 :]).all()
 
 
