@@ -56,6 +56,15 @@ def test_poses_of_a_text_file_keep_their_own_times(saved, tmp_path):
     np.testing.assert_allclose(recording.T_base_cam[1, :3, 3], [1, 2, 3])
 
 
+def test_poses_without_times_are_those_of_the_frames(saved, tmp_path):
+    T_base_cam = np.tile(np.eye(4), (3, 1, 1))
+    T_base_cam[:, 0, 3] = [0, 1, 2]
+    import_open3d(saved, tmp_path / "r", (np.zeros(0), T_base_cam))
+    np.testing.assert_allclose(open_recording(tmp_path / "r").T_base_cam, T_base_cam)
+    with pytest.raises(InputError, match="2 poses without times for 3 frames"):
+        import_open3d(saved, tmp_path / "s", (np.zeros(0), T_base_cam[:2]))
+
+
 def test_joint_angles_become_poses(tmp_path):
     angles_deg = np.array([5.0, -3, 10, -8, 2, 7])
     header = ",".join(["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)])
