@@ -18,7 +18,7 @@ JPEG_QUALITY = 95
 _MOST_UNITS = np.iinfo(np.uint16).max
 
 Poses = tuple[np.ndarray, np.ndarray]
-"""Times (m,) in seconds and T_base_cam (m, 4, 4); one pose is for all times, m without times frame by frame."""
+"""Times (m,) in seconds and T_base_cam (m, 4, 4); one pose is for all, m without times in order."""
 
 
 class RecordingWriter:

@@ -149,6 +149,8 @@ def test_what_is_there_twice_is_asked_for(tmp_path):
 unframed = {
     "color": lambda m, t, k: m.image(t, "", "rgb8", rgb(k)),
     "depth": lambda m, t, k: m.image(t, "", "16UC1", depth_mm(k)),
+    "info": {"frame": ""},
+    "depth_info": {"frame": "", "matrix": [9.0, *K[1:]]},
 }
 
 
@@ -169,7 +171,7 @@ def test_depth_further_than_a_recording_allows_is_told(tmp_path):
         ({"color": lambda m, t, k: m.image(t, OPTICAL, "bayer_rggb8", rgb(k)[..., 0].copy())}, "bayer_rggb8"),
         ({"depth": lambda m, t, k: m.image(t, "depth", "16UC1", depth_mm(k))}, "is not aligned"),
         ({"depth": lambda m, t, k: m.image(t + 9, OPTICAL, "16UC1", depth_mm(k))}, "no image of depth is"),
-        (unframed | {"info": {"frame": ""}, "depth_info": {"frame": "", "matrix": [9.0, *K[1:]]}}, "neither has"),
+        (unframed, "neither has a frame"),
         ({"n": 0}, "0 topics are of color"),
         ({"color": lambda m, t, k: m.compressed(t, OPTICAL, "png", b"x" if k else png(rgb(0)))}, "damaged"),
     ],
