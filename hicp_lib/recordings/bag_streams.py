@@ -155,17 +155,8 @@ def _stream(bag: Bag, topic: str) -> Stream:
 def _camera(bag: Bag, topic: str, frame: str) -> tuple[Camera, str, np.ndarray]:
     """Camera, model and coefficients of the CameraInfo beside the images, or else of the same frame.
 
-    Images that their topic's name calls rectified have the matrix P, and no distortion. Newer releases of
-    librealsense also write the camera as text; their CameraInfo says plumb_bob of any model.
+    Images that their topic's name calls rectified have the matrix P, and no distortion.
     """
-    text = bag.first(f"{frame}/camera_info") if _REALSENSE.match(topic) else None
-    if text:
-        said = _fields(text.data)
-        width, height, fx, fy, cx, cy = (
-            float(said[key]) for key in ("width", "height", "fx", "fy", "ppx", "ppy")
-        )
-        coefficients = np.array(said["coeffs"].split(","), float)
-        return Camera(int(width), int(height), fx, fy, cx, cy), said["model"], coefficients
     infos = {name: bag.first(name) for name in bag.topics("CameraInfo")}
     beside = [name for name in infos if topic.startswith(name.removesuffix("camera_info"))]
     beside += [name for name in infos if name == f"{frame}/info/camera_info"]
