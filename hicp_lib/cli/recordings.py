@@ -101,9 +101,8 @@ def import_(
     if bag is not None:
         from hicp_lib.recordings.bags import import_bag
 
-        topics = {"color_topic": color_topic, "depth_topic": depth_topic}
-        in_bag = {"base_frame": base_frame, "joints_mount": mount if joint_states else None}
-        n, notes = import_bag(bag, out, source if poses else None, **topics, **in_bag)
+        topics, joints_mount = (color_topic, depth_topic), mount if joint_states else None
+        n, notes = import_bag(bag, out, source, topics, base_frame, joints_mount)
     else:
         n, notes = import_open3d(folder, out, source, rate, depth_scale)
     _tell(out, n, notes)
@@ -113,6 +112,28 @@ def _tell(out: Path, n_frames: int, notes: list[str]) -> None:
     for note in notes:
         click.echo(note, err=True)
     click.echo(f"{out}: {n_frames} frames; check them with: hicp record check {out}")
+
+
+@record.command("camera")
+@click.argument("out", type=PATH)
+@click.option("--color", "color_px", default=(640, 480), show_default=True, help="Width and height.")
+@click.option("--depth", "depth_px", default=(848, 480), show_default=True, help="Width and height.")
+@click.option("--rate", "rate_hz", default=30, show_default=True, type=int, help="Frames per second.")
+@click.option(
+    "--seconds", "duration_s", type=click.FloatRange(min=0), help="How long; until Ctrl-C if not given."
+)
+@click.option("--joints", type=click.File(), help="Lines of joint angles as they come; - is standard input.")
+@pose_options
+def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> None:
+    """Record from a RealSense into the folder OUT, until Ctrl-C; what the camera gave stays in OUT.db3."""
+    from hicp_lib.recordings.importing import read_pose_source
+    from hicp_lib.recordings.realsense import record_camera
+
+    if joints and poses:
+        raise click.UsageError("Give either --poses FILE or --joints FILE.", click.get_current_context())
+    source = read_pose_source(poses, mount)
+    click.echo("Recording; Ctrl-C ends it.", err=True)
+    _tell(out, *record_camera(out, source, joints, mount, **settings))
 
 
 @click.command()

@@ -33,14 +33,10 @@ class Bag:
     path: Path
     reader: Any
 
-    @property
-    def types(self) -> dict[str, str]:
-        """Type of the messages of each topic, such as `sensor_msgs/msg/Image`."""
-        return {connection.topic: connection.msgtype for connection in self.reader.connections}
-
     def topics(self, *types: str) -> list[str]:
-        """Topics of messages of these types, without the package's name."""
-        return sorted(topic for topic, name in self.types.items() if name.rpartition("/")[2] in types)
+        """Topics of messages of these types, which are named without their package."""
+        named = {c.topic: c.msgtype.rpartition("/")[2] for c in self.reader.connections}
+        return sorted(topic for topic, name in named.items() if name in types)
 
     def messages(self, *topics: str) -> Iterator[tuple[str, int, Any]]:
         """Topic, time of recording in nanoseconds, and content of every message.
@@ -53,19 +49,15 @@ class Bag:
         connections = [c for c in self.reader.connections if c.topic in topics]
         with _told(self.path):
             for connection, recorded_ns, raw in self.reader.messages(connections) if connections else ():
-                yield connection.topic, recorded_ns, self._content(raw, connection.msgtype)
+                try:
+                    message = self.reader.deserialize(raw, connection.msgtype)
+                except Exception:
+                    message = self.reader.deserialize(raw[:-_SURPLUS_BYTES], connection.msgtype)
+                yield connection.topic, recorded_ns, message
 
     def first(self, topic: str) -> Any:
-        """Content of a topic's first message; None where it has none."""
+        """Content of a topic's first message; None where there is none."""
         return next((message for _, _, message in self.messages(topic)), None)
-
-    def _content(self, raw: bytes, msgtype: str) -> Any:
-        try:
-            return self.reader.deserialize(raw, msgtype)
-        except Exception:
-            if not msgtype.endswith("/Image"):
-                raise
-            return self.reader.deserialize(raw[:-_SURPLUS_BYTES], msgtype)
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """Where the camera was, from the transforms or the joint angles that a ROS bag holds."""
 
 from collections import defaultdict
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,29 +10,8 @@ from hicp_lib.core.quaternions import matrices_from_quaternions
 from hicp_lib.recordings.bag_file import Bag, stamp_s
 from hicp_lib.recordings.tum import MAX_DIFFERENCE_S
 
-
-@dataclass
-class Link:
-    """A frame's poses in its parent.
-
-    Attributes
-    ----------
-    parent : str
-    is_static : bool
-    times_s : list of float
-    T_parent_frame : list of array, shape (4, 4)
-    """
-
-    parent: str
-    is_static: bool
-    times_s: list[float] = field(default_factory=list)
-    T_parent_frame: list[np.ndarray] = field(default_factory=list)
-
-    def at(self, times_s: np.ndarray) -> np.ndarray:
-        """Poses at the nearest time, (n, 4, 4); NaN where that is more than 0.02 s away."""
-        if self.is_static:
-            return self.T_parent_frame[-1][None]
-        return _nearest(times_s, np.array(self.times_s), np.array(self.T_parent_frame))
+Link = tuple[str, list[float], list[np.ndarray]]
+"""A frame's parent, and times and poses in it; no times where the frame never moves."""
 
 
 def read_links(bag: Bag) -> dict[str, Link]:
@@ -56,11 +35,11 @@ def read_links(bag: Bag) -> dict[str, Link]:
     for topic, _, message in bag.messages(*bag.topics("TFMessage", "tfMessage")):
         for moved in message.transforms:
             parent, frame = moved.header.frame_id.strip("/"), moved.child_frame_id.strip("/")
-            link = links.setdefault(frame, Link(parent, topic.endswith("tf_static")))
-            if link.parent != parent:
-                raise InputError(f"{bag.path}: {topic}: {frame} is in {link.parent} and in {parent}; keep one")
-            link.times_s.append(stamp_s(moved))
-            link.T_parent_frame.append(rigid(moved.transform))
+            known, times_s, T_parent_frame = links.setdefault(frame, (parent, [], []))
+            if known != parent:
+                raise InputError(f"{bag.path}: {topic}: {frame} is in {known} and in {parent}; keep one")
+            times_s += [] if topic.endswith("tf_static") else [stamp_s(moved)]
+            T_parent_frame.append(rigid(moved.transform))
     return links
 
 
@@ -102,27 +81,30 @@ def frame_poses(bag: Bag, links: dict[str, Link], base: str, frame: str, times_s
     InputError
         If no transforms lead from one to the other.
     """
-    paths = [_ancestors(links, name) for name in (base, frame)]
-    common = next((name for name in paths[1] if name in paths[0]), None)
+    above = {name: _ancestors(links, name) for name in (base, frame)}
+    common = next((name for name in above[frame] if name in above[base]), None)
     if common is None:
-        known = ", ".join(sorted({*links, *(link.parent for link in links.values())})) or "none"
-        raise InputError(f"{bag.path}: no transforms lead from {frame!r} to {base!r}; frames there are: {known}")
-    T_common = [np.broadcast_to(np.eye(4), (len(times_s), 4, 4)) for _ in paths]
-    for k, path in enumerate(paths):
-        for name in path[: path.index(common)]:
-            T_common[k] = links[name].at(times_s) @ T_common[k]
-    return np.linalg.inv(T_common[0]) @ T_common[1]
+        known = ", ".join(sorted({*links, *(parent for parent, _, _ in links.values())})) or "none"
+        raise InputError(
+            f"{bag.path}: no transforms lead from {frame!r} to {base!r}; frames there are: {known}"
+        )
+    T = {name: np.broadcast_to(np.eye(4), (len(times_s), 4, 4)) for name in above}
+    for name, path in above.items():
+        for step in path[: path.index(common)]:
+            _, known_s, T_parent = links[step]
+            T[name] = (_nearest(times_s, known_s, T_parent) if known_s else T_parent[-1]) @ T[name]
+    return np.linalg.inv(T[base]) @ T[frame]
 
 
-def joint_poses(bag: Bag, times_s: np.ndarray, mount: str) -> np.ndarray:
+def joint_poses(bag: Bag, mount: str, times_s: np.ndarray) -> np.ndarray:
     """Poses of the camera by the robot's kinematics, from messages `JointState` in radians.
 
     Parameters
     ----------
     bag : Bag
-    times_s : array, shape (n,)
     mount : str
         Camera holder: "level" or "tilted".
+    times_s : array, shape (n,)
 
     Returns
     -------
@@ -142,24 +124,25 @@ def joint_poses(bag: Bag, times_s: np.ndarray, mount: str) -> np.ndarray:
             series[name].append((stamp_s(message), angle_rad))
     missing = [name for name in HEAD_JOINTS if name not in series]
     if missing:
-        raise InputError(f"{bag.path}: has no joint {missing[0]!r}; joints there are: {', '.join(series) or 'none'}")
-    angles_rad = [_nearest(times_s, *np.array(series[name]).T) for name in HEAD_JOINTS]
+        known = ", ".join(series) or "none"
+        raise InputError(f"{bag.path}: has no joint {missing[0]!r}; joints there are: {known}")
+    angles_rad = [_nearest(times_s, *zip(*series[name], strict=True)) for name in HEAD_JOINTS]
     return load_icub().T_root_camera(np.stack(angles_rad, axis=-1), mount)
 
 
 def _ancestors(links: dict[str, Link], frame: str) -> list[str]:
     """A frame, its parent, and so on."""
     path = [frame]
-    while path[-1] in links and links[path[-1]].parent not in path:
-        path.append(links[path[-1]].parent)
+    while path[-1] in links and links[path[-1]][0] not in path:
+        path.append(links[path[-1]][0])
     return path
 
 
-def _nearest(times_s: np.ndarray, known_s: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _nearest(times_s: np.ndarray, known_s: Sequence[float], values: Sequence) -> np.ndarray:
     """Values (m, ...) of the nearest of the times known; NaN where that is too far."""
     order = np.argsort(known_s, kind="stable")
-    known_s, values = known_s[order], values[order]
-    nearest = np.searchsorted((known_s[1:] + known_s[:-1]) / 2, times_s)
-    found = values[nearest].astype(float)
-    found[np.abs(known_s[nearest] - times_s) > MAX_DIFFERENCE_S] = np.nan
+    ordered_s = np.array(known_s)[order]
+    nearest = np.searchsorted((ordered_s[1:] + ordered_s[:-1]) / 2, times_s)
+    found = np.array(values, float)[order[nearest]]
+    found[np.abs(ordered_s[nearest] - times_s) > MAX_DIFFERENCE_S] = np.nan
     return found

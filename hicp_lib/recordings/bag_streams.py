@@ -1,7 +1,6 @@
 """The colour and the depth of a bag: which topics they are, their cameras, and when each image was taken."""
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,12 +8,13 @@ import numpy as np
 
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
-from hicp_lib.recordings.bag_file import Bag, decode, stamp_s
+from hicp_lib.recordings.bag_file import Bag, decode
 from hicp_lib.recordings.bag_poses import Link, rigid
 from hicp_lib.recordings.rectification import undistortion
 
 _REALSENSE = re.compile(r"((/device_\d+/sensor_\d+)/\w+)/image/data")
 _MM_PER_M = 1000.0
+Topics = tuple[str | None, str | None]
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,10 @@ class Stream:
         Where an ideal camera finds its pixels in the images (`undistortion`).
     units_per_m : float
         Of depth in whole numbers.
-    stamp_s : callable
-        Time at which an image was taken, from the time it was recorded at (ns) and the message.
+    taken_s : dict of int to float
+        When images were taken, by the time of recording in nanoseconds, where their headers do not say it.
+    notes : list of str
+        What a user must know of them.
     """
 
     topic: str
@@ -40,10 +42,11 @@ class Stream:
     camera: Camera
     pixels_px: np.ndarray | None
     units_per_m: float
-    stamp_s: Callable[[int, Any], float]
+    taken_s: dict[int, float]
+    notes: list[str]
 
 
-def find_streams(bag: Bag, color_topic: str | None, depth_topic: str | None) -> tuple[Stream, Stream]:
+def find_streams(bag: Bag, topics: Topics) -> list[Stream]:
     """Colour and depth, by their messages.
 
     Of a topic that is there raw and compressed, the raw one is taken; of several of depth, the one that is
@@ -52,29 +55,26 @@ def find_streams(bag: Bag, color_topic: str | None, depth_topic: str | None) -> 
     Parameters
     ----------
     bag : Bag
-    color_topic, depth_topic : str or None
+    topics : (str or None, str or None)
         Those to be taken, where there are several.
 
     Returns
     -------
-    color, depth : Stream
+    list of Stream
+        Two.
 
     Raises
     ------
     InputError
         If there is no such topic, or more than one; or its camera is not known.
     """
-    shown: dict[str, str] = {}
-    kinds: dict[str, list[str]] = {"colour": [], "depth": []}
-    for topic in bag.topics("Image", "CompressedImage"):
-        kind, shown[topic] = _kind(bag, topic)
-        kinds.get(kind, []).append(topic)
-    color = _chosen(bag, "colour", kinds["colour"], color_topic, shown)
-    frame = _frame(bag, color)
-    depths = kinds["depth"]
-    if depth_topic is None:
-        depths = [topic for topic in depths if _frame(bag, topic) == frame] or depths
-    return _stream(bag, color), _stream(bag, _chosen(bag, "depth", depths, depth_topic, shown))
+    kinds = {topic: _kind(topic, bag.first(topic)) for topic in bag.topics("Image", "CompressedImage")}
+    color, depth = ([topic for topic, (kind, _) in kinds.items() if kind == of] for of in ("color", "depth"))
+    chosen = [_chosen(bag, "color", color, topics[0], kinds)]
+    aligned = [topic for topic in depth if _frame(bag, topic) == _frame(bag, chosen[0])]
+    depth = depth if topics[1] else aligned or depth
+    chosen.append(_chosen(bag, "depth", depth, topics[1], kinds))
+    return [_stream(bag, topic) for topic in chosen]
 
 
 def realsense_links(bag: Bag) -> dict[str, Link]:
@@ -89,73 +89,70 @@ def realsense_links(bag: Bag) -> dict[str, Link]:
     dict of str to Link
         Empty where another recorder wrote the bag.
     """
-    links = {}
-    for topic in bag.types:
-        if match := re.fullmatch(r"(/device_\d+/sensor_\d+/\w+)/tf/(\w+)", topic):
-            written = bag.first(topic)
-            if hasattr(written, "data"):
-                numbers = _fields(written.data)
-                T_stream_reference = np.eye(4)
-                T_stream_reference[:3, :3] = np.reshape(_numbers(numbers["rotation"]), (3, 3)).T
-                T_stream_reference[:3, 3] = _numbers(numbers["translation"])
+    links: dict[str, Link] = {}
+    for topic in bag.topics("String", "Transform"):
+        if match := re.fullmatch(r"(/device_\d+/sensor_\d+/\w+)/tf/(?:ref_)?(\d+)", topic):
+            written, T_stream_reference = bag.first(topic), np.eye(4)
+            if hasattr(written, "data"):  # newer releases write text
+                numbers = {key: np.array(of.split(","), float) for key, of in _fields(written.data).items()}
+                T_stream_reference[:3, :3] = numbers["rotation"].reshape(3, 3).T
+                T_stream_reference[:3, 3] = numbers["translation"]
             else:
                 T_stream_reference = rigid(written)
-            group = match[2].rpartition("_")[2]
-            links[match[1]] = Link(f"reference {group}", True, [0.0], [np.linalg.inv(T_stream_reference)])
+            links[match[1]] = f"reference {match[2]}", [], [np.linalg.inv(T_stream_reference)]
     return links
 
 
-def _kind(bag: Bag, topic: str) -> tuple[str, str]:
-    """What a topic's images show, and how a list of topics names it."""
-    message = bag.first(topic)
-    if message is None:
-        return "none", f"{topic} (no messages)"
+def _kind(topic: str, message: Any) -> tuple[str, str]:
+    """What a topic's images show, and how they are encoded."""
+    encoding = getattr(message, "encoding", "") or getattr(message, "format", "no messages")
     try:
-        image = decode(topic, message)
-    except InputError as error:
-        return "none", f"{error}"
-    encoding = getattr(message, "encoding", None) or message.format
-    kind = "colour" if image.ndim == 3 else "none" if image.dtype == np.uint8 else "depth"
-    return kind, f"{topic} ({encoding})"
+        image = decode(topic, message) if message else np.zeros((1, 1), np.uint8)
+    except InputError:
+        return "", encoding
+    return "color" if image.ndim == 3 else "depth" if image.dtype != np.uint8 else "", encoding
 
 
-def _chosen(bag: Bag, kind: str, topics: list[str], asked: str | None, shown: dict[str, str]) -> str:
-    option = f"--{'color' if kind == 'colour' else kind}-topic"
+def _chosen(
+    bag: Bag, kind: str, topics: list[str], asked: str | None, kinds: dict[str, tuple[str, str]]
+) -> str:
     raw = [topic for topic in topics if topic.rpartition("/")[0] not in topics]
-    found = [topic for topic in topics if topic == asked] if asked is not None else raw
+    found = raw if asked is None else [topic for topic in topics if topic == asked]
     if len(found) != 1:
-        several = f"{len(raw)} topics are {kind}" if asked is None else f"{asked} is not a topic of {kind}"
-        listed = ", ".join(topics if topics else shown.values()) or "none"
-        raise InputError(f"{bag.path}: {several}; give one by {option}; there are: {listed}")
+        problem = f"{len(raw)} topics are of {kind}" if asked is None else f"{asked} is no topic of {kind}"
+        listed = ", ".join(f"{topic} ({kinds[topic][1]})" for topic in topics or kinds) or "none"
+        raise InputError(f"{bag.path}: {problem}; give one by --{kind}-topic; images there are: {listed}")
     return found[0]
 
 
 def _frame(bag: Bag, topic: str) -> str:
-    """librealsense gives its streams no frames."""
+    """librealsense gives its streams no frames of their own."""
     match = _REALSENSE.match(topic)
     return match[1] if match else bag.first(topic).header.frame_id.strip("/")
 
 
 def _stream(bag: Bag, topic: str) -> Stream:
-    where, frame = f"{bag.path}: {topic}", _frame(bag, topic)
-    camera, model, coefficients = _realsense_camera(bag, frame) or _ros_camera(bag, topic, frame)
-    pixels_px = undistortion(where, camera, model, coefficients)
-    units_per_m, match = _MM_PER_M, _REALSENSE.match(topic)
-    if match:
-        unit = bag.first(f"{match[2]}/option/Depth_Units/value")
-        units_per_m = round(1 / float(unit.data), 3) if unit else _MM_PER_M
-    taken_ms = {}
-    if match and bag.types.get(f"{frame}/image/metadata", "").endswith("/String"):
-        for _, recorded_ns, message in bag.messages(f"{frame}/image/metadata"):
-            taken_ms[recorded_ns] = float(_fields(message.data)["timestamp"])
+    frame, match = _frame(bag, topic), _REALSENSE.match(topic)
+    camera, *distortion = _camera(bag, topic, frame)
+    unit = bag.first(f"{match[2]}/option/Depth_Units/value") if match else None
+    units_per_m = round(1 / float(unit.data), 3) if unit else _MM_PER_M
+    pixels_px = undistortion(f"{bag.path}: {topic}", camera, *distortion)
+    notes = [] if pixels_px is None else ["distortion undone"]
+    said = {
+        ns: _fields(of.data) for _, ns, of in bag.messages(f"{frame}/image/metadata") if hasattr(of, "data")
+    }
+    taken_s = {
+        ns: float(of["timestamp"]) / 1000 for ns, of in said.items()
+    }  # headers have another clock there
+    numbers = {int(of["Frame number"]) for of in said.values()}
+    if lost := max(numbers, default=0) - min(numbers, default=1) + 1 - len(numbers):
+        notes.append(f"{lost} of {lost + len(numbers)} frames were lost while recording")
+    if domains := {of["timestamp_domain"] for of in said.values()} - {"Global Time", "System Time"}:
+        notes.append(f"times are of the camera's own clock ({', '.join(domains)}), not the computer's")
+    return Stream(topic, frame, camera, pixels_px, units_per_m, taken_s, notes)
 
-    def stamp(recorded_ns: int, message: Any) -> float:
-        return taken_ms[recorded_ns] / 1e3 if recorded_ns in taken_ms else stamp_s(message)
 
-    return Stream(topic, frame, camera, pixels_px, units_per_m, stamp)
-
-
-def _ros_camera(bag: Bag, topic: str, frame: str) -> tuple[Camera, str, np.ndarray]:
+def _camera(bag: Bag, topic: str, frame: str) -> tuple[Camera, str, np.ndarray]:
     """Camera, model and coefficients of the CameraInfo beside the images, or else of the same frame.
 
     Images that their topic's name calls rectified have the matrix P, and no distortion.
@@ -167,32 +164,15 @@ def _ros_camera(bag: Bag, topic: str, frame: str) -> tuple[Camera, str, np.ndarr
     info = infos[max(beside, key=len)] if beside else None
     if info is None:
         raise InputError(f"{bag.path}: {topic}: has no CameraInfo beside it; record its camera_info too")
-    K, D, P = (getattr(info, key, getattr(info, key.upper(), None)) for key in ("k", "d", "p"))
-    is_rectified = "rect" in topic.rpartition("/image")[2]
+    K, D, P = (getattr(info, key, getattr(info, key.upper(), None)) for key in "kdp")
+    is_rectified = re.search("(?<![a-z])rect", topic.rpartition("/image")[2])
     fx, fy, cx, cy = (P[0], P[5], P[2], P[6]) if is_rectified else (K[0], K[4], K[2], K[5])
     if min(fx, fy) <= 0:
         raise InputError(f"{bag.path}: {topic}: its CameraInfo is not calibrated (focal length {fx:g})")
-    size = info.width, info.height
-    return Camera(*size, fx, fy, cx, cy), info.distortion_model, np.zeros(0) if is_rectified else D
-
-
-def _realsense_camera(bag: Bag, frame: str) -> tuple[Camera, str, np.ndarray] | None:
-    """As newer releases of librealsense write it; None otherwise.
-
-    The CameraInfo beside it says plumb_bob of any model.
-    """
-    if not bag.types.get(f"{frame}/camera_info", "").endswith("/String"):
-        return None
-    said = _fields(bag.first(f"{frame}/camera_info").data)
-    numbers = (float(said[key]) for key in ("fx", "fy", "ppx", "ppy"))
-    camera = Camera(int(said["width"]), int(said["height"]), *numbers)
-    return camera, said["model"], _numbers(said["coeffs"])
+    camera = Camera(info.width, info.height, fx, fy, cx, cy)
+    return camera, info.distortion_model, np.zeros(0) if is_rectified else D
 
 
 def _fields(text: str) -> dict[str, str]:
     """Of "a=1;b=2,3"."""
     return dict(pair.split("=", 1) for pair in text.split(";") if "=" in pair)
-
-
-def _numbers(text: str) -> np.ndarray:
-    return np.array(text.split(","), float)

@@ -1,7 +1,7 @@
 """Recordings made by others' tools: the folder layout that Open3D's write, and where the camera was.
 
-Images are copied as they are, unless they are distorted. Poses come from the user: a text file in the TUM layout, one
-line of which is a camera that stands still, or a CSV of the robot's joint angles.
+Images are copied as they are, unless they are distorted. Poses come from the user: a text file in the
+TUM layout, one line of which is a camera that stands still, or a CSV of the robot's joint angles.
 """
 
 import re
@@ -83,7 +83,7 @@ def import_open3d(
     rate_hz: float | None = None,
     depth_units_per_m: float | None = None,
 ) -> tuple[int, list[str]]:
-    """Import `color/`, `depth/` and `intrinsic.json` or `camera_intrinsic.json` as Open3D's recorders write them.
+    """Import `color/`, `depth/` and `intrinsic.json` or `camera_intrinsic.json`, as Open3D's recorders do.
 
     Distortion that the file tells is undone. Frames are in the order of the numbers in their names.
 
@@ -167,7 +167,9 @@ def _frame_numbers(paths: list[Path], notes: list[str]) -> np.ndarray:
     if len(set(numbers)) < len(paths):
         raise InputError(f"{paths[0].parent}: two images have the same number; keep one of them")
     if not 0 < missing < len(paths):
-        notes.append(f"{paths[0].parent}: names do not count frames, which are taken as evenly spaced in time")
+        notes.append(
+            f"{paths[0].parent}: names do not count frames, which are taken as evenly spaced in time"
+        )
         return in_order
     notes.append(f"{paths[0].parent}: {missing} numbers are missing among {len(paths)}; times go by number")
     return np.array(numbers) - numbers[0]

@@ -18,7 +18,7 @@ JPEG_QUALITY = 95
 _MOST_UNITS = np.iinfo(np.uint16).max
 
 Poses = tuple[np.ndarray, np.ndarray]
-"""Times (m,) in seconds and T_base_cam (m, 4, 4); one pose is for all times."""
+"""Times (m,) in seconds and T_base_cam (m, 4, 4); one pose is for all, m without times in order."""
 
 
 class RecordingWriter:
@@ -132,8 +132,11 @@ def write_index(
     rgb, depth = names or ([rgb_name(k) for k in numbers], [depth_name(k) for k in numbers])
     write_camera(folder / CAMERA_FILE, intrinsics, depth_units_per_m)
     pose_s, T_base_cam = poses
-    if len(pose_s) == 1:
-        pose_s, T_base_cam = times_s, np.repeat(T_base_cam, len(times_s), axis=0)
+    if len(pose_s) == 0 and len(T_base_cam) != len(times_s):
+        wrong = f"{len(T_base_cam)} poses without times for {len(times_s)} frames"
+        raise InputError(f"{folder}: {wrong}; expected one for each, or a file with times")
+    if len(pose_s) < 2:
+        pose_s, T_base_cam = times_s, np.broadcast_to(T_base_cam, (len(times_s), 4, 4))
     write_poses(folder / POSES_FILE, pose_s, T_base_cam)
     write_file_list(folder / DEPTH_LIST, times_s, depth)
     write_file_list(folder / RGB_LIST, times_s, rgb)
