@@ -20,7 +20,8 @@ from hicp_lib.core.files import atomic_path, read_json
 from hicp_lib.formats.json_validation import is_number
 from hicp_lib.recordings.camera_file import read_camera
 from hicp_lib.recordings.recording import check_columns
-from hicp_lib.recordings.tum import read_poses
+from hicp_lib.recordings.trajectories import read_trajectory
+from hicp_lib.recordings.tum import names_poses
 from hicp_lib.recordings.writer import refuse_used_folder, write_frame, write_index
 
 _IMAGE_KINDS = (".png", ".jpg", ".jpeg")
@@ -32,7 +33,7 @@ Poses = tuple[np.ndarray, np.ndarray]
 
 
 def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
-    """Poses from a TUM text file, or from a CSV of joint angles by the robot's kinematics.
+    """Poses from a trajectory (`read_trajectory`), or a CSV of joint angles by the robot's kinematics.
 
     A CSV has a column `t_s` and one of degrees for every joint of torso and neck, such as
     `torso_pitch_deg`. Without a file the base frame is the camera's own.
@@ -46,7 +47,7 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
     Returns
     -------
     times_s : array, shape (m,)
-        One time where the camera stands still.
+        One time where the camera stands still, none where the poses are of frame after frame.
     T_base_cam : array, shape (m, 4, 4)
         Camera coordinates to the robot's base frame.
 
@@ -64,8 +65,8 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
     if path is None:
         return np.zeros(1), np.eye(4)[None]
     path = Path(path)
-    if path.suffix.lower() != ".csv":
-        return read_poses(path)
+    if path.suffix.lower() != ".csv" or names_poses(path):
+        return read_trajectory(path)
     from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub  # not in every installation
 
     columns = ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)]
@@ -216,4 +217,9 @@ def _poses_at(times_s: np.ndarray, poses: Poses) -> tuple[np.ndarray, np.ndarray
     pose_s, T_base_cam = poses
     if len(pose_s) > 1:
         return T_base_cam, pose_s
+    if len(pose_s) == 0:
+        if len(T_base_cam) != len(times_s):
+            wrong = f"{len(T_base_cam)} poses without times for {len(times_s)} frames"
+            raise InputError(f"{wrong}; expected one for each, or a file with times")
+        return T_base_cam, times_s
     return np.repeat(T_base_cam, len(times_s), axis=0), times_s
