@@ -21,6 +21,7 @@ from hicp_lib.inspection.facts import Facts
 from hicp_lib.inspection.kinds import IMAGE_SUFFIXES
 from hicp_lib.inspection.people import describe_annotations, describe_predictions
 
+_TASKS = {"pose": "mediapipe-pose", "hand": "mediapipe-hands"}
 _MOST_HEADERS = 2000  # of images of a folder that are looked into
 
 
@@ -119,7 +120,7 @@ def describe_archive(path: Path) -> Facts:
     return Facts(
         says,
         kind="MediaPipe task bundle",
-        needs={"hicp detect": "--detector mediapipe-pose or mediapipe-hands; this file as --model"},
+        needs={"hicp detect": f"--detector {_TASKS[task]}, --images; this file as --model"},
     )
 
 
