@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -62,10 +62,6 @@ class Facts:
             notes[room - 1 :] = [f"note: {len(notes) - room + 1} more notes, which --json shows"]
         return [*first, *notes, *last]
 
-    def as_dict(self) -> dict:
-        """For programs."""
-        return asdict(self)
-
 
 @contextmanager
 def under_name(path: Path, name: str) -> Iterator[Path]:
@@ -107,8 +103,8 @@ def about_people(keypoints_px: np.ndarray, of_person: str, origin: str = "") -> 
     dict of str to str
     """
     known = np.isfinite(keypoints_px).all(axis=-1)
-    groups = {"body": BODY, "face": FACE, "hands": HANDS}
-    counts = [f"{name} {int(known[:, part].any(axis=1).sum())}" for name, part in groups.items()]
+    parts = (("body", BODY), ("face", FACE), ("hands", HANDS))
+    counts = [f"{name} {int(known[:, part].any(axis=1).sum())}" for name, part in parts]
     units = f"pixels, {ORIGIN}{origin and f' ({origin})'}"
     says = {f"people with {of_person}": ", ".join(counts), "units": units}
     if known.any():

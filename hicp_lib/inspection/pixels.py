@@ -2,13 +2,11 @@
 
 import zipfile
 from collections import Counter
-from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
 import cv2
 import numpy as np
-import pandas as pd
 from PIL import Image
 
 from hicp_lib.core.errors import InputError, one_line
@@ -19,34 +17,26 @@ from hicp_lib.detectors.mediapipe.bundles import BUNDLES
 from hicp_lib.detectors.onnx.model_file import read_model
 from hicp_lib.inspection.facts import Facts
 from hicp_lib.inspection.kinds import IMAGE_SUFFIXES
-from hicp_lib.inspection.people import describe_annotations, describe_predictions
+from hicp_lib.inspection.people import describe_annotations
 
-_TASKS = {"pose": "mediapipe-pose", "hand": "mediapipe-hands"}
 _MOST_HEADERS = 2000  # of images of a folder that are looked into
 
 
 def describe_image(path: Path) -> Facts:
-    """Say what a picture is."""
+    """Say what a picture is; its pixels are read to the end."""
     content = np.frombuffer(read_bytes(path, "expected an image"), np.uint8)
     pixels = cv2.imdecode(content, cv2.IMREAD_UNCHANGED | cv2.IMREAD_IGNORE_ORIENTATION)
     try:
         with Image.open(path) as image:
             image.load()  # OpenCV fills up what is cut off
-    except (OSError, ValueError, SyntaxError) as error:
+        height_px, width_px, n_channels = (*pixels.shape, 1)[:3]
+    except (AttributeError, OSError, ValueError, SyntaxError) as error:
         raise InputError(f"{path}: is cut off or damaged ({one_line(error)}); write it again") from None
-    if pixels is None:
-        raise InputError(f"{path}: is no image that OpenCV can decode")
-    height_px, width_px, n_channels = (*pixels.shape, 1)[:3]
     says = {"size": f"{width_px} x {height_px} pixels, {n_channels} channels of {8 * pixels.itemsize} bits"}
     if pixels.dtype == np.uint16 and n_channels == 1:
-        known = pixels[pixels > 0]
-        middle = f"median {np.median(known):.0f}" if known.size else "nothing measured"
-        says["depth"] = f"raw units, {100 * known.size / pixels.size:.0f} % measured, {middle}"
-        needs = {
-            "hicp record import": "--open3d, its folder, and --depth-scale",
-            "hicp detect": "colour images",
-        }
-        return Facts(says, needs=needs, kind="depth image")
+        middle = np.median(pixels[pixels > 0]) if pixels.any() else 0
+        says["depth"] = f"raw units, {100 * np.mean(pixels > 0):.0f} % measured, median {middle:.0f}"
+        return Facts(says, needs={"hicp record import": "--depth-scale"}, kind="depth image")
     flag = image_header(path)[2]
     turned = f"rotation flag {flag} (EXIF): viewers turn it, here it is taken as stored"
     return Facts(says, [turned] * (flag > 1))
@@ -61,7 +51,7 @@ def describe_video(path: Path) -> Facts:
     height_px, width_px = seen[0][1].shape[:2]
     says = {"size": f"{width_px} x {height_px} pixels, turned as players show it"}
     says["frames"] = f"{n_frames or 'not known'}, as the file says"
-    if len(seen) == 2 and seen[1][0] > seen[0][0]:
+    if seen[-1][0] > seen[0][0]:
         says["times"] = f"of the file; {1 / (seen[1][0] - seen[0][0]):.4g} per second at the start"
     return Facts(says)
 
@@ -73,14 +63,12 @@ def describe_images(folder: Path) -> Facts:
     sizes = Counter(f"{width} x {height}" for width, height, _ in headers if width)
     shown = ", ".join(f"{size} ({n})" for size, n in sizes.most_common(3)) + ", ..." * (len(sizes) > 3)
     counts = {
-        "have a rotation flag (EXIF): viewers turn them, here they are as stored": sum(
-            f > 1 for *_, f in headers
-        ),
+        "have a rotation flag (EXIF): viewers turn them, here they are as stored": sum(f > 1 for *_, f in headers),
         "cannot be read": sum(not width for width, *_ in headers),
         "were not looked into": len(paths) - len(headers),
-    }
-    says = {"images": f"{len(paths)}; pixels: {shown or 'none'}"}
-    return Facts(says, [f"{n} images {what}" for what, n in counts.items() if n])
+    }  # fmt: skip
+    notes = [f"{n} images {what}" for what, n in counts.items() if n]
+    return Facts({"images": f"{len(paths)}; pixels: {shown or 'none'}"}, notes)
 
 
 def describe_dataset(folder: Path) -> Facts:
@@ -92,8 +80,8 @@ def describe_dataset(folder: Path) -> Facts:
 def describe_subsets(folder: Path) -> Facts:
     """Say what Basic and Headless hold."""
     parts = {name: describe_dataset(folder / name) for name in ("basic", "headless")}
-    says = {name: f"{part.says['people']}; images {part.says['images']}" for name, part in parts.items()}
-    notes = [f"{name}: {note}" for name, part in parts.items() for note in part.notes]
+    says = {name: f"{of.says['people']}; images {of.says['images']}" for name, of in parts.items()}
+    notes = [f"{name}: {note}" for name, of in parts.items() for note in of.notes]
     return Facts(says | {"layout": parts["basic"].says["layout"]}, notes)
 
 
@@ -106,34 +94,17 @@ def describe_network(path: Path) -> Facts:
     return Facts({"kinds of operators": str(len(model.operators)), **said})
 
 
-def describe_archive(path: Path) -> Facts:
-    """Say whether an archive is a bundle of MediaPipe's."""
+def describe_task(path: Path) -> Facts:
+    """Say which task a bundle of MediaPipe's is for."""
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.namelist()
-    except (OSError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: is cut off or damaged ({one_line(error)})") from None
-    task = next((task for task, needed in BUNDLES.items() if set(needed) <= set(members)), None)
-    if task is None:
-        return Facts(problem=f"of no kind that is known; it holds {', '.join(members[:4]) or 'nothing'}")
-    says = {"task": task, "networks": ", ".join(members)}
-    return Facts(
-        says,
-        kind="MediaPipe task bundle",
-        needs={"hicp detect": f"--detector {_TASKS[task]}, --images; this file as --model"},
-    )
-
-
-def describe_table(path: Path) -> Facts:
-    """Say what a Parquet table holds."""
-    try:
-        table = pd.read_parquet(path)
-    except (OSError, ValueError, ImportError) as error:
-        raise InputError(f"{path}: cannot be read as Parquet ({one_line(error)})") from None
-    if {"keypoint", "image_id", "u_px"} <= set(table):
-        needs = {"hicp evaluate": "--annotations", "hicp draw": "--images"}
-        return replace(describe_predictions(path, "coco"), kind="detections by hicp detect", needs=needs)
-    return Facts({"rows": str(len(table)), "columns": ", ".join(map(str, table))[:400]})
+        task = next(task for task, needed in BUNDLES.items() if set(needed) <= set(members))
+    except (OSError, StopIteration, zipfile.BadZipFile) as error:
+        raise InputError(
+            f"{path}: is cut off, or no task bundle of MediaPipe's ({one_line(error)})"
+        ) from None
+    return Facts({"task": task, "networks": ", ".join(members)}, kind="MediaPipe task bundle")
 
 
 def describe_count(path: Path) -> Facts:

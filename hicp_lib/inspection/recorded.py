@@ -5,19 +5,20 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.files import read_json
 from hicp_lib.inspection.facts import ORIGIN, Facts, about_times
 from hicp_lib.mocap.registration import read_registration
-from hicp_lib.recordings.bag_file import Bag, open_bag
-from hicp_lib.recordings.bag_streams import Stream, find_streams
+from hicp_lib.recordings.bag_file import open_bag
+from hicp_lib.recordings.bag_streams import find_streams
 from hicp_lib.recordings.camera_file import read_distorted_camera
 from hicp_lib.recordings.check import FURTHEST_POSE_M, check_recording
 from hicp_lib.recordings.importing import read_pose_source
 from hicp_lib.recordings.qualisys import read_mocap
 from hicp_lib.recordings.recording import open_recording
 from hicp_lib.recordings.trajectories import read_trajectory
-from hicp_lib.recordings.tum import count_repeated, doubt, names_poses, read_file_list
+from hicp_lib.recordings.tum import count_repeated, doubt, read_file_list
 
 _CAMERA_FILES = ("intrinsic.json", "camera_intrinsic.json")
 _OPTIONS = {"fps": "--rate", "depth_scale": "--depth-scale"}
@@ -27,27 +28,21 @@ def describe_bag(path: Path) -> Facts:
     """Say what a bag holds: a file, or the folder of one of ROS 2."""
     with open_bag(path) as bag:
         counts = {connection.topic: connection.msgcount for connection in bag.reader.connections}
-        says = {"messages": f"{bag.reader.message_count} on {len(counts)} topics"}
+        lasts_s, poses = bag.reader.duration / 1e9, bag.topics("TFMessage", "JointState")
+        says = {"messages": f"{bag.reader.message_count} on {len(counts)} topics in {lasts_s:.2f} s"}
         try:
-            color, depth = find_streams(bag, (None, None))
+            streams = find_streams(bag, (None, None))
         except InputError as error:
             says["topics"] = ", ".join(list(counts)[:8])
             return Facts(says, problem=str(error).removeprefix(f"{path}: "))
-        for name, stream in (("colour", color), ("depth", depth)):
-            says[name] = _stream(bag, stream, counts[stream.topic])
-        poses = bag.topics("TFMessage", "JointState")
-        says |= {"depth unit": f"{depth.units_per_m:g} per metre", "poses": ", ".join(poses) or "none"}
-        needed = "--base-frame or --joint-states" if poses else "--poses, unless the camera stands still"
-        return Facts(
-            says, [*dict.fromkeys(color.notes + depth.notes)], {"hicp record import": f"--bag; {needed}"}
-        )
-
-
-def _stream(bag: Bag, stream: Stream, n: int) -> str:
-    camera, lasts_s = stream.camera, bag.reader.duration / 1e9
-    rate = f"about {n / lasts_s:.3g} per second for {lasts_s:.2f} s" if lasts_s else "all at one time"
-    size = f"{camera.width_px} x {camera.height_px}, focal length {camera.fx_px:.1f} px"
-    return f"{n} on {stream.topic}, {rate} by recording's clock, times from headers; {size}"
+    for name, of in zip(("colour", "depth"), streams, strict=True):
+        n = counts[of.topic]
+        rate = f"{n} of about {n / lasts_s:.3g} per second" if lasts_s else str(n)
+        says[name] = f"{of.topic}: {rate}, times from headers; {_size(of.camera)}"
+    says |= {"depth unit": f"{streams[1].units_per_m:g} per metre", "poses": ", ".join(poses) or "none"}
+    needed = "--base-frame or --joint-states" if poses else "--poses, unless the camera stands still"
+    notes = dict.fromkeys(note for of in streams for note in of.notes)
+    return Facts(says, [*notes], {"hicp record import": f"--bag; {needed}"})
 
 
 def describe_recording(folder: Path) -> Facts:
@@ -57,12 +52,12 @@ def describe_recording(folder: Path) -> Facts:
     if fatal:
         return Facts(notes=fatal[1:] + notes, problem=fatal[0])
     recording = open_recording(folder)
-    camera, mocap = recording.intrinsics, recording.mocap_path
+    mocap = recording.mocap_path
     says = {
-        "frames": f"{len(recording)} of {camera.width_px} x {camera.height_px} pixels",
+        "frames": f"{len(recording)} of {_size(recording.intrinsics)}",
         "depth": f"{recording.depth_units_per_m:g} units per metre",
         "times": about_times(recording.times_s, "seconds, when images were taken"),
-        "poses": f"camera to base, metres; {_moved(recording.T_base_cam)}",
+        "poses": f"camera to base, {_moved(recording.T_base_cam)}",
         "motion capture": mocap.name if mocap else "none",
     }
     needed = "" if mocap else "mocap.tsv or mocap.c3d in it"
@@ -71,18 +66,20 @@ def describe_recording(folder: Path) -> Facts:
 
 def describe_open3d(folder: Path) -> Facts:
     """Say what a folder with `color/` and `depth/` holds."""
-    counts = {name: len(list((folder / name).iterdir())) for name in ("color", "depth")}
-    says = {"images": ", ".join(f"{name} {n}" for name, n in counts.items())}
+    n_color, n_depth = (len(list((folder / name).iterdir())) for name in ("color", "depth"))
     path = next((folder / name for name in _CAMERA_FILES if (folder / name).is_file()), None)
-    if path is None:
-        return Facts(says, needs={"hicp record import": f"--open3d; {' or '.join(_CAMERA_FILES)} in it"})
-    facts, content = describe_camera(path), read_json(path)
-    said = f"{content['fps']} per second" if "fps" in content else "not known"
-    says |= {"times": f"{said}, as {path.name} says; none of each image"} | facts.says
+    if path is None or n_color != n_depth:
+        expected = f"one depth image per colour, and {' or '.join(_CAMERA_FILES)}"
+        return Facts({"images": f"color {n_color}, depth {n_depth}"}, problem=f"expected {expected}")
+    content, facts = read_json(path), describe_camera(path)
+    rate = f"{content['fps']} per second" if "fps" in content else "no rate"
+    says = {
+        "images": f"color {n_color}, depth {n_depth}",
+        "times": f"{rate} in {path.name}, none of each image",
+    }
     missing = [option for key, option in _OPTIONS.items() if key not in content]
-    needs = {"hicp record import": " ".join(["--open3d", *missing, "--poses, unless it stands still"])}
-    problem = "" if counts["color"] == counts["depth"] else "expected one depth image per colour"
-    return Facts(says, facts.notes, needs, problem)
+    needs = " ".join(["--open3d", *missing, "--poses, unless the camera stands still"])
+    return Facts(says | facts.says, facts.notes, {"hicp record import": needs})
 
 
 def describe_camera(path: Path) -> Facts:
@@ -90,9 +87,8 @@ def describe_camera(path: Path) -> Facts:
     scale = read_json(path).get("depth_scale")
     camera, _, distorted_px = read_distorted_camera(path, 1.0 if scale is None else None)
     says = {
-        "image": f"{camera.width_px} x {camera.height_px} pixels, {ORIGIN}",
-        "focal lengths": f"{camera.fx_px:.2f}, {camera.fy_px:.2f} pixels",
-        "principal point": f"{camera.cx_px:.2f}, {camera.cy_px:.2f} pixels",
+        "image": _size(camera),
+        "principal point": f"{camera.cx_px:.2f}, {camera.cy_px:.2f}; {ORIGIN}",
         "depth": f"{scale:g} units per metre" if scale else "its unit is not in the file",
         "distortion": "none" if distorted_px is None else "some; undone on import",
     }
@@ -101,21 +97,22 @@ def describe_camera(path: Path) -> Facts:
 
 def describe_registration(path: Path) -> Facts:
     """Say what the registration of motion capture says."""
-    place_m = read_registration(path).T_base_mocap[:3, 3]
-    return Facts(
-        {"units": "metres, motion capture to the robot's base; at {:.3f}, {:.3f}, {:.3f}".format(*place_m)}
-    )
+    place = ", ".join(f"{along:.3f}" for along in read_registration(path).T_base_mocap[:3, 3])
+    return Facts({"units": f"metres, motion capture to the robot's base; at {place}"})
 
 
 def describe_mocap(path: Path) -> Facts:
     """Say what a file of motion capture holds."""
     mocap = read_mocap(path)
     seen = np.isfinite(mocap.points_m).all(axis=-1)
-    extent_m = np.ptp(mocap.points_m[seen], axis=0) if seen.any() else np.zeros(3)
+    extent = (
+        " x ".join(f"{along:.2f}" for along in np.ptp(mocap.points_m[seen], axis=0)) if seen.any() else "none"
+    )
+    more = ", ..." if len(mocap.names) > 12 else ""
     says = {
-        "markers": f"{len(mocap.names)}: {', '.join(mocap.names[:12])}{' ...' * (len(mocap.names) > 12)}",
+        "markers": f"{len(mocap.names)}: {', '.join(mocap.names[:12])}{more}",
         "frames": f"{len(mocap.times_s)}; markers seen in {100 * seen.sum() / max(seen.size, 1):.1f} %",
-        "units": "metres once read; extent {:.2f} x {:.2f} x {:.2f}".format(*extent_m),
+        "units": f"metres once read; extent {extent}",
         "times": about_times(mocap.times_s, f"the system's own clock, {mocap.rate_hz:g} Hz stated"),
     }
     return Facts(says)
@@ -124,33 +121,22 @@ def describe_mocap(path: Path) -> Facts:
 def describe_list(path: Path) -> Facts:
     """Say what a list of images holds."""
     times_s, names = read_file_list(path)
-    missing = sum(not (path.parent / name).is_file() for name in names)
-    says = {"images": f"{len(names)}" + f"; {missing} of them are not there" * bool(missing)}
-    says["times"] = about_times(times_s, "seconds, when each image was taken")
-    return Facts(says, _doubts(path, times_s))
-
-
-def describe_trajectory(path: Path) -> Facts:
-    """Say what a file of a camera's poses holds."""
-    times_s, T_base_cam = read_trajectory(path)
-    says = {
-        "poses": f"{len(T_base_cam)}, camera to the file's own world",
-        "units": f"metres; {_moved(T_base_cam)}",
-    }
-    says["times"] = about_times(times_s, "seconds once read")
-    furthest_m = np.linalg.norm(T_base_cam[:, :3, 3], axis=1).max()
-    far = f"up to {furthest_m:.4g} m from its origin, more than a robot reaches; are these millimetres?"
-    notes = _doubts(path, times_s) + [far] * bool(furthest_m > FURTHEST_POSE_M)
-    as_joints = path.suffix.lower() == ".csv" and not names_poses(path)
+    n_missing = sum(not (path.parent / name).is_file() for name in names)
+    times = about_times(times_s, "seconds, when each image was taken")
     return Facts(
-        says, notes + ["as --poses, .csv is taken for joint angles: end its name in .txt"] * as_joints
+        {"images": f"{len(names)}, of which {n_missing} are not there", "times": times},
+        _doubts(path, times_s),
     )
 
 
-def describe_joints(path: Path) -> Facts:
-    """Say what a table of the robot's joint angles holds."""
-    times_s, _ = read_pose_source(path)
-    return Facts({"rows": str(len(times_s)), "units": "degrees", "times": about_times(times_s, "seconds")})
+def describe_poses(path: Path, by: str = "") -> Facts:
+    """Say what a file of a camera's poses holds, or of joint angles by which it moves."""
+    times_s, T_base_cam = read_pose_source(path) if by else read_trajectory(path)
+    says = {"poses": f"{len(T_base_cam)}, camera to {by or 'the file'}'s world, {_moved(T_base_cam)}"}
+    says["times"] = about_times(times_s, "seconds once read")
+    furthest_m = np.linalg.norm(T_base_cam[:, :3, 3], axis=1).max()
+    far = f"up to {furthest_m:.4g} m from its origin, more than a robot reaches; are these millimetres?"
+    return Facts(says, _doubts(path, times_s) + [far] * int(furthest_m > FURTHEST_POSE_M))
 
 
 def describe_clicks(path: Path) -> Facts:
@@ -159,14 +145,16 @@ def describe_clicks(path: Path) -> Facts:
         table = pd.read_csv(path, skipinitialspace=True).astype({"frame": int, "u_px": float, "v_px": float})
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: is no table of clicks ({one_line(error)})") from None
-    markers, frames = table["marker"].nunique(), table["frame"].nunique()
-    return Facts(
-        {"clicks": f"{len(table)} on {markers} markers in {frames} frames", "units": f"pixels, {ORIGIN}"}
-    )
+    counts = f"{len(table)} on {table['marker'].nunique()} markers in {table['frame'].nunique()} frames"
+    return Facts({"clicks": counts, "units": f"pixels, {ORIGIN}"})
+
+
+def _size(of: Camera) -> str:
+    return f"{of.width_px} x {of.height_px} pixels, focal lengths {of.fx_px:.2f}, {of.fy_px:.2f}"
 
 
 def _moved(T_base_cam: np.ndarray) -> str:
-    return "moved {:.3f} x {:.3f} x {:.3f}".format(*np.ptp(T_base_cam[:, :3, 3], axis=0))
+    return "metres; moved " + " x ".join(f"{along:.3f}" for along in np.ptp(T_base_cam[:, :3, 3], axis=0))
 
 
 def _doubts(path: Path, times_s: np.ndarray) -> list[str]:
