@@ -1,19 +1,23 @@
 """What is known of a file before it is used, in lines for people or as JSON."""
 
+import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import BODY, FACE, HANDS, INDEX
 
 ORIGIN = "origin top left, pixel centres at integers"
 _FROM_ONE_SIDE = 0.7  # share of people whose left is on one side of the picture, from which on it is said
+_SIDES = ("mixed", "as of people facing the camera", "as of backs, or sides that are the picture's")
 _MOST_LINES = 10
 _EPOCH_S = (1e9, 4e9)  # times between these are seconds since 1970: 2001 to 2096
 
@@ -61,6 +65,12 @@ class Facts:
         if len(notes) > room:
             notes[room - 1 :] = [f"note: {len(notes) - room + 1} more notes, which --json shows"]
         return [*first, *notes, *last]
+
+
+@cache
+def tables() -> dict:
+    """Kinds of files, and layouts of keypoints by their order, as `data/kinds.toml` lists them."""
+    return tomllib.loads((DATA_DIR / "kinds.toml").read_text(encoding="utf-8"))
 
 
 @contextmanager
@@ -113,11 +123,7 @@ def about_people(keypoints_px: np.ndarray, of_person: str, origin: str = "") -> 
     across_px = keypoints_px[:, INDEX["left_shoulder"], 0] - keypoints_px[:, INDEX["right_shoulder"], 0]
     if np.isfinite(across_px).any():
         share = float((across_px > 0).sum() / np.isfinite(across_px).sum())
-        meaning = "as of people who face the camera, if left is the person's"
-        if share < _FROM_ONE_SIDE:
-            meaning = (
-                "as of backs, or sides that are the picture's" if share < 1 - _FROM_ONE_SIDE else "mixed"
-            )
+        meaning = _SIDES[int(share > _FROM_ONE_SIDE) - int(share < 1 - _FROM_ONE_SIDE)]
         says["handedness"] = f"left shoulders are right of right ones in {100 * share:.0f} %: {meaning}"
     return says
 

@@ -24,9 +24,7 @@ from hicp_lib.formats.annotations import Annotations
 from hicp_lib.formats.detection_files import read_rows
 from hicp_lib.inspection.skeletons import draw_people
 
-MAX_SIDE_PX = 960
-"""Pictures of a page are not larger than this."""
-
+MAX_SIDE_PX = 960  # pictures of a page are not larger than this
 _TRUTH_COLOUR, _FOUND_COLOUR = "#E69F00", "#56B4E9"  # of Okabe and Ito: told apart by everybody
 _JPEG_QUALITY = 85
 Note = Callable[[str], object]
@@ -42,7 +40,7 @@ class Picture:
     found : Detections
         What the detector gives.
     truth : Detections or None
-        The people known to be in it, labelled keypoints with a score of 1; None where there are no annotations.
+        The people known to be in it, labelled keypoints with score 1; None without annotations.
     oks : dict of str to list of float
         By group, of every person who counts.
     """
@@ -60,11 +58,9 @@ class Picture:
 
     def line(self) -> str:
         """What there is to say of it."""
-        if self.truth is None:
-            return f"{len(self.found)} found"
-        parts = [f"{len(self.truth)} annotated, {len(self.found)} found"]
-        parts += [f"OKS {group} {min(values):.2f}" for group, values in self.oks.items() if values]
-        return "; ".join(parts)
+        known = "" if self.truth is None else f"{len(self.truth)} annotated, "
+        oks = [f"; OKS {group} {min(values):.2f}" for group, values in self.oks.items() if values]
+        return f"{known}{len(self.found)} found{''.join(oks)}"
 
 
 def pictures(

@@ -14,18 +14,7 @@ from hicp_lib.formats.importers.scores import score_scale
 from hicp_lib.formats.json_validation import PART_KEYS
 from hicp_lib.formats.layouts import layouts_of
 from hicp_lib.formats.units import refuse_fractions
-from hicp_lib.inspection.facts import Facts, about_people, about_times, under_name
-
-# Layouts whose keypoints come in this order, as indices in Halpe's; -1 has no counterpart.
-_LAYOUTS = {
-    of: TO_HALPE[of].tolist() for of in ("halpe136", "halpe26", "coco17", "crowdpose14", "wholebody133")
-}
-_LAYOUTS |= {
-    "aic14": [6, 8, 10, 5, 7, 9, 12, 14, 16, 11, 13, 15, 17, 18],
-    "mpii16": [16, 14, 12, 11, 13, 15, 19, -1, 18, 17, 10, 8, 6, 5, 7, 9],
-    "posetrack17": [0, 18, 17, *range(3, 17)],
-    "h36m17": [19, 12, 14, 16, 11, 13, 15, -1, -1, -1, -1, 5, 7, 9, 6, 8, 10],
-}
+from hicp_lib.inspection.facts import Facts, about_people, about_times, tables
 
 
 def describe_predictions(path: Path, tool: str, origin: str = "") -> Facts:
@@ -44,7 +33,7 @@ def describe_predictions(path: Path, tool: str, origin: str = "") -> Facts:
     -------
     Facts
     """
-    people = _read(path, tool)
+    people = READERS[tool](path)
     refuse_fractions(path, people.keypoints_px)
     layouts = ", ".join(f"{name} {n}" for name, n in people.conventions.items())
     scores, needs = _scores(tool, people)
@@ -58,14 +47,6 @@ def describe_predictions(path: Path, tool: str, origin: str = "") -> Facts:
     if times_s:
         says["times"] = about_times(np.array(times_s), "of the video; frames with people")
     return Facts(says, needs=needs)
-
-
-def _read(path: Path, tool: str) -> People:
-    """A single file of a tool that writes one for each image is read as the folder it is alone in."""
-    if path.is_dir() or tool == "coco" or not (tool == "mmpose" or isinstance(read_json(path), dict)):
-        return READERS[tool](path)
-    with under_name(path, "file.json") as alone:
-        return READERS[tool](alone.parent)
 
 
 def _scores(tool: str, people: People) -> tuple[str, dict[str, str]]:
@@ -95,20 +76,20 @@ def describe_annotations(path: Path) -> Facts:
     flags = sorted({round(flag, 2) for flag in people.visibility[people.visibility != 0].tolist()})
     boxes_px2 = np.maximum(people.boxes_px[:, 2] * people.boxes_px[:, 3], 1)
     labelled_px = np.where((people.visibility > 0)[..., None], people.keypoints_px, np.nan)
-    n_crowds, names = int(people.is_crowd.sum()), people.category.keypoints
+    n_crowds, category = int(people.is_crowd.sum()), people.category
     says = {
-        "people": f"{len(people)} in {len(people.images)} images; crowds {n_crowds}; category {people.category.id}",
-        "layout": f"{_layout(rows, names)}; left is the person's",
+        "people": f"{len(people)} in {len(people.images)} images; crowds {n_crowds}; category {category.id}",
+        "layout": f"{_layout(rows, category.keypoints)}; left is the person's",
         "flags": f"{str(flags[:6])[1:-1]}; above 0 is labelled" if flags else "nothing is labelled",
         **about_people(labelled_px, "labelled"),
     }
     if len(people):
         says["area"] = f"{np.median(people.areas_px2 / boxes_px2):.2f} of the box in the median"
     written = ["hicp export wrote these detections; hicp import --format coco reads them"]
-    notes = written * any("confidence" in row for row in rows)
+    written *= any("confidence" in row for row in rows)
     hands = (people.visibility[:, HANDS] > 0).any()
     needs = {} if hands else {"hicp evaluate": "(the body only: no hand is labelled)"}
-    return Facts(says, [*notes, *people.notes.values()], needs)
+    return Facts(says, [*written, *people.notes.values()], needs)
 
 
 def _layout(rows: list[dict], names: tuple[str, ...]) -> str:
@@ -116,6 +97,7 @@ def _layout(rows: list[dict], names: tuple[str, ...]) -> str:
     if not names:
         return f"{', '.join(map(str, sorted(n)))} keypoints by their number: the file has no names"
     order = layouts_of("", names)[0][len(names)].tolist()
-    known = next((name for name, indices in _LAYOUTS.items() if indices == order), "its own")
+    orders = {name: indices.tolist() for name, indices in TO_HALPE.items()} | tables()["layouts"]
+    known = next((name for name, indices in orders.items() if indices == order), "its own")
     known = "wholebody133" if n == {133} and known == "coco17" else known
     return f"{known}, by the {len(names)} names in its category"

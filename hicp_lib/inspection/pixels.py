@@ -5,18 +5,17 @@ from collections import Counter
 from itertools import islice
 from pathlib import Path
 
-import cv2
 import numpy as np
 from PIL import Image
 
-from hicp_lib.core.errors import InputError, one_line
+from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, read_json
 from hicp_lib.core.images import image_header
 from hicp_lib.core.video import open_video
 from hicp_lib.detectors.mediapipe.bundles import BUNDLES
 from hicp_lib.detectors.onnx.model_file import read_model
-from hicp_lib.inspection.facts import Facts
-from hicp_lib.inspection.kinds import IMAGE_SUFFIXES
+from hicp_lib.detectors.runtime.to_file import IMAGE_SUFFIXES
+from hicp_lib.inspection.facts import Facts, about_times
 from hicp_lib.inspection.people import describe_annotations
 
 _MOST_HEADERS = 2000  # of images of a folder that are looked into
@@ -24,18 +23,12 @@ _MOST_HEADERS = 2000  # of images of a folder that are looked into
 
 def describe_image(path: Path) -> Facts:
     """Say what a picture is; its pixels are read to the end."""
-    content = np.frombuffer(read_bytes(path, "expected an image"), np.uint8)
-    pixels = cv2.imdecode(content, cv2.IMREAD_UNCHANGED | cv2.IMREAD_IGNORE_ORIENTATION)
-    try:
-        with Image.open(path) as image:
-            image.load()  # OpenCV fills up what is cut off
-        height_px, width_px, n_channels = (*pixels.shape, 1)[:3]
-    except (AttributeError, OSError, ValueError, SyntaxError) as error:
-        raise InputError(f"{path}: is cut off or damaged ({one_line(error)}); write it again") from None
-    says = {"size": f"{width_px} x {height_px} pixels, {n_channels} channels of {8 * pixels.itemsize} bits"}
-    if pixels.dtype == np.uint16 and n_channels == 1:
-        middle = np.median(pixels[pixels > 0]) if pixels.any() else 0
-        says["depth"] = f"raw units, {100 * np.mean(pixels > 0):.0f} % measured, median {middle:.0f}"
+    with Image.open(path) as image:
+        values = np.asarray(image)  # to the end: what is cut off is told
+    says = {"size": f"{image.width} x {image.height} pixels, {image.mode}"}
+    if image.mode.startswith("I"):
+        middle = np.median(values[values > 0]) if values.any() else 0
+        says["depth"] = f"16 bits, raw units; {100 * np.mean(values > 0):.0f} % measured, median {middle:.0f}"
         return Facts(says, needs={"hicp record import": "--depth-scale"}, kind="depth image")
     flag = image_header(path)[2]
     turned = f"rotation flag {flag} (EXIF): viewers turn it, here it is taken as stored"
@@ -51,8 +44,7 @@ def describe_video(path: Path) -> Facts:
     height_px, width_px = seen[0][1].shape[:2]
     says = {"size": f"{width_px} x {height_px} pixels, turned as players show it"}
     says["frames"] = f"{n_frames or 'not known'}, as the file says"
-    if seen[-1][0] > seen[0][0]:
-        says["times"] = f"of the file; {1 / (seen[1][0] - seen[0][0]):.4g} per second at the start"
+    says["times"] = about_times(np.array([time_s for time_s, _ in seen]), "of the file; of its first frames")
     return Facts(says)
 
 
@@ -62,8 +54,9 @@ def describe_images(folder: Path) -> Facts:
     headers = [image_header(path) for path in paths[:_MOST_HEADERS]]
     sizes = Counter(f"{width} x {height}" for width, height, _ in headers if width)
     shown = ", ".join(f"{size} ({n})" for size, n in sizes.most_common(3)) + ", ..." * (len(sizes) > 3)
+    turned = "have a rotation flag (EXIF): viewers turn them, here they are as stored"
     counts = {
-        "have a rotation flag (EXIF): viewers turn them, here they are as stored": sum(f > 1 for *_, f in headers),
+        turned: sum(flag > 1 for *_, flag in headers),
         "cannot be read": sum(not width for width, *_ in headers),
         "were not looked into": len(paths) - len(headers),
     }  # fmt: skip
@@ -96,15 +89,13 @@ def describe_network(path: Path) -> Facts:
 
 def describe_task(path: Path) -> Facts:
     """Say which task a bundle of MediaPipe's is for."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            members = archive.namelist()
-        task = next(task for task, needed in BUNDLES.items() if set(needed) <= set(members))
-    except (OSError, StopIteration, zipfile.BadZipFile) as error:
-        raise InputError(
-            f"{path}: is cut off, or no task bundle of MediaPipe's ({one_line(error)})"
-        ) from None
-    return Facts({"task": task, "networks": ", ".join(members)}, kind="MediaPipe task bundle")
+    with zipfile.ZipFile(path) as archive:
+        members = archive.namelist()
+    tasks = [task for task, needed in BUNDLES.items() if set(needed) <= set(members)]
+    if not tasks:
+        raise InputError(f"of no kind that is known; it holds {', '.join(members[:4]) or 'nothing'}")
+    needs = {"hicp detect": f"--detector mediapipe-{tasks[0].replace('hand', 'hands')}, this file as --model"}
+    return Facts({"task": tasks[0], "networks": ", ".join(members)}, (), needs, kind="MediaPipe task bundle")
 
 
 def describe_count(path: Path) -> Facts:

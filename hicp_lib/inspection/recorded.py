@@ -1,12 +1,13 @@
 """What recordings hold, and files of them: bags, cameras, trajectories, motion capture."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from hicp_lib.core.camera import Camera
-from hicp_lib.core.errors import InputError, one_line
+from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
 from hicp_lib.inspection.facts import ORIGIN, Facts, about_times
 from hicp_lib.mocap.registration import read_registration
@@ -30,19 +31,14 @@ def describe_bag(path: Path) -> Facts:
         counts = {connection.topic: connection.msgcount for connection in bag.reader.connections}
         lasts_s, poses = bag.reader.duration / 1e9, bag.topics("TFMessage", "JointState")
         says = {"messages": f"{bag.reader.message_count} on {len(counts)} topics in {lasts_s:.2f} s"}
-        try:
-            streams = find_streams(bag, (None, None))
-        except InputError as error:
-            says["topics"] = ", ".join(list(counts)[:8])
-            return Facts(says, problem=str(error).removeprefix(f"{path}: "))
+        streams = find_streams(bag, (None, None))
     for name, of in zip(("colour", "depth"), streams, strict=True):
-        n = counts[of.topic]
-        rate = f"{n} of about {n / lasts_s:.3g} per second" if lasts_s else str(n)
-        says[name] = f"{of.topic}: {rate}, times from headers; {_size(of.camera)}"
+        rate = f", about {counts[of.topic] / lasts_s:.3g} per second" if lasts_s else ""
+        says[name] = f"{counts[of.topic]} on {of.topic}{rate}, times from headers; {_size(of.camera)}"
     says |= {"depth unit": f"{streams[1].units_per_m:g} per metre", "poses": ", ".join(poses) or "none"}
     needed = "--base-frame or --joint-states" if poses else "--poses, unless the camera stands still"
-    notes = dict.fromkeys(note for of in streams for note in of.notes)
-    return Facts(says, [*notes], {"hicp record import": f"--bag; {needed}"})
+    notes = [*dict.fromkeys(streams[0].notes + streams[1].notes)]
+    return Facts(says, notes, {"hicp record import": f"--bag; {needed}"})
 
 
 def describe_recording(folder: Path) -> Facts:
@@ -57,29 +53,24 @@ def describe_recording(folder: Path) -> Facts:
         "frames": f"{len(recording)} of {_size(recording.intrinsics)}",
         "depth": f"{recording.depth_units_per_m:g} units per metre",
         "times": about_times(recording.times_s, "seconds, when images were taken"),
-        "poses": f"camera to base, {_moved(recording.T_base_cam)}",
+        "poses": f"camera to base, moved by {_metres(np.ptp(recording.T_base_cam[:, :3, 3], axis=0))} m",
         "motion capture": mocap.name if mocap else "none",
     }
-    needed = "" if mocap else "mocap.tsv or mocap.c3d in it"
-    return Facts(says, notes, {"errors against motion capture": needed})
+    needs = {"errors against motion capture": "" if mocap else "mocap.tsv or mocap.c3d in it"}
+    return Facts(says, notes, needs)
 
 
 def describe_open3d(folder: Path) -> Facts:
     """Say what a folder with `color/` and `depth/` holds."""
     n_color, n_depth = (len(list((folder / name).iterdir())) for name in ("color", "depth"))
-    path = next((folder / name for name in _CAMERA_FILES if (folder / name).is_file()), None)
+    path = next((path for path in map(folder.joinpath, _CAMERA_FILES) if path.is_file()), None)
     if path is None or n_color != n_depth:
-        expected = f"one depth image per colour, and {' or '.join(_CAMERA_FILES)}"
-        return Facts({"images": f"color {n_color}, depth {n_depth}"}, problem=f"expected {expected}")
+        raise InputError(f"{n_color} and {n_depth} images; expected as many, and one of {_CAMERA_FILES}")
     content, facts = read_json(path), describe_camera(path)
-    rate = f"{content['fps']} per second" if "fps" in content else "no rate"
-    says = {
-        "images": f"color {n_color}, depth {n_depth}",
-        "times": f"{rate} in {path.name}, none of each image",
-    }
-    missing = [option for key, option in _OPTIONS.items() if key not in content]
-    needs = " ".join(["--open3d", *missing, "--poses, unless the camera stands still"])
-    return Facts(says | facts.says, facts.notes, {"hicp record import": needs})
+    times = f"{content.get('fps', 'not known how many')} per second, as {path.name} says"
+    missing = "".join(f" {option}" for key, option in _OPTIONS.items() if key not in content)
+    needs = {"hicp record import": f"--open3d{missing} --poses, unless the camera stands still"}
+    return Facts({"images": f"{n_color} in each", "times": times} | facts.says, facts.notes, needs)
 
 
 def describe_camera(path: Path) -> Facts:
@@ -97,22 +88,19 @@ def describe_camera(path: Path) -> Facts:
 
 def describe_registration(path: Path) -> Facts:
     """Say what the registration of motion capture says."""
-    place = ", ".join(f"{along:.3f}" for along in read_registration(path).T_base_mocap[:3, 3])
-    return Facts({"units": f"metres, motion capture to the robot's base; at {place}"})
+    place_m = read_registration(path).T_base_mocap[:3, 3]
+    return Facts({"units": f"metres, motion capture to the robot's base; at {_metres(place_m)}"})
 
 
 def describe_mocap(path: Path) -> Facts:
     """Say what a file of motion capture holds."""
     mocap = read_mocap(path)
     seen = np.isfinite(mocap.points_m).all(axis=-1)
-    extent = (
-        " x ".join(f"{along:.2f}" for along in np.ptp(mocap.points_m[seen], axis=0)) if seen.any() else "none"
-    )
-    more = ", ..." if len(mocap.names) > 12 else ""
+    extent_m = np.ptp(mocap.points_m[seen], axis=0) if seen.any() else []
     says = {
-        "markers": f"{len(mocap.names)}: {', '.join(mocap.names[:12])}{more}",
+        "markers": f"{len(mocap.names)}: {', '.join(mocap.names[:12])}",
         "frames": f"{len(mocap.times_s)}; markers seen in {100 * seen.sum() / max(seen.size, 1):.1f} %",
-        "units": f"metres once read; extent {extent}",
+        "units": f"metres once read; extent {_metres(extent_m)}",
         "times": about_times(mocap.times_s, f"the system's own clock, {mocap.rate_hz:g} Hz stated"),
     }
     return Facts(says)
@@ -122,29 +110,28 @@ def describe_list(path: Path) -> Facts:
     """Say what a list of images holds."""
     times_s, names = read_file_list(path)
     n_missing = sum(not (path.parent / name).is_file() for name in names)
-    times = about_times(times_s, "seconds, when each image was taken")
-    return Facts(
-        {"images": f"{len(names)}, of which {n_missing} are not there", "times": times},
-        _doubts(path, times_s),
-    )
+    says = {"images": f"{len(names)}, of which {n_missing} are not there"}
+    says["times"] = about_times(times_s, "seconds, when each image was taken")
+    return Facts(says, _doubts(path, times_s))
 
 
 def describe_poses(path: Path, by: str = "") -> Facts:
     """Say what a file of a camera's poses holds, or of joint angles by which it moves."""
     times_s, T_base_cam = read_pose_source(path) if by else read_trajectory(path)
-    says = {"poses": f"{len(T_base_cam)}, camera to {by or 'the file'}'s world, {_moved(T_base_cam)}"}
-    says["times"] = about_times(times_s, "seconds once read")
-    furthest_m = np.linalg.norm(T_base_cam[:, :3, 3], axis=1).max()
+    place_m = T_base_cam[:, :3, 3]
+    says = {
+        "poses": f"{len(place_m)}, camera to {by or 'the file'}'s world",
+        "times": about_times(times_s, "seconds"),
+    }
+    says["units"] = f"metres; moved by {_metres(np.ptp(place_m, axis=0))}"
+    furthest_m = np.linalg.norm(place_m, axis=1).max()
     far = f"up to {furthest_m:.4g} m from its origin, more than a robot reaches; are these millimetres?"
     return Facts(says, _doubts(path, times_s) + [far] * int(furthest_m > FURTHEST_POSE_M))
 
 
 def describe_clicks(path: Path) -> Facts:
     """Say what a table of clicked markers holds."""
-    try:
-        table = pd.read_csv(path, skipinitialspace=True).astype({"frame": int, "u_px": float, "v_px": float})
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: is no table of clicks ({one_line(error)})") from None
+    table = pd.read_csv(path, skipinitialspace=True).astype({"frame": int, "u_px": float, "v_px": float})
     counts = f"{len(table)} on {table['marker'].nunique()} markers in {table['frame'].nunique()} frames"
     return Facts({"clicks": counts, "units": f"pixels, {ORIGIN}"})
 
@@ -153,8 +140,8 @@ def _size(of: Camera) -> str:
     return f"{of.width_px} x {of.height_px} pixels, focal lengths {of.fx_px:.2f}, {of.fy_px:.2f}"
 
 
-def _moved(T_base_cam: np.ndarray) -> str:
-    return "metres; moved " + " x ".join(f"{along:.3f}" for along in np.ptp(T_base_cam[:, :3, 3], axis=0))
+def _metres(xyz_m: Iterable[float]) -> str:
+    return ", ".join(f"{along:.3f}" for along in xyz_m)
 
 
 def _doubts(path: Path, times_s: np.ndarray) -> list[str]:

@@ -115,7 +115,7 @@ def set_case(layout: str, says: dict[str, str], notes: tuple = (), body_only: bo
 
     make.__name__ = f"annotations_{layout}"
     common = {"people": "2 in 2 images; crowds 0; category 1", "units": "pixels, origin top left", "flags": "2.0;",
-              "handedness": "in 100 %: as of people who face", "area": "0.49 of the box"}  # fmt: skip
+              "handedness": "in 100 %: as of people facing", "area": "0.49 of the box"}  # fmt: skip
     needs = BODY_ONLY if body_only else NEEDS_OF_SET
     case("COCO annotations of people", common | {"layout": layout} | says, notes=list(notes), needs=needs)(
         make
@@ -421,7 +421,7 @@ def hicp_csv(folder):
     return detected(folder / "d.csv").rename(folder / "trajectory.txt")
 
 
-@case("detections by hicp detect", PEOPLE | IN_01, needs=HICP, notes=["ends in .parquet"])
+@case("detections by hicp detect (Parquet)", PEOPLE | IN_01, needs=HICP, notes=["ends in .parquet"])
 def hicp_parquet(folder):
     return detected(folder / "d.parquet").rename(folder / "d.bin")
 
@@ -446,7 +446,7 @@ def image_names(folder):
     return dump(folder / "x.images.json", [{"id": 1, "file_name": "a"}, {"id": 2, "file_name": "b"}])
 
 
-@case("Parquet table", {"rows": "2", "columns": "x_m"}, notes=["ends in .parquet"])
+@case("detections by hicp detect (Parquet)", problem="is no table that hicp detect wrote")
 def another_parquet(folder):
     pd.DataFrame({"x_m": [1.0, 2.0]}).to_parquet(folder / "results.json")
     return folder / "results.json"
@@ -456,7 +456,7 @@ def another_parquet(folder):
 
 CAMERA = Camera(640, 480, 600.0, 610.0, 319.5, 239.5)
 INTRINSIC = {"width": 640, "height": 480, "intrinsic_matrix": [600, 0, 0, 0, 610, 0, 320, 240, 1]}
-CAMERA_SAYS = {"image": "640 x 480", "focal lengths": "600.00, 610.00 pixels"}
+CAMERA_SAYS = {"image": "640 x 480 pixels, focal lengths 600.00, 610.00"}
 AS_POSES = {"hicp record import": "this file as --poses"}
 
 
@@ -507,7 +507,7 @@ POSES[:, 0, 3] = np.arange(4) / 10
 
 
 @case("list of images and their times (TUM)", needs={"hicp record check": "folder"}, says={
-      "images": "4; 4 of them are not there", "times": "30 per second (median), 0.1 s, from 1600000000.000 s (since 1970: 2020"})  # fmt: skip
+      "images": "4, of which 4 are not there", "times": "30 per second (median), 0.1 s, from 1600000000.000 s (since 1970: 2020"})  # fmt: skip
 def rgb_list(folder):
     write_file_list(folder / "groundtruth.txt", TIMES_S, [f"rgb/{k}.png" for k in range(4)])
     return folder / "groundtruth.txt"
@@ -521,7 +521,7 @@ def rgb_list_in_ms(folder):
     return folder / "rgb.txt"
 
 
-TRAJECTORY = {"poses": "4, camera to", "units": "metres; moved 0.300 x 0.000 x 0.000"}
+TRAJECTORY = {"poses": "4, camera to", "units": "metres; moved by 0.300, 0.000, 0.000"}
 
 
 @case("trajectory of a camera (TUM)", TRAJECTORY | {"times": "30 per second"}, needs=AS_POSES)
@@ -565,11 +565,10 @@ def open3d_log(folder):
     return folder / "rgb.txt"
 
 
-@case("trajectory of a camera (KITTI)", TRAJECTORY | {"times": "none"}, needs=AS_POSES,
-      notes=["end its name in .txt"])  # fmt: skip
+@case("trajectory of a camera (KITTI)", TRAJECTORY | {"times": "none"}, needs=AS_POSES)  # fmt: skip
 def kitti_poses(folder):
-    np.savetxt(folder / "poses.csv", POSES[:, :3].reshape(4, 12))
-    return folder / "poses.csv"
+    np.savetxt(folder / "rgb.txt", POSES[:, :3].reshape(4, 12))
+    return folder / "rgb.txt"
 
 
 @case("trajectory of a camera (EuRoC)", TRAJECTORY | {"times": "20 per second"}, needs=AS_POSES)
@@ -581,7 +580,9 @@ def euroc_poses(folder):
 
 
 @case(
-    "joint angles of the robot", {"rows": "4", "units": "degrees", "times": "10 per second"}, needs=AS_POSES
+    "joint angles of the robot",
+    {"poses": "4, camera to the robot's world", "times": "10 per second"},
+    needs=AS_POSES,
 )
 def joints(folder):
     table = pd.DataFrame(0.0, range(4), ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)])
@@ -598,7 +599,7 @@ def clicks(folder):
 
 POINTS_M = np.arange(30.0).reshape(5, 2, 3) / 10 + 0.1
 MOCAP = {"markers": "2: elbow, wrist", "frames": "5; markers seen in 100.0 %",
-         "units": "metres once read; extent 2.70 x 2.70 x 2.70", "times": "100 Hz stated; 100 per second"}  # fmt: skip
+         "units": "metres once read; extent 2.700, 2.700, 2.700", "times": "100 Hz stated; 100 per second"}  # fmt: skip
 
 
 def capture(names=("elbow", "wrist")) -> MotionCapture:
@@ -685,7 +686,7 @@ LIFT = {"hicp lift": "--detector", "errors against motion capture": "mocap.tsv o
 
 @case("recording of an RGB-D camera", needs=LIFT, says={
       "frames": "4 of 32 x 24 pixels", "depth": "1000 units per metre", "times": "10 per second",
-      "poses": "moved 0.030 x", "motion capture": "none"})  # fmt: skip
+      "poses": "moved by 0.030,", "motion capture": "none"})  # fmt: skip
 def recording(folder):
     return write_small(folder / "bag")
 
@@ -713,7 +714,7 @@ def open3d(folder: Path, name: str, content: dict) -> Path:
 
 
 @case("RGB-D folder of Open3D's tools", CAMERA_SAYS | {
-      "images": "color 3, depth 3", "times": "20.0 per second, as intrinsic.json says"},
+      "images": "3 in each", "times": "20.0 per second, as intrinsic.json says"},
       needs={"hicp record import": "--open3d --poses"})  # fmt: skip
 def open3d_folder(folder):
     return open3d(folder, "intrinsic.json", INTRINSIC | {"fps": 20.0, "depth_scale": 1000})
@@ -725,7 +726,7 @@ def open3d_python_folder(folder):
     return open3d(folder, "camera_intrinsic.json", INTRINSIC)
 
 
-@case("RGB-D folder of Open3D's tools", {"images": "color 3, depth 2"}, problem="one depth image per colour")
+@case("RGB-D folder of Open3D's tools", problem="3 and 2 images; expected as many")
 def open3d_folder_of_unequal_numbers(folder):
     open3d(folder, "intrinsic.json", INTRINSIC)
     (folder / "depth/00001.png").unlink()
@@ -738,7 +739,7 @@ DETECT = {"hicp detect": "--images"}
 NOISE = np.random.default_rng(0).integers(0, 255, (48, 64, 3), np.uint8)
 
 
-@case("image", {"size": "64 x 48 pixels, 3 channels of 8 bits"}, needs=DETECT)
+@case("image", {"size": "64 x 48 pixels, RGB"}, needs=DETECT)
 def png(folder):
     Image.fromarray(NOISE).save(folder / "mocap.tsv", format="PNG")
     return folder / "mocap.tsv"
@@ -764,22 +765,22 @@ for _flag in range(1, 9):
     flag_case(_flag)
 
 
-@case("image", problem="is cut off or damaged")
+@case("image", problem="truncated")
 def jpeg_cut_off(folder):
     content = flagged(folder / "x.jpg", 1).read_bytes()
     (folder / "x.jpg").write_bytes(content[: len(content) // 2])
     return folder / "x.jpg"
 
 
-@case("image", problem="is cut off or damaged")
+@case("image", problem="truncated")
 def png_cut_off(folder):
     path = png(folder)
     path.write_bytes(path.read_bytes()[:2000])
     return path
 
 
-@case("depth image", {"size": "64 x 48 pixels, 1 channels of 16 bits", "depth": "50 % measured, median 900"},
-      needs={"hicp record import": "--depth-scale", "hicp detect": "colour"})  # fmt: skip
+@case("depth image", {"size": "64 x 48 pixels", "depth": "16 bits, raw units; 50 % measured, median 900"},
+      needs={"hicp record import": "--depth-scale"})  # fmt: skip
 def depth_png(folder):
     depth = np.full((48, 64), 900, np.uint16)
     depth[:24] = 0
@@ -824,7 +825,7 @@ def archive(path: Path, *members: str) -> Path:
 @case(
     "MediaPipe task bundle",
     {"task": "pose"},
-    needs={"hicp detect": "mediapipe-pose, --images; this file as --model"},
+    needs={"hicp detect": "mediapipe-pose, this file"},
 )
 def pose_task(folder):
     return archive(folder / "x.zip", "pose_detector.tflite", "pose_landmarks_detector.tflite")
@@ -833,7 +834,7 @@ def pose_task(folder):
 @case(
     "MediaPipe task bundle",
     {"task": "hand"},
-    needs={"hicp detect": "mediapipe-hands, --images; this file as --model"},
+    needs={"hicp detect": "mediapipe-hands, this file"},
 )
 def hand_task(folder):
     return archive(folder / "x.onnx", "hand_detector.tflite", "hand_landmarks_detector.tflite")
