@@ -82,18 +82,15 @@ def pictures(
     list of Picture
     """
     given = [np.isfinite(people.keypoints_px).all(axis=-1).any(axis=0) for people in found.values()]
-    groups = [name for name, keypoints in GROUPS.items() if any(of[keypoints].any() for of in given)]
-    oks = {}
-    for group in groups if annotations is not None else ():  # the detector's own
-        table = person_oks(annotations, found, group).query("n_labelled > 0")
-        oks[group] = table.groupby("image_id")["oks"].agg(list).to_dict()
+    groups = [name for name, points in GROUPS.items() if any(of[points].any() for of in given)]  # its own
+    tables = {} if annotations is None else {of: person_oks(annotations, found, of) for of in groups}
+    counted = {of: table[table["n_labelled"] > 0].groupby("image_id")["oks"] for of, table in tables.items()}
+    oks = {of: by_image.agg(list).to_dict() for of, by_image in counted.items()}
+    truth = {} if annotations is None else {i: _truth(annotations, i) for i in paths}
     known = [
-        Picture(
-            path, found.get(i, Detections.none()), None if annotations is None else _truth(annotations, i),
-            {group: of.get(i, []) for group, of in oks.items()},
-        )
+        Picture(path, found.get(i, Detections.none()), truth.get(i), {of: oks[of].get(i, []) for of in oks})
         for i, path in paths.items()
-    ]  # fmt: skip
+    ]
     return sorted(known, key=lambda picture: (picture.quality, picture.path.name))
 
 
@@ -128,9 +125,9 @@ def image_paths(
     """
     if not images.is_dir():
         raise InputError(f"{images}: is not a folder; give the folder that holds the pictures")
-    if annotations is not None:
-        names = {i: image.file_name for i, image in annotations.images.items()}
-    else:
+    known = {} if annotations is None else annotations.images
+    names: dict = {i: image.file_name for i, image in known.items()}
+    if annotations is None:
         beside = detections.with_suffix(".images.json")
         rows = read_json(beside) if beside.is_file() else read_rows(detections)
         named = [row for row in rows if isinstance(row, dict) and isinstance(row.get("file_name"), str)]

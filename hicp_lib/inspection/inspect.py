@@ -2,8 +2,8 @@
 
 import re
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 from hicp_lib.core.errors import InputError, one_line
@@ -134,8 +134,7 @@ def inspect(path: str | Path) -> Facts:
 
 
 def _describe(kind: Kind, path: Path) -> Facts:
-    module, _, name = kind["describe"].partition(".")
-    describe = getattr(import_module(f"hicp_lib.inspection.{module}"), name)
+    describe = resolve_name(f"hicp_lib.inspection.{kind['describe']}")
     suffix, each, given = kind.get("suffix", ""), kind.get("each"), kind.get("given", {})
     if path.is_dir() or not each and suffix in ("", path.suffix.lower()):
         return describe(path, **given)

@@ -48,15 +48,14 @@ def describe_recording(folder: Path) -> Facts:
     if fatal:
         return Facts(notes=fatal[1:] + notes, problem=fatal[0])
     recording = open_recording(folder)
-    mocap = recording.mocap_path
     says = {
         "frames": f"{len(recording)} of {_size(recording.intrinsics)}",
         "depth": f"{recording.depth_units_per_m:g} units per metre",
         "times": about_times(recording.times_s, "seconds, when images were taken"),
         "poses": f"camera to base, moved by {_metres(np.ptp(recording.T_base_cam[:, :3, 3], axis=0))} m",
-        "motion capture": mocap.name if mocap else "none",
+        "motion capture": recording.mocap_path.name if recording.mocap_path else "none",
     }
-    needs = {"errors against motion capture": "" if mocap else "mocap.tsv or mocap.c3d in it"}
+    needs = {"errors against motion capture": "" if recording.mocap_path else "mocap.tsv or mocap.c3d in it"}
     return Facts(says, notes, needs)
 
 

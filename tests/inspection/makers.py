@@ -386,7 +386,7 @@ def mmpose_saved_predictions(folder):
     )
 
 
-@case("empty list: nobody was found", {"objects": "0"}, needs={"hicp evaluate": "--annotations"})
+@case("empty list: nobody was found", {"people": "0 in 0 of 0 images", "scores": "none"}, needs={"hicp evaluate": "--annotations"})
 def empty_list(folder):
     return dump(folder / "results.json", [])
 
