@@ -5,7 +5,9 @@ import json
 import pytest
 
 from hicp_lib.cli.main import run
-from tests.inspection.makers import CASES, EXAMPLES, FOUND, png, write_coco
+from tests.inspection.cases import CASES, EXAMPLES
+from tests.inspection.made_detections import FOUND, write_coco
+from tests.inspection.made_pictures import png
 
 REFUSED = {
     "empty": (b"", "is empty"),
