@@ -32,7 +32,6 @@ from hicp_lib.core.images import Box, inside, read_image, write_png
 from hicp_lib.core.keypoints import HEAD
 from hicp_lib.datasets.crops import TRUNK, crop_people, headless_cut, image_name, n_pixels, whole_pixel_boxes
 from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
-from hicp_lib.formats.layouts import KeypointMap
 
 SUBSETS = ("basic", "headless")
 _Crop = tuple[Path, Box]  # the file to write, and what of the image goes into it
@@ -196,7 +195,7 @@ def create_hicp(
     min_pixels: int = 20_000,
     headless_min_pixels: int = 1,
     progress: bool = False,
-    keypoint_map: KeypointMap | None = None,
+    keypoint_map: str | Path | None = None,
 ) -> dict:
     """Write the dataset folders out/basic and out/headless, and out/summary.json.
 
@@ -215,7 +214,7 @@ def create_hicp(
         As of `plan`.
     progress : bool, optional
         Whether a bar is shown.
-    keypoint_map : mapping or sequence, optional
+    keypoint_map : str or Path, optional
         As of `read_annotations`.
 
     Returns
