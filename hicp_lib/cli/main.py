@@ -25,6 +25,11 @@ from hicp_lib.core.files import write_json
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff")
 
+_keypoint_map_option = click.option(
+    "--keypoint-map", type=PATH, metavar="FILE.json",
+    help="What keypoint names of the annotations mean: their names to ours, or null to leave one out.",
+)  # fmt: skip
+
 
 def main() -> NoReturn:
     """Run the command line and exit."""
@@ -70,6 +75,13 @@ def run(arguments: list[str]) -> int:
         return _fail(f"{name}: {error.strerror}; check the path, the rights and the disk space", 2)
 
 
+def _tell_notes(path: Path, notes: dict[str, str], area: str = "segment") -> None:
+    """Say what a reader of figures must know of a file; of areas, if they are used."""
+    for about, note in notes.items():
+        if about != "area" or area == "segment":
+            click.echo(f"{path}: {note}", err=True)
+
+
 def _fail(message: object, code: int) -> int:
     click.echo(f"hicp: {message}", err=True)
     return code
@@ -110,15 +122,19 @@ def dataset() -> None:
 
 
 @dataset.command("create")
-@click.option("--annotations", type=PATH, required=True, help="Annotations in Halpe's layout.")
+@click.option("--annotations", type=PATH, required=True, help="In COCO's layout.")
 @click.option("--images", type=PATH, required=True, help="Folder of the images.")
+@_keypoint_map_option
 @click.option("--out", type=PATH, required=True, help="Where basic/ and headless/ are written.")
 @click.option("--min-pixels", default=20_000, show_default=True, type=click.IntRange(min=1))
-def dataset_create(annotations: Path, images: Path, out: Path, min_pixels: int) -> None:
+def dataset_create(annotations: Path, images: Path, keypoint_map, out: Path, min_pixels: int) -> None:
     """Cut people out of annotated images: Basic, and Headless without their heads."""
     from hicp_lib.datasets.subsets import create_hicp
 
-    counts = create_hicp(annotations, images, out, min_pixels=min_pixels, progress=sys.stderr.isatty())
+    counts = create_hicp(
+        annotations, images, out, min_pixels, keypoint_map=keypoint_map, progress=sys.stderr.isatty()
+    )
+    _tell_notes(annotations, counts.get("notes", {}))
     click.echo(json.dumps(counts, indent=2))
 
 
@@ -175,15 +191,18 @@ def _numbered_images(folder: Path) -> dict[int, Path]:
 @click.option("--format", "kind", required=True, help="openpose, alphapose, mmpose, detectron2 or coco.")
 @click.option("--predictions", type=PATH, required=True, help="The folder or file the tool wrote.")
 @click.option("--annotations", type=PATH, required=True, help="Annotations of the images the tool saw.")
+@_keypoint_map_option
 @click.option("--out", type=PATH, required=True, help="COCO keypoint results to write.")
 @click.option("--score-scale", type=float, help="Divides keypoint scores; the format's own if not given.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
-def import_(kind: str, predictions: Path, annotations: Path, out: Path, score_scale, as_json: bool) -> None:
+def import_(
+    kind: str, predictions: Path, annotations: Path, keypoint_map, out: Path, score_scale, as_json: bool
+) -> None:
     """Read the predictions another tool wrote."""
     from hicp_lib.formats.annotations import read_annotations, write_detections
     from hicp_lib.formats.importers.importing import import_predictions
 
-    imported = import_predictions(kind, predictions, read_annotations(annotations), score_scale)
+    imported = import_predictions(kind, predictions, read_annotations(annotations, keypoint_map), score_scale)
     write_detections(out, imported.detections, imported.extras)
     summary = imported.summary
     click.echo(json.dumps(asdict(summary), indent=2) if as_json else "\n".join(summary.lines()))
@@ -205,20 +224,19 @@ def export(detections: Path, kind: str, layout: str, annotations: Path | None, o
     click.echo(f"{out}: {n} people")
 
 
-_LEAST_AREA = 0.01  # of a person, as a share of their box; a smaller one stands for none
-
-
 @hicp.command()
-@click.option("--annotations", type=PATH, required=True, help="Annotations in Halpe's layout.")
+@click.option("--annotations", type=PATH, required=True, help="In COCO's layout.")
 @click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
+@_keypoint_map_option
 @click.option("--group", default="body", show_default=True, help="body (17 points) or hand (42; and each).")
 @click.option("--sigmas", help="halpe or wholebody; else halpe, of each hand wholebody.")
-@click.option("--area", default="segment", show_default=True, help="segment, box, box53 or source.")
+@click.option("--area", default="segment", show_default=True, help="Or box, box53 (0.53 x box), source.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the bootstrap.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def evaluate(
-    annotations: Path, detections: Path, group: str, sigmas: str | None, area: str, seed: int, as_json
-) -> None:
+    annotations: Path, detections: Path, keypoint_map, group: str, sigmas: str | None, area: str, seed: int,
+    as_json: bool,
+) -> None:  # fmt: skip
     """Average precision and recall by OKS, with 95 % bootstrap intervals over images.
 
     Over all labelled keypoints, and over the visible ones only; with those outside the picture, by extended
@@ -230,13 +248,9 @@ def evaluate(
     from hicp_lib.evaluation.statistics.resampling import Draws
     from hicp_lib.formats.annotations import read_annotations, read_detections, source_images
 
-    people = read_annotations(annotations)
+    people = read_annotations(annotations, keypoint_map)
     found = read_detections(detections, people)
-    counted = people.take(~people.is_crowd)
-    n_tiny = int((counted.areas_px2 < _LEAST_AREA * counted.boxes_px[:, 2:].prod(axis=1)).sum())
-    if n_tiny and area == "segment":
-        said = f"the area of {n_tiny} of {len(counted)} people is below a hundredth of their box"
-        click.echo(f"{annotations}: {said}, so OKS forgives hardly an error; give --area box", err=True)
+    _tell_notes(annotations, people.notes, area)
     clusters = source_images(people)  # crops of one image are drawn together
     options = {"area": area} | ({"sigmas": sigmas} if sigmas else {})
     results = []
@@ -244,6 +258,8 @@ def evaluate(
         evaluation = evaluate_detections(people, found, of_group, **way, **options)
         metrics = bootstrap_intervals(evaluation, Draws(seed=seed), clusters).items()
         rows = {name: _finite(dict(zip(("value", "low", "high"), of, strict=True))) for name, of in metrics}
+        if any(map(len, found.values())) and not evaluation.n_detections:
+            rows = {name: dict.fromkeys(row) for name, row in rows.items()}
         results.append(_finite(evaluation.row()) | {"metrics": rows, "seed": seed})
     if as_json:
         click.echo(json.dumps(results[0] | {"other_definitions": results[1:]}, indent=2))
@@ -261,6 +277,10 @@ def _tell_evaluation(result: dict[str, Any]) -> None:
     of += " and outside" if result["outside"] == "count" else ""
     where = "{n_people} in {n_images} images; {sigmas} sigmas, {area} area".format(**result)
     click.echo(f"{result['group']}, {of} keypoints: {where}")
+    if all(row["value"] is None for row in result["metrics"].values()):
+        who = "the detections give" if result["n_people"] else "the annotations give"
+        click.echo(f"{who} no {'hands' if 'hand' in result['group'] else 'bodies'}")
+        return
     if all(row["low"] is None for row in result["metrics"].values()):
         click.echo(f"no intervals: they ask for {MIN_DRAWN} source images at least")
     for metric, row in result["metrics"].items():

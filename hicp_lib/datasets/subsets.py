@@ -195,6 +195,7 @@ def create_hicp(
     min_pixels: int = 20_000,
     headless_min_pixels: int = 1,
     progress: bool = False,
+    keypoint_map: str | Path | None = None,
 ) -> dict:
     """Write the dataset folders out/basic and out/headless, and out/summary.json.
 
@@ -204,7 +205,7 @@ def create_hicp(
     Parameters
     ----------
     annotations_path : str or Path
-        COCO, COCO-WholeBody or Halpe annotations.
+        Annotations in COCO's layout.
     images_dir : str or Path
         Folder of the annotated images.
     out : str or Path
@@ -213,11 +214,13 @@ def create_hicp(
         As of `plan`.
     progress : bool, optional
         Whether a bar is shown.
+    keypoint_map : str or Path, optional
+        As of `read_annotations`.
 
     Returns
     -------
     dict
-        As from `summary`.
+        As from `summary`; and `notes`, those of the annotations if any.
 
     Raises
     ------
@@ -225,7 +228,7 @@ def create_hicp(
         For malformed annotations, missing or wrongly sized images, or an `out` in use for something else.
     """
     out, images_dir = Path(out), Path(images_dir)
-    annotations = read_annotations(annotations_path)
+    annotations = read_annotations(annotations_path, keypoint_map)
     table = plan(annotations, min_pixels, headless_min_pixels)
     boxes = {subset: crop_boxes(table, subset) for subset in SUBSETS}
     _claim(out, _digest(table, boxes, images_dir))
@@ -237,7 +240,7 @@ def create_hicp(
     for subset in SUBSETS:
         path = out / subset / "annotations.json"
         write_annotations(path, crop_annotations(annotations, table, subset))
-    counts = summary(table)
+    counts = summary(table) | ({"notes": annotations.notes} if annotations.notes else {})
     write_json(out / "summary.json", counts, indent=2)
     return counts
 

@@ -2,7 +2,12 @@
 
 Both are checked where they enter. Conventions of this module, where formats in the wild differ:
 
-- People come in the Halpe-136 layout whatever the file has (17, 26, 133 or 136 keypoints).
+- People come in the Halpe-136 layout whatever the file has: by its keypoints' names (`layouts`), or where it
+  gives none by their number, 17 (COCO), 26, 133 or 136. People are told by their category's name.
+- Coordinates are pixels, of which boxes have the corner and keypoints the centre of the first at 0, 0;
+  fractions of the image are refused, and boxes that are x1, y1, x2, y2 (`units`).
+- A person whose area is absent, below a hundredth or above twice the box has 0.53 of the box instead, as
+  tools take it that have no segments; `Annotations.notes` says so.
 - A keypoint is labelled when its flag v > 0; flags are floats and kept as they are (Halpe and
   COCO-WholeBody files hold values other than 0, 1 and 2), except that v <= 0 becomes 0 and v = 3, in
   CropCOCO's layout a keypoint outside the picture, becomes `cropcoco.OUTSIDE`; it is written as 3 again.
@@ -16,8 +21,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path, PureWindowsPath
+from typing import Any
 
 import numpy as np
 
@@ -26,9 +32,13 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS, NAMES
 from hicp_lib.formats.cropcoco import FLAG_OUTSIDE, OUTSIDE, outside_from_flags
-from hicp_lib.formats.json_validation import PART_KEYS, Rows
+from hicp_lib.formats.importers.matching import match_images
+from hicp_lib.formats.json_validation import CONVENTIONS, PART_KEYS, Layouts, Rows
+from hicp_lib.formats.layouts import PERSON_CATEGORY, PersonCategory, layouts_of, person_category
+from hicp_lib.formats.units import corners_note, doubts, refuse_fractions
 
-PERSON_CATEGORY = 1
+SEGMENT_OF_BOX = 0.53  # area of a person's segment over that of the box, as tools take it
+_LEAST_AREA, _MOST_AREA = 0.01, 2.0  # of a person, as a share of their box; another one stands for none
 PERSON = {"id": PERSON_CATEGORY, "name": "person", "supercategory": "person"}
 MAX_SIDE_PX = 100_000
 _UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")  # control characters, halves of characters
@@ -79,6 +89,11 @@ class Annotations:
         0 not labelled, above 0 labelled (1 occluded, 2 visible), below 0 known to lie outside the picture.
     extras : list of dict
         Per person, the further keys of its JSON object.
+    category : PersonCategory
+        Of people in the file.
+    notes : dict of str to str
+        What a reader of the figures must know of the file, by what it is about: what was left out, assumed or
+        is doubtful.
 
     Examples
     --------
@@ -96,6 +111,8 @@ class Annotations:
     keypoints_px: np.ndarray
     visibility: np.ndarray
     extras: list[dict]
+    category: PersonCategory = field(default_factory=PersonCategory)
+    notes: dict[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -120,7 +137,7 @@ class Annotations:
     @classmethod
     def concatenate(cls, parts: Sequence[Annotations], images: dict[int, ImageInfo]) -> Annotations:
         """The people of all parts, in `images`, with the ids they have; parts may be none at all."""
-        arrays = {
+        arrays: dict[str, Any] = {
             name: np.concatenate([empty, *(getattr(part, name) for part in parts)])
             for name, empty in _NOBODY.items()
         }
@@ -150,13 +167,15 @@ def source_images(annotations: Annotations) -> dict[int, int]:
     return source
 
 
-def read_annotations(path: str | Path) -> Annotations:
-    """Read COCO, COCO-WholeBody or Halpe keypoint annotations.
+def read_annotations(path: str | Path, keypoint_map: str | Path | None = None) -> Annotations:
+    """Read keypoint annotations in COCO's layout, of any keypoints whose names are given.
 
     Parameters
     ----------
     path : str or Path
         A JSON file with `images` and `annotations`.
+    keypoint_map : str or Path, optional
+        A file that says what its keypoints' names mean, as of `hicp_lib.formats.layouts.layouts_of`.
 
     Returns
     -------
@@ -175,7 +194,26 @@ def read_annotations(path: str | Path) -> Annotations:
         if key not in data:
             raise InputError(f"{path}: has no {key!r}; expected a COCO annotation file")
     images = _read_images(Rows.of(path, "images", data["images"]))
-    return _read_people(Rows.of(path, "annotations", data["annotations"]), images)
+    category = person_category(path, data.get("categories"))
+    layouts, notes = layouts_of(f"{path}: keypoints of its category", category.keypoints, keypoint_map)
+    every = Rows.of(path, "annotations", data["annotations"])
+    rows = _of_people(every, category, {category.id} | category.others)
+    people = _read_people(rows, images, layouts)
+    if n_others := len(every.rows) - len(rows.rows):
+        notes["categories"] = f"{n_others} objects of other categories left out"
+    if layouts is CONVENTIONS and any(len(p["keypoints"]) == 51 and PART_KEYS[0] not in p for p in rows.rows):
+        notes["names"] = "17 keypoints without names are taken for COCO's"
+    notes |= people.notes
+    return replace(people, category=category, notes={about: note for about, note in notes.items() if note})
+
+
+def _of_people(rows: Rows, people: PersonCategory, allowed: set[int]) -> Rows:
+    """The people among objects of allowed categories; one without is a person where there is no other."""
+    expected = f"one of {', '.join(map(str, sorted(allowed)))}; {people.id} is people"
+    default = {} if people.others else {"default": people.id}
+    found = rows.column("category_id", lambda of: type(of) is int and of in allowed, expected, **default)
+    chosen = [row for row, of in zip(rows.rows, found, strict=True) if of not in people.others]
+    return rows if len(chosen) == len(found) else replace(rows, label="people", rows=chosen)
 
 
 def _read_images(rows: Rows) -> dict[int, ImageInfo]:
@@ -198,41 +236,46 @@ def _is_inside(name: object) -> bool:
     return bool(path.name) and not path.anchor and ".." not in path.parts
 
 
-def _read_people(rows: Rows, images: dict[int, ImageInfo]) -> Annotations:
-    ids, image_ids = rows.unique_integers("id"), rows.integers("image_id")
-    _check_references(rows, image_ids, images)
+def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> Annotations:
+    ids, image_ids = rows.unique_integers("id"), _images_of(rows, images)
     boxes = rows.vectors("bbox", ("x", "y", "width", "height"))
     for i in np.flatnonzero((boxes[:, 2:] < 0).any(axis=1))[:1]:
         raise rows.error(i, "bbox has a negative width or height; expected [x, y, width, height] in pixels")
-    areas = rows.numbers("area")
-    for i in np.flatnonzero(areas < 0)[:1]:
-        raise rows.error(i, f"area is {areas[i]:g}; expected the segment's area in square pixels")
-    triples = rows.keypoints()
+    flags = rows.column("iscrowd", lambda f: isinstance(f, int | float) and f in (0, 1), "0 or 1", default=0)
+    is_crowd = np.array(flags, dtype=bool)
+    areas, area_note = _areas(rows, boxes, is_crowd)
+    triples = rows.keypoints(layouts)
     sizes = np.array([(images[i].width_px, images[i].height_px) for i in image_ids.tolist()]).reshape(-1, 2)
     outside = outside_from_flags(rows, triples, sizes)
     visibility = np.where(outside, OUTSIDE, np.maximum(triples[..., 2], 0.0))
     known = (visibility > 0) | (outside & (triples[..., :2] != 0).any(axis=-1))
+    keypoints = np.where(known[..., None], triples[..., :2], np.nan)
+    labelled = np.where((visibility > 0)[..., None], keypoints, np.nan)
+    refuse_fractions(rows.path, labelled)
+    refuse_fractions(rows.path, boxes.reshape(-1, 2, 2), "boxes")
+    shown = boxes, labelled, sizes
+    notes = {"area": area_note, "boxes": corners_note(rows.path, *shown), "pixels": doubts(*shown)}
     return Annotations(
-        images, ids, image_ids, boxes, areas, _crowd_flags(rows),
-        np.where(known[..., None], triples[..., :2], np.nan), visibility, rows.extras(_KNOWN_KEYS),
+        images, ids, image_ids, boxes, areas, is_crowd, keypoints, visibility, rows.extras(_KNOWN_KEYS),
+        notes=notes,
     )  # fmt: skip
 
 
-def _check_references(rows: Rows, image_ids: np.ndarray, images: dict[int, ImageInfo] | None) -> None:
-    categories = rows.column("category_id", default=PERSON_CATEGORY)
-    for i, (image_id, category) in enumerate(zip(image_ids.tolist(), categories, strict=True)):
-        if images is not None and image_id not in images:
-            raise rows.error(i, f"image_id {image_id} is not among the annotated images")
-        if type(category) is not int or category != PERSON_CATEGORY:
-            raise rows.error(i, f"category_id is not {PERSON_CATEGORY} (person); leave other categories out")
-
-
-def _crowd_flags(rows: Rows) -> np.ndarray:
-    flags = rows.column("iscrowd", default=0)
-    for i, flag in enumerate(flags):
-        if not isinstance(flag, int | float) or flag not in (0, 1):
-            raise rows.error(i, "iscrowd is neither 0 nor 1")
-    return np.array(flags, dtype=bool)
+def _areas(rows: Rows, boxes_px: np.ndarray, is_crowd: np.ndarray) -> tuple[np.ndarray, str]:
+    """The areas, those that can be none replaced, and how many these are in words."""
+    given = [[0 if area is None else area] for area in rows.column("area", default=None)]
+    areas = rows.finite(given, 1, lambda j: "area")[:, 0]
+    for i in np.flatnonzero(areas < 0)[:1]:
+        raise rows.error(i, f"area is {areas[i]:g}; expected the segment's area in square pixels")
+    of_box = boxes_px[:, 2] * boxes_px[:, 3]
+    beyond = (areas < _LEAST_AREA * of_box) | ((areas > _MOST_AREA * of_box) & (of_box > 0))
+    none = beyond & ~is_crowd
+    areas = np.where(none, SEGMENT_OF_BOX * of_box, areas)
+    note = (
+        f"the area of {none.sum()} of {(~is_crowd).sum()} people is below a hundredth of their box, above "
+        f"twice or absent; {SEGMENT_OF_BOX} of the box is taken. For all alike, give --area box or box53"
+    )
+    return areas, note if none.any() else ""
 
 
 def write_annotations(path: str | Path, annotations: Annotations) -> None:
@@ -291,14 +334,15 @@ def keypoint_triples(keypoints_px: np.ndarray, values: np.ndarray) -> np.ndarray
 def read_detections(path: str | Path, annotations: Annotations | None = None) -> dict[int, Detections]:
     """Read COCO keypoint results (a list of `image_id, category_id, keypoints, score`).
 
-    An empty list is a result: nobody was found.
+    An empty list is a result: nobody was found. Where every result has a `file_name`, it says which image is
+    meant.
 
     Parameters
     ----------
     path : str or Path
         A JSON file.
     annotations : Annotations, optional
-        Every image id must be among theirs, and images without a detection come back with none.
+        Every image must be among theirs, and images without a detection come back with none.
 
     Returns
     -------
@@ -311,16 +355,35 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
         For anything malformed: NaN, a wrong number of keypoints, an unknown image, ...
     """
     rows = Rows.of(Path(path), "results", read_json(path), name_key="image_id")
-    image_ids, person_scores = rows.integers("image_id"), rows.numbers("score")
-    _check_references(rows, image_ids, None if annotations is None else annotations.images)
+    person_scores = rows.numbers("score")
+    category = PersonCategory() if annotations is None else annotations.category
+    _of_people(rows, replace(category, others=set()), {category.id, PERSON_CATEGORY} - category.others)
+    image_ids = rows.integers("image_id") if annotations is None else _images_of(rows, annotations.images)
     triples = rows.keypoints()
     keypoints = np.where((triples == 0).all(axis=-1, keepdims=True), np.nan, triples[..., :2])
+    refuse_fractions(rows.path, keypoints)
     found = {} if annotations is None else dict.fromkeys(annotations.images, Detections.none())
     order = np.argsort(image_ids, kind="stable")
     ids, starts = np.unique(image_ids[order], return_index=True)
     for image_id, chosen in zip(ids.tolist(), np.split(order, starts[1:]), strict=False):  # none: one empty
         found[image_id] = Detections(keypoints[chosen], triples[chosen, :, 2], person_scores[chosen])
     return found
+
+
+def _images_of(rows: Rows, images: Mapping[int, ImageInfo]) -> np.ndarray:
+    """The annotated image of each result: by name where all have one: tools number differently."""
+    if not rows.rows or not all("file_name" in row for row in rows.rows):
+        ids = rows.integers("image_id")
+        for i in np.flatnonzero(~np.isin(ids, list(images)))[:1].tolist():
+            raise rows.error(i, f"image_id {ids[i]} is not among the annotated images")
+        return ids
+    names = rows.column("file_name", lambda name: isinstance(name, str), "a file name")
+    sources = list(dict.fromkeys(names))
+    image_of = dict(zip(sources, match_images(rows.path, sources, "id", images), strict=True))
+    for i, name in enumerate(names):
+        if image_of[name] is None:
+            raise rows.error(i, f"file_name {name[:80]!r} is not among the annotated images")
+    return np.array([image_of[name] for name in names], dtype=np.int64)
 
 
 def write_detections(

@@ -14,12 +14,13 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES, TO_HALPE, to_halpe
+from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES, TO_HALPE
 
 # Beyond any image and any detector's raw output, and small enough for squares and products.
 MAX_ABS = 1e9
 MAX_INTEGER = 2**53  # every JSON reader has them exact up to here
 CONVENTIONS = {17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"}
+Layouts = Mapping[int, str | np.ndarray]
 # COCO-WholeBody files spread their 133 keypoints over five keys, in this order.
 PART_KEYS = ("foot_kpts", "face_kpts", "lefthand_kpts", "righthand_kpts")
 _REQUIRED = object()
@@ -142,21 +143,26 @@ class Rows:
         values = self.column(key, lambda v: isinstance(v, list) and len(v) == n, f"[{', '.join(names)}]")
         return self.finite(values, n, lambda j: f"{key}[{j}] ({names[j]})")
 
-    def keypoints(self) -> np.ndarray:
-        """Triples (x, y, v) in the Halpe-136 order, zeros where the file's convention has no such keypoint.
+    def keypoints(self, layouts: Layouts = CONVENTIONS) -> np.ndarray:
+        """Triples (x, y, v) in the Halpe-136 order, zeros where the file's layout has no such keypoint.
 
         Accepts 17 (COCO), 26 (Halpe body), 133 (COCO-WholeBody, also spread over its five keys) and 136
-        (Halpe) keypoints, row by row.
+        (Halpe) keypoints, row by row, if not told otherwise.
+
+        Parameters
+        ----------
+        layouts : Layouts, optional
+            As of `points`.
 
         Returns
         -------
         array, shape (n, 136, 3)
         """
-        lists = dict(enumerate(self._keypoint_lists()))
-        return self.points("keypoints", lists, CONVENTIONS)[0]
+        lists = dict(enumerate(self._keypoint_lists(layouts)))
+        return self.points("keypoints", lists, layouts)[0]
 
     def points(
-        self, key: str, lists: Mapping[int, list], conventions: Mapping[int, str], width: int = 3
+        self, key: str, lists: Mapping[int, list], layouts: Layouts, width: int = 3
     ) -> tuple[np.ndarray, Counter[str]]:
         """Flat lists of numbers of some rows, `width` for each keypoint, in the Halpe-136 order.
 
@@ -166,27 +172,28 @@ class Rows:
             For messages.
         lists : mapping of int to list
             By row.
-        conventions : mapping of int to str
-            By the number of keypoints, a key of `hicp_lib.core.keypoints.TO_HALPE`.
+        layouts : Layouts
+            By the number of keypoints, a key of `hicp_lib.core.keypoints.TO_HALPE`, or what that would hold.
         width : int, optional
             Numbers per keypoint.
 
         Returns
         -------
         values : array, shape (n, 136, width)
-            0 where the convention has no such keypoint, and in rows without a list.
+            0 where the layout has no such keypoint, and in rows without a list.
         found : Counter
-            Rows by convention.
+            Rows by the layout's name.
         """
         values, found = np.zeros((len(self.rows), N_KEYPOINTS, width)), Counter[str]()
-        for n, convention in conventions.items():
+        for n, layout in layouts.items():
             chosen = {i: numbers for i, numbers in lists.items() if len(numbers) == width * n}
             if chosen:
-                found[convention] = len(chosen)
-                names = _triples_namer(key, convention) if width == 3 else lambda j: f"{key}[{j}]"
-                numbers = self.finite(list(chosen.values()), width * n, names, list(chosen))
-                points = to_halpe(numbers.reshape(-1, n, width), convention, axis=-2, fill=0.0)
-                values[list(chosen)] = points
+                found[str(layout)] = len(chosen)
+                indices = TO_HALPE[layout] if isinstance(layout, str) else layout
+                names = _triples_namer(key, indices) if width == 3 else lambda j: f"{key}[{j}]"
+                points = self.finite(list(chosen.values()), width * n, names, list(chosen))
+                points = points.reshape(-1, n, width)[:, indices >= 0]
+                values[np.ix_(np.array(list(chosen)), indices[indices >= 0])] = points
         return values, found
 
     def conventions(self) -> list[str]:
@@ -203,15 +210,19 @@ class Rows:
                 raise self.error(i, "a further key holds NaN, infinity or too deep a nesting") from None
         return extras
 
-    def _keypoint_lists(self) -> list[list]:
-        """Each row's keypoints in one list; its length is one of `CONVENTIONS`, times 3."""
+    def _keypoint_lists(self, layouts: Collection[int] = CONVENTIONS) -> list[list]:
+        """Each row's keypoints in one list; its length is one of `layouts`, times 3."""
         lists = self.column("keypoints", lambda v: isinstance(v, list), "a list of x, y, v per keypoint")
         for i, row in enumerate(self.rows):
-            if len(lists[i]) == 51 and all(isinstance(row.get(key), list) for key in PART_KEYS):
+            if (
+                len(lists[i]) == 51
+                and 133 in layouts
+                and all(isinstance(row.get(key), list) for key in PART_KEYS)
+            ):
                 lists[i] = list(chain(lists[i], *(row[key] for key in PART_KEYS)))
             n = len(lists[i])
-            if n % 3 or n // 3 not in CONVENTIONS:
-                counts = ", ".join(map(str, CONVENTIONS))
+            if n % 3 or n // 3 not in layouts:
+                counts = ", ".join(map(str, layouts))
                 raise self.error(i, f"keypoints has {n} numbers; expected 3 per keypoint, of {counts}")
         return lists
 
@@ -256,8 +267,8 @@ def _is_finite(value: Any) -> bool:
     return type(value) in (int, float) and abs(value) <= MAX_ABS
 
 
-def _triples_namer(key: str, convention: str) -> Callable[[int], str]:
-    names = [NAMES[i] if i >= 0 else "other" for i in TO_HALPE[convention]]
+def _triples_namer(key: str, indices: np.ndarray) -> Callable[[int], str]:
+    names = [NAMES[i] if i >= 0 else "other" for i in indices]
     return lambda j: f"{key}[{j}] ({names[j // 3]} {'xyv'[j % 3]})"
 
 

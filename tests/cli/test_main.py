@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from hicp_lib.cli import main as cli
+from hicp_lib.core.keypoints import NAMES
 
 
 def mistake(capsys, *arguments: str) -> str:
@@ -168,8 +169,9 @@ def test_areas_that_stand_for_none_are_told(capsys, tmp_path, area, told):
     image = {"id": 1, "file_name": "1.jpg", "width": 400, "height": 600}
     shifted = [value + (k % 3 < 2) for k, value in enumerate(keypoints)]
     results = [{"image_id": 1, "category_id": 1, "keypoints": shifted, "score": 0.9}]
+    category = {"id": 1, "name": "person", "keypoints": NAMES[:17]}
     truth, found = tmp_path / "annotations.json", tmp_path / "detections.json"
-    truth.write_text(json.dumps({"images": [image], "annotations": [person], "categories": [{"id": 1}]}))
+    truth.write_text(json.dumps({"images": [image], "annotations": [person], "categories": [category]}))
     found.write_text(json.dumps(results))
     arguments = ["evaluate", "--annotations", str(truth), "--detections", str(found)]
     for options in ([], ["--json"]):

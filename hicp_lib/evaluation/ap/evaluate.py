@@ -13,9 +13,7 @@ from hicp_lib.core.oks import oks
 from hicp_lib.evaluation.ap import cocoeval
 from hicp_lib.evaluation.ap.extended_oks import PRESENCE_CUT, extended_oks, known_flags
 from hicp_lib.evaluation.ap.options import VISIBLE, Options, choose
-from hicp_lib.formats.annotations import Annotations
-
-_SEGMENT_OF_BOX = 0.53  # area of a person's segment over that of the box, as tools take it
+from hicp_lib.formats.annotations import SEGMENT_OF_BOX, Annotations
 
 
 @dataclass(frozen=True)
@@ -225,7 +223,7 @@ def _areas(people: Annotations, area: str) -> np.ndarray:
     box = people.boxes_px[:, 2] * people.boxes_px[:, 3]
     if area == "source":
         return np.array([_source_area(people, i) for i in range(len(people))], dtype=float)
-    return {"segment": people.areas_px2, "box": box, "box53": _SEGMENT_OF_BOX * box}[area]
+    return {"segment": people.areas_px2, "box": box, "box53": SEGMENT_OF_BOX * box}[area]
 
 
 def _source_area(people: Annotations, i: int) -> float:

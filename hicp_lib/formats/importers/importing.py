@@ -21,6 +21,7 @@ from hicp_lib.formats.importers.openpose import read_openpose, refuse_other_size
 from hicp_lib.formats.importers.people import People
 from hicp_lib.formats.importers.results import ALPHAPOSE, COCO, DETECTRON2, read_results
 from hicp_lib.formats.importers.scores import score_scale
+from hicp_lib.formats.units import refuse_fractions
 
 READERS: dict[str, Callable[[Path], People]] = {
     "openpose": read_openpose,
@@ -144,7 +145,8 @@ def import_predictions(
     people = READERS[format](Path(path))
     if not len(people):
         raise InputError(f"{path}: holds no people; check the run, or leave this detector out")
-    matched = match_images(people, annotations.images)
+    refuse_fractions(people.path, people.keypoints_px)
+    matched = match_images(people.path, people.sources, people.named_by, annotations.images)
     scale = score_scale(format, people) if scale is None else scale
     rows = np.flatnonzero([matched[s] is not None for s in people.source_of])
     shown = [annotations.images[i] for s in people.source_of if (i := matched[s]) is not None]
