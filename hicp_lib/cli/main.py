@@ -8,8 +8,10 @@ standard error, never a traceback for a user's mistake.
 import json
 import math
 import os
+import shlex
 import sys
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -21,9 +23,7 @@ from hicp_lib.cli.models import models
 from hicp_lib.cli.options import PATH, detector_options, given, people_option, tell_assumed, worker_options
 from hicp_lib.cli.recordings import lift, record
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import write_json
 
-IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff")
 
 _keypoint_map_option = click.option(
     "--keypoint-map", type=PATH, metavar="FILE.json",
@@ -141,50 +141,45 @@ def dataset_create(annotations: Path, images: Path, keypoint_map, out: Path, min
 @hicp.command()
 @detector_options
 @click.option("--dataset", "dataset_dir", type=PATH, help="Folder with images/ and annotations.json.")
-@click.option("--images", "images_dir", type=PATH, help="Folder of images without annotations.")
-@click.option("--out", type=PATH, required=True, help="COCO keypoint results to write.")
+@click.option("--images", "images_dir", type=PATH, help="Folder of images without annotations, or a video.")
+@click.option("--out", type=PATH, required=True, help="To write: .json (COCO results), .csv or .parquet.")
+@click.option("--by-image", is_flag=True, help="Print a line per image: people, scores (keypoints of each).")
+@click.option("--strict", is_flag=True, help="End at a picture that cannot be read.")
 @worker_options("Threads")
 def detect(
-    detector: str, dataset_dir: Path | None, images_dir: Path | None, out: Path, workers, **chosen
-) -> None:
+    detector: str, dataset_dir: Path | None, images_dir: Path | None, out: Path, by_image: bool, strict: bool,
+    workers: int | str | None, **chosen,
+) -> None:  # fmt: skip
     """Find people and their keypoints in images.
 
-    What was found in an image is kept: after an interruption, the same command does only the rest.
+    What was found in an image is kept: after an interruption, the same command does only the rest. A picture
+    that cannot be read is told and passed over; where none can be, the exit code is 2.
     """
     from hicp_lib.detectors.registry import DETECTORS, describe, make_detector
-    from hicp_lib.detectors.runtime.results import detections_of
-    from hicp_lib.detectors.runtime.run import detect_dataset, detect_images
-    from hicp_lib.formats.annotations import write_detections
+    from hicp_lib.detectors.runtime.to_file import detect_to_file, open_dataset, open_pictures
+    from hicp_lib.formats.detection_files import refuse_other_suffix
 
-    if (dataset_dir is None) == (images_dir is None):
+    source = dataset_dir or images_dir
+    if source is None or (dataset_dir and images_dir):
         raise click.UsageError("Give either --dataset DIR or --images DIR.", click.get_current_context())
+    refuse_other_suffix(out)
     needs_model = detector in DETECTORS and DETECTORS[detector].needs_model
     # Held until the end: the runs share the network it has open.
     made = make_detector(detector, **given(**chosen)) if needs_model else None
-    if dataset_dir is not None:
-        found = detect_dataset(detector, dataset_dir, workers=workers, **given(**chosen))
-    elif images_dir is not None:
-        paths = _numbered_images(images_dir)
-        found = detections_of(detect_images(detector, paths, workers, **given(**chosen)))
-        # COCO's result layout has no place for names: beside it, the image of each id.
-        names = [{"id": number, "file_name": path.name} for number, path in paths.items()]
-        write_json(out.with_suffix(".images.json"), names, indent=1)
-    write_detections(out, found)
-    click.echo(f"{out}: {sum(len(people) for people in found.values())} people in {len(found)} images")
+    pictures = open_pictures(source) if dataset_dir is None else open_dataset(source)
+    options = {"workers": workers, "strict": strict} | given(**chosen)
+    lines = click.echo if by_image else None
+    n_people, n_images, n_broken = detect_to_file(
+        detector, pictures, out, partial(click.echo, err=True), lines, **options
+    )
+    passed_over = f"; {n_broken} could not be read" * bool(n_broken)
+    click.echo(f"{out}: {n_people} people in {n_images} images{passed_over}")
+    if source.is_dir():
+        images = shlex.quote(str(source if dataset_dir is None else source / "images"))
+        page = shlex.quote(str(out.with_suffix(".html")))
+        click.echo(f"look: hicp draw --detections {shlex.quote(str(out))} --images {images} --out {page}")
     if made is not None:
         tell_assumed(describe(made))
-
-
-def _numbered_images(folder: Path) -> dict[int, Path]:
-    """Image ids as COCO numbers its files (000000012345.jpg is 12345), else by the order of names."""
-    if not folder.is_dir():
-        raise InputError(f"{folder}: is not a folder; give the folder that holds the images")
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in IMAGE_SUFFIXES)
-    if not paths:
-        raise InputError(f"{folder}: holds no images; expected files such as 000001.jpg or photo.png")
-    numbers = [int(path.stem) for path in paths if path.stem.isascii() and path.stem.isdigit()]
-    ids = numbers if len(set(numbers)) == len(paths) else range(1, len(paths) + 1)
-    return dict(zip(ids, paths, strict=True))
 
 
 @hicp.command("import")

@@ -2,7 +2,7 @@
 
 import click
 
-from hicp_lib.cli.options import detector_options, given, tell_assumed
+from hicp_lib.cli.options import detector_options, given, tell_assumed, text_table
 from hicp_lib.core.errors import InputError
 
 
@@ -18,17 +18,22 @@ def models_list() -> None:
     from hicp_lib.detectors.weights.published import published, status
     from hicp_lib.detectors.weights.user import all_user_options
 
+    rows = [("name", "state", "MB", "licence", "for")]
     for weight in default.registry().values():
-        size = f"{weight.size_bytes / 1e6:5.1f} MB"
-        row = f"{weight.name:<32} {default.status(weight):<8} {size}  {weight.licence:<12}"
-        click.echo(f"{row} {', '.join(weight.used_by)}")
-    click.echo("\npublished, fetched by name:")
+        used_by = ", ".join(weight.used_by)
+        rows.append((weight.name, default.status(weight), _mb(weight.size_bytes), weight.licence, used_by))
     for model in published().values():
-        size = "     ? MB" if model.size_bytes is None else f"{model.size_bytes / 1e6:6.1f} MB"
-        row = f"{model.name:<32} {status(model):<10} {size}  {model.licence or 'licence ?':<12}"
-        click.echo(f"{row} {model.use or 'not run here'}: {model.note}")
+        size = model.path.stat().st_size if model.path.is_file() else model.size_bytes
+        used_by = f"{model.use or 'not run here'}: {model.note}"
+        rows.append((model.name, status(model), _mb(size), model.licence or "-", used_by))
+    click.echo(text_table(rows))
+    click.echo("- is unknown, a size until the file is here; published models are fetched by name only")
     for name, options in all_user_options().items():
         click.echo(f"yours: {name} with {', '.join(f'{key} {value}' for key, value in options.items())}")
+
+
+def _mb(size_bytes: int | None) -> str:
+    return "-" if size_bytes is None else f"{size_bytes / 1e6:.1f}"
 
 
 @models.command("fetch")
@@ -62,8 +67,8 @@ def models_show(detector: str, **chosen) -> None:
     """Tell everything that is taken for granted about a detector and its model file."""
     from hicp_lib.detectors.registry import describe, make_detector
 
-    for what, value, why in describe(make_detector(detector, **given(**chosen))):
-        click.echo(f"{what:<16} {value}" + (f"  ({why})" if why else ""))
+    rows = describe(make_detector(detector, **given(**chosen)))
+    click.echo(text_table([("what", "value", "why"), *rows]))
 
 
 @models.command("use")

@@ -1,6 +1,6 @@
 """Kinds of options that the `hicp` command's parts share."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -53,6 +53,20 @@ def detector_options(command: Callable) -> Callable:
     ):  # fmt: skip
         command = option(command)
     return command
+
+
+def text_table(rows: Sequence[Sequence[str]]) -> str:
+    """Rows as lines of text, columns one below the other.
+
+    Examples
+    --------
+    >>> print(text_table([("name", "MB"), ("a", "1.5")]))
+    name  MB
+    a     1.5
+    """
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    padded = ([f"{cell:<{n}}" for cell, n in zip(row, widths, strict=True)] for row in rows)
+    return "\n".join("  ".join(cells).rstrip() for cells in padded)
 
 
 def tell_assumed(facts: list[tuple[str, str, str]]) -> None:

@@ -14,6 +14,7 @@ import logging
 import math
 import tempfile
 import threading
+import time
 import traceback
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator
@@ -39,12 +40,13 @@ Key = TypeVar("Key", bound=Hashable)
 Answer = TypeVar("Answer")
 # How long to wait for the scheduler, and for workers where there are none.
 PATIENCE_S = 30.0
+_ANEW_S = 1.0  # when to look again how many workers there are
 _LOGGERS = ("distributed", "distributed.client", "tornado.application", "asyncio")
 
 
 def run_on_cluster(
     address: str,
-    jobs: Iterable[tuple[Key, Callable]],
+    jobs: Iterable[tuple[Key, Callable | None]],
     kind: str,
     folder: Path | None,
     alike: Callable[[], dict] | None,
@@ -56,7 +58,7 @@ def run_on_cluster(
     ----------
     address : str
         Of Dask's scheduler, e.g. "tcp://127.0.0.1:8786".
-    jobs : iterable of (key, callable)
+    jobs : iterable of (key, callable or None)
     kind : str
     folder : Path or None
     alike : callable or None
@@ -73,8 +75,11 @@ def run_on_cluster(
         would find something else, or a job kills its workers.
     """
     todo = iter(jobs)
-    first = next(todo, None)
-    if first is None:
+    for first in todo:
+        if first[1] is not None:
+            break
+        yield first[0], None
+    else:
         return
     alike = alike or partial(code_identity, getattr(first[1], "func", first[1]).__module__)
     how = alike(), alike, folder is not None, kind == "processes"
@@ -82,7 +87,7 @@ def run_on_cluster(
         for key, answer in _spread(client, address, chain([first], todo), how, named):
             if isinstance(answer, Exception):
                 raise answer
-            yield key, answer if folder is None else _written(answer, folder, str(key))
+            yield key, answer if folder is None or answer is None else _written(answer, folder, str(key))
 
 
 def _written(answer: tuple[Any, dict[str, bytes]], folder: Path, last: str) -> Any:
@@ -153,7 +158,7 @@ def _quiet() -> Iterator[None]:
 def _spread(
     client: Client,
     address: str,
-    jobs: Iterable[tuple[Key, Callable]],
+    jobs: Iterable[tuple[Key, Callable | None]],
     how: tuple,
     named: Callable[[Key], object],
 ) -> Iterator[tuple[Key, Any]]:
@@ -170,12 +175,20 @@ def _spread(
         some = list(futures)
         return _patiently(client, lambda s: wait(some, timeout=s, return_when="FIRST_COMPLETED").done)
 
+    asked_s, n_threads = -math.inf, 0
+
     def n_most() -> float:
-        return 2 * sum(client.nthreads().values()) or math.inf
+        nonlocal asked_s, n_threads
+        # To ask the scheduler takes as long as to give a job away.
+        if not n_threads or time.monotonic() > asked_s + _ANEW_S:
+            asked_s, n_threads = time.monotonic(), sum(client.nthreads().values())
+        return 2 * n_threads or math.inf
 
     with _explained(address, client):
         for key, future in as_they_come(jobs, submit, first_ones, n_most):
-            if future.status == "error":
+            if future is None:
+                yield key, None
+            elif future.status == "error":
                 yield key, _not_run(future.exception(PATIENCE_S), named(key))
             else:
                 yield key, _patiently(client, future.result)

@@ -65,7 +65,7 @@ def resolved(workers: Workers) -> int | str:
 
 
 def run_jobs(
-    jobs: Iterable[tuple[Key, Callable]],
+    jobs: Iterable[tuple[Key, Callable | None]],
     workers: Workers = None,
     kind: str = "processes",
     *,
@@ -79,7 +79,7 @@ def run_jobs(
     ----------
     jobs : iterable of (key, callable)
         Drawn as workers get free. Processes and clusters are given functions of modules, or partials of
-        them; threads anything.
+        them; threads anything. None in place of a callable is done already: its key comes back with None.
     workers : int or str, optional
         As of `resolved`. A single one, or a single job, is run by the caller itself.
     kind : str
@@ -116,15 +116,15 @@ def run_jobs(
         yield from run_on_cluster(workers, jobs, kind, folder, alike, named)
         return
     n = min(workers, length_hint(jobs, workers))
-    todo = jobs if folder is None else ((key, partial(job, folder)) for key, job in jobs)
+    todo = jobs if folder is None else ((key, job and partial(job, folder)) for key, job in jobs)
     with single_threaded_opencv:
         if n < 2:
-            yield from ((key, job()) for key, job in todo)
+            yield from ((key, job and job()) for key, job in todo)
             return
         with (_Threads if kind == "threads" else Processes)(n) as executor:
             try:
                 for key, future in as_they_come(todo, executor.submit, _first_ones, lambda: 2 * n):
-                    yield key, future.result()
+                    yield key, future and future.result()
             except BrokenProcessPool:
                 raise InputError(
                     "a process that worked was killed (is memory short?); run the same command again to go "
@@ -144,7 +144,7 @@ def threads_beside() -> int:
 
 
 def as_they_come(
-    jobs: Iterable[tuple[Key, Callable]],
+    jobs: Iterable[tuple[Key, Callable | None]],
     submit: Callable[[Callable], Any],
     first_ones: Callable[[Iterable], Iterable],
     n_most: Callable[[], float],
@@ -153,7 +153,7 @@ def as_they_come(
 
     Parameters
     ----------
-    jobs : iterable of (key, callable)
+    jobs : iterable of (key, callable or None)
     submit : callable
         Gives a job away, for a future.
     first_ones : callable
@@ -164,13 +164,17 @@ def as_they_come(
     Yields
     ------
     (object, object)
-        Key and future.
+        Key and future; None where there was no job.
     """
     running: dict[Any, Key] = {}
     for key, job in jobs:
-        running[submit(job)] = key
-        while len(running) >= n_most():
-            yield from [(running.pop(future), future) for future in first_ones(running)]
+        if job is None:
+            yield key, None
+            ended: Iterable = [future for future in running if future.done()]
+        else:
+            running[submit(job)] = key
+            ended = first_ones(running) if len(running) >= n_most() else ()
+        yield from [(running.pop(future), future) for future in ended]
     while running:
         yield from [(running.pop(future), future) for future in first_ones(running)]
 

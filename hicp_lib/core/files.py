@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import re
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -60,7 +61,8 @@ def read_checked(path: str | Path) -> bytes | None:
     (b'kept', None)
     """
     try:
-        content = Path(path).read_bytes()
+        with open(path, "rb") as file:  # pathlib takes as long again
+            content = file.read()
     except OSError:
         return None
     stated, payload = content[:32], content[32:]
@@ -86,7 +88,8 @@ def read_bytes(path: str | Path, expected: str) -> bytes:
         If it cannot be read.
     """
     try:
-        return Path(path).read_bytes()
+        with open(path, "rb") as file:
+            return file.read()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); {expected}") from None
 
@@ -110,6 +113,17 @@ def write_json(path: str | Path, value: Any, *, indent: int | None = None) -> No
     """
     text = json.dumps(value, indent=indent, allow_nan=False)
     write_bytes(path, (text + "\n").encode())
+
+
+def natural_order(name: str) -> tuple[str, str]:
+    """What names are sorted by so that the numbers in them (up to 20 digits) are in their order.
+
+    Examples
+    --------
+    >>> sorted(["b10.png", "b9.png", "a.png"], key=natural_order)
+    ['a.png', 'b9.png', 'b10.png']
+    """
+    return re.sub("[0-9]+", lambda number: number[0].zfill(20), name), name
 
 
 def json_or_text(text: str) -> Any:

@@ -32,6 +32,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS, NAMES
 from hicp_lib.formats.cropcoco import FLAG_OUTSIDE, OUTSIDE, outside_from_flags
+from hicp_lib.formats.detection_files import open_detections, read_rows
 from hicp_lib.formats.importers.matching import match_images
 from hicp_lib.formats.json_validation import CONVENTIONS, PART_KEYS, Layouts, Rows
 from hicp_lib.formats.layouts import PERSON_CATEGORY, PersonCategory, layouts_of, person_category
@@ -354,7 +355,7 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     InputError
         For anything malformed: NaN, a wrong number of keypoints, an unknown image, ...
     """
-    rows = Rows.of(Path(path), "results", read_json(path), name_key="image_id")
+    rows = Rows.of(Path(path), "results", read_rows(Path(path)), name_key="image_id")
     person_scores = rows.numbers("score")
     category = PersonCategory() if annotations is None else annotations.category
     _of_people(rows, replace(category, others=set()), {category.id, PERSON_CATEGORY} - category.others)
@@ -389,7 +390,7 @@ def _images_of(rows: Rows, images: Mapping[int, ImageInfo]) -> np.ndarray:
 def write_detections(
     path: str | Path, detections: Mapping[int, Detections], extras: Mapping[int, list[dict]] | None = None
 ) -> None:
-    """Write detections as COCO keypoint results with 136 keypoints in Halpe's order.
+    """Write detections in the format of the file's suffix, as `hicp_lib.formats.detection_files` says.
 
     Parameters
     ----------
@@ -398,34 +399,8 @@ def write_detections(
     detections : mapping of int to Detections
         By image id.
     extras : mapping of int to list of dict, optional
-        By image id, further keys of each person's JSON object; readers pass over them.
+        By image id, further keys of each person's JSON object; readers pass over them. Not in tables.
     """
-    results = [
-        {**extra, **result_row(image_id, triples, score)}
-        for image_id, found in detections.items()
-        for triples, score, extra in zip(
-            keypoint_triples(found.keypoints_px, found.scores), found.person_scores,
-            extras[image_id] if extras is not None else [{}] * len(found), strict=True,
-        )
-    ]  # fmt: skip
-    write_json(path, results)
-
-
-def result_row(image_id: int, triples: np.ndarray, score: float) -> dict:
-    """A detected person as a COCO keypoint result.
-
-    Parameters
-    ----------
-    image_id : int
-        The image.
-    triples : array, shape (3 k,)
-        A row of `keypoint_triples`.
-    score : float
-        The person's.
-
-    Returns
-    -------
-    dict
-    """
-    return {"image_id": int(image_id), "category_id": PERSON_CATEGORY, "keypoints": triples.tolist(),
-            "score": float(score)}  # fmt: skip
+    with open_detections(path) as write:
+        for image_id, found in detections.items():
+            write(int(image_id), {}, found, extras and extras[image_id])

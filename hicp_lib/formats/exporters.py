@@ -23,7 +23,8 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import write_json
 from hicp_lib.core.keypoints import LIMBS, NAMES, TO_HALPE
-from hicp_lib.formats.annotations import PERSON, Annotations, image_rows, keypoint_triples, result_row
+from hicp_lib.formats.annotations import PERSON, Annotations, image_rows
+from hicp_lib.formats.detection_files import result_rows
 
 FORMATS = ("coco", "fiftyone")
 LAYOUTS = ("halpe136", "halpe26", "coco17", "wholebody133")
@@ -78,10 +79,9 @@ def export_detections(
 def _people(detections: Mapping[int, Detections], keypoints: np.ndarray) -> Iterator[dict]:
     """One COCO keypoint result after the other."""
     for image_id, found in detections.items():
-        points = found.keypoints_px[:, keypoints]
-        triples = keypoint_triples(points, found.scores[:, keypoints])
-        for i in np.flatnonzero(np.isfinite(points).all(axis=-1).any(axis=1)):
-            yield result_row(image_id, triples[i], found.person_scores[i])
+        for row in result_rows(int(image_id), {}, found, keypoints=keypoints):
+            if row["keypoints"].any():
+                yield row | {"keypoints": row["keypoints"].tolist()}
 
 
 def _as_labelled(row: dict) -> dict:

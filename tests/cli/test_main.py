@@ -38,7 +38,18 @@ def mistake(capsys, *arguments: str) -> str:
         (["report", "-p", "sed", "1"], "-p sed: no notebook has such a parameter; known are"),
         (["detect", "--out", "x.json"], "Missing option '--detector'"),
         (["detect", "--detector", "x", "--out", "x.json"], "Give either --dataset DIR or --images DIR"),
-        (["detect", "--detector", "x", "--images", "/nowhere", "--out", "x"], "/nowhere: is not a folder"),
+        (
+            ["detect", "--detector", "x", "--images", "/nowhere", "--out", "x.json"],
+            "/nowhere: is not a folder",
+        ),
+        (
+            ["detect", "--detector", "x", "--images", ".", "--out", "x.xml"],
+            "ends in '.xml'; expected .json, .csv",
+        ),
+        (
+            ["detect", "--detector", "x", "--images", ".", "--out", "x"],
+            "x: ends in 'no suffix'; expected .json",
+        ),
         (["scenes", "render", "out", "--n", "0"], "0 is not in the range x>=1"),
         (["evaluate", "--annotations", "/no.json", "--detections", "x"], "/no.json: cannot be read"),
         (["dataset", "create", "--annotations", "/no.json", "--images", ".", "--out", "x"], "/no.json: "),
@@ -112,14 +123,6 @@ def test_weights_are_listed(capsys):
     assert cli.run(["models", "list"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert any("pose_landmark" in line and "Apache-2.0" in line for line in lines)
-
-
-def test_image_numbers_are_those_of_coco_or_the_order_of_names(tmp_path):
-    for name in ("000000000139.jpg", "000000000285.jpg", "notes.txt"):
-        (tmp_path / name).write_bytes(b"")
-    assert list(cli._numbered_images(tmp_path)) == [139, 285]
-    (tmp_path / "photo.png").write_bytes(b"")
-    assert list(cli._numbered_images(tmp_path)) == [1, 2, 3]
 
 
 def test_evaluation_of_perfect_detections(capsys, tmp_path):

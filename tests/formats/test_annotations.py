@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from hicp_lib.core.detections import Detections
@@ -349,6 +349,7 @@ def test_damaged_results_are_read_or_refused_and_never_evaluate_to_more_than_one
 @FUZZ
 @given(st.binary(max_size=60))
 def test_bytes_that_are_no_file_are_refused(tmp_path, content):
+    assume(not set(content) <= set(b"[] \t\r\n"))  # an empty list is nobody
     path = tmp_path / "fuzz.json"
     path.write_bytes(content)
     for read in (read_annotations, read_detections):

@@ -5,7 +5,6 @@ settings (with its weights' hashes), and what the code of the detector and of it
 (`hicp_lib.core.cache`). A stale or damaged file is never an answer: it is computed again.
 """
 
-import io
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -118,25 +117,20 @@ def read_result(path: Path) -> Timed | None:
     payload = read_checked(path)
     if payload is None:
         return None
-    timing, *people = np.load(io.BytesIO(payload), allow_pickle=False)
-    rows = np.array(people).reshape(-1, _N_COLUMNS)
-    keypoints_px, scores, person_scores = np.split(rows, [2 * N_KEYPOINTS, 3 * N_KEYPOINTS], axis=1)
-    found = Detections(keypoints_px.reshape(-1, N_KEYPOINTS, 2), scores, person_scores[:, 0])
-    return Timed(found, float(timing[0]), int(timing[1]))
+    values = np.frombuffer(payload).copy()
+    rows = values[2:].reshape(-1, _N_COLUMNS)
+    keypoints_px = rows[:, : 2 * N_KEYPOINTS].reshape(-1, N_KEYPOINTS, 2)
+    found = Detections(keypoints_px, rows[:, 2 * N_KEYPOINTS : -1], rows[:, -1])
+    return Timed(found, float(values[0]), int(values[1]))
 
 
 def write_result(path: Path, result: Timed) -> None:
     """Keep a result at `path`; another process may do the same at the same time.
 
-    The file is checked (`hicp_lib.core.files.write_checked`) and holds a `.npy` array: a row with the timing,
-    then one row per person with positions, scores and person score.
+    The file is checked (`hicp_lib.core.files.write_checked`) and holds 64-bit floats: time and workers, then
+    per person positions, scores and person score. One person fits in one block of a disk.
     """
     found = result.detections
-    rows = np.zeros((len(found) + 1, _N_COLUMNS))
-    rows[0, :2] = result.time_ms, result.workers
-    rows[1:, : 2 * N_KEYPOINTS] = found.keypoints_px.reshape(len(found), 2 * N_KEYPOINTS)
-    rows[1:, 2 * N_KEYPOINTS : -1] = found.scores
-    rows[1:, -1] = found.person_scores
-    payload = io.BytesIO()
-    np.save(payload, rows)
-    write_checked(path, payload.getvalue())
+    positions = found.keypoints_px.reshape(len(found), 2 * N_KEYPOINTS)
+    people = np.column_stack([positions, found.scores, found.person_scores])
+    write_checked(path, np.concatenate([[result.time_ms, result.workers], people.ravel()]).tobytes())

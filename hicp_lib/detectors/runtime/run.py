@@ -1,7 +1,8 @@
 """Run a detector over many images: all cores or a cluster, a progress bar, results kept on disk.
 
 Each result is kept as soon as it is there, so a run that was cut off goes on where it was. On a cluster, the
-images' bytes travel, and the workers need the weights.
+images' bytes travel, and the workers need the weights. Results are handed on in the order of the images as
+soon as all before are there, and forgotten: a million images take no more memory than a thousand.
 
 The work is spread over threads, not processes: the networks run outside Python's global lock,
 and threads need no start-up. Every thread has its own detector, and OpenCV is held to one
@@ -9,7 +10,10 @@ thread in each, so the results do not depend on how many there are.
 """
 
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import closing
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -17,6 +21,7 @@ import numpy as np
 from tqdm import tqdm
 
 from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
 from hicp_lib.core.executor import Workers, resolved, run_jobs, threads_beside
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.core.images import decode_image, image_bytes
@@ -29,11 +34,15 @@ from hicp_lib.detectors.runtime.results import (
     cache_folder,
     detections_of,
     identity,
+    pixels_sha256,
     read_result,
     result_path,
     write_result,
 )
 from hicp_lib.formats.annotations import Annotations, read_annotations
+
+Image = str | Path | np.ndarray  # a file, or RGB, shape (height, width, 3), uint8
+_MOST_WAITING = 4096  # results in memory that wait for that of an image before theirs
 
 
 def detect_dataset(name: str, dataset_dir: str | Path, **options) -> dict[int, Detections]:
@@ -92,9 +101,16 @@ def detect_annotated(
     dict of int to Timed
     """
     paths = {i: Path(images_dir) / image.file_name for i, image in annotations.images.items()}
+    return detect_images(name, paths, boxes_px=boxes_by_image(annotations), **options)
+
+
+def boxes_by_image(annotations: Annotations) -> dict[int, np.ndarray]:
+    """The annotated people's boxes, arrays (n, 4: x, y, width, height), by image id."""
     people = annotations.take(~annotations.is_crowd)
-    boxes_px = {image_id: people.boxes_px[people.image_ids == image_id] for image_id in paths}
-    return detect_images(name, paths, boxes_px=boxes_px, **options)
+    order = np.argsort(people.image_ids, kind="stable")
+    ids, starts = np.unique(people.image_ids[order], return_index=True)
+    found = dict(zip(ids.tolist(), np.split(people.boxes_px[order], starts[1:]), strict=False))
+    return {image_id: found.get(image_id, np.zeros((0, 4))) for image_id in annotations.images}
 
 
 def detect_images(
@@ -132,37 +148,112 @@ def detect_images(
     InputError
         If an image cannot be read, or the detector cannot be made.
     """
+    results = {}
+    each = detect_each(name, paths.items(), workers, progress, boxes_px, len(paths), **options)
+    with closing(each):
+        for key, found in each:
+            if isinstance(found, InputError):
+                raise found
+            results[key] = found
+    return results
+
+
+@dataclass
+class _Waiting:
+    """An image whose result has not been handed on; where it is kept once it is found."""
+
+    name: str
+    kept: Path
+    found: Timed | InputError | Path | None = None
+
+
+def detect_each(
+    name: str, images: Iterable[tuple[Key, Image]], workers: Workers = None, progress: bool = True,
+    boxes_px: Mapping[Key, np.ndarray] | None = None, n_images: int | None = None, **options,
+) -> Iterator[tuple[Key, Timed | InputError]]:  # fmt: skip
+    """People in one image after the other; what was handed on is not held any more.
+
+    Parameters
+    ----------
+    name : str
+    images : iterable of (object, path or array)
+        Keys that differ, with image files or RGB arrays; drawn as workers get free.
+    workers : int or str, optional
+    progress : bool, default True
+    boxes_px : dict of object to array, optional
+        These as of `detect_images`.
+    n_images : int, optional
+        How many there are, if that is known.
+    **options : object
+        Of the detector.
+
+    Yields
+    ------
+    (object, Timed or InputError)
+        In the order of `images`; of an image that cannot be read, why.
+
+    Raises
+    ------
+    InputError
+        If the detector cannot be made, or fails.
+    """
     workers = resolved(workers)
-    n_here = None if isinstance(workers, str) else max(1, min(workers, len(paths)))
+    n_here = None if isinstance(workers, str) else max(1, min(workers, n_images or workers))
     asked = name, options, n_here
     detector = _runner(*asked).detector  # it looks, too, where the caller does the work
     boxes_px = boxes_px if getattr(detector, "takes_boxes", False) else None
-    folder, kept, done = cache_folder(detector), {}, {}
+    folder, waiting = cache_folder(detector), OrderedDict[Key, _Waiting]()
 
-    def missing() -> Iterator[tuple[Key, Callable[[], Timed]]]:
-        for key, path in paths.items():
-            content, boxes = image_bytes(path), None if boxes_px is None else boxes_px[key]
-            sha256 = sha256_bytes(content)
-            kept[key] = result_path(folder, sha256, boxes)
-            result = read_result(kept[key])
-            if result is None:
-                # Of a combination's parts, only what is found here is kept.
-                yield key, partial(_detect, asked, content, str(path), boxes, sha256 if n_here else None)
-            else:
-                done[key] = result
+    def jobs() -> Iterator[tuple[Key, Callable[[], Timed | str] | None]]:
+        for key, image in images:
+            named = f"image {key}" if isinstance(image, np.ndarray) else str(image)
+            boxes = None if boxes_px is None else boxes_px[key]
+            try:
+                content, sha256 = _content(image)
+            except InputError as error:
+                waiting[key] = _Waiting(named, folder, error)
+                yield key, None
+                continue
+            kept = result_path(folder, sha256, boxes)
+            result = read_result(kept)
+            waiting[key] = _Waiting(named, kept, kept if result and len(waiting) > _MOST_WAITING else result)
+            # Of a combination's parts, only what is found here is kept.
+            job = partial(_detect, asked, content, named, boxes, sha256 if n_here else None)
+            yield key, None if result else job
 
-    alike = partial(_identity, asked)
-    found = run_jobs(missing(), n_here or workers, "threads", alike=alike, named=paths.__getitem__)
+    alike, named = partial(_identity, asked), lambda key: waiting[key].name
     # disable=None: no bar unless standard error is a terminal.
     try:
-        with tqdm(desc=name, total=len(paths), disable=None if progress else True) as bar:
-            for key, result in found:
-                write_result(kept[key], result)
-                done[key] = result
-                bar.update(len(done) - bar.n)
+        with tqdm(desc=name, total=n_images, disable=None if progress else True) as bar:
+            for key, found in run_jobs(jobs(), n_here or workers, "threads", alike=alike, named=named):
+                if isinstance(found, Timed):
+                    write_result(waiting[key].kept, found)
+                    waiting[key].found = waiting[key].kept if len(waiting) > _MOST_WAITING else found
+                elif found is not None:
+                    waiting[key].found = InputError(found)
+                for done in _in_order(waiting):
+                    bar.update()
+                    yield done
     finally:
         _made.__dict__.clear()
-    return {key: done[key] for key in paths}
+
+
+def _in_order(waiting: OrderedDict[Key, _Waiting]) -> Iterator[tuple[Key, Timed | InputError]]:
+    """Take those results off the front that are there."""
+    while waiting and (found := next(iter(waiting.values())).found) is not None:
+        key, image = waiting.popitem(last=False)
+        if isinstance(found, Path):
+            gone = InputError(f"{found}: was removed while it was needed; run the same command again")
+            found = read_result(found) or gone
+        yield key, found
+
+
+def _content(image: Image) -> tuple[bytes | np.ndarray, str]:
+    """What a job is given of an image, and its hash."""
+    if isinstance(image, np.ndarray):
+        return image, pixels_sha256(image)
+    content = image_bytes(image)
+    return content, sha256_bytes(content)
 
 
 _made = threading.local()  # each thread's own detector, the one that was asked for last
@@ -181,9 +272,15 @@ def _identity(asked: tuple) -> dict:
 
 
 def _detect(
-    asked: tuple, content: bytes, path: str, boxes_px: np.ndarray | None, sha256: str | None
-) -> Timed:
+    asked: tuple, image: bytes | np.ndarray, named: str, boxes_px: np.ndarray | None, sha256: str | None
+) -> Timed | str:
+    """What is found in an image, or why it cannot be read: raised, that would end the others' run too."""
+    runner = _runner(*asked)
     try:
-        return _runner(*asked).detect(decode_image(content, path), boxes_px, sha256)
+        pixels = decode_image(image, named) if isinstance(image, bytes) else image
+    except InputError as error:
+        return str(error)
+    try:
+        return runner.detect(pixels, boxes_px, sha256)
     except IsolationError as error:
-        raise IsolationError(f"{path}: {error}") from None
+        raise IsolationError(f"{named}: {error}") from None

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, refuse_unknown
@@ -23,6 +24,8 @@ from hicp_lib.formats.importers.results import ALPHAPOSE, COCO, DETECTRON2, read
 from hicp_lib.formats.importers.scores import score_scale
 from hicp_lib.formats.units import refuse_fractions
 
+_LEAST_IMAGES = 5  # that say whether coordinates are those of another size
+_OFF, _ALIKE = np.log(1.25), 0.1  # what is another size, and the same; of ratios' logarithms
 READERS: dict[str, Callable[[Path], People]] = {
     "openpose": read_openpose,
     "alphapose": lambda path: read_results(path, ALPHAPOSE),
@@ -143,8 +146,6 @@ def import_predictions(
     if scale is not None and not 0 < scale < np.inf:
         raise InputError(f"--score-scale is {scale:g}; expected a positive number")
     people = READERS[format](Path(path))
-    if not len(people):
-        raise InputError(f"{path}: holds no people; check the run, or leave this detector out")
     refuse_fractions(people.path, people.keypoints_px)
     matched = match_images(people.path, people.sources, people.named_by, annotations.images)
     scale = score_scale(format, people) if scale is None else scale
@@ -153,8 +154,27 @@ def import_predictions(
     sizes = np.array([(image.width_px, image.height_px) for image in shown]).reshape(-1, 2)
     if format == "openpose":
         refuse_other_size(people.path, people.keypoints_px[rows], sizes)
+    image_ids = np.array([matched[s] for s in people.source_of[rows]], dtype=np.int64)
+    _refuse_other_scale(people.path, people.keypoints_px[rows], image_ids, annotations)
     detections, extras = _by_image(people, matched, annotations, scale)
     return Imported(detections, extras, _summary(format, people, matched, annotations, rows, sizes, scale))
+
+
+def _refuse_other_scale(
+    path: Path, points_px: np.ndarray, image_ids: np.ndarray, annotations: Annotations
+) -> None:
+    """Refuse coordinates in images of another size: people end too soon or late, alike in both directions."""
+    ends_px = pd.DataFrame(np.nan_to_num(points_px, nan=-np.inf).max(axis=1)).groupby(image_ids).max()
+    boxes_px = annotations.boxes_px[:, :2] + annotations.boxes_px[:, 2:]
+    ratios = ends_px / pd.DataFrame(boxes_px).groupby(annotations.image_ids).max()
+    logs = np.log(ratios[(ratios > 0) & (ratios < np.inf)].dropna())
+    middle = logs.median()
+    alike = abs(middle[0] - middle[1]) < _ALIKE and ((logs - middle).abs().median() < _ALIKE).all()
+    if len(logs) >= _LEAST_IMAGES and alike and (middle.abs() > _OFF).all():
+        raise InputError(
+            f"{path}: people end at {np.exp(middle.mean()):.2f} of where the annotated ones do, across and "
+            "down; expected pixels of the annotated images: of OpenPose, run it with --keypoint_scale 0"
+        )
 
 
 def _by_image(
@@ -166,7 +186,7 @@ def _by_image(
     extras: dict[int, list[dict]] = {image: [] for image in annotations.images}
     order = np.argsort(people.source_of, kind="stable")
     starts = np.searchsorted(people.source_of[order], np.arange(1, len(matched)))
-    for image, rows in zip(matched, np.split(order, starts), strict=True):
+    for image, rows in zip(matched, np.split(order, starts), strict=bool(matched)):
         if image is not None:
             points = people.keypoints_px[rows]
             detections[image] = Detections(points, scores[rows], people.person_scores[rows])
@@ -183,18 +203,10 @@ def _summary(
     outside = given & ~inside(points, (0, 0, *sizes_px.T[..., None]))
     n_mentioned = sum(image is not None for image in matched)
     n_with = len(set(people.source_of[rows].tolist()))
+    unmatched = tuple(str(s) for s, image in zip(people.sources, matched, strict=True) if image is None)
+    low, middle, high = np.quantile(raw[given], [0, 0.5, 1]).tolist() if given.any() else (0.0, 0.0, 0.0)
+    n, counts = len(annotations.images), (int((raw > scale).sum()), int(given.sum()), int(outside.sum()))
     return Summary(
-        format=format,
-        n_images=len(annotations.images),
-        n_with_people=n_with,
-        n_without_people=n_mentioned - n_with,
-        n_not_mentioned=len(annotations.images) - n_mentioned,
-        unmatched=tuple(str(s) for s, image in zip(people.sources, matched, strict=True) if image is None),
-        n_people=len(rows),
-        conventions=dict(people.conventions),
-        score_range=tuple(np.quantile(raw[given], [0, 0.5, 1]).tolist()) if given.any() else (0.0, 0.0, 0.0),
-        score_scale=float(scale),
-        n_cut=int((raw > scale).sum()),
-        n_keypoints=int(given.sum()),
-        n_outside=int(outside.sum()),
-    )
+        format, n, n_with, n_mentioned - n_with, n - n_mentioned, unmatched, len(rows),
+        dict(people.conventions), (low, middle, high), float(scale), *counts,
+    )  # fmt: skip

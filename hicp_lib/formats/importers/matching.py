@@ -56,9 +56,9 @@ def match_images(
                 f"{path}: {first[image]!r} and {source!r} both belong to the image "
                 f"{images[image].file_name}; leave the predictions of one run only"
             )
-    if not first:
+    if sources and not first:
         example = next(iter(images.values())).file_name if images else "no image"
-        its_example = repr(sources[0])[:80] if sources else "none"
+        its_example = repr(sources[0])[:80]
         raise InputError(
             f"{path}: none of its {len(sources)} images is annotated; it has {its_example}, "
             f"the annotations {example}; give the annotations of the images the tool saw"
@@ -92,7 +92,7 @@ def _image_of(
         by_number = [] if named_by == "id" else tables[_last_number].get(source, [])
         candidates = sorted({*by_number, *([source] if source in images else [])})
     elif named_by == "stem":
-        candidates = tables[_stem].get(source, [])
+        candidates = tables[_stem].get(source) or tables[_name].get(source, [])
     else:
         path = _path(source)
         candidates = next((tables[k][k(path)] for k in (str, _name, _stem) if k(path) in tables[k]), [])

@@ -1,5 +1,7 @@
-"""MMPoseInferencer's prediction folders (`pred_out_dir`): `<name>.json` for each image.
+"""MMPose's prediction folders: the inferencer's (`pred_out_dir`), and the demos' (`--save-predictions`).
 
+- The inferencer writes `<name>.json` for each image; the demos `results_<name>.json`, the same people as
+  `instance_info` beside `meta_info`, whose names of keypoints say which they are.
 - A file is a list of people: `keypoints` [[x, y], ...], `keypoint_scores`, and from top-down models `bbox`
   [[x1, y1, x2, y2]] (a list of one) and `bbox_score`.
 - Keypoint scores are the decoder's maxima: about 0 to 1 for heat maps, RTMPose and DWPose, up to about
@@ -11,9 +13,8 @@ Sources: MMPose's inferencer, `split_instances`, and `CocoMetric` ("bbox_keypoin
 """
 
 from collections import Counter
-from itertools import chain
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,9 +22,11 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
 from hicp_lib.formats.importers.people import FileRows, People, json_files, split
 from hicp_lib.formats.json_validation import CONVENTIONS, Rows, shown
+from hicp_lib.formats.layouts import layouts_of
 
 _KNOWN_KEYS = {"keypoints", "keypoint_scores", "bbox"}
 _COUNTED_FROM = 0.2
+_SAVED = "results_"  # what --save-predictions puts before an image's name
 
 
 def read_mmpose(path: Path) -> People:
@@ -43,62 +46,60 @@ def read_mmpose(path: Path) -> People:
     InputError
         For anything malformed, and for predictions of a video.
     """
-    files = json_files(path, ".json", "the folder MMPoseInferencer wrote with pred_out_dir")
-    rows, source_of = FileRows.joined(path, "instances", {file: _instances(file) for file in files.values()})
-    triples, conventions = _triples(rows)
+    files = json_files(path, (".json",), "the folder MMPoseInferencer wrote with pred_out_dir")
+    read = {file: _instances(file) for file in files.values()}
+    sources = [n.removeprefix(_SAVED) if read[file][1] is not None else n for n, file in files.items()]
+    of_models = {names for _, names in read.values() if names}
+    if len(of_models) > 1:
+        raise InputError(f"{path}: keypoint_id2name differs from file to file; import each model by itself")
+    layouts, _ = layouts_of(f"{path}: keypoint_id2name", next(iter(of_models), ()))
+    joined, source_of = FileRows.joined(
+        path, "instances", {file: people for file, (people, _) in read.items()}
+    )
+    rows = replace(joined, rows=[row | {"keypoints": _flat(joined, i)} for i, row in enumerate(joined.rows)])
+    triples = rows.keypoints(layouts)
+    conventions = Counter(CONVENTIONS.get(len(row["keypoints"]) // 3, "by their names") for row in rows.rows)
     keypoints, scores = split(triples, triples[..., 2] > 0)
     counted = scores > _COUNTED_FROM
     means = np.where(counted, scores, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
     return People(
-        path, "stem", list(files), source_of, keypoints, scores,
+        path, "stem", sources, source_of, keypoints, scores,
         rows.numbers("bbox_score", default=1.0) * means,  # 1 where a bottom-up model gave no box
         conventions, _extras(rows),
     )  # fmt: skip
 
 
-def _instances(file: Path) -> list[dict]:
-    rows = Rows.of(file, "instances", read_json(file)).rows
+def _instances(file: Path) -> tuple[list[dict], tuple[str, ...] | None]:
+    """Who is in a file, and of a demo's, the names of their keypoints if it has them."""
+    data, names = read_json(file), None
+    if isinstance(data, dict) and "instance_info" in data:
+        meta = data.get("meta_info")
+        named = meta.get("keypoint_id2name") if isinstance(meta, dict) else None
+        names = tuple(str(named.get(str(i))) for i in range(len(named))) if isinstance(named, dict) else ()
+        data = data["instance_info"]
+    rows = Rows.of(file, "instances", data).rows
     if rows and "instances" in rows[0]:
         raise InputError(f"{file}: holds the frames of a video; run MMPose on the images, one file each")
-    return rows
+    return rows, names
 
 
-def _triples(rows: FileRows) -> tuple[np.ndarray, Counter[str]]:
-    scores = rows.column("keypoint_scores")
-    points = rows.column("keypoints", _is_points, "one [x, y] per keypoint")
-    flat = {i: _flat(rows, i, *both) for i, both in enumerate(zip(points, scores, strict=True))}
-    positions, conventions = rows.points("keypoints", flat, CONVENTIONS, width=2)
-    values, _ = rows.points("keypoint_scores", dict(enumerate(scores)), CONVENTIONS, width=1)
-    return np.concatenate([positions, values], axis=-1), conventions
-
-
-def _is_points(value: Any) -> bool:
-    return isinstance(value, list) and set(map(type, value)) == {list} and set(map(len, value)) == {2}
-
-
-def _flat(rows: FileRows, i: int, points: list, scores: Any) -> list:
-    """One person's [[x, y], ...] as a flat list, once the number of them and of the scores is right."""
-    if len(points) not in CONVENTIONS:
-        counts = ", ".join(map(str, CONVENTIONS))
-        raise rows.error(i, f"keypoints has {len(points)} points; expected a whole person's {counts}")
+def _flat(rows: FileRows, i: int) -> list:
+    """One person's x, y, score of each keypoint in one list."""
+    points, scores = (rows.rows[i].get(key) for key in ("keypoints", "keypoint_scores"))
+    if not isinstance(points, list) or not all(isinstance(xy, list) and len(xy) == 2 for xy in points):
+        raise rows.error(i, f"keypoints is {shown(points)}; expected one [x, y] per keypoint")
     if not isinstance(scores, list) or len(scores) != len(points):
         raise rows.error(i, f"keypoint_scores is {shown(scores)}; expected {len(points)} numbers")
-    return list(chain.from_iterable(points))
+    return [value for (x, y), score in zip(points, scores, strict=True) for value in (x, y, score)]
 
 
 def _extras(rows: FileRows) -> list[dict]:
     """What else is written, the box as COCO has it."""
     extras = rows.extras(_KNOWN_KEYS)
-    for i, row in enumerate(rows.rows):
-        if "bbox" in row:
-            x1, y1, x2, y2 = _corners(rows, i, row["bbox"])
-            extras[i]["bbox"] = [x1, y1, x2 - x1, y2 - y1]
+    for i, box in ((i, row["bbox"]) for i, row in enumerate(rows.rows) if "bbox" in row):
+        corners = box[0] if isinstance(box, list) and len(box) == 1 else box
+        if not isinstance(corners, list) or len(corners) != 4:
+            raise rows.error(i, f"bbox is {shown(corners)}; expected [[x1, y1, x2, y2]]")
+        x1, y1, x2, y2 = rows.finite([corners], 4, lambda j: f"bbox[{j}]", [i])[0].tolist()
+        extras[i]["bbox"] = [x1, y1, x2 - x1, y2 - y1]
     return extras
-
-
-def _corners(rows: FileRows, i: int, box: Any) -> list[float]:
-    if isinstance(box, list) and len(box) == 1:
-        box = box[0]
-    if not isinstance(box, list) or len(box) != 4:
-        raise rows.error(i, f"bbox is {shown(box)}; expected [[x1, y1, x2, y2]]")
-    return rows.finite([box], 4, lambda j: f"bbox[{j}]", [i])[0].tolist()

@@ -1,10 +1,12 @@
-"""OpenPose's `--write_json` folders: `<name>_keypoints.json` for each image.
+"""OpenPose's `--write_json` folders, and those of others in its style: a file for each image.
 
-- The body has 25 parts (BODY_25) or 18 (COCO), told by the length of its list; face 70 and hands 21 each.
-  An empty list is a part of the model that was not run; a part with confidence 0 was not found.
+- A file is named `<name>_keypoints.json`, or where there is none such `<name>.json`.
+- The body has 25 parts (BODY_25) or 18 (COCO), told by the length of its list; face 70 and hands 21 each. In
+  OpenPose's style others write 17 (COCO), 26 or 136 (Halpe) and 133 (COCO-WholeBody), face and hands among
+  them. An empty list, or null, is a part of the model that was not run; one with confidence 0 was not found.
 - Coordinates are read as source pixels (`--keypoint_scale 0`, OpenPose's default) and refused otherwise.
-- OpenPose adds half a pixel to the body's peaks, not to those of face and hands; it is taken off, which
-  puts pixel centres at integers.
+- OpenPose itself adds half a pixel to the body's peaks, not to those of face and hands; it is taken off,
+  which puts pixel centres at integers. Who writes a text as `version`, as AlphaPose does, is not OpenPose.
 - No score of the person is written (OpenPose's own averages parts and limbs, and limbs are not in the
   file). Here it is the sum of the body parts' confidences over the number of parts, absent ones 0;
   where no body was run, the mean confidence of what was found.
@@ -19,16 +21,16 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
-from hicp_lib.core.keypoints import BODY, N_KEYPOINTS
+from hicp_lib.core.keypoints import BODY, N_KEYPOINTS, TO_HALPE
 from hicp_lib.formats.importers.people import FileRows, People, json_files, split
 from hicp_lib.formats.importers.results import OPENPOSE, read_results
-from hicp_lib.formats.json_validation import Rows
+from hicp_lib.formats.json_validation import CONVENTIONS, Rows
 
-_ENDING = "_keypoints.json"
+_ENDINGS = ("_keypoints.json", ".json")
 _BODY = "pose_keypoints_2d"
 # Key -> what its list may be, by length.
 _PARTS = {
-    _BODY: {75: "openpose_body25", 54: "openpose_coco18"},
+    _BODY: {75: "openpose_body25", 54: "openpose_coco18"} | {3 * n: name for n, name in CONVENTIONS.items()},
     "face_keypoints_2d": {210: "openpose_face70"},
     "hand_left_keypoints_2d": {63: "left_hand21"},
     "hand_right_keypoints_2d": {63: "right_hand21"},
@@ -57,11 +59,12 @@ def read_openpose(path: Path) -> People:
     """
     if path.is_file():
         return read_results(path, OPENPOSE)
-    files = json_files(path, _ENDING, "the folder OpenPose wrote with --write_json")
-    rows, source_of = FileRows.joined(path, "people", {file: _people(file) for file in files.values()})
-    triples, conventions, n_parts = _triples(rows)
+    files = json_files(path, _ENDINGS, "the folder OpenPose wrote with --write_json")
+    read = {file: _people(file) for file in files.values()}
+    rows, source_of = FileRows.joined(path, "people", {file: people for file, (people, _) in read.items()})
+    of_openpose = np.array([own for _, own in read.values()])[source_of]
+    triples, conventions, n_parts = _triples(rows, of_openpose)
     keypoints, scores = split(triples, triples[..., 2] > 0)
-    _refuse_normalised(path, keypoints)
     parts, n_counted = scores[:, BODY], n_parts
     if not n_parts.any():  # only face or hands were run
         parts, n_counted = scores, (scores > 0).sum(axis=1)
@@ -72,14 +75,16 @@ def read_openpose(path: Path) -> People:
     )  # fmt: skip
 
 
-def _people(file: Path) -> list[dict]:
+def _people(file: Path) -> tuple[list[dict], bool]:
+    """Who is in a file, and whether OpenPose itself may have written it."""
     data = read_json(file)
+    data = data or {"people": []} if isinstance(data, list) else data
     if not isinstance(data, dict) or "people" not in data:
         raise InputError(f"{file}: has no 'people'; expected a file of OpenPose's --write_json")
-    return Rows.of(file, "people", data["people"]).rows
+    return Rows.of(file, "people", data["people"]).rows, not isinstance(data.get("version"), str)
 
 
-def _triples(rows: FileRows) -> tuple[np.ndarray, Counter[str], np.ndarray]:
+def _triples(rows: FileRows, of_openpose: np.ndarray) -> tuple[np.ndarray, Counter[str], np.ndarray]:
     """All parts as (n, 136, 3), people per convention, and the number of the body's parts, shape (n,)."""
     triples, n_parts = np.zeros((len(rows.rows), N_KEYPOINTS, 3)), np.zeros(len(rows.rows))
     conventions: Counter[str] = Counter()
@@ -88,10 +93,13 @@ def _triples(rows: FileRows) -> tuple[np.ndarray, Counter[str], np.ndarray]:
         by_number = {length // 3: convention for length, convention in by_length.items()}
         points, found = rows.points(key, lists, by_number)
         if key == _BODY:
-            n_parts[list(lists)] = [len(values) // 3 for values in lists.values()]
-            points[..., :2] -= OPENPOSE.offset_px * (points[..., 2:] > 0)
+            for i, values in lists.items():
+                convention = by_length[len(values)]
+                n_parts[i] = np.isin(TO_HALPE[convention], BODY).sum()
+                if of_openpose[i] and convention.startswith("openpose"):
+                    points[i, :, :2] -= OPENPOSE.offset_px * (points[i, :, 2:] > 0)
         conventions += found
-        triples += points
+        triples = np.where(points[..., 2:] > 0, points, triples)
     return triples, conventions, n_parts
 
 
@@ -101,15 +109,10 @@ def _lists(rows: FileRows, key: str, by_length: dict[int, str]) -> dict[int, lis
     needed: dict[str, list] = {} if key == _BODY else {"default": []}
     allowed = (0, *by_length)
     expected = f"x, y, c per part: {names}, or 0 numbers"
-    values = rows.column(key, lambda v: isinstance(v, list) and len(v) in allowed, expected, **needed)
+    values = rows.column(
+        key, lambda v: v is None or isinstance(v, list) and len(v) in allowed, expected, **needed
+    )
     return {i: value for i, value in enumerate(values) if value}
-
-
-def _refuse_normalised(path: Path, keypoints_px: np.ndarray) -> None:
-    values = keypoints_px[np.isfinite(keypoints_px)]
-    if values.size and np.abs(values).max() <= 1:
-        span = "[0, 1]" if values.min() >= 0 else "[-1, 1]"
-        raise InputError(f"{path}: all coordinates lie in {span}; expected pixels, {_RUN_AGAIN}")
 
 
 def refuse_other_size(path: Path, keypoints_px: np.ndarray, sizes_px: np.ndarray) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import natural_order
 from hicp_lib.formats.importers.matching import NamedBy
 from hicp_lib.formats.json_validation import Rows
 
@@ -101,15 +102,15 @@ class FileRows(Rows):
         return InputError(f"{path}: {self.label}[{entry}]: {problem}")
 
 
-def json_files(folder: Path, ending: str, what: str) -> dict[str, Path]:
-    """Files of a folder by their name without `ending`, in the order of names.
+def json_files(folder: Path, endings: tuple[str, ...], what: str) -> dict[str, Path]:
+    """Files of a folder by their name without the ending, in the order of names and of numbers in them.
 
     Parameters
     ----------
     folder : Path
         Where they are.
-    ending : str
-        How their names end.
+    endings : tuple of str
+        How their names end; the first that any has.
     what : str
         Which folder to give, for messages.
 
@@ -123,10 +124,11 @@ def json_files(folder: Path, ending: str, what: str) -> dict[str, Path]:
         If it is no folder, or holds no such file.
     """
     try:
-        names = sorted(entry.name for entry in os.scandir(folder) if entry.name.endswith(ending))
+        names = sorted((entry.name for entry in os.scandir(folder)), key=natural_order)
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); give {what}") from None
-    files = {name.removesuffix(ending): folder / name for name in names if name != ending}
-    if not files:
-        raise InputError(f"{folder}: holds no file *{ending}; give {what}")
-    return files
+    for ending in endings:
+        files = {n.removesuffix(ending): folder / n for n in names if n.endswith(ending) and n[0] not in "._"}
+        if files:
+            return files
+    raise InputError(f"{folder}: holds no file *{endings[0]}; give {what}")

@@ -2,7 +2,9 @@
 
 All have `image_id, category_id, keypoints, score`; what each tool does its own way is a `Dialect`:
 
-- COCO: the third number of a keypoint is anything; a keypoint 0, 0, 0 is not given.
+- COCO: the third number of a keypoint is anything; a keypoint 0, 0, 0 is not given. Tables that `hicp detect`
+  writes, and data sets that `hicp export` writes, are read too. Where every row has a `file_name`, that is
+  the image's name, not the id.
 - Detectron2's `coco_instances_results.json`: it takes half a pixel off its continuous coordinates on
   writing, which puts pixel centres at integers as everywhere here, so nothing is added on reading.
   Keypoint scores are the softmax mass of the best cell of a 56 x 56 grid: small numbers, 0.05 is a lot.
@@ -25,12 +27,12 @@ from typing import Any, Literal
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_json
 from hicp_lib.formats.annotations import PERSON_CATEGORY
+from hicp_lib.formats.detection_files import read_rows
 from hicp_lib.formats.importers.people import People, split
 from hicp_lib.formats.json_validation import PART_KEYS, Rows, shown
 
-_KNOWN_KEYS = {"image_id", "category_id", "keypoints", "score", *PART_KEYS}
+_KNOWN_KEYS = {"image_id", "file_name", "category_id", "keypoints", "score", *PART_KEYS}
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ def read_results(path: Path, dialect: Dialect) -> People:
         For anything malformed; the message names the file, the row, the key and what was expected.
     """
     path = path / dialect.file_name if path.is_dir() else path
-    rows = Rows.of(path, "results", _checked_list(path, read_json(path), dialect), name_key="image_id")
+    rows = Rows.of(path, "results", _checked_list(path, read_rows(path), dialect), name_key="image_id")
     sources, source_of = _sources(rows)
     for i, category in enumerate(rows.column("category_id", default=PERSON_CATEGORY)):
         if type(category) is not int or category not in dialect.categories:
@@ -105,9 +107,22 @@ def read_results(path: Path, dialect: Dialect) -> People:
 def _checked_list(path: Path, value: Any, dialect: Dialect) -> list:
     if isinstance(value, dict) and dialect is ALPHAPOSE:
         raise InputError(f"{path}: was written with --format cmu or open; run AlphaPose without --format")
+    if isinstance(value, dict) and (exported := _exported(value.get("annotations"))):
+        return exported
     if isinstance(value, dict) and "annotations" in value:
         raise InputError(f"{path}: holds annotations; expected {dialect.tool} results, a list of objects")
     return value
+
+
+def _exported(rows: Any) -> list[dict]:
+    """Results out of a data set that `hicp export` wrote, its flags replaced by its scores; else none."""
+    try:
+        triples = [np.reshape(row["keypoints"], (-1, 3)).copy() for row in rows]
+        for row, of in zip(rows, triples, strict=True):
+            of[:, 2] = row["confidence"]
+    except (KeyError, TypeError, ValueError):
+        return []
+    return [row | {"keypoints": of.ravel().tolist()} for row, of in zip(rows, triples, strict=True)]
 
 
 def _is_image_id(value: Any) -> bool:
@@ -115,7 +130,9 @@ def _is_image_id(value: Any) -> bool:
 
 
 def _sources(rows: Rows) -> tuple[list[str | int], np.ndarray]:
-    """The images in the order of the file, and the index of each row's."""
-    keys = rows.column("image_id", _is_image_id, "a whole number or a file name")
+    """The images in the order of the file, by name where all rows have one, and the index of each row's."""
+    named = bool(rows.rows) and all("file_name" in row for row in rows.rows)
+    key = "file_name" if named else "image_id"
+    keys = rows.column(key, _is_image_id, "a whole number or a file name")
     index = {key: i for i, key in enumerate(dict.fromkeys(keys))}
     return list(index), np.array([index[key] for key in keys], dtype=int)

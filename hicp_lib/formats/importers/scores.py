@@ -4,18 +4,17 @@ A score is divided by its format's scale and cut to [0, 1], where order is kept,
 equal; the tool's own score stays beside it. This makes ranges equal, not meanings: 0.3 of one tool is still
 not 0.3 of another.
 
-- OpenPose, AlphaPose, Detectron2: scale 1. OpenPose's confidences lie in [0, 1]; heat-map maxima and
-  Detectron2's softmax mass can pass 1 by a little.
-- MMPose and plain COCO results: 1, or 10 when a score is above 2, which only RTMW's are (up to about 10).
-  Between 1 and 2 both may be meant, and the network's next folder could fall on the other side: asked for.
-- Scores above 20 belong to no known scale, which must then be given.
+A detector has one scale, whatever the highest score in a folder is: 1, or where scores pass that it is asked
+for. OpenPose's confidences lie in [0, 1]; AlphaPose's heat-map maxima and Detectron2's softmax mass can pass
+1 by a little. MMPose's can be those of RTMW, which reach about 10, and so can plain COCO results.
 """
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.formats.importers.people import People
 
+_RTMW_SCALE, _RTMW_UP_TO = 10.0, 20.0
 _WITH_RTMW = ("mmpose", "coco")
-_RTMW_SCALE, _SURELY_RTMW_FROM, _RTMW_UP_TO = 10.0, 2.0, 20.0
+_A_LITTLE_MORE = 2.0  # than 1
 
 
 def score_scale(format: str, people: People) -> float:
@@ -35,19 +34,14 @@ def score_scale(format: str, people: People) -> float:
     Raises
     ------
     InputError
-        If the scores fit no known scale, or more than one.
+        If they pass 1, and another scale may be meant.
     """
     highest = people.raw_scores.max(initial=0.0)
-    if highest > _RTMW_UP_TO:
-        raise InputError(
-            f"{people.path}: keypoint scores go up to {highest:g}; expected at most {_RTMW_UP_TO:g}, "
-            "or give --score-scale, the score that is to become 1"
-        )
-    if format not in _WITH_RTMW or highest <= 1:
+    if highest <= (1.0 if format in _WITH_RTMW else _A_LITTLE_MORE):
         return 1.0
-    if highest <= _SURELY_RTMW_FROM:
-        raise InputError(
-            f"{people.path}: keypoint scores go up to {highest:g}, as those of two scales may; give "
-            f"--score-scale {_RTMW_SCALE:g} if RTMW wrote them, else --score-scale 1"
-        )
-    return _RTMW_SCALE
+    known = highest <= _RTMW_UP_TO and format in _WITH_RTMW
+    rtmw = f" ({_RTMW_SCALE:g} if RTMW wrote them; if not, 1, and what passes it is cut)" if known else ""
+    raise InputError(
+        f"{people.path}: keypoint scores go up to {highest:.4g}; give --score-scale, the score that is to "
+        f"become 1{rtmw}, the same for every folder of this detector"
+    )

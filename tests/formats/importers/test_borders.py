@@ -31,22 +31,24 @@ def people(highest: float = 0.5, named_by="stem", sources=("a",)) -> People:
 
 
 @pytest.mark.parametrize("format", ["openpose", "alphapose", "detectron2"])
-def test_scores_of_formats_that_rtmw_does_not_write_are_taken_as_they_are(format):
-    assert score_scale(format, people(1.6)) == score_scale(format, people(20.0)) == 1
-    with pytest.raises(InputError, match="go up to 20.5"):
-        score_scale(format, people(20.5))
+def test_scores_of_formats_that_rtmw_does_not_write_may_pass_1_a_little(format):
+    assert score_scale(format, people(1.0)) == score_scale(format, people(2.0)) == 1
+    with pytest.raises(
+        InputError, match="go up to 2.1; give --score-scale, the score that is to become 1, the"
+    ):
+        score_scale(format, people(2.1))
 
 
 @pytest.mark.parametrize("format", ["mmpose", "coco"])
 def test_rtmws_scale_is_never_taken_for_another_in_the_next_folder(format):
-    """Of one detector 4 and 1.6 were found in two folders: the first is RTMW's, the second is asked for."""
+    """Of one detector 4, 1.6 and 0.9 are found in three folders."""
     assert score_scale(format, people(1.0)) == 1
-    for highest in (np.nextafter(1.0, 2), 1.6, 2.0):
-        with pytest.raises(InputError, match="--score-scale 10 if RTMW wrote them, else --score-scale 1"):
+    for highest in (np.nextafter(1.0, 2), 1.6, 4.0, 20.0):
+        with pytest.raises(InputError, match="10 if RTMW wrote them"):
             score_scale(format, people(highest))
-    for highest in (np.nextafter(2.0, 3), 4.0, 20.0):
-        assert score_scale(format, people(highest)) == 10
-    with pytest.raises(InputError, match="go up to 20.5; expected at most 20, or give --score-scale"):
+    with pytest.raises(
+        InputError, match="go up to 20.5; give --score-scale, the score that is to become 1, the"
+    ):
         score_scale(format, people(20.5))
 
 

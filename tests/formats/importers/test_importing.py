@@ -146,12 +146,12 @@ def test_openpose_coco_json_has_flags_for_scores(tmp_path, images, found):
     assert np.allclose(people.keypoints_px[1, :17], found[NAMES[785]][1].points_px[:17], rtol=1e-6)
 
 
-@pytest.mark.parametrize(("highest", "scale"), [(0.98, 1), (8.4, 10)], ids=["heat map", "RTMW"])
-def test_mmpose_scores_above_one(tmp_path, images, highest, scale):
+@pytest.mark.parametrize(("highest", "scale"), [(0.98, None), (8.4, 10)], ids=["heat map", "RTMW"])
+def test_mmpose_scores_keep_their_order(tmp_path, images, highest, scale):
     scores = np.linspace(0.01, highest, 136)
     write_mmpose(tmp_path, {NAMES[785]: [make_person(scores=scores, score=0.5)]}, "halpe136")
-    imported = import_predictions("mmpose", tmp_path, images)
-    people = imported.detections[785]
+    imported = import_predictions("mmpose", tmp_path, images, scale)
+    people, scale = imported.detections[785], scale or 1
     assert imported.summary.score_scale == scale
     assert np.allclose(people.scores[0], np.minimum(scores / scale, 1), rtol=1e-6)
     assert (np.diff(people.scores[0]) >= 0).all()

@@ -1,0 +1,45 @@
+"""Videos in: one frame after the other."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from hicp_lib.core.errors import InputError
+
+SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".webm")
+
+
+def open_video(path: str | Path) -> tuple[int, Iterator[tuple[float, np.ndarray]]]:
+    """The frames of a video, turned as players show them.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    n_frames : int
+        How many it says it has; 0 if it does not say.
+    frames : iterator of (float, array of shape (height, width, 3))
+        Time in seconds, as the file gives it, and the image, RGB, uint8.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    capture = cv2.VideoCapture(str(path))
+    if not capture.isOpened():
+        raise InputError(f"{path}: is no video that OpenCV can read; give .mp4, .avi or .mov, or images")
+
+    def frames() -> Iterator[tuple[float, np.ndarray]]:
+        while capture.grab():
+            time_s = capture.get(cv2.CAP_PROP_POS_MSEC) / 1e3
+            decoded, bgr = capture.retrieve()
+            if not decoded:
+                return
+            yield time_s, cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+
+    return max(0, int(capture.get(cv2.CAP_PROP_FRAME_COUNT))), frames()

@@ -1,0 +1,162 @@
+"""People in a folder of images, a data set or a video, written to a file as they are found."""
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import atomic_path, natural_order
+from hicp_lib.core.video import SUFFIXES as VIDEO_SUFFIXES
+from hicp_lib.core.video import open_video
+from hicp_lib.detectors.runtime.run import Image, boxes_by_image, detect_each
+from hicp_lib.formats.annotations import read_annotations
+from hicp_lib.formats.detection_files import json_list, open_detections
+
+IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".webp", ".tif", ".tiff")
+
+
+Facts = dict[str, Any]  # what is known of an image: `file_name`, or of a frame `frame` and `time_s`
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """What is to be looked at.
+
+    Attributes
+    ----------
+    source : Path
+        The folder or video, for messages.
+    images : iterable of (int, dict, path or array)
+        Image ids, what is known of each, and the images.
+    n_images : int or None
+        How many it should be; None if that is not known.
+    boxes_px : mapping of int to array, optional
+        Annotated boxes by image id.
+    """
+
+    source: Path
+    images: Iterable[tuple[int, Facts, Image]]
+    n_images: int | None
+    boxes_px: Mapping[int, np.ndarray] | None = None
+
+
+def open_pictures(source: Path) -> Pictures:
+    """The images of a folder, or the frames of a video.
+
+    Image ids are as COCO numbers its files (000000012345.jpg is 12345), else by the order of names, in which
+    numbers are in their order; of a video, frames from 0.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    if source.suffix.lower() in VIDEO_SUFFIXES:
+        n_frames, frames = open_video(source)
+        images = ((i, {"frame": i, "time_s": time_s}, frame) for i, (time_s, frame) in enumerate(frames))
+        return Pictures(source, images, n_frames or None)
+    if not source.is_dir():
+        raise InputError(f"{source}: is not a folder; give the folder that holds the images, or a video")
+    names = [entry.name for entry in os.scandir(source) if entry.name.lower().endswith(IMAGE_SUFFIXES)]
+    if not names:
+        raise InputError(f"{source}: holds no images; expected files such as 000001.jpg or photo.png")
+    names.sort(key=natural_order)
+    stems = [os.path.splitext(name)[0] for name in names]
+    numbers = {int(stem) for stem in stems if stem.isascii() and stem.isdigit()}
+    ids = map(int, stems) if len(numbers) == len(names) else range(1, len(names) + 1)
+    return Pictures(source, _files(source, zip(ids, names, strict=True)), len(names))
+
+
+def open_dataset(folder: Path) -> Pictures:
+    """The images of a data set folder (`images/`, `annotations.json`), with the annotated boxes.
+
+    Raises
+    ------
+    InputError
+        If the annotations are absent or malformed.
+    """
+    annotations = read_annotations(folder / "annotations.json")
+    names = [(i, image.file_name) for i, image in annotations.images.items()]
+    return Pictures(folder, _files(folder / "images", names), len(names), boxes_by_image(annotations))
+
+
+def _files(folder: Path, names: Iterable[tuple[int, str]]) -> Iterator[tuple[int, Facts, Image]]:
+    return ((i, {"file_name": name}, f"{folder}{os.sep}{name}") for i, name in names)
+
+
+def detect_to_file(
+    name: str, pictures: Pictures, out: Path, tell: Callable[[str], None],
+    by_image: Callable[[str], None] | None = None, strict: bool = False, **options,
+) -> tuple[int, int, int]:  # fmt: skip
+    """Find people and write them, image by image; a picture that cannot be read is passed over.
+
+    Beside `out`, `OUT.images.json` names all images, also those with nobody, and tells of those that could
+    not be read.
+
+    Parameters
+    ----------
+    name : str
+        The detector.
+    pictures : Pictures
+    out : Path
+        The file to write, as `hicp_lib.formats.detection_files.open_detections` says.
+    tell : callable
+        Takes what is amiss, a line at a time.
+    by_image : callable, optional
+        Takes a line about each image.
+    strict : bool, optional
+        Whether a picture that cannot be read ends the run.
+    **options : object
+        Of `hicp_lib.detectors.runtime.run.detect_each`.
+
+    Returns
+    -------
+    n_people, n_images, n_broken : int
+        People found, images they were looked for in, and images that could not be read.
+
+    Raises
+    ------
+    InputError
+        If no image can be read, or one where `strict`; and as of `detect_each`.
+    """
+    n_people = n_images = n_broken = 0
+    n, known = pictures.n_images, dict[int, Facts]()
+    images = (known.update({i: facts}) or (i, image) for i, facts, image in pictures.images)
+    each = detect_each(name, images, boxes_px=pictures.boxes_px, n_images=n, **options)
+    with ExitStack() as stack:
+        write = stack.enter_context(open_detections(out))
+        listed = stack.enter_context(atomic_path(out.with_suffix(".images.json")))
+        append = stack.enter_context(json_list(listed))
+        for image_id, found in stack.enter_context(closing(each)):
+            facts = known.pop(image_id)
+            if isinstance(found, InputError):
+                if strict:
+                    raise found
+                append({"id": image_id, **facts, "error": str(found)})
+                tell(str(found))
+                n_broken += 1
+                continue
+            append({"id": image_id, **facts})
+            write(image_id, facts, found.detections)
+            if by_image is not None:
+                by_image(_line(image_id, facts, found.detections))
+            n_images, n_people = n_images + 1, n_people + len(found.detections)
+        if not n_images:
+            raise InputError(f"{pictures.source}: none of its {n or 0} images can be read")
+    if n not in (None, n_images + n_broken):
+        tell(f"{pictures.source}: says {n} frames, {n_images} could be decoded; it may be cut off")
+    return n_people, n_images, n_broken
+
+
+def _line(image_id: int, facts: Mapping[str, Any], people: Detections) -> str:
+    """An image's row of a table in text."""
+    name = facts.get("file_name") or f"{facts['time_s']:.3f} s"
+    n_given = np.isfinite(people.keypoints_px).all(axis=-1).sum(axis=1).tolist()
+    each = [f"{score:.2f} ({n})" for score, n in zip(people.person_scores, n_given, strict=True)]
+    return f"{image_id:>8}  {name:<32} {len(people):>3}  {' '.join(each)}".rstrip()

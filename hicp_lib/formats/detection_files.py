@@ -1,0 +1,215 @@
+"""Detections written one image after the other, however many: JSON, CSV or Parquet, as the suffix says.
+
+- `.json`: COCO keypoint results, a list with an object for each person, 136 keypoints in Halpe's order. What
+  is known of the image (`file_name`; of a video's frame `frame` and `time_s`) stands beside `image_id`.
+- `.csv`, `.parquet`: one row per image x person x keypoint given; columns `image_id`, what is known of the
+  image, `person` (from 0), `person_score`, `keypoint` (Halpe's name), `u_px`, `v_px`, `score`.
+
+The bytes follow from the detections and their order alone.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+import pandas as pd
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.errors import InputError, one_line
+from hicp_lib.core.extras import require
+from hicp_lib.core.files import atomic_path, read_json
+from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
+
+SUFFIXES = (".json", ".csv", ".parquet")
+_PEOPLE_AT_ONCE = 1000  # of a table; a group of rows of Parquet
+_Append = Callable[..., None]
+
+
+def refuse_other_suffix(path: str | Path) -> None:
+    """Refuse, before anything is done, a file to write that is in none of the formats.
+
+    Raises
+    ------
+    InputError
+        For another suffix, or Parquet without its library.
+    """
+    suffix = Path(path).suffix
+    if suffix not in SUFFIXES:
+        raise InputError(f"{path}: ends in {suffix or 'no suffix'!r}; expected {', '.join(SUFFIXES)}")
+    if suffix == ".parquet":
+        require("analysis", "pyarrow")
+
+
+@contextmanager
+def open_detections(path: str | Path) -> Iterator[_Append]:
+    """Write a file of detections, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        Its suffix is the format.
+
+    Yields
+    ------
+    callable
+        Takes, of one image after the other, its id, what is known of it, the people in it, and if there are
+        any, further keys of each person's object in JSON.
+
+    Raises
+    ------
+    InputError
+        As `refuse_other_suffix`.
+    """
+    refuse_other_suffix(path)
+    is_json = Path(path).suffix == ".json"
+    with atomic_path(path) as temporary, json_list(temporary) if is_json else _table(temporary) as append:
+        yield lambda image_id, facts, found, extras=None: append(
+            *result_rows(image_id, facts, found, extras if is_json else None)
+        )
+
+
+@contextmanager
+def json_list(path: Path) -> Iterator[_Append]:
+    """Write a list in JSON, item by item.
+
+    Parameters
+    ----------
+    path : Path
+
+    Yields
+    ------
+    callable
+        Takes the next items, JSON-able, or with arrays.
+    """
+    with open(path, "wb") as file:
+        file.write(b"[")
+        between = b""
+
+        def append(*items: object) -> None:
+            nonlocal between
+            for item in items:
+                file.write(between + orjson.dumps(item, option=orjson.OPT_SERIALIZE_NUMPY))
+                between = b",\n"
+
+        yield append
+        file.write(b"]\n")
+
+
+def result_rows(
+    image_id: int, facts: Mapping[str, Any], found: Detections, extras: Sequence[dict] | None = None,
+    keypoints: np.ndarray | slice = slice(None),
+) -> Iterator[dict]:  # fmt: skip
+    """The people of an image as COCO keypoint results, with arrays in them.
+
+    Parameters
+    ----------
+    image_id : int
+    facts : mapping of str to object
+        Further keys of each.
+    found : Detections
+    extras : sequence of dict, optional
+        Further keys of one each.
+    keypoints : array of int or slice, optional
+        Which of the 136, all if left out.
+
+    Yields
+    ------
+    dict
+
+    Raises
+    ------
+    ValueError
+        For a score that is no number.
+    """
+    points = found.keypoints_px[:, keypoints]
+    triples = np.concatenate([points, found.scores[:, keypoints, None]], axis=-1)
+    triples[~np.isfinite(points).all(axis=-1)] = 0.0
+    if not (np.isfinite(triples).all() and np.isfinite(found.person_scores).all()):
+        raise ValueError(f"image {image_id}: a score is not a finite number")
+    flat = triples.reshape(len(found), 3 * points.shape[1])
+    for of, score, extra in zip(flat, found.person_scores.tolist(), extras or [{}] * len(found), strict=True):
+        yield {**extra, "image_id": image_id, **facts, "category_id": 1, "keypoints": of, "score": score}
+
+
+@contextmanager
+def _table(path: Path) -> Iterator[_Append]:
+    """Write people as rows of a table, a group at a time."""
+    waiting: list[dict] = []
+    with ExitStack() as stack:
+        write = _append_csv(path) if path.suffix == ".csv" else _append_parquet(path, stack)
+
+        def append(*people: dict) -> None:
+            if len(waiting) >= _PEOPLE_AT_ONCE:
+                write(_by_keypoint(waiting))
+                waiting.clear()
+            waiting.extend(people)
+
+        yield append
+        write(_by_keypoint(waiting))
+
+
+def _append_csv(path: Path) -> _Append:
+    return lambda table: table.to_csv(path, mode="a", index=False, header=not path.stat().st_size)
+
+
+def _append_parquet(path: Path, stack: ExitStack) -> _Append:
+    from pyarrow import Table
+    from pyarrow.parquet import ParquetWriter
+
+    writers: list[ParquetWriter] = []
+
+    def append(table: pd.DataFrame) -> None:
+        group = Table.from_pandas(table, preserve_index=False).replace_schema_metadata()
+        if not writers:
+            writers.append(stack.enter_context(ParquetWriter(path, group.schema)))
+        writers[0].write_table(group)
+
+    return append
+
+
+def _by_keypoint(people: list[dict]) -> pd.DataFrame:
+    """People as of `result_rows`, all of an image one after the other, as a row for each keypoint."""
+    triples = np.array([row.pop("keypoints") for row in people]).reshape(-1, N_KEYPOINTS, 3)
+    table = pd.DataFrame(people or {"image_id": np.zeros(0, int), "category_id": 1, "score": 0.0})
+    table.insert(table.columns.get_loc("score"), "person", table.groupby("image_id").cumcount())
+    rows, keypoints = np.nonzero(triples.any(axis=-1))
+    table = table.drop(columns="category_id").rename(columns={"score": "person_score"}).iloc[rows]
+    u_px, v_px, scores = triples[rows, keypoints].T
+    names = pd.array(np.array(NAMES)[keypoints], dtype="string")
+    return table.assign(keypoint=names, u_px=u_px, v_px=v_px, score=scores)
+
+
+def read_rows(path: Path) -> Any:
+    """What a file of COCO keypoint results holds, to be checked: a list of objects, also out of a table.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is a table without the columns that `open_detections` writes.
+    """
+    if path.suffix not in (".csv", ".parquet"):
+        return read_json(path)
+    refuse_other_suffix(path)
+    try:
+        table = _read_csv(path) if path.suffix == ".csv" else pd.read_parquet(path)
+        keypoints = [INDEX[name] for name in table["keypoint"]]
+        values = table[["u_px", "v_px", "score"]].to_numpy(float)
+        if table.duplicated(["image_id", "person", "keypoint"]).any():
+            raise ValueError("a keypoint of a person twice")
+        people = table.groupby(["image_id", "person"], sort=False, dropna=False)
+        first = people[["person_score", *table.columns.intersection(["file_name"])]].first()
+    except (KeyError, OSError, TypeError, ValueError) as error:  # pyarrow's and pandas' own are among these
+        problem = f"{type(error).__name__}: {one_line(error)}"
+        raise InputError(f"{path}: is no table that hicp detect wrote ({problem})") from None
+    triples = np.zeros((people.ngroups, N_KEYPOINTS, 3))
+    triples[people.ngroup(), keypoints] = values
+    rows = first.rename(columns={"person_score": "score"}).reset_index().to_dict("records")
+    flat = triples.reshape(len(rows), 3 * N_KEYPOINTS).tolist()
+    return [row | {"keypoints": keypoints} for row, keypoints in zip(rows, flat, strict=True)]
+
+
+def _read_csv(path: Path) -> pd.DataFrame:
+    return pd.read_csv(path, float_precision="round_trip", dtype={"file_name": str})
