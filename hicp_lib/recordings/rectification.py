@@ -74,7 +74,8 @@ def rectify(image: np.ndarray, pixels_px: np.ndarray | None) -> np.ndarray:
     """
     if pixels_px is None:
         return image
-    return cv2.remap(image, pixels_px, None, cv2.INTER_LINEAR if image.ndim == 3 else cv2.INTER_NEAREST)
+    interpolation = cv2.INTER_LINEAR if image.ndim == 3 else cv2.INTER_NEAREST
+    return cv2.remap(image, pixels_px[..., 0], pixels_px[..., 1], interpolation)
 
 
 def align_depth(depth_m: np.ndarray, camera: Camera, color: Camera, T_color_depth: np.ndarray) -> np.ndarray:
