@@ -97,7 +97,7 @@ def finish_recording(out: Path, plan: Scenario, n: int, stamp: dict) -> None:
     mocap = out / PARTS_DIR / MOCAP_PART
     settings |= read_json(mocap) if mocap.exists() else {}
     write_json(out / SIMULATION_FILE, stamp | settings, indent=1)
-    write_index(out, COLOUR, DEPTH_UNITS_PER_M, times_s, T_base_cam)
+    write_index(out, COLOUR, DEPTH_UNITS_PER_M, times_s, (times_s, T_base_cam))
 
 
 def _truth(out: Path, times_s: np.ndarray, T_base_cam: np.ndarray) -> pd.DataFrame:
