@@ -24,7 +24,6 @@ from hicp_lib.cli.options import PATH, detector_options, given, people_option, t
 from hicp_lib.cli.recordings import lift, record
 from hicp_lib.core.errors import InputError
 
-
 _keypoint_map_option = click.option(
     "--keypoint-map", type=PATH, metavar="FILE.json",
     help="What keypoint names of the annotations mean: their names to ours, or null to leave one out.",

@@ -17,7 +17,8 @@ from hicp_lib.formats.json_validation import is_number, shown
 from hicp_lib.recordings.camera_file import read_distorted_camera
 from hicp_lib.recordings.recording import check_columns
 from hicp_lib.recordings.rectification import rectify
-from hicp_lib.recordings.tum import read_poses
+from hicp_lib.recordings.trajectories import read_trajectory
+from hicp_lib.recordings.tum import names_poses
 from hicp_lib.recordings.writer import JPEG_QUALITY, Poses, refuse_used_folder, write_index
 
 _METADATA = ("intrinsic.json", "camera_intrinsic.json")
@@ -26,7 +27,7 @@ _MAX_RATE_HZ = 10_000
 
 
 def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
-    """Poses from a TUM text file, or from a CSV of joint angles by the robot's kinematics.
+    """Poses from a trajectory (`read_trajectory`), or a CSV of joint angles by the robot's kinematics.
 
     A CSV has a column `t_s` and one of degrees for every joint of torso and neck, such as
     `torso_pitch_deg`. Without a file the base frame is the camera's own.
@@ -40,7 +41,7 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
     Returns
     -------
     times_s : array, shape (m,)
-        One time where the camera stands still.
+        One time where the camera stands still, none where the poses are of frame after frame.
     T_base_cam : array, shape (m, 4, 4)
         Camera coordinates to the robot's base frame.
 
@@ -58,8 +59,8 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
     if path is None:
         return np.zeros(1), np.eye(4)[None]
     path = Path(path)
-    if path.suffix.lower() != ".csv":
-        return read_poses(path)
+    if path.suffix.lower() != ".csv" or names_poses(path):
+        return read_trajectory(path)
     from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub  # not in every installation
 
     columns = ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)]
