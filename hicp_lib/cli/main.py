@@ -114,12 +114,17 @@ def dataset() -> None:
 @click.option("--images", type=PATH, required=True, help="Folder of the images.")
 @click.option("--out", type=PATH, required=True, help="Where basic/ and headless/ are written.")
 @click.option("--min-pixels", default=20_000, show_default=True, type=click.IntRange(min=1))
-def dataset_create(annotations: Path, images: Path, out: Path, min_pixels: int) -> None:
+@click.option(
+    "--orientation", type=click.Choice(["stored", "seen"]), help="Of pictures with a rotation flag."
+)
+def dataset_create(out: Path, annotations: Path, images: Path, **options) -> None:
     """Cut people out of annotated images: Basic, and Headless without their heads."""
-    from hicp_lib.datasets.subsets import create_hicp
+    from hicp_lib.datasets.subsets import create_hicp, notes
 
-    counts = create_hicp(annotations, images, out, min_pixels=min_pixels, progress=sys.stderr.isatty())
+    counts = create_hicp(annotations, images, out, progress=sys.stderr.isatty(), **options)
     click.echo(json.dumps(counts, indent=2))
+    for note in notes(counts):
+        click.echo(note, err=True)
 
 
 @hicp.command()
