@@ -63,29 +63,29 @@ def image_sizes(annotations: Annotations) -> np.ndarray:
     return np.array([(image.width_px, image.height_px) for image in images]).reshape(-1, 2)
 
 
-def person_crops(annotations: Annotations, boxes_px: np.ndarray) -> np.ndarray:
+def person_crops(annotations: Annotations) -> tuple[np.ndarray, np.ndarray]:
     """The crop of everybody: the pixels of the box, and of labelled keypoints within it or on its edge.
 
     Parameters
     ----------
     annotations : Annotations
         From `on_pixels`.
-    boxes_px : array of int, shape (n, 4)
-        Theirs, from `whole_pixel_boxes`.
 
     Returns
     -------
-    array of int, shape (n, 4)
-        Left, top, right, bottom, the last two exclusive.
+    boxes_px, crops_px : array of int, shape (n, 4)
+        Left, top, right, bottom, the last two exclusive: as from `whole_pixel_boxes`, and with the keypoints.
     """
-    sizes, boxes, points = image_sizes(annotations), annotations.boxes_px[:, None], annotations.keypoints_px
-    start, end = boxes[..., :2] - _EDGE_PX, boxes[..., :2] + boxes[..., 2:] + _EDGE_PX
-    own = ((points >= start) & (points <= end)).all(axis=-1) & (annotations.visibility > 0)
+    sizes, (start, sides) = image_sizes(annotations), np.split(annotations.boxes_px[:, None], 2, axis=-1)
+    boxes_px, points = whole_pixel_boxes(annotations.boxes_px, *sizes.T), annotations.keypoints_px
+    near = (points >= start - _EDGE_PX) & (points <= start + sides + _EDGE_PX)
+    own = near.all(axis=-1) & (annotations.visibility > 0)
     own &= (boxes_px[:, 2:] > boxes_px[:, :2]).all(axis=-1)[:, None]
     pixels = np.clip(np.floor(np.nan_to_num(points) + 0.5), 0, sizes[:, None] - 1)
     first = np.where(own[..., None], pixels, np.inf).min(axis=1)
     last = np.where(own[..., None], pixels, -np.inf).max(axis=1)
-    return np.hstack([np.minimum(boxes_px[:, :2], first), np.maximum(boxes_px[:, 2:], last + 1)]).astype(int)
+    grown = [np.minimum(boxes_px[:, :2], first), np.maximum(boxes_px[:, 2:], last + 1)]
+    return boxes_px, np.hstack(grown).astype(int)
 
 
 def n_pixels(crop_px: Box) -> int:

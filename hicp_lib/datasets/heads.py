@@ -11,7 +11,6 @@ The rest is chosen here:
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -20,15 +19,15 @@ from hicp_lib.core.keypoints import BODY, FACE, HEAD, INDEX
 
 TRUNK = np.setdiff1d(BODY, HEAD)
 _MID_HEAD = np.arange(0, 5)  # nose, eyes, ears
-_TOP, _CHIN, _NECK = INDEX["head_top"], INDEX["face_8"], INDEX["neck"]
-_SHOULDERS = np.array([INDEX["left_shoulder"], INDEX["right_shoulder"]])
+_TOP, _CHIN = INDEX["head_top"], INDEX["face_8"]
+_WAYS = {"neck": [INDEX["neck"]], "shoulders": [INDEX["left_shoulder"], INDEX["right_shoulder"]]}
 # Where a face ends on the way to neck or shoulders, from nose, eyes and ears and from the head top: of 599
 # pictures of the development bodies, in poses as they are rendered, 97.5 % of the faces end before.
 _FACE_ENDS = {"middle": 0.75, "top": 0.90}
 # How the end of a face was known, by falling trust; with the last a part of the face may stay in the picture.
-CUT_RULES = ("chin labelled", "head top", "neck", "shoulders", "head labels only")
+CUT_RULES = ("chin labelled", "head top", *_WAYS, "head labels only")
 
-Side = Literal["left", "top", "right", "bottom"]
+SIDES = ("left", "top", "right", "bottom")
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,7 @@ class HeadCut:
 
     head_px: np.ndarray
     body_px: np.ndarray
-    side: Side
+    side: str
     kept_px: Box
     rule: str
 
@@ -79,21 +78,16 @@ def headless_cut(keypoints_px: np.ndarray, visibility: np.ndarray, crop_px: Box)
     head_px, body_px = head.mean(axis=0), body.mean(axis=0)
     away = head_px - body_px
     axis = 0 if abs(away[0]) > abs(away[1]) else 1
-    rule, end = face_end(keypoints_px, labelled, visibility > 0, axis, bool(away[axis] > 0))
+    rule, end = face_end(keypoints_px[:, axis], labelled, visibility > 0, bool(away[axis] > 0))
     reach = np.append(head[:, axis], end)
-    left, top, right, bottom = (int(edge) for edge in crop_px)
-    before, after = int(np.floor(reach.min() + 0.5)), int(np.floor(reach.max() + 0.5)) + 1
-    cuts: dict[tuple[int, bool], tuple[Side, Box]] = {  # by axis, and whether the head is further along it
-        (0, False): ("left", (after, top, right, bottom)),
-        (0, True): ("right", (left, top, before, bottom)),
-        (1, False): ("top", (left, after, right, bottom)),
-        (1, True): ("bottom", (left, top, right, before)),
-    }
-    return HeadCut(head_px, body_px, *cuts[axis, bool(away[axis] > 0)], rule)
+    kept, further = [int(edge) for edge in crop_px], bool(away[axis] > 0)
+    k = axis + 2 * further
+    kept[k] = int(np.floor(reach.min() + 0.5)) if further else int(np.floor(reach.max() + 0.5)) + 1
+    return HeadCut(head_px, body_px, SIDES[k], (kept[0], kept[1], kept[2], kept[3]), rule)
 
 
 def face_end(
-    keypoints_px: np.ndarray, labelled: np.ndarray, known: np.ndarray, axis: int, backwards: bool
+    along: np.ndarray, labelled: np.ndarray, known: np.ndarray, backwards: bool
 ) -> tuple[str, list[float]]:
     """Where a face ends towards the body, as far as it is not labelled.
 
@@ -102,12 +96,10 @@ def face_end(
 
     Parameters
     ----------
-    keypoints_px : array, shape (136, 2)
-        In Halpe's order.
+    along : array, shape (136,)
+        Keypoints on the axis along which the head is cut off, in Halpe's order, in pixels.
     labelled, known : array of bool, shape (136,)
         Labelled keypoints in the crop; and anywhere.
-    axis : int
-        Along which the head is cut off: 0 is u, 1 is v.
     backwards : bool
         Whether the body lies towards smaller values.
 
@@ -118,15 +110,14 @@ def face_end(
     end : list of float
         The place along the axis, or none.
     """
-    along = keypoints_px[:, axis]
     if known[_CHIN]:
         return CUT_RULES[0], [along[_CHIN]]
     middle = [along[part[labelled[part]]].mean() for part in (_MID_HEAD, FACE) if labelled[part].any()][:1]
     if labelled[_TOP] and middle:
         return CUT_RULES[1], [2 * middle[0] - along[_TOP]]
     start, share = (middle[0], _FACE_ENDS["middle"]) if middle else (along[_TOP], _FACE_ENDS["top"])
-    for rule, part in zip(CUT_RULES[2:], (np.array([_NECK]), _SHOULDERS), strict=False):
-        way = along[part[known[part]]].mean() - start if known[part].any() else 0.0
-        if (way < 0) if backwards else (way > 0):
+    for rule, part in _WAYS.items():
+        way = np.mean(along[part][known[part]]) - start if known[part].any() else 0.0
+        if way and (way < 0) == backwards:
             return rule, [start + share * way]
     return CUT_RULES[-1], []

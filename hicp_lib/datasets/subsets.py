@@ -33,22 +33,13 @@ from hicp_lib.core.executor import run_jobs
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.core.images import Box, as_seen, inside, read_image, write_png
 from hicp_lib.core.keypoints import HEAD
-from hicp_lib.datasets.crops import (
-    crop_people,
-    image_name,
-    image_sizes,
-    n_pixels,
-    on_pixels,
-    person_crops,
-    whole_pixel_boxes,
-)
+from hicp_lib.datasets.crops import crop_people, image_name, n_pixels, on_pixels, person_crops
 from hicp_lib.datasets.frames import in_frame, outside_image
-from hicp_lib.datasets.heads import CUT_RULES, TRUNK, headless_cut
+from hicp_lib.datasets.heads import CUT_RULES, SIDES, TRUNK, headless_cut
 from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
 
 SUBSETS = ("basic", "headless")
 _Crop = tuple[Path, Box]  # the file to write, and what of the image goes into it
-_EDGES = ("left", "top", "right", "bottom")
 
 
 def plan(annotations: Annotations, min_pixels: int = 20_000, headless_min_pixels: int = 1) -> pd.DataFrame:
@@ -75,27 +66,17 @@ def plan(annotations: Annotations, min_pixels: int = 20_000, headless_min_pixels
         that is removed, and `cut_rule`, how the end of the face was known.
     """
     annotations = on_pixels(annotations)
-    images = [annotations.images[i] for i in annotations.image_ids.tolist()]
-    boxes = whole_pixel_boxes(annotations.boxes_px, *image_sizes(annotations).T)
+    boxes, crops = person_crops(annotations)
     large = [n_pixels(box) >= max(min_pixels, 1) for box in boxes]
-    crops = person_crops(annotations, boxes)
-    people = zip(
-        annotations.keypoints_px, annotations.visibility, crops, annotations.is_crowd, large, strict=True
-    )
-    rows = [
-        {
-            "annotation_id": i,
-            "image_id": image.id,
-            "file_name": image.file_name,
-            **_plan_person(*person, headless_min_pixels),
-        }
-        for i, image, person in zip(annotations.ids.tolist(), images, people, strict=True)
-    ]
-    return pd.DataFrame(rows, columns=_columns())
+    columns = (annotations.keypoints_px, annotations.visibility, crops, annotations.is_crowd, large)
+    rows = [_plan_person(*person, headless_min_pixels) for person in zip(*columns, strict=True)]
+    names = [annotations.images[i].file_name for i in annotations.image_ids.tolist()]
+    ids = {"annotation_id": annotations.ids, "image_id": annotations.image_ids, "file_name": names}
+    return pd.DataFrame(rows, columns=_columns()).assign(**ids)
 
 
 def _columns() -> list[str]:
-    boxes = [f"{box}_{edge}_px" for box in ("basic_crop", "headless_crop", "head", "body") for edge in _EDGES]
+    boxes = [f"{box}_{edge}_px" for box in ("basic_crop", "headless_crop", "head", "body") for edge in SIDES]
     centres = [f"{part}_{axis}_px" for part in ("head", "body") for axis in "uv"]
     return ["annotation_id", "image_id", "file_name", *SUBSETS, "cut_side", "cut_rule", *boxes, *centres]
 
@@ -118,22 +99,21 @@ def _plan_person(
         row |= _named(name, np.concatenate([points.min(axis=0), points.max(axis=0)]))
     cut = headless_cut(keypoints_px, visibility, crop)
     assert cut is not None  # both parts are labelled
-    row |= zip(
-        ("head_u_px", "head_v_px", "body_u_px", "body_v_px"), [*cut.head_px, *cut.body_px], strict=True
-    )
+    row |= {"head_u_px": cut.head_px[0], "head_v_px": cut.head_px[1]}
+    row |= {"body_u_px": cut.body_px[0], "body_v_px": cut.body_px[1]}
     fate = "kept" if n_pixels(cut.kept_px) >= max(least, 1) else "too small"
     how = {"headless": fate, "cut_side": cut.side, "cut_rule": cut.rule}
     return row | how | _named("headless_crop", cut.kept_px)
 
 
 def _named(box: str, edges: Iterable) -> dict[str, float]:
-    return {f"{box}_{edge}_px": float(value) for edge, value in zip(_EDGES, edges, strict=True)}
+    return {f"{box}_{edge}_px": float(value) for edge, value in zip(SIDES, edges, strict=True)}
 
 
 def crop_boxes(table: pd.DataFrame, subset: str) -> dict[int, Box]:
     """The crops of a subset of a plan: row number -> left, top, right, bottom."""
     kept = np.flatnonzero(table[subset] == "kept")
-    edges = table[[f"{subset}_crop_{edge}_px" for edge in _EDGES]].to_numpy()[kept].astype(int)
+    edges = table[[f"{subset}_crop_{edge}_px" for edge in SIDES]].to_numpy()[kept].astype(int)
     return dict(zip(kept.tolist(), map(tuple, edges.tolist()), strict=True))
 
 
@@ -188,11 +168,9 @@ def summary(table: pd.DataFrame) -> dict:
     """
     counts = {subset: table[subset].value_counts().to_dict() for subset in SUBSETS}
     cut_by = table.loc[table["headless"] == "kept", "cut_rule"].value_counts().to_dict()
-    return {
-        "people": len(table),
-        **{subset: {"kept": 0} | counts[subset] for subset in SUBSETS},
-        "headless_cut_by": {rule: cut_by.get(rule, 0) for rule in CUT_RULES},
-    }
+    fates = {subset: {"kept": 0} | counts[subset] for subset in SUBSETS}
+    by_rule = {rule: cut_by.get(rule, 0) for rule in CUT_RULES}
+    return {"people": len(table), **fates, "headless_cut_by": by_rule}
 
 
 def notes(counts: dict) -> list[str]:

@@ -7,7 +7,10 @@ from pathlib import Path
 from hicp_lib.core.cache import key
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import cache_dir, read_json, sha256_file
-from hicp_lib.datasets.subsets import create_hicp
+from hicp_lib.core.keypoints import COCO_17, HANDS
+from hicp_lib.datasets.subsets import create_hicp, notes
+from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN
+from hicp_lib.formats.annotations import read_annotations, source_images
 
 SOURCES = ("rendered", "halpe")
 
@@ -37,6 +40,23 @@ class Source:
     basic: Path
     headless: Path
     summary: dict
+
+    @property
+    def limits(self) -> list[str]:
+        """What these people cannot show, a sentence each."""
+        basic = read_annotations(self.basic / "annotations.json")
+        n_images = len(set(source_images(basic).values()))
+        labelled = (basic.visibility[~basic.is_crowd] > 0).any(axis=0)
+        said = {
+            "Nobody is in Headless: what is about it is empty.": not self.summary["headless"]["kept"],
+            "Nobody has a labelled hand: what is about hands is empty or a dash.": not labelled[HANDS].any(),
+            "Nobody has a labelled body: what is about bodies is empty or a dash.": not labelled[
+                COCO_17
+            ].any(),
+            f"Intervals need {MIN_DRAWN} images, here are {n_images}: none is given.": n_images < MIN_DRAWN,
+            "Calibrations are fitted on some images and judged on others: one is too few.": n_images < 2,
+        }
+        return notes(self.summary) + [sentence for sentence, holds in said.items() if holds]
 
     @property
     def subsets(self) -> dict[str, Path]:
@@ -95,6 +115,11 @@ def open_source(
         raise InputError(f"source={source!r} is unknown; use one of {', '.join(SOURCES)}")
     folder = _crops(annotations, images, min_pixels)
     summary = read_json(folder / "summary.json")
+    if not summary["basic"]["kept"]:
+        why = ", ".join(f"{reason}: {n}" for reason, n in summary["basic"].items() if n)
+        raise InputError(
+            f"{annotations}: no annotated person becomes a crop ({why}); is min_pixels too large?"
+        )
     return Source(source, note, annotations, images, folder / "basic", folder / "headless", summary)
 
 
