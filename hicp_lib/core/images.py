@@ -73,10 +73,9 @@ def image_header(path: str | Path) -> tuple[int, int, int]:
     """
     try:
         with Image.open(path) as image:
-            if image.format == "TIFF":
-                return *image.size, 1
             exif = Image.Exif()
-            exif.load(image.info.get("exif", b""))  # `getexif` would decode a PNG to its end
+            # A TIFF has nothing there, as it should; `getexif` would decode a PNG to its end.
+            exif.load(image.info.get("exif", b""))
             flag = exif.get(ExifTags.Base.Orientation)
             return *image.size, flag if flag in range(2, 9) else 1
     except Exception:  # Pillow raises many kinds; whoever reads the pixels tells what is wrong with them

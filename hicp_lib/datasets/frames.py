@@ -53,19 +53,15 @@ def in_frame(
         flags[images[i].file_name] = flag
         stored, seen = tuple(size), tuple(size[::-1] if flag > 4 else size)
         if annotated not in {"stored": [stored], "seen": [stored, seen]}.get(orientation or "", []):
+            sizes = "{}x{} as stored, {}x{} as viewers show it, annotated as {}x{}"
             raise InputError(
-                f"{path}: has a rotation flag (EXIF orientation {flag}): {_text(stored)} as stored, "
-                f"{_text(seen)} as viewers show it, annotated as {_text(annotated)}; say what was annotated, "
-                "--orientation seen (the picture as viewers show it; it is turned) or --orientation stored "
+                f"{path}: has a rotation flag ({flag}), {sizes.format(*stored, *seen, *annotated)}; say what "
+                "was annotated: --orientation seen (the picture as viewers show it; it is turned) or stored "
                 "(the pixels as they lie in the file), or save the picture turned, without the flag"
             )
         if orientation == "seen":
             images[i] = replace(images[i], width_px=seen[0], height_px=seen[1])
     return replace(annotations, images=images), flags
-
-
-def _text(size: tuple[int, ...]) -> str:
-    return "x".join(map(str, size))
 
 
 def outside_image(annotations: Annotations) -> dict[str, int]:

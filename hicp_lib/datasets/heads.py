@@ -21,9 +21,6 @@ TRUNK = np.setdiff1d(BODY, HEAD)
 _MID_HEAD = np.arange(0, 5)  # nose, eyes, ears
 _TOP, _CHIN = INDEX["head_top"], INDEX["face_8"]
 _WAYS = {"neck": [INDEX["neck"]], "shoulders": [INDEX["left_shoulder"], INDEX["right_shoulder"]]}
-# Where a face ends on the way to neck or shoulders, from nose, eyes and ears and from the head top: of 599
-# pictures of the development bodies, in poses as they are rendered, 97.5 % of the faces end before.
-_FACE_ENDS = {"middle": 0.75, "top": 0.90}
 # How the end of a face was known, by falling trust; with the last a part of the face may stay in the picture.
 CUT_RULES = ("chin labelled", "head top", *_WAYS, "head labels only")
 
@@ -115,7 +112,8 @@ def face_end(
     middle = [along[part[labelled[part]]].mean() for part in (_MID_HEAD, FACE) if labelled[part].any()][:1]
     if labelled[_TOP] and middle:
         return CUT_RULES[1], [2 * middle[0] - along[_TOP]]
-    start, share = (middle[0], _FACE_ENDS["middle"]) if middle else (along[_TOP], _FACE_ENDS["top"])
+    # Of 599 pictures of development people, in poses as they are rendered, 97.5 % of the faces end before.
+    start, share = (middle[0], 0.75) if middle else (along[_TOP], 0.90)
     for rule, part in _WAYS.items():
         way = np.mean(along[part][known[part]]) - start if known[part].any() else 0.0
         if way and (way < 0) == backwards:

@@ -39,6 +39,7 @@ from hicp_lib.datasets.heads import CUT_RULES, SIDES, TRUNK, headless_cut
 from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
 
 SUBSETS = ("basic", "headless")
+_CENTRES = [f"{part}_{axis}_px" for part in ("head", "body") for axis in "uv"]
 _Crop = tuple[Path, Box]  # the file to write, and what of the image goes into it
 
 
@@ -77,8 +78,7 @@ def plan(annotations: Annotations, min_pixels: int = 20_000, headless_min_pixels
 
 def _columns() -> list[str]:
     boxes = [f"{box}_{edge}_px" for box in ("basic_crop", "headless_crop", "head", "body") for edge in SIDES]
-    centres = [f"{part}_{axis}_px" for part in ("head", "body") for axis in "uv"]
-    return ["annotation_id", "image_id", "file_name", *SUBSETS, "cut_side", "cut_rule", *boxes, *centres]
+    return ["annotation_id", "image_id", "file_name", *SUBSETS, "cut_side", "cut_rule", *boxes, *_CENTRES]
 
 
 def _plan_person(
@@ -86,12 +86,10 @@ def _plan_person(
 ) -> dict:
     row: dict = {"basic": "kept", "headless": "not in Basic", **_named("basic_crop", crop)}
     labelled = (visibility > 0) & inside(keypoints_px, crop)
-    if is_crowd:
-        return row | {"basic": "crowd"}
-    if not large:
-        return row | {"basic": "too small"}
-    if not labelled.any():
-        return row | {"basic": "no keypoints"}
+    why_not = {"crowd": is_crowd, "too small": not large, "no keypoints": not labelled.any()}
+    for reason, holds in why_not.items():
+        if holds:
+            return row | {"basic": reason}
     for name, part in (("head", HEAD), ("body", TRUNK)):
         points = keypoints_px[part[labelled[part]]]
         if not len(points):
@@ -99,8 +97,7 @@ def _plan_person(
         row |= _named(name, np.concatenate([points.min(axis=0), points.max(axis=0)]))
     cut = headless_cut(keypoints_px, visibility, crop)
     assert cut is not None  # both parts are labelled
-    row |= {"head_u_px": cut.head_px[0], "head_v_px": cut.head_px[1]}
-    row |= {"body_u_px": cut.body_px[0], "body_v_px": cut.body_px[1]}
+    row |= zip(_CENTRES, [*cut.head_px, *cut.body_px], strict=True)
     fate = "kept" if n_pixels(cut.kept_px) >= max(least, 1) else "too small"
     how = {"headless": fate, "cut_side": cut.side, "cut_rule": cut.rule}
     return row | how | _named("headless_crop", cut.kept_px)
@@ -143,8 +140,7 @@ def crop_annotations(annotations: Annotations, table: pd.DataFrame, subset: str)
     for row, box in crop_boxes(table, subset).items():
         person_id, source_id = int(annotations.ids[row]), int(annotations.image_ids[row])
         images[person_id] = ImageInfo(person_id, image_name(person_id), box[2] - box[0], box[3] - box[1])
-        others = [k for k in in_image[source_id] if k != row]
-        people = crop_people(annotations, np.array([row, *others]), box)
+        people = crop_people(annotations, np.array([row, *(k for k in in_image[source_id] if k != row)]), box)
         about = {
             "subset": subset, "source_id": person_id, "source_image_id": source_id,
             "source_file": annotations.images[source_id].file_name,
@@ -178,9 +174,10 @@ def notes(counts: dict) -> list[str]:
     unsure = counts["headless_cut_by"][CUT_RULES[-1]]
     lines = {
         "{keypoints} labelled keypoints and {boxes} boxes, of {people} people, lie outside their image; "
-        "compare the sizes in the annotations with the pictures": counts["outside_image"],
-        "{people} Headless crops may show a part of the face: no chin, neck or shoulders are labelled "
-        "(cut_rule in headless/annotations.json)": {"people": unsure},
+        "do the annotated sizes fit the pictures?": counts["outside_image"],
+        "{people} Headless crops may show a part of the face: cut_rule 'head labels only'": {
+            "people": unsure
+        },
     }
     return [line.format(**of) for line, of in lines.items() if of["people"]]
 
@@ -198,11 +195,9 @@ def count_sensitivity(annotations: Annotations, min_pixels: int = 20_000) -> pd.
     basic, headless = tables[0]["basic"], tables[0]["headless"]
     without = "people without keypoints kept, people without labelled head kept in Headless"
     in_headless = headless.isin(["kept", "no head labelled"]) | (basic == "no keypoints")
-    counts.append(
-        pd.Series({"basic": basic.isin(["kept", "no keypoints"]).sum(), "headless": in_headless.sum()})
-    )
-    table = pd.DataFrame(counts, index=pd.Index([*rules, without], name="rule"))
-    return table.reset_index()
+    in_basic = basic.isin(["kept", "no keypoints"])
+    counts.append(pd.Series({"basic": in_basic.sum(), "headless": in_headless.sum()}))
+    return pd.DataFrame(counts, index=pd.Index([*rules, without], name="rule")).reset_index()
 
 
 def create_hicp(
@@ -252,15 +247,13 @@ def create_hicp(
     table = plan(annotations, min_pixels, headless_min_pixels)
     boxes = {subset: crop_boxes(table, subset) for subset in SUBSETS}
     _claim(out, _digest(table, boxes, images_dir, turned))
-    jobs = _jobs(annotations, boxes, out)
     write = partial(_write_crops, images_dir, turned)
-    todo = [(image, partial(write, image, crops)) for image, crops in jobs.items()]
+    todo = [(image, partial(write, image, crops)) for image, crops in _jobs(annotations, boxes, out).items()]
     done = run_jobs(todo, usable_cores(), "threads")
-    for _ in tqdm(done, total=len(jobs), desc="HiCP crops", unit="image", disable=not progress):
+    for _ in tqdm(done, total=len(todo), desc="HiCP crops", unit="image", disable=not progress):
         pass
     for subset in SUBSETS:
-        path = out / subset / "annotations.json"
-        write_annotations(path, crop_annotations(annotations, table, subset))
+        write_annotations(out / subset / "annotations.json", crop_annotations(annotations, table, subset))
     counts = summary(table) | {"outside_image": outside_image(annotations), "rotation_flags": flags}
     write_json(out / "summary.json", counts, indent=2)
     return counts

@@ -116,10 +116,7 @@ def open_source(
     folder = _crops(annotations, images, min_pixels)
     summary = read_json(folder / "summary.json")
     if not summary["basic"]["kept"]:
-        why = ", ".join(f"{reason}: {n}" for reason, n in summary["basic"].items() if n)
-        raise InputError(
-            f"{annotations}: no annotated person becomes a crop ({why}); is min_pixels too large?"
-        )
+        raise InputError(f"{annotations}: nobody becomes a crop {summary['basic']}; is min_pixels too large?")
     return Source(source, note, annotations, images, folder / "basic", folder / "headless", summary)
 
 

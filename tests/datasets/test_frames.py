@@ -50,9 +50,7 @@ def test_a_picture_is_turned_as_asked_or_refused(tmp_path, flag, sizes):
     stored_px = SEEN_PX[::-1] if flag > 4 else SEEN_PX
     paths = write_set(tmp_path / "in", flag, SEEN_PX if sizes == "seen" else stored_px)
     if flag > 1:
-        with pytest.raises(
-            InputError, match=rf"a.jpg: has a rotation flag \(EXIF orientation {flag}\).*--orientation"
-        ):
+        with pytest.raises(InputError, match=rf"a.jpg: has a rotation flag \({flag}\).*--orientation"):
             create_hicp(*paths, tmp_path / "out")
     counts = create_hicp(*paths, tmp_path / "out", orientation="seen")
     assert counts["rotation_flags"] == ({"a.jpg": flag} if flag > 1 else {})
