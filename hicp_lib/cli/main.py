@@ -114,9 +114,7 @@ def dataset() -> None:
 @click.option("--images", type=PATH, required=True, help="Folder of the images.")
 @click.option("--out", type=PATH, required=True, help="Where basic/ and headless/ are written.")
 @click.option("--min-pixels", default=20_000, show_default=True, type=click.IntRange(min=1))
-@click.option(
-    "--orientation", type=click.Choice(["stored", "seen"]), help="Of pictures with a rotation flag."
-)
+@click.option("--orientation", type=click.Choice(["stored", "seen"]), help="Where pictures are flagged.")
 def dataset_create(out: Path, annotations: Path, images: Path, **options) -> None:
     """Cut people out of annotated images: Basic, and Headless without their heads."""
     from hicp_lib.datasets.subsets import create_hicp, notes

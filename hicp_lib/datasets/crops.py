@@ -80,7 +80,7 @@ def person_crops(annotations: Annotations) -> tuple[np.ndarray, np.ndarray]:
     boxes_px, points = whole_pixel_boxes(annotations.boxes_px, *sizes.T), annotations.keypoints_px
     near = (points >= start - _EDGE_PX) & (points <= start + sides + _EDGE_PX)
     own = near.all(axis=-1) & (annotations.visibility > 0)
-    own &= (boxes_px[:, 2:] > boxes_px[:, :2]).all(axis=-1)[:, None]
+    own &= (boxes_px[:, None, 2:] > boxes_px[:, None, :2]).all(axis=-1)
     pixels = np.clip(np.floor(np.nan_to_num(points) + 0.5), 0, sizes[:, None] - 1)
     first = np.where(own[..., None], pixels, np.inf).min(axis=1)
     last = np.where(own[..., None], pixels, -np.inf).max(axis=1)

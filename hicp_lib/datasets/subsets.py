@@ -87,9 +87,8 @@ def _plan_person(
     row: dict = {"basic": "kept", "headless": "not in Basic", **_named("basic_crop", crop)}
     labelled = (visibility > 0) & inside(keypoints_px, crop)
     why_not = {"crowd": is_crowd, "too small": not large, "no keypoints": not labelled.any()}
-    for reason, holds in why_not.items():
-        if holds:
-            return row | {"basic": reason}
+    if reasons := [reason for reason, holds in why_not.items() if holds]:
+        return row | {"basic": reasons[0]}
     for name, part in (("head", HEAD), ("body", TRUNK)):
         points = keypoints_px[part[labelled[part]]]
         if not len(points):
@@ -171,13 +170,11 @@ def summary(table: pd.DataFrame) -> dict:
 
 def notes(counts: dict) -> list[str]:
     """What a user must know of the counts of `create_hicp`, a line each."""
-    unsure = counts["headless_cut_by"][CUT_RULES[-1]]
+    unsure = {"people": counts["headless_cut_by"][CUT_RULES[-1]]}
     lines = {
         "{keypoints} labelled keypoints and {boxes} boxes, of {people} people, lie outside their image; "
         "do the annotated sizes fit the pictures?": counts["outside_image"],
-        "{people} Headless crops may show a part of the face: cut_rule 'head labels only'": {
-            "people": unsure
-        },
+        "{people} Headless crops may show a part of the face: cut_rule 'head labels only'": unsure,
     }
     return [line.format(**of) for line, of in lines.items() if of["people"]]
 

@@ -46,13 +46,11 @@ class Source:
         """What these people cannot show, a sentence each."""
         basic = read_annotations(self.basic / "annotations.json")
         n_images = len(set(source_images(basic).values()))
-        labelled = (basic.visibility[~basic.is_crowd] > 0).any(axis=0)
+        some = (basic.visibility[~basic.is_crowd] > 0).any(axis=0)
         said = {
             "Nobody is in Headless: what is about it is empty.": not self.summary["headless"]["kept"],
-            "Nobody has a labelled hand: what is about hands is empty or a dash.": not labelled[HANDS].any(),
-            "Nobody has a labelled body: what is about bodies is empty or a dash.": not labelled[
-                COCO_17
-            ].any(),
+            "Nobody has a labelled hand: what is about hands is empty or a dash.": not some[HANDS].any(),
+            "Nobody has a labelled body: what is about bodies is empty or a dash.": not some[COCO_17].any(),
             f"Intervals need {MIN_DRAWN} images, here are {n_images}: none is given.": n_images < MIN_DRAWN,
             "Calibrations are fitted on some images and judged on others: one is too few.": n_images < 2,
         }

@@ -163,9 +163,7 @@ def calibration_study(
     names = ["detector", "group", "n_keypoints", "n_images", "hit_rate"] + [
         f"{kind}{end}" for kind in ("raw", "calibrated", "change") for end in ("", "_low", "_high")
     ]
-    none = pd.DataFrame(
-        columns=["detector", "group", "scores", "bin", "score", "rate", "low", "high", "count"]
-    )
+    none = pd.DataFrame(columns=["detector", "group", "scores"])
     return pd.DataFrame(errors, columns=names), pd.concat(curves or [none], ignore_index=True), calibrations
 
 

@@ -57,13 +57,13 @@ _NOTHING = "Nothing to draw: these data have nobody and nothing that this figure
 def in_style(draw: Callable[..., Figure]) -> Callable[..., Figure]:
     """Decorator: run a drawing function in the report's style, leaving Matplotlib's settings as they were.
 
-    An empty table or list is not drawn: one sentence stands in the figure's place.
+    An empty table, list or mapping is not drawn: one sentence stands in the figure's place.
     """
 
     @functools.wraps(draw)
     def styled(*args, **kwargs) -> Figure:
         with plt.rc_context(_RC):
-            if any(isinstance(given, pd.DataFrame | list) and not len(given) for given in args):
+            if any(isinstance(given, pd.DataFrame | list | dict) and not len(given) for given in args):
                 figure, axis = new_figure(1, 1, 6.0, 0.5)
                 axis.axis("off")
                 axis.text(0.5, 0.5, _NOTHING, ha="center", va="center")
