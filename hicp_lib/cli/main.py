@@ -121,8 +121,7 @@ def dataset_create(out: Path, annotations: Path, images: Path, **options) -> Non
 
     counts = create_hicp(annotations, images, out, progress=sys.stderr.isatty(), **options)
     click.echo(json.dumps(counts, indent=2))
-    for note in notes(counts):
-        click.echo(note, err=True)
+    click.echo("".join(f"{note}\n" for note in notes(counts)), nl=False, err=True)
 
 
 @hicp.command()

@@ -51,8 +51,7 @@ class Source:
             "Nobody is in Headless: what is about it is empty.": not self.summary["headless"]["kept"],
             "Nobody has a labelled hand: what is about hands is empty or a dash.": not some[HANDS].any(),
             "Nobody has a labelled body: what is about bodies is empty or a dash.": not some[COCO_17].any(),
-            f"Intervals need {MIN_DRAWN} images, here are {n_images}: none is given.": n_images < MIN_DRAWN,
-            "Calibrations are fitted on some images and judged on others: one is too few.": n_images < 2,
+            f"Intervals need {MIN_DRAWN} images, calibrations 2, here are {n_images}.": n_images < MIN_DRAWN,
         }
         return notes(self.summary) + [sentence for sentence, holds in said.items() if holds]
 

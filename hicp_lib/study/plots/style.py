@@ -64,9 +64,8 @@ def in_style(draw: Callable[..., Figure]) -> Callable[..., Figure]:
     def styled(*args, **kwargs) -> Figure:
         with plt.rc_context(_RC):
             if any(isinstance(given, pd.DataFrame | list | dict) and not len(given) for given in args):
-                figure, axis = new_figure(1, 1, 6.0, 0.5)
-                axis.axis("off")
-                axis.text(0.5, 0.5, _NOTHING, ha="center", va="center")
+                figure = new_figure(1, 1, 6.0, 0.5, subplot_kw={"visible": False})[0]
+                figure.text(0.5, 0.5, _NOTHING, ha="center", va="center")
                 return Figure(figure, _NOTHING, _NOTHING)
             return draw(*args, **kwargs)
 
