@@ -126,15 +126,15 @@ def dataset() -> None:
 @_keypoint_map_option
 @click.option("--out", type=PATH, required=True, help="Where basic/ and headless/ are written.")
 @click.option("--min-pixels", default=20_000, show_default=True, type=click.IntRange(min=1))
-def dataset_create(annotations: Path, images: Path, keypoint_map, out: Path, min_pixels: int) -> None:
+@click.option("--orientation", type=click.Choice(["stored", "seen"]), help="Where pictures are flagged.")
+def dataset_create(out: Path, annotations: Path, images: Path, **options) -> None:
     """Cut people out of annotated images: Basic, and Headless without their heads."""
-    from hicp_lib.datasets.subsets import create_hicp
+    from hicp_lib.datasets.subsets import create_hicp, notes
 
-    counts = create_hicp(
-        annotations, images, out, min_pixels, keypoint_map=keypoint_map, progress=sys.stderr.isatty()
-    )
+    counts = create_hicp(annotations, images, out, progress=sys.stderr.isatty(), **options)
     _tell_notes(annotations, counts.get("notes", {}))
     click.echo(json.dumps(counts, indent=2))
+    click.echo("".join(f"{note}\n" for note in notes(counts)), nl=False, err=True)
 
 
 @hicp.command()

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.quaternions import matrices_from_quaternions
+from hicp_lib.core.rotations import matrices_from_quaternions
 from hicp_lib.recordings.bag_file import Bag, stamp_s
 from hicp_lib.recordings.tum import MAX_DIFFERENCE_S
 
