@@ -19,6 +19,7 @@ import click
 
 from hicp_lib import __version__
 from hicp_lib.cli.calibration import calibration
+from hicp_lib.cli.looking import draw, inspect_
 from hicp_lib.cli.models import models
 from hicp_lib.cli.options import PATH, detector_options, given, people_option, tell_assumed, worker_options
 from hicp_lib.cli.recordings import lift, record
@@ -92,7 +93,7 @@ def hicp() -> None:
     """Human keypoint detection at close range: data, detectors, evaluation, report."""
 
 
-for _command in (record, lift, calibration, models):
+for _command in (record, lift, calibration, models, draw, inspect_):
     hicp.add_command(_command)
 
 

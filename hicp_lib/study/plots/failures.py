@@ -11,10 +11,11 @@ from hicp_lib.datasets.visibility import CLASSES, MIN_PEOPLE
 from hicp_lib.evaluation.failures.error_kinds import KINDS
 from hicp_lib.evaluation.failures.placed_keypoints import STATES
 from hicp_lib.formats.annotations import Annotations
+from hicp_lib.inspection.skeletons import draw_rings
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.evaluation import GROUP_TITLES
 from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.people import draw_detections, draw_rings, draw_truth, picture_grid
+from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
 from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
 
 _TRUTH_COLOUR = "#39D353"

@@ -9,10 +9,11 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import HANDS, INDEX, LIMBS, N_KEYPOINTS
+from hicp_lib.inspection.skeletons import draw_rings
 from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
-from hicp_lib.study.plots.people import detections_grid, draw_rings
+from hicp_lib.study.plots.people import detections_grid
 from hicp_lib.study.plots.style import Figure, in_style, new_figure, series_text
 from hicp_lib.study.table_format import intervals_over
 

@@ -34,36 +34,6 @@ def metrics() -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["subset", "group", "detector", "metric", "value", "low", "high"])
 
 
-def person(**points) -> tuple[np.ndarray, np.ndarray]:
-    keypoints, scores = np.full((1, 136, 2), np.nan), np.zeros((1, 136))
-    for name, (u, v, score) in points.items():
-        keypoints[0, INDEX[name]], scores[0, INDEX[name]] = (u, v), score
-    return keypoints, scores
-
-
-def test_a_keypoint_is_drawn_around_its_pixel_in_its_colour():
-    canvas = people.draw_people(
-        np.zeros((60, 80, 3), np.uint8), *person(nose=(30, 20, 1)), "#FF0000", thickness_px=3
-    )
-    assert canvas[20, 30].tolist() == [255, 0, 0]
-    rows, columns = np.nonzero(canvas[..., 0] > 200)
-    assert (rows.mean(), columns.mean()) == pytest.approx((20, 30), abs=0.1)
-
-
-def test_limbs_join_shown_points_only():
-    image = np.zeros((60, 80, 3), np.uint8)
-    shown = person(left_shoulder=(10, 30, 1), left_elbow=(70, 30, 1))
-    weak = person(left_shoulder=(10, 30, 1), left_elbow=(70, 30, 0.05))
-    assert people.draw_people(image, *shown, "white")[30, 40].tolist() == [255, 255, 255]
-    assert people.draw_people(image, *weak, "white")[30, 40].tolist() == [0, 0, 0]
-
-
-def test_drawing_leaves_the_image_and_survives_wild_points():
-    image = np.zeros((20, 20, 3), np.uint8)
-    people.draw_people(image, *person(nose=(1e9, -1e9, 1), left_eye=(-40, 400, 1)), "white")
-    assert not image.any()
-
-
 @pytest.mark.parametrize(("flag", "is_drawn"), [(2, True), (1, True), (0.4, True), (0, False)])
 def test_what_is_labelled_is_drawn_hidden_or_not(flag, is_drawn, tmp_path):
     write_png(tmp_path / "1.png", np.zeros((60, 60, 3), np.uint8))
