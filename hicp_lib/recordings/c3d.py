@@ -103,8 +103,8 @@ def read_points(path: Path) -> Points:
             command = [sys.executable, "-P", "-c", _CONVERT, str(path), str(out), *limits]
             subprocess.run(command, capture_output=True, timeout=_TIMEOUT_S, check=True)
         except subprocess.SubprocessError as error:
-            told = (error.stderr or b"").decode(errors="replace").strip().rpartition("\n")[2][:_SHOWN]
-            why = told or "it did not end well"
+            told = (getattr(error, "stderr", None) or b"").decode(errors="replace")
+            why = told.strip().rpartition("\n")[2][:_SHOWN] or "it did not end well"
             hint = "if it is cut off, export it again, else as TSV"
             raise InputError(f"{path}: ezc3d cannot read it as C3D ({why}); {hint}") from None
         with np.load(out, allow_pickle=False) as stored:

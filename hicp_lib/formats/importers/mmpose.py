@@ -48,7 +48,9 @@ def read_mmpose(path: Path) -> People:
     """
     files = json_files(path, (".json",), "the folder MMPoseInferencer wrote with pred_out_dir")
     read = {file: _instances(file) for file in files.values()}
-    sources = [n.removeprefix(_SAVED) if read[file][1] is not None else n for n, file in files.items()]
+    sources: list[str | int] = [
+        n.removeprefix(_SAVED) if read[file][1] is not None else n for n, file in files.items()
+    ]
     of_models = {names for _, names in read.values() if names}
     if len(of_models) > 1:
         raise InputError(f"{path}: keypoint_id2name differs from file to file; import each model by itself")

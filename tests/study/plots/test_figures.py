@@ -9,7 +9,6 @@ import pytest
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import write_png
-from hicp_lib.core.keypoints import INDEX
 from hicp_lib.detectors.registry import DETECTORS, default_detector_names
 from hicp_lib.evaluation.ap.found_and_placed import found_and_placed
 from hicp_lib.evaluation.statistics.resampling import Draws
