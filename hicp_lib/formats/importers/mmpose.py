@@ -56,6 +56,8 @@ def read_mmpose(path: Path) -> People:
     joined, source_of = FileRows.joined(
         path, "instances", {file: people for file, (people, _) in read.items()}
     )
+    for key in ("keypoint_scores", "keypoints"):
+        joined.column(key)
     rows = replace(joined, rows=[row | {"keypoints": _flat(joined, i)} for i, row in enumerate(joined.rows)])
     triples = rows.keypoints(layouts)
     conventions = Counter(CONVENTIONS.get(len(row["keypoints"]) // 3, "by their names") for row in rows.rows)
