@@ -114,13 +114,9 @@ def boxes_by_image(annotations: Annotations) -> dict[int, np.ndarray]:
 
 
 def detect_images(
-    name: str,
-    paths: Mapping[Key, str | Path],
-    workers: Workers = None,
-    progress: bool = True,
-    boxes_px: Mapping[Key, np.ndarray] | None = None,
-    **options,
-) -> dict[Key, Timed]:
+    name: str, paths: Mapping[Key, str | Path], workers: Workers = None, progress: bool = True, boxes_px:
+    Mapping[Key, np.ndarray] | None = None, **options,
+) -> dict[Key, Timed]:  # fmt: skip
     """People in every image file.
 
     Parameters
