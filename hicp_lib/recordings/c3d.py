@@ -102,7 +102,7 @@ def read_points(path: Path) -> Points:
         try:
             command = [sys.executable, "-P", "-c", _CONVERT, str(path), str(out), *limits]
             subprocess.run(command, capture_output=True, timeout=_TIMEOUT_S, check=True)
-        except subprocess.SubprocessError as error:
+        except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
             why = (error.stderr or b"crash").decode(errors="replace").strip().rpartition("\n")[2][:_SHOWN]
             hint = "if it is cut off, export it again, else as TSV"
             raise InputError(f"{path}: ezc3d cannot read it as C3D ({why}); {hint}") from None
