@@ -116,8 +116,12 @@ def _tell(out: Path, n_frames: int, notes: list[str]) -> None:
 
 @record.command("camera")
 @click.argument("out", type=PATH)
-@click.option("--color", "color_px", default=(640, 480), show_default=True, help="Width and height.")
-@click.option("--depth", "depth_px", default=(848, 480), show_default=True, help="Width and height.")
+@click.option(
+    "--color", "color_px", nargs=2, type=int, default=(640, 480), show_default=True, help="Width and height."
+)
+@click.option(
+    "--depth", "depth_px", nargs=2, type=int, default=(848, 480), show_default=True, help="Width and height."
+)
 @click.option("--rate", "rate_hz", default=30, show_default=True, type=int, help="Frames per second.")
 @click.option(
     "--seconds", "duration_s", type=click.FloatRange(min=0), help="How long; until Ctrl-C if not given."
