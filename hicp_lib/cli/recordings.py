@@ -135,9 +135,7 @@ def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> Non
 
     if joints and poses:
         raise click.UsageError("Give either --poses FILE or --joints FILE.", click.get_current_context())
-    source = read_pose_source(poses, mount)
-    click.echo("Recording; Ctrl-C ends it.", err=True)
-    _tell(out, *record_camera(out, source, joints, mount, **settings))
+    _tell(out, *record_camera(out, read_pose_source(poses, mount), joints, mount, **settings))
 
 
 @click.command()
