@@ -9,8 +9,10 @@ machine that is busy otherwise; every depth image is measured some times and the
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -18,9 +20,12 @@ from timing import Comparison, best_seconds, run
 
 from hicp_lib.simulation.rendering.camera import pixel_rays
 from hicp_lib.simulation.rendering.render import render
-from hicp_lib.simulation.sensors.depth_camera import depth_imager, simulate_depth, simulate_raw_depth
-from hicp_lib.simulation.sensors.stereo_camera import D435, without_errors
+from hicp_lib.simulation.sensors.depth_camera import depth_imager, simulate_depth
+from hicp_lib.simulation.sensors.stereo_camera import D435
 from hicp_lib.simulation.world.staging import random_stage
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests.simulation.sensors.bare_depth import simulate_raw_depth, without_errors  # noqa: E402
 
 SEED = 20220
 

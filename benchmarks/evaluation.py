@@ -26,8 +26,9 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import GROUPS, SIGMAS
 from hicp_lib.core.oks import oks
 from hicp_lib.evaluation.ap import cocoeval
-from hicp_lib.evaluation.ap.bootstrap import N_RESAMPLES, bootstrap_intervals
+from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals
 from hicp_lib.evaluation.ap.evaluate import evaluate
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import (
     Annotations,
     ImageInfo,
@@ -128,11 +129,11 @@ def scoring(people: Annotations, found: dict[int, Detections]) -> Iterator[Compa
 
 def bootstrapping(people: Annotations, found: dict[int, Detections], n_draws: int) -> Comparison:
     evaluation = evaluate(people, found)
-    (ours,) = best_seconds(lambda: bootstrap_intervals(evaluation, N_RESAMPLES), turns=1)
+    (ours,) = best_seconds(lambda: bootstrap_intervals(evaluation), turns=1)
     # A draw costs pycocotools what the whole set costs.
     (draw,) = best_seconds(pycocotools(people, found, GROUPS["body"]), turns=n_draws)
     return Comparison(
-        f"{N_RESAMPLES} bootstrap draws from matches", ours, "pycocotools anew for each", draw * N_RESAMPLES
+        f"{Draws().n} bootstrap draws from matches", ours, "pycocotools anew for each", draw * Draws().n
     )
 
 

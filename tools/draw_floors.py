@@ -19,6 +19,7 @@ HOLDS = {
     "study": "this paper: pages, tables, plots, claims",
     "experiments": "simulated recordings, doses, avoidance",
     "simulation": "people, rooms, renderer, sensors",
+    "inspection": "what a file is; detections drawn over pictures",
     "evaluation": "AP, statistics, failures, calibration, space",
     "mocap": "clocks, registration, reprojection",
     "lifting": "keypoints from the image into space",
@@ -29,7 +30,7 @@ HOLDS = {
     "formats": "annotations, results and files of other tools",
     "core": "keypoints, detections, camera, OKS, cache, errors",
 }
-COLOURS = {"study": ("#f6d9c2", 4), "world": ("#cfe3f5", 5), "data": ("#d8ecd2", 5)}  # from the top down
+COLOURS = {"study": ("#f6d9c2", 4), "world": ("#cfe3f5", 6), "data": ("#d8ecd2", 5)}  # from the top down
 WIDTH, HEIGHT, GAP = 620, 30, 4
 
 

@@ -16,7 +16,7 @@ import pandas as pd
 
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.files import write_bytes
-from hicp_lib.evaluation.space.similar_views import NEAR_M, NEAR_RAD
+from hicp_lib.evaluation.space.sightings import NEAR_M, NEAR_RAD
 from hicp_lib.experiments.laboratory import robot_camera
 from hicp_lib.experiments.recordings.seated_person import VIEWS
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub

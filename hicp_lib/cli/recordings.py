@@ -60,32 +60,80 @@ def check(folder: Path) -> int:
     return 0
 
 
+def pose_options(command):
+    """Where poses come from that were not recorded with the images."""
+    for option in (
+        click.option("--mount", default="level", show_default=True, type=click.Choice(["level", "tilted"]),
+                     help="Camera holder, for joints."),
+        click.option("--poses", type=PATH,
+                     help="Camera poses (TUM text; one line: it stands still), or joints (CSV)."),
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
 @record.command("import")
 @click.argument("out", type=PATH)
-@click.option("--bag", type=PATH, help="A .bag of the RealSense viewer.")
+@click.option("--bag", type=PATH, help="A bag of ROS 1, ROS 2 or RealSense: file, or ROS 2's folder.")
+@click.option("--color-topic", help="Topic of colour, where a bag has several.")
+@click.option("--depth-topic", help="Topic of depth, where a bag has several.")
+@click.option("--base-frame", help="Poses are the camera's in this frame, by the bag's transforms.")
+@click.option("--joint-states", is_flag=True, help="Poses are by the bag's angles of the iCub's joints.")
 @click.option("--open3d", "folder", type=PATH, help="A folder with color/, depth/ and intrinsic.json.")
-@click.option(
-    "--poses", type=PATH, help="Camera poses (TUM text; one line: it stands still), or joints (CSV)."
-)
-@click.option(
-    "--mount", default="level", show_default=True, type=click.Choice(["level", "tilted"]), help="For joints."
-)
 @click.option("--rate", type=click.FloatRange(min=0, min_open=True), help="Frames per second of a folder.")
-def import_(out: Path, bag: Path | None, folder: Path | None, poses: Path | None, mount: str, rate) -> None:
-    """Make a recording in the folder OUT of what RealSense's or Open3D's tools saved.
+@click.option("--depth-scale", type=click.FloatRange(min=1), help="Depth units per metre of a folder.")
+@pose_options
+def import_(
+    out, bag, color_topic, depth_topic, base_frame, joint_states, folder, rate, depth_scale, poses, mount
+):
+    """Make a recording in the folder OUT of what ROS, RealSense's or Open3D's tools saved.
 
-    Without --poses the camera's own frame is the base frame.
+    Without --poses, --base-frame or --joint-states the camera's own frame is the base frame.
     """
-    from hicp_lib.recordings.importing import import_bag, import_open3d, read_pose_source
+    from hicp_lib.recordings.importing import import_open3d, read_pose_source
 
     if (bag is None) == (folder is None):
         raise click.UsageError("Give either --bag FILE or --open3d DIR.", click.get_current_context())
+    if sum(map(bool, (poses, base_frame, joint_states))) > 1:
+        message = "Give one of --poses, --base-frame and --joint-states."
+        raise click.UsageError(message, click.get_current_context())
     source = read_pose_source(poses, mount)
     if bag is not None:
-        n = import_bag(bag, out, source)
-    elif folder is not None:
-        n = import_open3d(folder, out, source, rate)
-    click.echo(f"{out}: {n} frames; check them with: hicp record check {out}")
+        from hicp_lib.recordings.bags import import_bag
+
+        topics, joints_mount = (color_topic, depth_topic), mount if joint_states else None
+        n, notes = import_bag(bag, out, source, topics, base_frame, joints_mount)
+    else:
+        n, notes = import_open3d(folder, out, source, rate, depth_scale)
+    _tell(out, n, notes)
+
+
+def _tell(out: Path, n_frames: int, notes: list[str]) -> None:
+    for note in notes:
+        click.echo(note, err=True)
+    click.echo(f"{out}: {n_frames} frames; check them with: hicp record check {out}")
+
+
+@record.command("camera")
+@click.argument("out", type=PATH)
+@click.option("--color", "color_px", default=(640, 480), show_default=True, help="Width and height.")
+@click.option("--depth", "depth_px", default=(848, 480), show_default=True, help="Width and height.")
+@click.option("--rate", "rate_hz", default=30, show_default=True, type=int, help="Frames per second.")
+@click.option(
+    "--seconds", "duration_s", type=click.FloatRange(min=0), help="How long; until Ctrl-C if not given."
+)
+@click.option("--joints", type=click.File(), help="Lines of joint angles as they come; - is standard input.")
+@pose_options
+def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> None:
+    """Record from a RealSense into the folder OUT, until Ctrl-C; what the camera gave stays in OUT.db3."""
+    from hicp_lib.recordings.importing import read_pose_source
+    from hicp_lib.recordings.realsense import record_camera
+
+    if joints and poses:
+        raise click.UsageError("Give either --poses FILE or --joints FILE.", click.get_current_context())
+    source = read_pose_source(poses, mount)
+    click.echo("Recording; Ctrl-C ends it.", err=True)
+    _tell(out, *record_camera(out, source, joints, mount, **settings))
 
 
 @click.command()

@@ -33,9 +33,7 @@ def sources() -> Path:
     """
     found = _study_around(Path.cwd()) or CHECKOUT
     if found is None:
-        raise InputError(
-            f"{Path.cwd()}: has no {_MARK}; the report is made of the study's notebooks, run it in a checkout"
-        )
+        raise InputError(f"{Path.cwd()}: has no {_MARK}; run the report in a checkout of the study")
     return found
 
 

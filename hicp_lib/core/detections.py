@@ -66,11 +66,8 @@ class Detections:
         Detections
         """
         scores = np.where(np.isnan(positions_px).any(axis=-1), 0.0, scores)
-        return cls(
-            to_halpe(positions_px, convention, axis=-2),
-            to_halpe(scores, convention, axis=-1, fill=0.0),
-            person_scores,
-        )
+        given_px, given = to_halpe(positions_px, convention, axis=-2), to_halpe(scores, convention, -1, 0.0)
+        return cls(given_px, given, person_scores)
 
     def concatenate(self, more: Detections) -> Detections:
         """These people, then others in the same image."""

@@ -1,9 +1,17 @@
-"""Images in and out: RGB, 8 bit, as arrays."""
+"""Images in and out: RGB, 8 bit, as arrays.
 
+A camera may store a picture turned, with a flag that tells viewers how to turn it back (EXIF's orientation,
+1 to 8). Pixels are always read as they are stored, and keypoints found or labelled are in that frame;
+whoever reads pictures of others asks for the flag and says so (`rotation_note`), or turns them (`as_seen`).
+TIFF alone is turned as it is read, by OpenCV and by every viewer, and counts as without a flag.
+"""
+
+from collections.abc import Iterable
 from pathlib import Path
 
 import cv2
 import numpy as np
+from PIL import ExifTags, Image
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, write_bytes
@@ -12,7 +20,7 @@ Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom ex
 
 
 def read_image(path: str | Path) -> np.ndarray:
-    """Read an image; EXIF rotation is not applied.
+    """Read an image as it is stored: a rotation flag is not applied.
 
     Parameters
     ----------
@@ -51,6 +59,59 @@ def decode_image(content: bytes | np.ndarray, path: str | Path) -> np.ndarray:
     if bgr is None:
         raise InputError(f"{path}: is not an image (PNG, JPEG, ...) or is cut off; replace the file")
     return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+
+
+def image_header(path: str | Path) -> tuple[int, int, int]:
+    """Width and height of an image as stored, and its rotation flag; its pixels are not decoded.
+
+    Returns
+    -------
+    width_px, height_px : int
+        0 where the file is no image that can be read.
+    flag : int
+        2 to 8 for pictures that viewers turn (see `as_seen`), 1 for all others.
+    """
+    try:
+        with Image.open(path) as image:
+            exif = Image.Exif()
+            # A TIFF has nothing there, as it should; `getexif` would decode a PNG to its end.
+            exif.load(image.info.get("exif", b""))
+            flag = int(exif.get(ExifTags.Base.Orientation, 1))
+            return *image.size, flag if flag in range(2, 9) else 1
+    except Exception:  # Pillow raises many kinds; whoever reads the pixels tells what is wrong with them
+        return 0, 0, 1
+
+
+def as_seen(pixels: np.ndarray, flag: int) -> np.ndarray:
+    """Pixels as viewers show them.
+
+    Parameters
+    ----------
+    pixels : array, shape (height, width, ...)
+        As stored.
+    flag : int
+        EXIF's orientation, 1 to 8.
+
+    Returns
+    -------
+    array
+        Height and width change places for flags above 4.
+
+    Examples
+    --------
+    >>> as_seen(np.array([[1, 2, 3], [4, 5, 6]]), 6).tolist()
+    [[4, 1], [5, 2], [6, 3]]
+    """
+    turned = pixels.swapaxes(0, 1) if flag > 4 else pixels
+    rows, columns = (slice(None, None, -1 if flag in flags else 1) for flags in ((3, 4, 7, 8), (2, 3, 6, 7)))
+    return np.ascontiguousarray(turned[rows, columns])
+
+
+def rotation_note(paths: Iterable[Path]) -> str:
+    """One line that names pictures with a rotation flag; empty where there is none."""
+    flags = [f"{path.name}: {flag}" for path in paths if (flag := image_header(path)[2]) != 1]
+    about = "they are taken as stored in the file, not as viewers show them, and keypoints are in that frame"
+    return f"{len(flags)} images have a rotation flag (EXIF; {flags[0]}, ...): {about}" if flags else ""
 
 
 def write_png(path: str | Path, image: np.ndarray) -> None:

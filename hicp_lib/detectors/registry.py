@@ -77,8 +77,7 @@ _OPENPOSE = "hicp_lib.detectors.openpose.user_network"
 _MMPOSE = "hicp_lib.detectors.onnx.mmpose"
 _ALPHAPOSE = "hicp_lib.detectors.onnx.alphapose"
 _RCNN = "hicp_lib.detectors.onnx.keypoint_rcnn"
-_THUNDER = "hicp_lib.detectors.movenet.single_pose"
-_MULTIPOSE = "hicp_lib.detectors.movenet.multi_pose"
+_MOVENET = "hicp_lib.detectors.movenet.networks"
 _POSENET = "hicp_lib.detectors.posenet.detector"
 _ONE_STAGE = "hicp_lib.detectors.onnx.one_stage"
 _TOP_DOWN, _BOTTOM_UP = "top-down", "bottom-up"
@@ -96,13 +95,13 @@ _ENTRIES = (
     Entry("mediapipe", "MediaPipe Pose + Hands", _BOTH, _MEDIAPIPE, "MediaPipe",
           Facts(_TOP_DOWN, "33 of the body, 21 of each hand", "Google's own", "as its parts", "as its parts",
                 9_950_000, 1_484_000_000)),
-    Entry("movenet-thunder", "MoveNet Thunder", _BODY, _THUNDER, "MoveNetThunder",
+    Entry("movenet-thunder", "MoveNet Thunder", _BODY, _MOVENET, "MoveNetThunder",
           Facts(_TOP_DOWN, "17 of the body", _COCO_ACTIVE, _PREVIOUS, "256 x 256 of each box",
                 6_240_000, 1_220_000_000)),
-    Entry("movenet-lightning", "MoveNet Lightning", _BODY, _THUNDER, "MoveNetLightning",
+    Entry("movenet-lightning", "MoveNet Lightning", _BODY, _MOVENET, "MoveNetLightning",
           Facts(_TOP_DOWN, "17 of the body", _COCO_ACTIVE, _PREVIOUS, "192 x 192 of each box",
                 2_320_000, 271_000_000)),
-    Entry("movenet-multipose", "MoveNet MultiPose", _BODY, _MULTIPOSE, "MoveNetMultiPose",
+    Entry("movenet-multipose", "MoveNet MultiPose", _BODY, _MOVENET, "MoveNetMultiPose",
           Facts(_BOTTOM_UP, "17 of the body", _COCO_ACTIVE, "of people", "256 x 256",
                 4_740_000, 971_000_000)),
     Entry("posenet", "PoseNet (MobileNetV1)", _BODY, _POSENET, "PoseNetMobileNet",

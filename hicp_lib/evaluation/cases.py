@@ -83,10 +83,8 @@ def over_people(tables: Sequence[pd.DataFrame], n_frames: Sequence[int]) -> pd.D
     [[0, 0], [0, 1], [1, 3], [1, 4]]
     """
     starts = np.cumsum([0, *n_frames])[:-1]
-    people = [
-        labelled(table.assign(frame=table["frame"] + start), subject=k)
-        for k, (table, start) in enumerate(zip(tables, starts, strict=True))
-    ]
+    moved = (table.assign(frame=table["frame"] + at) for table, at in zip(tables, starts, strict=True))
+    people = [labelled(table, subject=k) for k, table in enumerate(moved)]
     return pd.concat(people, ignore_index=True)
 
 

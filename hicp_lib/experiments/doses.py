@@ -176,13 +176,10 @@ def _smaller(base: Picture, scale: float) -> Picture:
         return base
     size = round(_WIDTH_PX * scale), round(_HEIGHT_PX * scale)
     factor = np.array(size) / [_WIDTH_PX, _HEIGHT_PX]
-    return Picture(
-        cv2.resize(base.image, size, interpolation=cv2.INTER_AREA),
-        cv2.resize(base.mask.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.5,
-        (base.keypoints_px + 0.5) * factor - 0.5,
-        base.visibility,
-        base.area_px2 * factor.prod(),
-    )
+    image = cv2.resize(base.image, size, interpolation=cv2.INTER_AREA)
+    mask = cv2.resize(base.mask.astype(np.float32), size, interpolation=cv2.INTER_AREA) > 0.5
+    keypoints_px = (base.keypoints_px + 0.5) * factor - 0.5
+    return Picture(image, mask, keypoints_px, base.visibility, base.area_px2 * factor.prod())
 
 
 def _part(base: Picture, share: float, from_above: bool) -> Picture:
@@ -194,13 +191,9 @@ def _part(base: Picture, share: float, from_above: bool) -> Picture:
     left, above, right, below = map(int, crop)
     shown = inside(base.keypoints_px, (left, above, right, below))
     window = slice(above, below), slice(left, right)
-    return replace(
-        base,
-        image=base.image[window],
-        mask=base.mask[window],
-        keypoints_px=base.keypoints_px - [left, above],
-        visibility=np.where(shown, base.visibility, 0),
-    )
+    image, mask, visible = base.image[window], base.mask[window], np.where(shown, base.visibility, 0)
+    moved_px = base.keypoints_px - [left, above]
+    return replace(base, image=image, mask=mask, keypoints_px=moved_px, visibility=visible)
 
 
 def _bounds(mask: np.ndarray) -> np.ndarray:

@@ -161,18 +161,14 @@ def chair(rng: Rng, middle_m: tuple[float, float], seat_m: float) -> list[Surfac
     half, back, below_m, top_m = 0.215, y + 0.2, seat_m - 0.045, seat_m + 0.42
     inset = (-half + 0.03, half - 0.03)
     frame = legs([x + dx for dx in inset], [y + dy for dy in inset], 0.018, 0.0, below_m)
-    frame += [
-        ((x + dx - 0.015, back, below_m), (x + dx + 0.015, back + 0.03, top_m))
-        for dx in (-half + 0.04, half - 0.04)
-    ]
+    backs = [x + dx for dx in (-half + 0.04, half - 0.04)]
+    frame += [((at - 0.015, back, below_m), (at + 0.015, back + 0.03, top_m)) for at in backs]
     cushions = [
         ((x - half, y - half, below_m), (x + half, y + half, seat_m)),
         ((x - half + 0.01, back - 0.025, seat_m + 0.14), (x + half - 0.01, back, top_m)),
     ]
-    return [
-        Surface(g.boxes(frame), m.plain(np.full(3, 0.08), 0.3)),
-        Surface(g.boxes(cushions), m.upholstery(rng)),
-    ]
+    frame_look, cushion_look = m.plain(np.full(3, 0.08), 0.3), m.upholstery(rng)
+    return [Surface(g.boxes(frame), frame_look), Surface(g.boxes(cushions), cushion_look)]
 
 
 def _lighting(rng: Rng, height_m: float) -> tuple[list[lights.Light], lights.Ambient]:

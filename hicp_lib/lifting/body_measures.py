@@ -46,15 +46,11 @@ PARENTS = _parents()
 """The keypoint each one hangs on, shape (136,), -1 for the root: a tree from the right shoulder outwards."""
 
 
-def _levels() -> np.ndarray:
-    levels, above = np.zeros(N_KEYPOINTS, int), PARENTS
-    while (above >= 0).any():
-        levels += above >= 0
-        above = np.where(above >= 0, PARENTS[above], -1)
-    return levels
+def _level(keypoint: int) -> int:
+    return 0 if PARENTS[keypoint] < 0 else 1 + _level(PARENTS[keypoint])
 
 
-LEVELS = _levels()
+LEVELS = np.array([*map(_level, range(N_KEYPOINTS))])
 """How many keypoints each one is away from the root, shape (136,)."""
 
 

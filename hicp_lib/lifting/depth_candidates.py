@@ -146,7 +146,8 @@ def depth_costs(candidates: Candidates, grid_m: np.ndarray) -> np.ndarray:
     nearest = np.rint((depth_m - grid_m[0]) / step_m).astype(int) + 1
     place = np.clip(nearest + np.arange(-reach, reach + 1)[:, None], 0, len(beyond_m) - 1)
     apart = (beyond_m[place] - depth_m) / candidates.sigma_m[keypoint]
-    np.minimum.at(costs.reshape(-1), keypoint * len(beyond_m) + place, apart * apart + cost)
+    flat = keypoint * len(beyond_m) + place
+    np.minimum.at(costs.reshape(-1), flat.ravel(), (apart * apart + cost).ravel())  # fast in one dimension
     return costs[:, 1:-1]
 
 

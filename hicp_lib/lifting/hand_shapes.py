@@ -20,7 +20,7 @@ import numpy as np
 from hicp_lib.core.datafiles import DATA_DIR, read_arrays
 from hicp_lib.core.keypoints import HAND_LIMBS, LEFT_HAND, RIGHT_HAND
 from hicp_lib.core.memo import memoised
-from hicp_lib.core.quaternions import matrices_from_quaternions
+from hicp_lib.core.rotations import matrices_from_quaternions
 
 SHAPES_FILE = DATA_DIR / "hand_shapes.npz"
 PALM = np.array([0, 5, 9, 13, 17])
@@ -127,11 +127,11 @@ def fit_hand(
     places_m, costs = rays[:, :2].T * middle_m, np.minimum(costs, _MOST)
     known = middle_m, places_m, grid_m - middle_m, costs
     seen = _SeenHand(which, *(array.astype(np.float32) for array in known))
-    palms = _place_palm(seen.take(is_palm), is_right)
-    total, mean_m, square_m2 = palms.cost, *np.empty((2, len(which), len(palms.cost)))
-    mean_m[is_palm], square_m2[is_palm] = palms.behind_m, palms.behind_m**2
+    total, palms_m, *palms = _place_palm(seen.take(is_palm), is_right)
+    mean_m, square_m2 = np.empty((2, len(which), len(total)))
+    mean_m[is_palm], square_m2[is_palm] = palms_m, palms_m**2
     if not is_palm.all():
-        cost, mean_m[~is_palm], square_m2[~is_palm] = _bend(seen.take(~is_palm), palms)
+        cost, mean_m[~is_palm], square_m2[~is_palm] = _bend(seen.take(~is_palm), *palms)
         total = total + cost
     weights = np.exp((total.min() - total) / _LIKELY)
     weights /= weights.sum()
@@ -202,35 +202,14 @@ class _SeenHand:
 
     def look_up(self, behind_m: np.ndarray) -> np.ndarray:
         """What depths (k, ...) behind the middle cost."""
-        per_m = 1 / (self.grid_m[1] - self.grid_m[0])
-        index = np.rint((behind_m - self.grid_m[0]) * per_m)
-        index = np.maximum(np.minimum(index, len(self.grid_m) - 1), 0).astype(np.intp)
-        index += _beside(np.arange(len(self.costs)) * len(self.grid_m), behind_m)
-        return self.costs.take(index)
-
-
-@dataclass(frozen=True)
-class _Palms:
-    """Palms that fit.
-
-    Attributes
-    ----------
-    turns : array, shape (p, 3, 3)
-        Times the size.
-    z_m : array, shape (p,)
-        How far their middles lie behind where they seem to be.
-    shift_m : array, shape (2, p)
-        Across the line of sight.
-    behind_m : array, shape (k, p)
-        How far their k keypoints found lie behind where the middle seems to be.
-    cost : array, shape (p,)
-    """
-
-    turns: np.ndarray
-    z_m: np.ndarray
-    shift_m: np.ndarray
-    behind_m: np.ndarray
-    cost: np.ndarray
+        per_m, last = 1 / (self.grid_m[1] - self.grid_m[0]), len(self.grid_m) - 1
+        place = behind_m - self.grid_m[0]  # in place from here on, as memory is what takes the time
+        place *= per_m
+        np.rint(place, out=place)
+        np.minimum(place, last, out=place)
+        np.maximum(place, 0, out=place)
+        place += _beside(np.arange(len(self.costs), dtype=np.float32) * (last + 1), behind_m)
+        return self.costs.take(place.astype(np.intp))
 
 
 @memoised()
@@ -252,7 +231,12 @@ def _turns(is_right: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return scaled, (0.5 * ((sizes - 1) / _SIZE_SIGMA) ** 2).astype(np.float32), palms_m
 
 
-def _place_palm(seen: _SeenHand, is_right: bool) -> _Palms:
+def _place_palm(seen: _SeenHand, is_right: bool) -> tuple[np.ndarray, ...]:
+    """The palms that fit: what they cost, (p,), and how deep their keypoints lie (as of `_bend`), (k, p).
+
+    Then their turns times the size, (p, 3, 3), how far their middles lie behind where they seem to be, (p,),
+    and across the line of sight, (2, p).
+    """
     turns, total, points_m = _turns(is_right)
     points_m = points_m[:, np.searchsorted(PALM, seen.which)]
     apart_m = seen.apart_m(points_m)
@@ -265,26 +249,29 @@ def _place_palm(seen: _SeenHand, is_right: bool) -> _Palms:
     best = np.argpartition(total, _N_PLACES, axis=None)[:_N_PLACES]
     place, palm = np.unravel_index(best, total.shape)
     palm, z_m = fitting[palm], z_m[place]
-    return _Palms(turns[palm], z_m, shift_m[:, palm], points_m[2][:, palm] + z_m, total.ravel()[best])
+    return total.ravel()[best], points_m[2][:, palm] + z_m, turns[palm], z_m, shift_m[:, palm]
 
 
-def _bend(seen: _SeenHand, palms: _Palms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _bend(
+    seen: _SeenHand, turns: np.ndarray, z_m: np.ndarray, shift_m: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Fingers on each palm: what they cost in their best shapes, (p,), and how deep they lie, (k, p).
 
     That is behind where the middle seems to be, in the mean over shapes by how well they fit; and the mean
     of its square.
     """
     shapes_m = load_hand_shapes()[:, seen.which].swapaxes(0, 1)
-    points_m = _turned(shapes_m.reshape(-1, 3), palms.turns).reshape(3, *shapes_m.shape[:2], -1)
-    misfit = ((seen.apart_m(points_m) - palms.shift_m[:, None, None]) ** 2).sum(axis=0) / _FINGER_SIGMA_M**2
-    behind_m = points_m[2] + palms.z_m
-    finger = _FINGER_OF[seen.which]
-    first = np.flatnonzero(np.diff(finger, prepend=-1))
-    cost = np.add.reduceat(np.minimum(misfit, _MOST) + seen.look_up(behind_m), first, axis=0)
+    points_m = _turned(shapes_m.reshape(-1, 3), turns).reshape(3, *shapes_m.shape[:2], -1)
+    misfit = ((seen.apart_m(points_m) - shift_m[:, None, None]) ** 2).sum(axis=0) / _FINGER_SIGMA_M**2
+    behind_m = points_m[2] + z_m
+    of = _FINGER_OF[seen.which]
+    first = np.flatnonzero(np.diff(of, prepend=-1))
+    cost = np.minimum(misfit, _MOST) + seen.look_up(behind_m)
+    cost = np.stack([finger[0] + finger[1:].sum(axis=0) for finger in np.split(cost, first[1:])])
     least = cost.min(axis=1, keepdims=True)
     weights = np.exp((least - cost) / _LIKELY)
     weights /= weights.sum(axis=1, keepdims=True)
-    weighted_m = weights.repeat(np.diff(first, append=len(finger)), axis=0) * behind_m
+    weighted_m = weights.repeat(np.diff(first, append=len(of)), axis=0) * behind_m
     return least.sum(axis=(0, 1)), weighted_m.sum(axis=1), (weighted_m * behind_m).sum(axis=1)
 
 

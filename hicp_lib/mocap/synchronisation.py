@@ -24,6 +24,9 @@ _MAX_DRIFT_S = 0.5
 _STAMP_ERROR_S = 5e-7  # stamps in files are decimal
 _MIN_SHARE = 0.5  # of what was seen on the one clock, to be seen on the other as well
 _STANDING_M2_S2 = 1e-6  # variance of speeds, summed, of what stands still
+_FIT_ALIKE = np.log(20)  # an offset that much less likely than the best one is not in question
+_OVERLAP_GIVEN = 4 / 3  # an offset at which less was seen, by up to this, is judged as if as much had been
+_LEAST_RESIDUAL = 1e-4  # share of the variance; speeds that agree better say no more
 
 
 @dataclass(frozen=True)
@@ -96,9 +99,10 @@ def clock_offset(
 
     The *speeds* of the points do not depend on the frame they are given in. They are smoothed
     (Savitzky-Golay over a quarter of a second, or two periods of the slower clock), and the offset is where
-    their normalised cross-correlation, times how much both saw there, is largest, refined by a parabola
-    through its peak. All offsets are tried at which half of what was seen of the points on the one clock was
-    also seen on the other.
+    one predicts the other best: where the logarithm of the likelihood ratio, -n/2 log(1 - r²) with r their
+    correlation and n how many smoothing windows both saw there, is largest. Few samples are soon alike by
+    chance, and count for little. A parabola through r refines it. All offsets are tried at which half of what
+    was seen of the points on the one clock was also seen on the other.
 
     Parameters
     ----------
@@ -118,7 +122,8 @@ def clock_offset(
     Raises
     ------
     InputError
-        If no offset makes the two move together.
+        If no offset makes the two move together, or several do: one apart from the best is at least a
+        twentieth as likely.
 
     Examples
     --------
@@ -134,12 +139,18 @@ def clock_offset(
     half = len(speeds_a) // 2
     early, late = speeds_a.copy(), speeds_a.copy()
     early[half:], late[:half] = np.nan, np.nan
-    lag, correlation = _best_lag(speeds_a, speeds_b)
+    start_s = float(times_a_s[0] - times_b_s[0])
+    window = max(_LEAST_S, _SMOOTHED_PERIODS * period_s) * _RATE_HZ
+    lag, correlation, other = _best_lag(speeds_a, speeds_b, window)
     if not np.isfinite(lag):
         hint = "record at least some seconds of clear movement that both see"
         raise InputError(f"no clock offset makes camera and motion capture move together; {hint}")
-    lags = (lag, *(_best_lag(part, speeds_b, near=lag)[0] for part in (early, late)))
-    start_s = float(times_a_s[0] - times_b_s[0])
+    if np.isfinite(other):
+        both = " and ".join(f"{start_s + value / _RATE_HZ:.2f} s" for value in (lag, other))
+        hint = "record a movement that does not repeat, or its start and end"
+        raise InputError(f"clock offsets of {both} fit camera and motion capture alike; {hint}")
+    halves = (_best_lag(part, speeds_b, window, near=lag) for part in (early, late))
+    lags = (lag, *(part if np.isnan(another) else np.nan for part, _, another in halves))
     offset_s, early_s, late_s = (start_s + value / _RATE_HZ for value in lags)
     return ClockOffset(offset_s, correlation, (early_s, late_s))
 
@@ -157,27 +168,37 @@ def _speeds(times_s: np.ndarray, points_m: np.ndarray, period_s: float = 0.0) ->
     return np.minimum(np.linalg.norm(velocity, axis=-1), _MAX_SPEED_M_S)
 
 
-def _best_lag(a: np.ndarray, b: np.ndarray, near: float | None = None) -> tuple[float, float]:
-    """Rows by which b must be moved to be most like a, and the correlation then; NaN where nothing is."""
+def _best_lag(
+    a: np.ndarray, b: np.ndarray, window: float, near: float | None = None
+) -> tuple[float, float, float]:
+    """Rows by which b must be moved to be most like a, the correlation then, and another such lag.
+
+    NaN where nothing is alike, and where no other lag, apart by more than the `window` of rows over which
+    speeds are smoothed, is about as likely.
+    """
     values, n = _correlations(a, b)
     lags = np.arange(len(values)) - (len(b) - 1)
     if near is not None:
         values[np.abs(lags - near) > _MAX_DRIFT_S * _RATE_HZ] = np.nan
-    if not np.isfinite(values).any():
-        return np.nan, np.nan
-    # Weighted by what both saw there: a little of two recordings is sooner alike by chance than all of them.
-    peak = int(np.nanargmax(values * n))
+    gain = -0.5 * n / window * np.log(np.maximum(1 - np.maximum(values, 0) ** 2, _LEAST_RESIDUAL))
+    gain = np.where(np.isfinite(gain), gain, -np.inf)
+    peak = int(np.argmax(gain))
     around = values[max(peak - 1, 0) : peak + 2]
     if len(around) < 3 or not np.isfinite(around).all():
-        return np.nan, np.nan
+        return np.nan, np.nan, np.nan
+    # That a little less was seen there is no reason against another offset.
+    rivals = gain * np.clip(n[peak] / np.maximum(n, 1), 1, _OVERLAP_GIVEN)
+    rival = int(np.argmax(np.where(np.abs(lags - lags[peak]) > window, rivals, -np.inf)))
+    is_alike = rivals[rival] > gain[peak] - _FIT_ALIKE
     before, top, after = around
-    return float(lags[peak] + 0.5 * (before - after) / (before - 2 * top + after)), float(top)
+    lag = float(lags[peak] + 0.5 * (before - after) / (before - 2 * top + after))
+    return lag, float(top), float(lags[rival]) if is_alike else np.nan
 
 
 def _correlations(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Pearson's correlation at every lag over what both have, each track about its own mean there.
 
-    NaN where they have too little together; and how much that is.
+    NaN where they have too little together; and the most samples of one track that are.
     """
     seen_a, seen_b = np.isfinite(a), np.isfinite(b)
     a, b = np.where(seen_a, a, 0.0), np.where(seen_b, b, 0.0)
@@ -190,7 +211,7 @@ def _correlations(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     enough = n.sum(axis=1) >= max(_MIN_OVERLAP_S * _RATE_HZ, _MIN_SHARE * min(seen_a.sum(), seen_b.sum()))
     enough &= np.minimum(variance_a, variance_b) > _STANDING_M2_S2
     scale = np.sqrt(np.where(enough, variance_a * variance_b, 1.0))
-    return np.where(enough, covariance / scale, np.nan), n.sum(axis=1)
+    return np.where(enough, covariance / scale, np.nan), n.max(axis=1, initial=0)
 
 
 def _sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:

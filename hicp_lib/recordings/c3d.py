@@ -1,9 +1,14 @@
-"""C3D files: the trajectories of markers, in and out, through ezc3d."""
+"""C3D files: the trajectories of markers, in and out, through ezc3d.
+
+A C3D file says twice how its numbers lie: in its first block and in its parameters. ezc3d believes the
+parameters; here both are compared, and what is left of the file decides between them, or nothing does.
+"""
 
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +20,14 @@ from hicp_lib.core.files import atomic_path, read_bytes
 with needs("analysis"):
     import ezc3d
 
-_UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+# The longer ones are how the words for a unit begin: old files cut them to four letters.
+_UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
+_UNITS_M |= {"mill": 1e-3, "cent": 1e-2, "met": 1.0, "inch": 0.0254, "feet": 0.3048, "foot": 0.3048}
 _MAX_RATE_HZ = 1e5
+_SAME_SHARE = 0.005  # of a rate or scale, by which its two statements may differ
+_PARAMETERS, _TRIAL = ("RATE", "SCALE", "FRAMES", "DATA_START"), ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD")
+_SHOWN = 160  # characters of the reader's own reason
+_BLOCK_BYTES = 512
 MAX_FRAMES = 65535  # that the format's own header counts to
 _TIMEOUT_S = 300
 _MAX_MEMORY_BYTES = 8 * 2**30
@@ -31,15 +42,21 @@ except (ImportError, ValueError, OSError):  # no such limit on this system
     pass
 import ezc3d, numpy
 file = ezc3d.c3d(sys.argv[1])
-point = file["parameters"]["POINT"]
-labels = sorted((key for key in point if key.startswith("LABELS")), key=lambda key: int(key[6:] or 1))
+points, analogs = file["data"]["points"], file["data"]["analogs"]
+def of(group, name):
+    group = file["parameters"][group] if group in file["parameters"] else {}
+    return numpy.ravel(group[name]["value"]) if name in group else numpy.array([])
+labels = sorted((key for key in file["parameters"]["POINT"] if key.startswith("LABELS")),
+                key=lambda key: int(key[6:] or 1))
 numpy.savez(
     sys.argv[2],
-    points=file["data"]["points"][:3],
+    points=points[:3],
     residuals=file["data"]["meta_points"]["residuals"][0],
-    names=numpy.array([name for key in labels for name in point[key]["value"]], dtype=str),
-    rate=numpy.ravel(point["RATE"]["value"])[:1],
-    units=numpy.array(point["UNITS"]["value"], dtype=str),
+    names=numpy.array([str(name) for key in labels for name in of("POINT", key)], dtype=str),
+    units=of("POINT", "UNITS").astype(str),
+    n_analog=analogs.size // max(points.shape[2], 1),
+    **{name: of("POINT", name) for name in sys.argv[4].split()},
+    **{name: of("TRIAL", name) for name in sys.argv[5].split()},
 )
 """
 
@@ -59,14 +76,14 @@ def read_points(path: Path) -> Points:
     points_m : array, shape (n, m, 3)
         NaN where the residual is negative.
     names : tuple of str
-        Of the m markers, no two alike.
+        Of the m markers, no two alike: those named the same are numbered, one without a name is "unnamed".
     rate_hz : float
         Frames per second.
 
     Raises
     ------
     InputError
-        If the file is missing, damaged, or lacks names, rate or unit of length.
+        If the file is missing, damaged, lacks names, rate or unit of length, or contradicts itself.
 
     Examples
     --------
@@ -76,44 +93,115 @@ def read_points(path: Path) -> Points:
     >>> points_m.shape, names, rate_hz
     ((5, 2, 3), ('elbow', 'wrist'), 100.0)
     """
-    head = read_bytes(path, "give the path of a C3D file")[:10]
-    if len(head) < 10 or head[1:2] != b"\x50":
+    raw = read_bytes(path, "give the path of a C3D file")
+    if raw[1:2] != b"\x50":
         raise InputError(f"{path}: is not a C3D file (its second byte is not 80); export it again")
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "points.npz"
-        command = [sys.executable, "-P", "-c", _CONVERT, str(path), str(out), str(_MAX_MEMORY_BYTES)]
+        limits = [str(_MAX_MEMORY_BYTES), " ".join(_PARAMETERS), " ".join(_TRIAL)]
         try:
+            command = [sys.executable, "-P", "-c", _CONVERT, str(path), str(out), *limits]
             subprocess.run(command, capture_output=True, timeout=_TIMEOUT_S, check=True)
-        except subprocess.SubprocessError:
-            raise InputError(f"{path}: cannot be read as C3D; it may be cut off, export it again") from None
+        except subprocess.SubprocessError as error:
+            told = (getattr(error, "stderr", None) or b"").decode(errors="replace")
+            why = told.strip().rpartition("\n")[2][:_SHOWN] or "it did not end well"
+            hint = "if it is cut off, export it again, else as TSV"
+            raise InputError(f"{path}: ezc3d cannot read it as C3D ({why}); {hint}") from None
         with np.load(out, allow_pickle=False) as stored:
-            points = _checked(path, stored)
-    _refuse_cut_off(path, head, len(points[0]))
-    return points
+            return _checked(path, stored, _n_frames(path, raw, stored))
 
 
-def _checked(path: Path, stored: Mapping[str, np.ndarray]) -> Points:
+def decoded(raw: bytes) -> str:
+    """Text of an export; what is not UTF-8 is in the code page of its computer, where every byte is a letter.
+
+    Examples
+    --------
+    >>> decoded("épaule".encode()), decoded("épaule".encode("latin-1"))
+    ('épaule', 'épaule')
+    """
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
+
+
+def _checked(path: Path, stored: Mapping[str, np.ndarray], n_frames: int) -> Points:
     """Points, names and rate of what `_CONVERT` stored."""
-    points, rate, units = stored["points"], stored["rate"], stored["units"]
-    names = tuple(str(name).strip() for name in stored["names"][: points.shape[1]])
-    if not names or len(names) != points.shape[1] or len(set(names)) != len(names) or "" in names:
-        raise InputError(f"{path}: POINT:LABELS does not name every marker once; name them in Qualisys")
+    points, rate = stored["points"][:, :, :n_frames], stored["RATE"]
+    names = [decoded(str(name).encode(errors="surrogateescape")).strip() for name in stored["names"]]
+    names = _distinct([*names, *[""] * points.shape[1]][: points.shape[1]]) if any(names) else []
+    if not names or len(set(names)) != len(names):
+        raise InputError(f"{path}: POINT:LABELS does not name the markers; name them in Qualisys")
     if not len(rate) or not 0 < rate[0] <= _MAX_RATE_HZ:
         raise InputError(f"{path}: POINT:RATE is missing or wrong; expected frames per second")
-    if not len(units) or str(units[0]) not in _UNITS_M:
-        raise InputError(f"{path}: POINT:UNITS is none of {', '.join(_UNITS_M)}; export it again")
-    points_m = np.moveaxis(points, 0, -1).swapaxes(0, 1) * _UNITS_M[str(units[0])]
-    valid = (stored["residuals"].T >= 0) & np.isfinite(points_m).all(axis=2)
-    return np.where(valid[..., None], points_m, np.nan), names, float(rate[0])
+    found = {_unit_m(str(unit)) for unit in stored["units"] if str(unit).strip()}
+    if len(found) != 1 or None in found:
+        raise InputError(f"{path}: POINT:UNITS is none of mm, cm, m, in, ft; export it again")
+    points_m = np.moveaxis(points, 0, -1).swapaxes(0, 1) * found.pop()
+    valid = (stored["residuals"].T[:n_frames] >= 0) & np.isfinite(points_m).all(axis=2)
+    return np.where(valid[..., None], points_m, np.nan), tuple(names), float(rate[0])
 
 
-def _refuse_cut_off(path: Path, head: bytes, n_frames: int) -> None:
-    """ezc3d keeps quiet about frames that are missing at the end; the fourth and fifth word number them."""
-    first, last = np.frombuffer(head, "<u2")[3:5].astype(int)
-    if n_frames == MAX_FRAMES:
-        raise InputError(f"{path}: {n_frames} frames are all C3D counts to, more may be missing; export TSV")
-    if n_frames < last - first + 1:
-        raise InputError(f"{path}: holds {n_frames} of {last - first + 1} frames: cut off, export it again")
+def _distinct(names: Sequence[str]) -> list[str]:
+    """Names, numbered where several are the same: none of them may pass for the one that was meant."""
+    total, so_far, distinct = Counter(names), Counter[str](), []
+    for name in names:
+        so_far[name] += 1
+        distinct.append((name or "unnamed") + (f"_{so_far[name]}" if total[name] > 1 else ""))
+    return distinct
+
+
+def _unit_m(text: str) -> float | None:
+    unit = text.strip().lower()
+    return next((m for u, m in _UNITS_M.items() if unit == u or (len(u) > 2 and unit.startswith(u))), None)
+
+
+def _n_frames(path: Path, raw: bytes, stored: Mapping[str, np.ndarray]) -> int:
+    """How many of the frames that ezc3d read are the file's; InputError where it contradicts itself."""
+    words = np.frombuffer(raw[:24], "<u2")
+    is_dec = raw[_BLOCK_BYTES * (raw[0] - 1) + 3] == 85  # halves of a float swapped, and four times as large
+    floats = words[[7, 6, 11, 10] if is_dec else [6, 7, 10, 11]].view("<f4") / (4 if is_dec else 1)
+    n_points, n_analog, first, last, _, _, _, start = words[1:9].tolist()
+    of = {name: float(np.nan_to_num(stored[name][0])) if stored[name].size else 0.0 for name in _PARAMETERS}
+    for name, header in (("RATE", floats[1]), ("DATA_START", start), ("SCALE", floats[0])):
+        if min(header, of[name]) > 0 and abs(header - of[name]) > _SAME_SHARE * of[name]:
+            raise _disagreement(path, f"POINT:{name}", f"{header:g}", f"{of[name]:g}")
+    _, m, n = stored["points"].shape
+    stated = (4 * n_points + n_analog) * (4 if floats[0] < 0 else 2)
+    frame_bytes = (4 * m + int(stored["n_analog"])) * (4 if of["SCALE"] < 0 else 2)
+    data_bytes = len(raw) - _BLOCK_BYTES * (start - 1)
+    if stated != frame_bytes and (_fits(data_bytes, n * stated) or not _fits(data_bytes, n * frame_bytes)):
+        raise _disagreement(path, "the bytes from frame to frame", stated, frame_bytes)
+    header, frames, actual = last - first + 1, int(of["FRAMES"]), _actual(stored)
+    n_true = actual if actual >= MAX_FRAMES else n
+    fits, actual_fits = (_fits(data_bytes, k * frame_bytes) for k in (n_true, actual))
+    # Counts that do not reach further stay at the highest; TRIAL may be of a file that was cut since.
+    agree = header == n_true or header == MAX_FRAMES <= actual
+    agree &= frames in (0, n, n_true) or (frames in (-1, MAX_FRAMES) and actual >= MAX_FRAMES)
+    agree &= actual in (0, n_true) or (fits and not actual_fits)
+    too_long = data_bytes - n_true * frame_bytes >= 2**16 * frame_bytes or (n_true == MAX_FRAMES and not fits)
+    if n_true > n or not agree or too_long:
+        counts = ((header, "header"), (frames, "POINT:FRAMES"), (actual, "TRIAL"))
+        told = ", ".join(f"{count} ({where})" for count, where in counts if count)
+        hint = "it is cut off, or too long for C3D; export it again, or as TSV"
+        raise InputError(f"{path}: holds {n} frames, counts {told}; {hint}")
+    return n_true
+
+
+def _fits(file_bytes: int, data_bytes: int) -> bool:
+    """Whether data fill a file but for the rest of a block."""
+    return 0 <= file_bytes - data_bytes < _BLOCK_BYTES
+
+
+def _actual(stored: Mapping[str, np.ndarray]) -> int:
+    """Frames by the group TRIAL, which counts with 32 bits; 0 if it does not."""
+    first, last = (stored[name].astype(int) % 2**16 @ [1, 2**16][: stored[name].size] for name in _TRIAL)
+    return int(last - first + 1) if stored[_TRIAL[1]].size else 0
+
+
+def _disagreement(path: Path, what: str, header: object, parameters: object) -> InputError:
+    told = f"header and parameters disagree on {what} ({header}, {parameters})"
+    return InputError(f"{path}: {told}; export it again, or as TSV")
 
 
 def write_points(path: str | Path, points_m: np.ndarray, names: tuple[str, ...], rate_hz: float) -> None:

@@ -1,15 +1,20 @@
 """camera.json: the intrinsics of a recording's camera, and the scale of its depth images."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.formats.json_validation import is_number, shown
+from hicp_lib.recordings.rectification import undistortion
 
 MAX_SIDE_PX = 100_000
+_DISTORTION = re.compile(r"(?i)d|.*(dist|coef).*|k[1-6]|p[12]")  # however a tool names the key
 _LAYOUT = "fx, 0, 0, 0, fy, 0, cx, cy, 1"
 
 
@@ -17,7 +22,8 @@ def read_camera(path: str | Path) -> tuple[Camera, float]:
     """Read camera.json: Open3D's PinholeCameraIntrinsic layout, and `depth_scale`.
 
     The keys are `width`, `height`, `intrinsic_matrix` (nine numbers column by column: fx, 0, 0, 0, fy,
-    0, cx, cy, 1) and `depth_scale`, the number of depth-image units per metre. Others are not read.
+    0, cx, cy, 1) and `depth_scale`, the number of depth-image units per metre. Others are not read, but
+    distortion is refused.
 
     Parameters
     ----------
@@ -31,7 +37,7 @@ def read_camera(path: str | Path) -> tuple[Camera, float]:
     Raises
     ------
     InputError
-        If the file is not such a file; the key is named.
+        If the file is not such a file, and the key is named; or if images are distorted.
 
     Examples
     --------
@@ -41,6 +47,36 @@ def read_camera(path: str | Path) -> tuple[Camera, float]:
     ...     intrinsics, depth_units_per_m = read_camera(Path(folder, "camera.json"))
     >>> intrinsics.width_px, intrinsics.fx_px, depth_units_per_m
     (640, 600.0, 1000.0)
+    """
+    intrinsics, depth_units_per_m, pixels_px = read_distorted_camera(path)
+    if pixels_px is not None:
+        hint = "undistort the images, as `hicp record import` does, and remove the coefficients"
+        raise InputError(f"{path}: says that images are distorted; {hint}")
+    return intrinsics, depth_units_per_m
+
+
+def read_distorted_camera(
+    path: str | Path, depth_units_per_m: float | None = None
+) -> tuple[Camera, float, np.ndarray | None]:
+    """Read the file of a camera whose images may be distorted.
+
+    Parameters
+    ----------
+    path : str or Path
+    depth_units_per_m : float, optional
+        In place of the file's.
+
+    Returns
+    -------
+    intrinsics : Camera
+    depth_units_per_m : float
+    pixels_px : array or None, shape (height, width, 2)
+        As `undistortion` gives them.
+
+    Raises
+    ------
+    InputError
+        If the file is not such a file, or the distortion cannot be undone.
     """
     content = read_json(path)
     if not isinstance(content, dict):
@@ -58,8 +94,10 @@ def read_camera(path: str | Path) -> tuple[Camera, float]:
     matrix = read("intrinsic_matrix", *numbers)
     intrinsics = Camera(width, height, *_focal_and_centre(f"{path}: intrinsic_matrix", matrix))
     units = "the number of depth units per metre, at least 1"
-    scale = read("depth_scale", _is_scale, units, "for depth images in millimetres write 1000")
-    return intrinsics, float(scale)
+    if depth_units_per_m is None:
+        hint = "for depth images in millimetres write 1000, or give --depth-scale"
+        depth_units_per_m = read("depth_scale", _is_scale, units, hint)
+    return intrinsics, float(depth_units_per_m), _distortion(path, content, intrinsics)
 
 
 def write_camera(path: str | Path, intrinsics: Camera, depth_units_per_m: float) -> None:
@@ -80,6 +118,17 @@ def write_camera(path: str | Path, intrinsics: Camera, depth_units_per_m: float)
         "depth_scale": float(depth_units_per_m),
     }
     write_json(path, content, indent=1)
+
+
+def _distortion(path: str | Path, content: dict, intrinsics: Camera) -> np.ndarray | None:
+    """What its keys say, of which one is the model's name and one the list of coefficients."""
+    said = [content[key] for key in content if _DISTORTION.fullmatch(key)]
+    model = next((value for value in said if isinstance(value, str)), "")
+    numbers = [value for value in said if not isinstance(value, str | None) and value not in (0, [])]
+    if len(numbers) > 1 or not all(isinstance(of, list) and all(map(is_number, of)) for of in numbers):
+        expected = "a distortion_model and one list coeffs: k1, k2, p1, p2, k3"
+        raise InputError(f"{path}: distortion: expected {expected}, found {shown(numbers)}")
+    return undistortion(str(path), intrinsics, model, numbers[0] if numbers else [])
 
 
 def _is_side(value: object) -> bool:

@@ -1,38 +1,33 @@
-"""Recordings made by others' tools: a RealSense `.bag`, and the folder layout Open3D's tools write.
+"""Recordings made by others' tools: the folder layout that Open3D's write, and where the camera was.
 
-Images of a folder are copied as they are. Poses come from the user: a text file in the TUM layout, one
-line of which is a camera that stands still, or a CSV of the robot's joint angles.
+Images are copied as they are, unless they are distorted. Poses come from the user: a text file in the
+TUM layout, one line of which is a camera that stands still, or a CSV of the robot's joint angles.
 """
 
-import shutil
-from collections.abc import Iterator
+import re
 from pathlib import Path
-from typing import Any
 
+import cv2
 import numpy as np
 import pandas as pd
 
-from hicp_lib.core.camera import Camera
-from hicp_lib.core.environment import with_variables
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.extras import needs
-from hicp_lib.core.files import atomic_path, read_json
-from hicp_lib.formats.json_validation import is_number
-from hicp_lib.recordings.camera_file import read_camera
+from hicp_lib.core.files import read_bytes, read_json, write_bytes
+from hicp_lib.formats.json_validation import is_number, shown
+from hicp_lib.recordings.camera_file import read_distorted_camera
 from hicp_lib.recordings.recording import check_columns
-from hicp_lib.recordings.tum import read_poses
-from hicp_lib.recordings.writer import refuse_used_folder, write_frame, write_index
+from hicp_lib.recordings.rectification import rectify
+from hicp_lib.recordings.trajectories import read_trajectory
+from hicp_lib.recordings.tum import names_poses
+from hicp_lib.recordings.writer import JPEG_QUALITY, Poses, refuse_used_folder, write_index
 
+_METADATA = ("intrinsic.json", "camera_intrinsic.json")
 _IMAGE_KINDS = (".png", ".jpg", ".jpeg")
 _MAX_RATE_HZ = 10_000
 
 
-Poses = tuple[np.ndarray, np.ndarray]
-"""Times (m,) in seconds and T_base_cam (m, 4, 4); one pose is for all times."""
-
-
 def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
-    """Poses from a TUM text file, or from a CSV of joint angles by the robot's kinematics.
+    """Poses from a trajectory (`read_trajectory`), or a CSV of joint angles by the robot's kinematics.
 
     A CSV has a column `t_s` and one of degrees for every joint of torso and neck, such as
     `torso_pitch_deg`. Without a file the base frame is the camera's own.
@@ -46,7 +41,7 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
     Returns
     -------
     times_s : array, shape (m,)
-        One time where the camera stands still.
+        One time where the camera stands still, none where the poses are of frame after frame.
     T_base_cam : array, shape (m, 4, 4)
         Camera coordinates to the robot's base frame.
 
@@ -64,8 +59,8 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
     if path is None:
         return np.zeros(1), np.eye(4)[None]
     path = Path(path)
-    if path.suffix.lower() != ".csv":
-        return read_poses(path)
+    if path.suffix.lower() != ".csv" or names_poses(path):
+        return read_trajectory(path)
     from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub  # not in every installation
 
     columns = ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)]
@@ -82,8 +77,16 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
     return numbers[:, 0], load_icub().T_root_camera(np.radians(numbers[:, 1:]), mount)
 
 
-def import_open3d(source: str | Path, out: str | Path, poses: Poses, rate_hz: float | None = None) -> int:
-    """Import `color/`, `depth/` and `intrinsic.json` as Open3D's recorder writes them.
+def import_open3d(
+    source: str | Path,
+    out: str | Path,
+    poses: Poses,
+    rate_hz: float | None = None,
+    depth_units_per_m: float | None = None,
+) -> tuple[int, list[str]]:
+    """Import `color/`, `depth/` and `intrinsic.json` or `camera_intrinsic.json`, as Open3D's recorders do.
+
+    Distortion that the file tells is undone. Frames are in the order of the numbers in their names.
 
     Parameters
     ----------
@@ -95,11 +98,14 @@ def import_open3d(source: str | Path, out: str | Path, poses: Poses, rate_hz: fl
         As `read_pose_source` gives them.
     rate_hz : float, optional
         Frames per second; the file's `fps` when left out. The first frame is at time 0.
+    depth_units_per_m : float, optional
+        Of the depth images; the file's `depth_scale` when left out.
 
     Returns
     -------
-    int
-        The number of frames.
+    n_frames : int
+    notes : list of str
+        What was done to the images, and what the files say in two ways; one line each.
 
     Raises
     ------
@@ -109,111 +115,83 @@ def import_open3d(source: str | Path, out: str | Path, poses: Poses, rate_hz: fl
     source, out = Path(source), Path(out)
     if rate_hz is not None and not 0 < rate_hz < np.inf:
         raise InputError(f"rate is {rate_hz!r}; expected frames per second")
-    intrinsics, depth_units_per_m = read_camera(source / "intrinsic.json")
+    found = [source / name for name in _METADATA if (source / name).is_file()]
+    if len(found) > 1:
+        raise InputError(f"{source}: holds {' and '.join(_METADATA)}; keep the one of these images")
+    path = (found or [source / _METADATA[0]])[0]
+    intrinsics, units_per_m, pixels_px = read_distorted_camera(path, depth_units_per_m)
+    notes = [] if pixels_px is None else [f"{path}: distortion undone"]
+    said = read_json(path)
+    for key, given in (("fps", rate_hz), ("depth_scale", depth_units_per_m)):
+        if given is not None and said.get(key, given) != given:
+            notes.append(f"{path}: {key} is {shown(said[key])}; {given:g} was given and counts")
     rgb, depth = (_images(source / name) for name in ("color", "depth"))
-    if [path.stem for path in rgb] != [path.stem for path in depth]:
-        raise InputError(f"{source}: color/ and depth/ hold other names; expected one depth image per colour")
-    times_s = np.arange(len(rgb)) / (_rate_hz(source / "intrinsic.json") if rate_hz is None else rate_hz)
+    if [image.stem for image in rgb] != [image.stem for image in depth]:
+        counts = f"color/ holds {len(rgb)} images, depth/ {len(depth)}, not all of the same names"
+        raise InputError(f"{source}: {counts}; expected one depth image per colour")
+    rate_hz = _rate_hz(path, said) if rate_hz is None else rate_hz
+    times_s = _frame_numbers(rgb, notes) / rate_hz
+    lasts_s, said_us = times_s[-1] + 1 / rate_hz, said.get("stream_length_usec")
+    if is_number(said_us) and abs(said_us / 1e6 - lasts_s) > max(2 / rate_hz, 0.01 * lasts_s):
+        lengths = f"stream_length_usec is {said_us / 1e6:.2f} s, {len(rgb)} frames are {lasts_s:.2f} s"
+        notes.append(f"{path}: {lengths}; frames were dropped, or the rate is another")
     refuse_used_folder(out)
-    names = [f"rgb/{path.name}" for path in rgb], [f"depth/{path.name}" for path in depth]
-    for path, name in zip(rgb + depth, sum(names, []), strict=True):
-        with atomic_path(out / name) as temporary:
-            shutil.copyfile(path, temporary)
-    write_index(out, intrinsics, depth_units_per_m, times_s, *_poses_at(times_s, poses), names)
-    return len(times_s)
-
-
-def import_bag(bag: str | Path, out: str | Path, poses: Poses) -> int:
-    """Import a `.bag` recorded by the RealSense viewer or SDK; depth is aligned to colour on the way.
-
-    Times are those of the file, in seconds; colour is stored as JPEG of high quality.
-
-    Parameters
-    ----------
-    bag : str or Path
-    out : str or Path
-        Folder of the recording; new or empty.
-    poses : tuple of array
-        As `read_pose_source` gives them.
-
-    Returns
-    -------
-    int
-        The number of frames.
-
-    Raises
-    ------
-    InputError
-        If Open3D was built without RealSense, the file is not such a bag, or `out` holds files.
-    """
-    out = Path(out)
-    refuse_used_folder(out)
-    reader = _open_bag(Path(bag))
-    meta = reader.metadata
-    if meta.color_format not in ("RGB8", "BGR8"):
-        raise InputError(f"{bag}: colour is {meta.color_format}; record it as RGB8")
-    stamps_s: list[float] = []
-    for time_s, rgb, depth_units in _frames(reader):
-        if stamps_s and time_s <= stamps_s[-1]:
-            continue  # the reader may return the last frame twice
-        rgb = rgb if meta.color_format == "RGB8" else rgb[..., ::-1].copy()
-        write_frame(out, len(stamps_s), rgb, depth_units, 1)
-        stamps_s.append(time_s)
-    if not stamps_s:
-        raise InputError(f"{bag}: holds no frames with colour and depth; record both streams")
-    times_s, matrix = np.array(stamps_s), meta.intrinsics.intrinsic_matrix
-    intrinsics = Camera(meta.width, meta.height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2])
-    write_index(out, intrinsics, meta.depth_scale, times_s, *_poses_at(times_s, poses))
-    return len(times_s)
-
-
-def _open_bag(bag: Path) -> Any:
-    """Open3D's reader, opened."""
-    with needs("render"), with_variables(OPEN3D_DISABLE_WEB_VISUALIZER="true"):
-        import open3d as o3d
-
-    if not hasattr(o3d.t.io, "RSBagReader"):
-        hint = "use its tools elsewhere to save the frames, then import with --open3d"
-        raise InputError(f"{bag}: this Open3D was built without RealSense; {hint}")
-    if not bag.is_file():
-        raise InputError(f"{bag}: is not there; give a .bag recorded by the RealSense viewer")
-    reader = o3d.t.io.RSBagReader()
-    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        is_open = reader.open(str(bag))
-    if not is_open:
-        raise InputError(f"{bag}: cannot be opened; expected a .bag recorded by the RealSense viewer")
-    return reader
-
-
-def _frames(reader: Any) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
-    """Time in seconds, colour (height, width, 3) and depth in units (height, width) of every frame."""
-    frame = reader.next_frame()
-    while not reader.is_eof():
-        color, depth = (np.asarray(image.as_tensor().numpy()) for image in (frame.color, frame.depth))
-        yield reader.get_timestamp() / 1e6, color, depth.squeeze()
-        frame = reader.next_frame()
-    reader.close()
+    names = [f"rgb/{image.name}" for image in rgb], [f"depth/{image.name}" for image in depth]
+    size = intrinsics.height_px, intrinsics.width_px
+    for image, name in zip(rgb + depth, sum(names, []), strict=True):
+        write_bytes(out / name, _rectified(image, size, pixels_px))
+    write_index(out, intrinsics, units_per_m, times_s, poses, names)
+    return len(times_s), notes
 
 
 def _images(folder: Path) -> list[Path]:
+    """Sorted by the numbers in their names."""
     if not folder.is_dir():
         raise InputError(f"{folder}: is not a folder; expected color/, depth/ and intrinsic.json")
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in _IMAGE_KINDS)
+    paths = [path for path in folder.iterdir() if path.suffix.lower() in _IMAGE_KINDS]
     if not paths:
         raise InputError(f"{folder}: holds no images; expected files such as 00000.png")
-    return paths
+
+    def key(path: Path) -> list[str | int]:
+        return [int(part) if k % 2 else part for k, part in enumerate(re.split("([0-9]+)", path.stem))]
+
+    return sorted(paths, key=key)
 
 
-def _rate_hz(path: Path) -> float:
-    value = read_json(path).get("fps")
+def _frame_numbers(paths: list[Path], notes: list[str]) -> np.ndarray:
+    """Which frame each image is, from 0: by its name's number, where few are missing."""
+    in_order = np.arange(len(paths))
+    numbers = [int(match[0]) for path in paths if (match := re.search("[0-9]+$", path.stem))]
+    missing = numbers[-1] - numbers[0] + 1 - len(paths) if len(numbers) == len(paths) else 0
+    if missing == 0:
+        return in_order
+    if len(set(numbers)) < len(paths):
+        raise InputError(f"{paths[0].parent}: two images have the same number; keep one of them")
+    if not 0 < missing < len(paths):
+        notes.append(
+            f"{paths[0].parent}: names do not count frames, which are taken as evenly spaced in time"
+        )
+        return in_order
+    notes.append(f"{paths[0].parent}: {missing} numbers are missing among {len(paths)}; times go by number")
+    return np.array(numbers) - numbers[0]
+
+
+def _rectified(path: Path, size: tuple[int, int], pixels_px: np.ndarray | None) -> bytes:
+    """An image file's content, without distortion."""
+    content = read_bytes(path, "expected an image")
+    image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if content else None
+    if image is None:
+        raise InputError(f"{path}: is not a whole image; expected PNG or JPEG")
+    if image.shape[:2] != size:
+        raise InputError(f"{path}: is {image.shape[:2]} (height, width); the intrinsics are of {size}")
+    if pixels_px is None:
+        return content
+    quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
+    return cv2.imencode(path.suffix, rectify(image, pixels_px), quality)[1].tobytes()
+
+
+def _rate_hz(path: Path, said: dict) -> float:
+    value = said.get("fps")
     if not (is_number(value) and 0 < value < _MAX_RATE_HZ):
         raise InputError(f"{path}: fps: expected frames per second, found {value!r}; give --rate")
     return float(value)
-
-
-def _poses_at(times_s: np.ndarray, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
-    """Poses and their times; of a camera that stands still, one for every image."""
-    pose_s, T_base_cam = poses
-    if len(pose_s) > 1:
-        return T_base_cam, pose_s
-    return np.repeat(T_base_cam, len(times_s), axis=0), times_s

@@ -127,7 +127,7 @@ def write_c3d(path: str | Path, mocap: MotionCapture) -> None:
 
 def _read_tsv(path: Path) -> MotionCapture:
     raw = read_bytes(path, "give the path of a TSV file")
-    lines = re.split(r"\r\n|\n|\r", _decoded(raw).rstrip("\r\n \x1a"))
+    lines = re.split(r"\r\n|\n|\r", c3d.decoded(raw).rstrip("\r\n \x1a"))
     start = next((k for k, line in enumerate(lines) if _is_data(line)), None)
     if start is None:
         _refuse_without_data(path, lines)
@@ -138,14 +138,6 @@ def _read_tsv(path: Path) -> MotionCapture:
     _check_count(path, header, "NO_OF_FRAMES", len(values), "rows of data")
     points_m = 1e-3 * coordinates_mm.reshape(len(values), -1, 3)
     return MotionCapture(times_s, names, _without_missing(points_m), rate_hz)
-
-
-def _decoded(raw: bytes) -> str:
-    """Marker names may be in the code page of the exporting computer; every byte is a letter there."""
-    try:
-        return raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
 
 
 def _is_data(line: str) -> bool:

@@ -105,10 +105,10 @@ def open_recording(folder: str | Path) -> Recording:
         none = f"no frame has colour, depth and pose within {MAX_DIFFERENCE_S:g} s"
         raise InputError(f"{folder}: {none}; bring their clocks together")
     rgb_paths, depth_paths = [folder / rgb_names[k] for k in rgb], [folder / depth_names[k] for k in depth]
-    mocap = folder / MOCAP_FILE
+    mocap = (folder / MOCAP_FILE, (folder / MOCAP_FILE).with_suffix(".c3d"))
     return Recording(
         folder, intrinsics, depth_units_per_m, rgb_s[rgb], rgb_paths, depth_paths, T_base_cam[pose],
-        mocap_path=mocap if mocap.is_file() else None,
+        mocap_path=next(filter(Path.is_file, mocap), None),
     )  # fmt: skip
 
 

@@ -1,25 +1,33 @@
 """The text files of the TUM RGB-D layout: lists of images, camera poses, and how they go together.
 
 A line of `rgb.txt` or `depth.txt` is "timestamp filename", one of `groundtruth.txt` is
-"timestamp tx ty tz qx qy qz qw"; `#` starts a comment. Timestamps are seconds and increase.
+"timestamp tx ty tz qx qy qz qw"; `#` starts a comment. Timestamps are seconds and increase. Where a line
+above the poses names their columns, as EuRoC's CSV does, they are what it says.
 Layout and association as in the tools of Sturm et al., *A Benchmark for the Evaluation of RGB-D
 SLAM Systems*, IROS 2012.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import atomic_path, write_bytes
-from hicp_lib.core.quaternions import matrices_from_quaternions, quaternions_from_matrices
+from hicp_lib.core.files import atomic_path, read_bytes, write_bytes
+from hicp_lib.core.rotations import matrices_from_quaternions, quaternions_from_matrices
 
 MAX_DIFFERENCE_S = 0.02  # images and poses further apart in time do not belong together
 _UNIT_TOLERANCE = 0.01  # a quaternion's length may differ from 1 by this much: files are rounded
-_MAX_ABS = 1e15  # seconds or metres; more is no time and no place
+_MAX_ABS = 1e20  # more is no time and no place
+_MAX_TIME_S = 1e11  # later than the year 5000: another unit
+_UNITS_S = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_SLOW_S = 5.0  # between two images: as many milliseconds are more usual
 _LIST_COLUMNS = "timestamp filename"
 _POSE_COLUMNS = "timestamp tx ty tz qx qy qz qw"
+# Names of a coordinate: x, tx, p_x, p_RS_R_x [m]; of a quaternion's: qx, q_RS_x []
+_COLUMN = re.compile(r"(?:([ptq])(?:\w*_)?)?([wxyz])")
+_TIME_UNIT = re.compile(r"time(?:stamps?)?[ _\[(]*(ns|us|ms|s)\b")
 
 
 def read_file_list(path: str | Path) -> tuple[np.ndarray, list[str]]:
@@ -33,7 +41,7 @@ def read_file_list(path: str | Path) -> tuple[np.ndarray, list[str]]:
     Returns
     -------
     times_s : array, shape (n,)
-        Increasing.
+        Increasing: of lines with the same time the first is read (`count_repeated`).
     names : list of str
         Relative to the list's folder, and inside it.
 
@@ -41,7 +49,7 @@ def read_file_list(path: str | Path) -> tuple[np.ndarray, list[str]]:
     ------
     InputError
         If the file cannot be read, is empty, or a line is not "timestamp filename" with a time
-        after the one before and a name inside the folder.
+        not before the last one and a name inside the folder.
 
     Examples
     --------
@@ -71,7 +79,7 @@ def read_poses(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     times_s : array, shape (n,)
-        Increasing.
+        Increasing: of lines with the same time the first is read (`count_repeated`).
     T_base_cam : array, shape (n, 4, 4)
         Camera coordinates to the robot's base frame, metres.
 
@@ -79,7 +87,7 @@ def read_poses(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     ------
     InputError
         If the file cannot be read, is empty, or a line is not eight finite numbers with a time
-        after the one before and a quaternion of length 1.
+        not before the last one and a quaternion of length 1.
     """
     rows = []
     for number, time_s, fields in _rows(path, _POSE_COLUMNS):
@@ -162,36 +170,96 @@ def associate(
     return a[a >= 0], b[a >= 0]
 
 
-def _rows(path: str | Path, columns: str) -> Iterator[tuple[int, float, list[str]]]:
-    """Line number, time and further fields of every line that says something."""
+def count_repeated(path: str | Path) -> int:
+    """How many lines of a file that can be read have the time of the line before, and are passed over."""
+    lines = (line.partition("#")[0].replace(",", " ").split() for line in _text(path).split("\n"))
+    return int((np.diff([_float(fields[0]) for fields in lines if fields]) == 0).sum())
+
+
+def names_poses(path: str | Path) -> bool:
+    """Whether the first line of a file names the columns of poses (as EuRoC's CSV, not one of joints)."""
+    first = read_bytes(path, "give a file of camera poses").partition(b"\n")[0]
+    return _named_columns(first.decode("latin-1")) is not None
+
+
+def doubt(times_s: np.ndarray) -> str:
+    """Why times are hardly those of images in seconds, if so, else nothing.
+
+    Examples
+    --------
+    >>> doubt(np.arange(4) / 30), doubt(np.arange(4) / 30 * 1000)
+    ('', '0.03 frames per second; times are expected in seconds (these look like milliseconds)')
+    """
+    step_s = float(np.median(np.diff(times_s))) if len(times_s) > 1 else 0.0
+    if step_s <= _SLOW_S:
+        return ""
+    seconds = f"times are expected in seconds (these look like {_prefix(step_s)}seconds)"
+    return f"{1 / step_s:.2g} frames per second; {seconds}"
+
+
+def _prefix(step: float) -> str:
+    """Of the unit in which the time between two images is such a number."""
+    return "milli" if step < 1e3 * _SLOW_S else "micro" if step < 1e6 * _SLOW_S else "nano"
+
+
+def _text(path: str | Path) -> str:
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        return Path(path).read_text(encoding="utf-8-sig")
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); a recording needs it") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: is not text in UTF-8; expected a text file of the TUM layout") from None
-    before_s = -np.inf
-    for number, line in enumerate(text.split("\n"), start=1):
-        fields = line.partition("#")[0].split()
+
+
+def _rows(path: str | Path, columns: str) -> Iterator[tuple[int, float, list[str]]]:
+    """Line number, time and further fields of every line that says something new."""
+    width = len(columns.split())
+    order, unit_s, before_s, is_table = list(range(width)), 1.0, -np.inf, False
+    for number, line in enumerate(_text(path).split("\n"), start=1):
+        named = _named_columns(line) if columns == _POSE_COLUMNS and np.isinf(before_s) else None
+        if named:
+            is_table, (order, unit_s) = True, named
+            continue
+        content = line.partition("#")[0]
+        fields = (content.replace(",", " ") if is_table else content).split()
         if not fields:
             continue
-        if len(fields) != len(columns.split()):
+        if len(fields) <= max(order) or (len(fields) > width and not is_table):
             raise _error(path, number, f"has {len(fields)} fields; expected '{columns}'")
-        time_s = _number(path, number, fields[0])
-        if not time_s > before_s:
-            late = f"timestamp {fields[0]} is not after the one before; sort the lines by time"
+        time_s = _number(path, number, fields[0]) * unit_s
+        if abs(time_s) > _MAX_TIME_S:
+            looks = f"looks like {_prefix(_SLOW_S * abs(time_s) / _MAX_TIME_S)}seconds"
+            raise _error(path, number, f"timestamp {fields[0]} {looks}; expected seconds, convert the times")
+        if time_s < before_s:
+            late = f"timestamp {fields[0]} is before the last one; sort the lines by time"
             raise _error(path, number, late)
-        yield number, time_s, fields[1:]
+        if time_s > before_s:
+            yield number, time_s, [fields[k] for k in order[1:]]
         before_s = time_s
     if np.isinf(before_s):
         raise InputError(f"{path}: holds no lines; expected one per image or pose")
 
 
-def _number(path: str | Path, number: int, text: str) -> float:
+def _named_columns(line: str) -> tuple[list[int], float] | None:
+    """Which columns are those of `_POSE_COLUMNS`, and the unit of time, if the line names them."""
+    names = re.split(r"[,;\s]+", re.sub(r"\[.*?\]", "", line.strip("# \r")))
+    found = [_COLUMN.fullmatch(name) for name in names]
+    keys = [(m[1] or "qt"[m[2] != "w"]).replace("p", "t") + m[2] if m else "" for m in found]
+    if not all(keys.count(name) == 1 for name in _POSE_COLUMNS.split()[1:]):
+        return None
+    unit = _TIME_UNIT.search(line.lower())
+    return [0, *map(keys.index, _POSE_COLUMNS.split()[1:])], _UNITS_S.get(unit[1] if unit else "s", 1.0)
+
+
+def _float(text: str) -> float:
     try:
-        value = float(text)
+        return float(text)
     except ValueError:
-        value = np.nan
+        return np.nan
+
+
+def _number(path: str | Path, number: int, text: str) -> float:
+    value = _float(text)
     if not abs(value) < _MAX_ABS:
         raise _error(path, number, f"{text[:40]!r} is not a finite number; expected seconds and metres")
     return value

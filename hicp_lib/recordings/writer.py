@@ -17,6 +17,9 @@ from hicp_lib.recordings.tum import write_file_list, write_poses
 JPEG_QUALITY = 95
 _MOST_UNITS = np.iinfo(np.uint16).max
 
+Poses = tuple[np.ndarray, np.ndarray]
+"""Times (m,) in seconds and T_base_cam (m, 4, 4); one pose is for all, m without times in order."""
+
 
 class RecordingWriter:
     """Writes a recording frame by frame; the folder is one only after `finish`.
@@ -54,7 +57,9 @@ class RecordingWriter:
         self._times_s: list[float] = []
         self._poses: list[np.ndarray] = []
 
-    def add(self, time_s: float, rgb: np.ndarray, depth_m: np.ndarray, T_base_cam: np.ndarray) -> None:
+    def add(
+        self, time_s: float, rgb: np.ndarray, depth_m: np.ndarray, T_base_cam: np.ndarray | None = None
+    ) -> None:
         """Write a frame.
 
         Parameters
@@ -63,8 +68,8 @@ class RecordingWriter:
         rgb : array, shape (height, width, 3), dtype uint8
         depth_m : array, shape (height, width)
             Along the camera's axis; what is not finite is stored as no depth.
-        T_base_cam : array, shape (4, 4)
-            Camera coordinates to the robot's base frame.
+        T_base_cam : array, shape (4, 4), optional
+            Camera coordinates to the robot's base frame; the camera's own when left out.
 
         Raises
         ------
@@ -79,10 +84,15 @@ class RecordingWriter:
             raise InputError(f"{self.folder}: {found} must both be {expected}, as the intrinsics say")
         write_frame(self.folder, len(self._times_s), rgb, depth_m, self.depth_units_per_m)
         self._times_s.append(float(time_s))
-        self._poses.append(np.asarray(T_base_cam, float))
+        self._poses.append(np.eye(4) if T_base_cam is None else np.asarray(T_base_cam, float))
 
-    def finish(self) -> None:
+    def finish(self, poses: Poses | None = None) -> None:
         """Write intrinsics, poses and the lists of images.
+
+        Parameters
+        ----------
+        poses : tuple of array, optional
+            In place of those given with the frames.
 
         Raises
         ------
@@ -91,8 +101,9 @@ class RecordingWriter:
         """
         if not self._times_s:
             raise InputError(f"{self.folder}: no frames were added; a recording has at least one")
-        times_s, T_base_cam = np.array(self._times_s), np.array(self._poses)
-        write_index(self.folder, self.intrinsics, self.depth_units_per_m, times_s, T_base_cam)
+        times_s = np.array(self._times_s)
+        poses = (times_s, np.array(self._poses)) if poses is None else poses
+        write_index(self.folder, self.intrinsics, self.depth_units_per_m, times_s, poses)
 
 
 def write_index(
@@ -100,8 +111,7 @@ def write_index(
     intrinsics: Camera,
     depth_units_per_m: float,
     times_s: np.ndarray,
-    T_base_cam: np.ndarray,
-    pose_s: np.ndarray | None = None,
+    poses: Poses,
     names: tuple[Sequence[str], Sequence[str]] | None = None,
 ) -> None:
     """Make images of a folder a recording; `rgb.txt`, without which it is none, comes last.
@@ -113,17 +123,21 @@ def write_index(
     depth_units_per_m : float
     times_s : array, shape (n,)
         Of the images.
-    T_base_cam : array, shape (m, 4, 4)
-        Camera coordinates to the robot's base frame.
-    pose_s : array, shape (m,), optional
-        Times of the poses; those of the images when left out.
+    poses : tuple of array
+        Times (m,) and camera coordinates to the robot's base frame (m, 4, 4); one is for all images.
     names : (sequence of str, sequence of str), optional
         Files of colour and of depth within the folder; by `rgb_name` and `depth_name` when left out.
     """
     folder, numbers = Path(folder), range(len(times_s))
     rgb, depth = names or ([rgb_name(k) for k in numbers], [depth_name(k) for k in numbers])
     write_camera(folder / CAMERA_FILE, intrinsics, depth_units_per_m)
-    write_poses(folder / POSES_FILE, times_s if pose_s is None else pose_s, T_base_cam)
+    pose_s, T_base_cam = poses
+    if len(pose_s) == 0 and len(T_base_cam) != len(times_s):
+        wrong = f"{len(T_base_cam)} poses without times for {len(times_s)} frames"
+        raise InputError(f"{folder}: {wrong}; expected one for each, or a file with times")
+    if len(pose_s) < 2:
+        pose_s, T_base_cam = times_s, np.broadcast_to(T_base_cam, (len(times_s), 4, 4))
+    write_poses(folder / POSES_FILE, pose_s, T_base_cam)
     write_file_list(folder / DEPTH_LIST, times_s, depth)
     write_file_list(folder / RGB_LIST, times_s, rgb)
 

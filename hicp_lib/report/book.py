@@ -134,10 +134,8 @@ def _book_stamp(folders: Folders) -> dict:
     results = Results(folders.results, folders.profile)
     stamps = [results.stamp(name) for name in results.notebooks()]
     made = provenance.provenance({"profile": folders.profile})
-    return made | {
-        "onnx_providers": sorted({name for stamp in stamps for name in stamp["onnx_providers"]}),
-        "wall_s": sum(stamp["wall_s"] for stamp in stamps),
-    }
+    providers = {name for stamp in stamps for name in stamp["onnx_providers"]}
+    return made | {"onnx_providers": sorted(providers), "wall_s": sum(stamp["wall_s"] for stamp in stamps)}
 
 
 def _run_sphinx(staging: Path, log: Path) -> Path:

@@ -11,9 +11,8 @@ _HARMLESS_LINKS = {
 }  # fmt: skip
 _REMOTE = re.compile(r"\s*(https?:)?//", re.IGNORECASE)
 _REMOTE_IN_CSS = re.compile(r"(url\(\s*['\"]?|@import\s+['\"])\s*(https?:)?//", re.IGNORECASE)
-_LOADING_IN_SCRIPT = re.compile(
-    r"(import|importScripts|fetch|\.src\s*=|\.href\s*=)\s*\(?\s*['\"`](https?:)?//"
-)
+_LOADS = r"(import|importScripts|fetch|\.src\s*=|\.href\s*=)"
+_LOADING_IN_SCRIPT = re.compile(_LOADS + r"\s*\(?\s*['\"`](https?:)?//")
 
 
 class _Page(HTMLParser):

@@ -159,10 +159,8 @@ def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
         raise InputError(
             f"{path}, [after]: {' waits for '.join(reversed(error.args[1]))}; break the circle"
         ) from None
-    parameters = {
-        key: check_parameters(known[key], given, f"{path}, [{name}.{key}]")
-        for key, given in content[name].items()
-    }
+    given = content[name].items()
+    parameters = {key: check_parameters(known[key], its, f"{path}, [{name}.{key}]") for key, its in given}
     return Profile(parameters, after)
 
 

@@ -125,9 +125,8 @@ class Results:
         if not stamps:
             return None
         rows, left_out = repetition.compare(reference, self.folder)
-        counts = pd.crosstab(rows["notebook"], rows["verdict"]).reindex(
-            columns=repetition.VERDICTS, fill_value=0
-        )
+        counts = pd.crosstab(rows["notebook"], rows["verdict"])
+        counts = counts.reindex(columns=repetition.VERDICTS, fill_value=0)
         counts.insert(0, "outputs", counts.sum(axis=1))
         outside = rows[rows["verdict"] == "outside"].drop(columns="verdict")
         return {
@@ -191,9 +190,8 @@ def render_page(source: Path, results: Results, profile: str) -> str:
         If the page uses a name that does not exist, or is not a valid template.
     """
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    names = {
-        name: getattr(results, name) for name in ("value", "raw", "table", "figure", "stamp", "repetition")
-    }
+    offered = ("value", "raw", "table", "figure", "stamp", "repetition")
+    names = {name: getattr(results, name) for name in offered}
     names |= {"data": lambda name: json.loads((DATA_DIR / name).read_text())}
     names |= {"profile": profile, "notebooks": results.notebooks()}
     try:

@@ -131,9 +131,8 @@ class Chain:
             For an unknown link.
         """
         frame = self._frame(link)
-        full = pin.computeFrameJacobian(
-            self._model, self._data, np.asarray(q_rad, dtype=float), frame, pin.LOCAL_WORLD_ALIGNED
-        )
+        q, axes = np.asarray(q_rad, dtype=float), pin.LOCAL_WORLD_ALIGNED
+        full = pin.computeFrameJacobian(self._model, self._data, q, frame, axes)
         if points_link_m is None:
             return full[:3].copy()
         # v = v_origin + w x r, with r from the link's origin to the point, in root axes

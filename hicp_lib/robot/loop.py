@@ -183,9 +183,8 @@ class AvoidanceLoop:
         """
         points, weights = self.tracker.points(now_s)
         positions, normals = self.skin.in_root(self.controller.icub, posture)
-        activations = self.sensing.activations(
-            positions, normals, points.reshape(-1, 3), gains(weights, self.valence).ravel()
-        )
+        felt = gains(weights, self.valence).ravel()
+        activations = self.sensing.activations(positions, normals, points.reshape(-1, 3), felt)
         return Threat(activations, obstacles(self.skin, activations, self.controller.settings.onset))
 
     def _stop(self, now_s: float, reason: str) -> Command:

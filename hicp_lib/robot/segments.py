@@ -1,6 +1,7 @@
-"""The robot's body as thick lines, and where its links are.
+"""The robot's body as thick lines, where its links are, and what of a camera's points is the robot itself.
 
-Ends are origins of links; thicknesses are rough. What the robot looks like: `hicp_lib.robot.shape`.
+Ends are origins of links; thicknesses are rough. Its camera sees its arms, and detectors find
+people in them. What the robot looks like: `hicp_lib.robot.shape`.
 """
 
 from typing import NamedTuple
@@ -10,21 +11,19 @@ import numpy as np
 from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
 
-_UPPER_ARM_M, _FOREARM_M, _HAND_M, _FINGERS_M = 0.035, 0.03, 0.025, 0.036
 _TIPS_M = 0.075  # from the origin of the hand's link along its x axis to the fingertips
+_ARM = (
+    ("upper_arm", "shoulder_pitch", "upper_arm", 0.035),
+    ("forearm", "elbow", "forearm", 0.03),
+    ("hand", "forearm", "hand", 0.025),
+    ("fingers", "hand", "tips", 0.036),
+)
 _CAPSULES = (
     ("torso", "root", "head torso", 0.07),
     ("shoulders", "left shoulder_pitch", "right shoulder_pitch", 0.05),
     ("neck", "head torso", "head neck_roll", 0.03),
     ("head", "head neck_roll", "head head", 0.06),
-    ("left_upper_arm", "left shoulder_pitch", "left upper_arm", _UPPER_ARM_M),
-    ("left_forearm", "left elbow", "left forearm", _FOREARM_M),
-    ("left_hand", "left forearm", "left hand", _HAND_M),
-    ("left_fingers", "left hand", "left tips", _FINGERS_M),
-    ("right_upper_arm", "right shoulder_pitch", "right upper_arm", _UPPER_ARM_M),
-    ("right_forearm", "right elbow", "right forearm", _FOREARM_M),
-    ("right_hand", "right forearm", "right hand", _HAND_M),
-    ("right_fingers", "right hand", "right tips", _FINGERS_M),
+    *((f"{s}_{part}", f"{s} {a}", f"{s} {b}", r_m) for s in ("left", "right") for part, a, b, r_m in _ARM),
 )
 """Part, chain and link where it begins and where it ends, radius in metres; fingers with the thumb."""
 
@@ -93,3 +92,59 @@ def link_poses(icub: ICub, posture: Posture, mount: str = "tilted") -> dict[str,
         links = icub.chains[chain].T_root_links(posture.angles(chain))
         poses |= {f"{chain} {link}": T for link, T in links.items()}
     return poses
+
+
+MARGIN_M = 0.02
+"""How far from the robot's surface a point still counts as on it: errors of depth and of the calibration."""
+
+
+def self_distance_m(icub: ICub, posture: Posture, points_m: np.ndarray) -> np.ndarray:
+    """Distances of points from the robot's body.
+
+    Parameters
+    ----------
+    icub : ICub
+    posture : Posture
+    points_m : array, shape (..., 3)
+        In the root frame.
+
+    Returns
+    -------
+    array, shape (...)
+        Metres, negative inside; NaN where a point is.
+
+    Examples
+    --------
+    >>> from hicp_lib.robot.kinematics import load_icub
+    >>> self_distance_m(load_icub(), Posture(), np.array([[0.0, 0.0, 0.1], [0.3, 0.0, 0.1]])).round(2)
+    array([-0.07,  0.23])
+    """
+    nearest_m = np.full(np.shape(points_m)[:-1], np.inf)
+    for segment in body_segments(icub, posture):
+        along_m = segment.end_m - segment.start_m
+        from_start_m = points_m - segment.start_m
+        share = np.clip(from_start_m @ along_m / max(along_m @ along_m, 1e-12), 0, 1)
+        gap_m = np.linalg.norm(from_start_m - share[..., None] * along_m, axis=-1) - segment.radius_m
+        nearest_m = np.minimum(nearest_m, gap_m)
+    return nearest_m
+
+
+def filter_self(icub: ICub, posture: Posture, points_m: np.ndarray, margin_m: float = MARGIN_M) -> np.ndarray:
+    """The points that are not the robot's own body.
+
+    Parameters
+    ----------
+    icub : ICub
+    posture : Posture
+    points_m : array, shape (..., 3)
+        In the root frame.
+    margin_m : float, optional
+        What is nearer to the body is taken for it.
+
+    Returns
+    -------
+    array, shape (..., 3)
+        NaN for those that are.
+    """
+    is_self = self_distance_m(icub, posture, points_m) < margin_m
+    return np.where(is_self[..., None], np.nan, points_m)

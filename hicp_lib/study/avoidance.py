@@ -74,9 +74,8 @@ def over_people(table: pd.DataFrame, by: Sequence[str], of: str = "min_distance_
     for group, part in table.groupby(list(by), sort=False):
         people = part["script"] + part["subject"].astype(str)
         row = dict(zip(by, group, strict=True))
-        row |= dict(
-            zip(("value", "low", "high"), mean_with_interval(part[of], people, subjects=people), strict=True)
-        )
+        interval = mean_with_interval(part[of], people, subjects=people)
+        row |= dict(zip(("value", "low", "high"), interval, strict=True))
         for mark_m in MARKS_M:
             kept, name = part[of] >= mark_m, f"kept_{100 * mark_m:.0f}cm"
             low, high = _wilson(int(kept.sum()), len(kept))

@@ -19,6 +19,7 @@ from hicp_lib.evaluation.space import mocap_error
 from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_errors, sigma_coverage, summary
 from hicp_lib.evaluation.space.occlusion import joint_occlusion
 from hicp_lib.evaluation.space.stability import POSITION, position_array
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.lifting.robust import METHODS
 from hicp_lib.lifting.table import lift_found
 from hicp_lib.mocap.registration import Registration
@@ -179,13 +180,12 @@ def find_clock(recording: Recording, mocap: MotionCapture, points: pd.DataFrame)
     # Speeds are the same in any frame: no registration is needed yet.
     means = mocap_error.marker_means(mocap, mocap.times_s, np.eye(4), mocap_error.TABLE_JOINTS)
     means_m = means[POSITION].to_numpy(float).reshape(len(mocap.times_s), len(mocap_error.TABLE_JOINTS), 3)
-    return clock_offset(
-        recording.times_s, np.concatenate(seen_m, axis=1), mocap.times_s, np.tile(means_m, (1, len(cases), 1))
-    )
+    tiled_m = np.tile(means_m, (1, len(cases), 1))
+    return clock_offset(recording.times_s, np.concatenate(seen_m, axis=1), mocap.times_s, tiled_m)
 
 
 def medians_under(
-    registered: Sequence[Registered], points: Sequence[pd.DataFrame], n_resamples: int = 1000, seed: int = 0
+    registered: Sequence[Registered], points: Sequence[pd.DataFrame], draws: Draws = Draws()
 ) -> pd.DataFrame:
     """What the choice of the registration does to the median errors of elbows and wrists.
 
@@ -195,8 +195,8 @@ def medians_under(
         Of each person.
     points : sequence of pd.DataFrame
         The first of `lift_frames`, of each.
-    n_resamples, seed : int
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws
+        Of the bootstrap.
 
     Returns
     -------
@@ -204,16 +204,15 @@ def medians_under(
         Column `registration`, then as from `median_errors`, score above 0.1; the exact transform, where it is
         known, comes last.
     """
-    errors: dict[str, tuple[list, list]] = {}
+    errors, least = dict[str, tuple[list, list]](), mocap_error.MIN_SCORES[-1:]
     for one, lifted in zip(registered, points, strict=True):
         exact = [] if one.exact is None else [Registration("exact", one.exact)]
         for fit in [*one.fits, *exact]:
             tables, n_frames = errors.setdefault(fit.method, ([], []))
             tables.append(mocap_error.mocap_errors(lifted, one.reference(fit, mocap_error.TABLE_JOINTS)))
             n_frames.append(len(one.recording))
-    draws = (mocap_error.MIN_SCORES[-1:], n_resamples, seed)
     medians = [
-        labelled(mocap_error.median_errors(over_people(*of), *draws), registration=method)
+        labelled(mocap_error.median_errors(over_people(*of), least, draws), registration=method)
         for method, of in errors.items()
     ]
     return pd.concat(medians, ignore_index=True)
@@ -247,9 +246,6 @@ def ablation(people: Sequence[Person]) -> tuple[pd.DataFrame, pd.DataFrame] | No
 
     None where true positions are not known.
     """
-    errors = [
-        lifting_errors(person.stepwise, truth, person.recording.T_base_cam)
-        for person in people
-        if (truth := read_truth(person.recording)) is not None
-    ]
+    known = [(one, truth) for one in people if (truth := read_truth(one.recording)) is not None]
+    errors = [lifting_errors(one.stepwise, truth, one.recording.T_base_cam) for one, truth in known]
     return (summary(pd.concat(errors)), sigma_coverage(pd.concat(errors))) if errors else None

@@ -44,11 +44,8 @@ if TYPE_CHECKING:
 SCHEMA_VERSION = 1
 PLOTLY_MIME = "application/vnd.plotly.v1+json"
 _SVG_STYLE: dict[Any, Any] = {"svg.hashsalt": "hicp", "svg.fonttype": "none"}
-_SAVE_OPTIONS: dict[str, dict[str, Any]] = {
-    "png": {},
-    "svg": {"metadata": {"Date": None}},
-    "webp": {"pil_kwargs": {"quality": 88, "method": 4}},
-}
+_SAVE_OPTIONS: dict[str, dict[str, Any]] = {"png": {}, "svg": {"metadata": {"Date": None}}}
+_SAVE_OPTIONS |= {"webp": {"pil_kwargs": {"quality": 88, "method": 4}}}
 
 
 class Study:
@@ -172,6 +169,11 @@ class Study:
         metadata = (arrow.schema.metadata or {}) | {b"hicp": json.dumps(stamp).encode()}
         with atomic_path(self.folder / f"{name}.parquet") as temporary:
             pq.write_table(arrow.replace_schema_metadata(metadata), temporary)
+
+    def note(self, sentences: list[str]) -> None:
+        """Show what could not be computed, and why, as a paragraph; nothing where there is nothing to say."""
+        if sentences:
+            display(HTML(f'<p class="hicp-note"><em>{html.escape(" ".join(sentences))}</em></p>'))
 
     def value(self, name: str, value: Any) -> None:
         """Record a number, text or list for the prose of the book; None means "not run".

@@ -181,11 +181,8 @@ def registration_readings(
     InputError
         If fewer than three clicks have a depth, or the camera has no marker.
     """
-    tables = [
-        _drawn_readings(one, one.exact, n_images, noise_px, n_draws, seed + number)
-        for number, one in enumerate(people)
-        if one.exact is not None
-    ]
+    known = [(seed + k, one, one.exact) for k, one in enumerate(people) if one.exact is not None]
+    tables = [_drawn_readings(one, exact, n_images, noise_px, n_draws, drawn) for drawn, one, exact in known]
     if not tables:
         return None
     of_reading = pd.concat(tables).groupby("reading", sort=False)

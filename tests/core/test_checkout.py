@@ -29,5 +29,5 @@ def test_elsewhere_results_stay_in_the_working_folder(study, tmp_path, monkeypat
 def test_an_installed_library_says_where_a_report_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(checkout, "CHECKOUT", None)
-    with pytest.raises(InputError, match=r"has no notebooks/profiles.toml; .* run it in a checkout"):
+    with pytest.raises(InputError, match=r"has no notebooks/profiles.toml; run the report in a checkout"):
         checkout.sources()

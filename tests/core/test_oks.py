@@ -60,7 +60,7 @@ def test_agrees_with_pycocotools_on_ten_thousand_sets(group, sigmas):
 
 def one_term(distance_px: float, area_px2: float, sigma: float) -> float:
     found = np.array([[100 + distance_px, 50.0]])
-    return float(oks_terms(np.array([[100.0, 50.0]]), found, area_px2, np.array([sigma]))[0])
+    return float(oks_terms(found - np.array([[100.0, 50.0]]), area_px2, np.array([sigma]))[0])
 
 
 def test_values_worked_out_by_hand():
@@ -83,7 +83,7 @@ def test_a_missing_keypoint_counts_zero_and_an_unlabelled_one_not_at_all():
     found = np.array([[0, 0], [np.nan, np.nan], [0, 0], [1e6, 1e6]])
     labelled = np.array([True, True, False, False])
     sigmas, box = np.full(4, 0.05), np.array([0, 0, 10, 10.0])
-    assert oks_terms(truth, found, 1000.0, sigmas).tolist() == [1, 0, 1, 0]
+    assert oks_terms(found - truth, 1000.0, sigmas).tolist() == [1, 0, 1, 0]
     assert oks(truth, labelled, box, 1000.0, found, sigmas) == 0.5
 
 

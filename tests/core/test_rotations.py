@@ -1,9 +1,19 @@
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
-from hicp_lib.core.rotations import about, between, rotation, rotations_from_vectors
+from hicp_lib.core.rotations import (
+    about,
+    between,
+    matrices_from_quaternions,
+    quaternions_from_matrices,
+    rotation,
+    rotations_from_vectors,
+)
 
 VECTORS = st.tuples(*[st.floats(-4, 4)] * 3).map(np.array)
 
@@ -49,3 +59,20 @@ def test_many_at_once():
     assert rotations_from_vectors(vectors) == pytest.approx(
         np.array([rotation(v) for v in vectors]), abs=1e-14
     )
+
+
+def quaternions() -> np.ndarray:
+    """Of any length and direction, the ones of half turns and of no turn among them."""
+    some = np.random.default_rng(0).normal(size=(5000, 4))
+    return np.concatenate([some, np.eye(4), -np.eye(4)])
+
+
+def test_matrices_are_those_of_scipy():
+    assert (matrices_from_quaternions(quaternions()) == Rotation.from_quat(quaternions()).as_matrix()).all()
+
+
+def test_quaternions_are_those_of_scipy_with_w_not_negative():
+    rotations = Rotation.from_quat(quaternions()).as_matrix()
+    found = quaternions_from_matrices(rotations)
+    assert (found == Rotation.from_matrix(rotations).as_quat(canonical=True)).all()
+    assert (found[:, 3] >= 0).all()

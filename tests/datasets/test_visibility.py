@@ -18,6 +18,7 @@ from hicp_lib.datasets.visibility import (
     visible_parts,
 )
 from hicp_lib.evaluation.failures.by_visibility import compare_classes
+from hicp_lib.evaluation.statistics.resampling import Draws
 from tests.evaluation.made_people import make_annotations, make_detections
 
 HEAD = ["nose", "left_eye"]
@@ -107,7 +108,7 @@ def test_classes_are_evaluated_apart_and_small_ones_not_at_all():
     # In one subset the detector is right, in the other it finds nobody.
     right = {i: make_detections(POINTS[None]) for i in range(n)}
     found = {("basic", "mediapipe-pose"): right, ("close", "mediapipe-pose"): {}}
-    table = compare_classes({"basic": people, "close": people}, found, n_resamples=20)
+    table = compare_classes({"basic": people, "close": people}, found, draws=Draws(20))
     table = table[table["metric"] == "AR50"].set_index("class")
     assert table["n_people"].to_dict() == {"only head": 2 * MIN_PEOPLE, "only legs": 2}
     assert table.loc["only head", "value"] == pytest.approx(0.5)
@@ -120,7 +121,7 @@ def test_detectors_are_ordered_on_the_same_pictures_of_a_class():
     right = {i: make_detections(POINTS[None]) for i in range(n)}
     half = {i: right[i] for i in range(n // 2)}
     found = {("basic", "mediapipe-pose"): right, ("basic", "movenet-thunder"): half}
-    table = compare_classes({"basic": people}, found, n_resamples=200)
+    table = compare_classes({"basic": people}, found, draws=Draws(200))
     assert set(table[table["other"] == ""]["detector"]) == {"mediapipe-pose", "movenet-thunder"}
     less = table[table["metric"] == "AR50"].set_index("pair")
     ahead = less.loc["mediapipe-pose less movenet-thunder"]

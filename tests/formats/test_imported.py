@@ -6,6 +6,7 @@ import pytest
 from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.ap.metric_table import compare
 from hicp_lib.evaluation.cases import groups_of
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import write_detections
 from hicp_lib.formats.imported import read_imported
 from tests.evaluation.made_people import make_annotations, make_detections
@@ -37,7 +38,7 @@ def test_imported_detections_are_compared_like_others(truth, folder):
     found = read_imported(folder, truth)
     assert list(found) == [("basic", "mmpose-imported"), ("headless", "mmpose-imported")]
     assert len(found["headless", "mmpose-imported"]) == 6
-    table = compare(truth, found, n_resamples=2).set_index(["subset", "group", "metric"])["value"]
+    table = compare(truth, found, draws=Draws(2)).set_index(["subset", "group", "metric"])["value"]
     assert table["basic", "body", "AP"] == table["basic", "hand", "AP"] == pytest.approx(1)
     assert table["headless", "body", "AR"] == pytest.approx(1 / 6)
     assert table["headless", "hand", "AR"] == 0

@@ -143,34 +143,35 @@ def misfits_m2(places_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
 
 def test_palms_cost_their_size_and_their_misfit():
     seen = seen_hand(PALM)
-    palms = _place_palm(seen, True)
-    assert len(palms.cost) == 40
-    assert np.unique(palms.z_m.round(4)) == pytest.approx(np.arange(-15, 16) / 100)  # all as good
-    points_m = np.einsum("kj,pij->pki", load_hand_shapes()[0, PALM], palms.turns)
-    sizes = np.linalg.det(palms.turns.astype(float)) ** (1 / 3)
+    cost, behind_m, turns, z_m, _ = _place_palm(seen, True)
+    assert len(cost) == 40
+    assert np.unique(z_m.round(4)) == pytest.approx(np.arange(-15, 16) / 100)  # all as good
+    points_m = np.einsum("kj,pij->pki", load_hand_shapes()[0, PALM], turns)
+    sizes = np.linalg.det(turns.astype(float)) ** (1 / 3)
     misfit = np.minimum(misfits_m2(seen.places_m, points_m) / 0.012**2, 9).sum(axis=1)
-    np.testing.assert_allclose(palms.cost, 0.5 * ((sizes - 1) / 0.1) ** 2 + misfit, rtol=2e-3, atol=1e-3)
-    np.testing.assert_allclose(palms.behind_m, points_m[..., 2].T + palms.z_m, atol=1e-6)
+    np.testing.assert_allclose(cost, 0.5 * ((sizes - 1) / 0.1) ** 2 + misfit, rtol=2e-3, atol=1e-3)
+    np.testing.assert_allclose(behind_m, points_m[..., 2].T + z_m, atol=1e-6)
 
 
 def test_fingers_cost_their_best_shapes_and_lie_in_the_mean_of_the_likely_ones():
-    palms = _place_palm(seen_hand(PALM), True)
+    _, _, *palms = _place_palm(seen_hand(PALM), True)
+    turns, z_m, shift_m = palms
     index_finger, seen = FINGERS[1], seen_hand(FINGERS[1])
-    cost, mean_m, square_m2 = _bend(seen, palms)
-    shapes_m = np.einsum("skj,ij->ski", load_hand_shapes()[:, index_finger], palms.turns[0])
-    apart_m = seen.places_m.T - shapes_m[..., :2] / (1 + shapes_m[..., 2:]) - palms.shift_m[:, 0]
+    cost, mean_m, square_m2 = _bend(seen, *palms)
+    shapes_m = np.einsum("skj,ij->ski", load_hand_shapes()[:, index_finger], turns[0])
+    apart_m = seen.places_m.T - shapes_m[..., :2] / (1 + shapes_m[..., 2:]) - shift_m[:, 0]
     of_shape = np.minimum((apart_m**2).sum(axis=2) / 0.010**2, 9).sum(axis=1)
     assert cost[0] == pytest.approx(of_shape.min(), rel=1e-3, abs=1e-3)
     weights = np.exp(-(of_shape - of_shape.min()) / 2)
-    depths_m = shapes_m[..., 2] + palms.z_m[0]
+    depths_m = shapes_m[..., 2] + z_m[0]
     np.testing.assert_allclose(mean_m[:, 0], weights @ depths_m / weights.sum(), atol=1e-4)
     np.testing.assert_allclose(square_m2[:, 0], weights @ depths_m**2 / weights.sum(), atol=1e-5)
 
 
 def test_every_finger_bends_by_itself():
-    palms = _place_palm(seen_hand(PALM), True)
-    alone = [_bend(seen_hand(finger), palms) for finger in FINGERS]
-    together = _bend(seen_hand(np.concatenate(FINGERS)), palms)
+    _, _, *palms = _place_palm(seen_hand(PALM), True)
+    alone = [_bend(seen_hand(finger), *palms) for finger in FINGERS]
+    together = _bend(seen_hand(np.concatenate(FINGERS)), *palms)
     np.testing.assert_allclose(together[0], sum(cost for cost, _, _ in alone), rtol=1e-4)
     np.testing.assert_allclose(together[1], np.concatenate([mean_m for _, mean_m, _ in alone]), atol=1e-6)
 

@@ -158,8 +158,67 @@ def test_the_halves_are_sought_near_the_whole():
 def test_half_of_what_one_clock_saw_is_enough_on_the_other(later_s, is_enough):
     """Ten seconds each, of which six or four are the same."""
     a_s, b_s = np.arange(0, 10, 0.01), later_s + np.arange(0, 10, 0.01)
-    offset_s = clock_offset(a_s, walk(a_s), b_s, walk(b_s)).offset_s
-    assert (abs(offset_s) < 0.01) == is_enough
+    if is_enough:
+        assert abs(clock_offset(a_s, walk(a_s), b_s, walk(b_s)).offset_s) < 0.01
+    else:
+        with pytest.raises(InputError, match="fit camera and motion capture alike"):
+            clock_offset(a_s, walk(a_s), b_s, walk(b_s))
+
+
+def swing(times_s, start_s=-np.inf, end_s=np.inf):
+    """A wrist that swings once a second, from start to end."""
+    t = 2 * np.pi * np.clip(times_s, start_s, end_s)
+    return np.stack([0.15 * np.sin(t), 0.02 * np.cos(t), 0 * t], axis=-1)[:, None]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("between_s", "camera_s", "is_sure"),
+    [
+        ((-np.inf, np.inf), (0, 20), False),
+        ((0, np.inf), (0, 20), False),  # the camera began to look when the wrist moved already
+        ((0, np.inf), (-2, 20), True),
+        ((-np.inf, 18), (0, 20), True),
+        ((2, 15), (0, 20), True),
+        ((2, 15), (2, 15), True),  # only motion capture saw start and end
+    ],
+)
+def test_a_movement_that_repeats_gives_an_offset_only_by_its_start_or_end(between_s, camera_s, is_sure, seed):
+    camera_s, mocap_s = np.arange(*camera_s, 1 / 30), np.arange(-15, 35, 0.01)
+    seen = swing(camera_s, *between_s)
+    seen = seen + np.random.default_rng(seed).normal(0, 0.008, seen.shape)
+    if is_sure:
+        found = clock_offset(100 + camera_s, seen, mocap_s + 87.5, swing(mocap_s, *between_s))
+        assert found.offset_s == pytest.approx(12.5, abs=0.01)
+    else:
+        with pytest.raises(InputError, match="record a movement that does not repeat") as told:
+            clock_offset(100 + camera_s, seen, mocap_s + 87.5, swing(mocap_s, *between_s))
+        assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("shift_s", [0.0, 0.3, 1.0])
+def test_the_larger_overlap_of_a_movement_that_repeats_is_no_reason(shift_s):
+    times_s = np.arange(0, 20, 0.01)
+    with pytest.raises(InputError, match="alike"):
+        clock_offset(times_s, swing(times_s), times_s + shift_s, swing(times_s + shift_s))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_movements_that_have_nothing_to_do_with_each_other_have_no_offset(seed):
+    rng = np.random.default_rng(seed)
+    a_s, b_s = np.arange(0, 20, 1 / 30), np.arange(0, 30, 0.01)
+    a, b = (np.cumsum(rng.normal(0, 0.2 * np.sqrt(t[1]), (len(t), 2, 3)), axis=0) for t in (a_s, b_s))
+    with pytest.raises(InputError):
+        clock_offset(a_s, a, b_s, b)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_few_samples_that_are_alike_by_chance_do_not_win(seed):
+    """The whole movement with much noise, rather than any part of it that chance makes alike."""
+    rng = np.random.default_rng(seed)
+    camera_s, mocap_s = np.arange(0, 20, 1 / 15), np.arange(-10, 30, 0.01)
+    seen = walk(camera_s) + rng.normal(0, 0.03, (len(camera_s), 2, 3))
+    assert clock_offset(camera_s, seen, mocap_s, walk(mocap_s)).offset_s == pytest.approx(0, abs=0.05)
 
 
 @pytest.mark.parametrize(("variance", "moves"), [(1.2e-6, True), (0.8e-6, False)])
@@ -174,6 +233,7 @@ def test_at_its_peak_a_parabola_through_three_lags_gives_the_offset():
     a = rng.normal(size=(600, 1))
     values, _ = _correlations(a, np.roll(a, -3, axis=0) + np.roll(a, -2, axis=0))
     peak = int(np.nanargmax(values))
-    lag, top = _best_lag(a, np.roll(a, -3, axis=0) + np.roll(a, -2, axis=0))
+    lag, top, other = _best_lag(a, np.roll(a, -3, axis=0) + np.roll(a, -2, axis=0), 25.0)
     curve = np.polynomial.Polynomial.fit([-1, 0, 1], values[peak - 1 : peak + 2], 2)
     assert lag == pytest.approx(peak - 599 + curve.deriv().roots().item()) and top == values[peak]
+    assert np.isnan(other)

@@ -6,7 +6,7 @@ import pytest
 from hicp_lib.core.errors import InputError
 from hicp_lib.robot import shape
 from hicp_lib.robot.posture import Posture
-from hicp_lib.robot.self_filter import MARGIN_M, self_distance_m
+from hicp_lib.robot.segments import MARGIN_M, self_distance_m
 from hicp_lib.robot.shape import SHAPE_FILE, robot_shape
 from hicp_lib.robot.skin import read_skin
 from tools.bake_robot import bake

@@ -40,7 +40,7 @@ from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at
 from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
 from hicp_lib.simulation.rendering.mesh import Mesh, quad
 from hicp_lib.simulation.rendering.render import World, render
-from hicp_lib.simulation.rendering.surfaces import Hits, Material, Surface
+from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, Surface
 from hicp_lib.simulation.world import furniture, room, staging
 
 EXPECTED_FILE = Path(__file__).with_suffix(".json")
@@ -74,7 +74,7 @@ def looks(material: Material, n_coords: int = 2, span_m: float = 1.0) -> np.ndar
     rng = np.random.default_rng(5)
     coords = rng.uniform(0, span_m, (n_coords, 400)).astype(np.float32)
     footprint_m = np.repeat(np.float32([0.0005, 0.01]), 200)
-    look = material(Hits(footprint_m, lambda: coords))
+    look = material if isinstance(material, Look) else material(Hits(footprint_m, coords))
     return np.concatenate(
         [
             np.broadcast_to(getattr(look, part), (n, 400))
@@ -98,14 +98,15 @@ def textures_seen() -> list[np.ndarray]:
         "strands",
         "skin",
     )
-    made = [getattr(textures, name)() for name in (*plain, "dots")]
-    made += [
-        textures.stripes(0.35),
-        *(textures.checks(k) for k in range(3)),
-        *(textures.blobs(k) for k in range(3)),
+    made = [(getattr(textures, name),) for name in plain]
+    made += [(textures.dots, 0.16), (textures.stripes, 0.35)]
+    made += [(pattern, k) for pattern in (textures.checks, textures.blobs) for k in range(3)]
+    made += [*((textures.prints, k) for k in range(4)), (textures.picture, 3)]
+    return [
+        textures.sample(pattern, uv, footprint_m, *numbers).T
+        for pattern, *numbers in made
+        for footprint_m in (0.0002, 0.01)
     ]
-    made += [*(textures.prints(k) for k in range(4)), textures.picture(3)]
-    return [texture.sample(uv, footprint_m).T for texture in made for footprint_m in (0.0002, 0.01)]
 
 
 def styles_drawn() -> np.ndarray:
@@ -143,7 +144,8 @@ def hair_grown() -> list[np.ndarray]:
         hair_styles.Style(0.3, 0.3, tie="bun", n_locks=200),
         hair_styles.Style(0.07, 0.05, coil_m=0.007, n_locks=300),
     ]
-    grown = [hair.grow(style, BODY, rest, landmarks, rng) for style, rng in zip(styles, rngs(4), strict=True)]
+    head = hair.obstacles(BODY, rest, landmarks)
+    grown = [hair.grow(style, BODY, rest, head, rng) for style, rng in zip(styles, rngs(4), strict=True)]
     carried = hair.carry(grown[0], BODY, posed, heads, landmarks)
     return [*map(mesh, grown), mesh(carried), looks(hair.hair_material(np.array([0.2, 0.1, 0.05])), 4)]
 
@@ -176,7 +178,7 @@ def cloths() -> list[np.ndarray]:
     for k, fabric in enumerate(made):
         limbs = ("arms", "legs", "")[k % 3]
         look = fabrics.cloth_material(fabric, panels, limbs, trims[k % 3])(
-            Hits(np.full(600, 0.001, np.float32), lambda: coords)
+            Hits(np.full(600, 0.001, np.float32), coords)
         )
         found.append(np.column_stack([look.albedo.T, look.height_m]))
     chest = fabrics.printed(np.random.default_rng(0))(rng.uniform(-0.1, 0.4, (2, 600)), np.full(600, 0.001))
@@ -184,7 +186,12 @@ def cloths() -> list[np.ndarray]:
         [*f.colours.ravel(), f.pattern is None, f.weave_m, f.crease_m, f.roughness, f.gloss, f.fuzz]
         for f in made
     ]
-    return [*found, chest.T, np.array(numbers, float), np.column_stack(list(astuple(panels)))]
+    return [
+        *found,
+        chest.T,
+        np.array(numbers, float),
+        np.column_stack([panels[0], *panels[1].swapaxes(0, 1)[:2], fabrics._PANEL_RADII_M]),
+    ]
 
 
 def shoes() -> list[np.ndarray]:
@@ -217,7 +224,7 @@ def things() -> list[np.ndarray]:
         looks(m)
         for m in (
             materials.plain(white),
-            materials.glowing(white, 0.5),
+            materials.plain(white, 0.6, glow=0.5),
             materials.pictured(2),
             materials.paint(white, 0.1),
         )
@@ -241,7 +248,7 @@ def skins() -> list[np.ndarray]:
     numbers = [[c.tone, c.warmth, *c.hair, *c.iris, c.lips, c.brows, c.stubble, c.freckles] for c in drawn]
     rows = coords[np.argsort(BODY.regions, kind="stable")[::7]]
     footprint_m = np.full(len(rows), 0.0005, np.float32)
-    seen = [skin.skin_material(c, 0.7)(Hits(footprint_m, lambda: rows.T)) for c in drawn[3:7]]
+    seen = [skin.skin_material(c, 0.7)(Hits(footprint_m, rows.T)) for c in drawn[3:7]]
     columns = [np.column_stack([s.albedo.T, s.height_m, s.gloss, s.roughness, s.softness]) for s in seen]
     return [coords, np.array(numbers), *columns]
 

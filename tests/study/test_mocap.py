@@ -13,6 +13,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.evaluation.space.lifting_ablation import N_STEPS
 from hicp_lib.evaluation.space.mocap_error import JOINTS, MARKERS, TABLE_JOINTS
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.mocap.synchronisation import ClockOffset
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import TRUTH_FILE, Recording
@@ -129,13 +130,13 @@ MIDDLES_M = transform(T_BASE_CAM, markers_cam()).reshape(6, 2, 3).mean(axis=1)
 
 
 def test_medians_change_with_the_registration(registered):
-    medians = medians_under([registered] * 2, [lifted(MIDDLES_M)] * 2, n_resamples=20)
+    medians = medians_under([registered] * 2, [lifted(MIDDLES_M)] * 2, draws=Draws(20))
     assert set(medians["keypoint"]) == set(TABLE_JOINTS) and (medians["count"] == 4).all()
     worst_m = medians.groupby("registration")["median_m"].max()
     assert worst_m["exact"] < 1e-6 < worst_m["all clicks"] < 0.005
     assert worst_m["paper: eight clicks, camera marker"] > 0.02
     given = replace(registered, fits=registered.fits[-1:])  # a person with a registration the others lack
-    one = medians_under([registered, given], [lifted(MIDDLES_M)] * 2, n_resamples=20)
+    one = medians_under([registered, given], [lifted(MIDDLES_M)] * 2, draws=Draws(20))
     counts = one.groupby("registration")[["count", "n_people"]].max()
     assert counts.loc["all clicks"].tolist() == [2, 1]
     assert counts.loc["reprojection of all clicks"].tolist() == [4, 2]

@@ -236,11 +236,8 @@ def _instances(hands: Hands, lefts: list[int], rights: list[int]) -> Detections:
     """People without a body: the k-th left with the k-th right hand, as far as there are both."""
     chosen = np.full((max(len(lefts), len(rights)), 2), -1)
     chosen[: len(lefts), 0], chosen[: len(rights), 1] = lefts, rights
-    nobody = Detections(
-        np.full((len(chosen), N_KEYPOINTS, 2), np.nan),
-        np.zeros((len(chosen), N_KEYPOINTS)),
-        np.zeros(len(chosen)),
-    )
+    n = len(chosen)
+    nobody = Detections(np.full((n, N_KEYPOINTS, 2), np.nan), np.zeros((n, N_KEYPOINTS)), np.zeros(n))
     found = give_hands(nobody, hands, chosen)
     given = found.scores[:, SIDES.ravel()] > 0
     person_scores = found.scores.sum(axis=1) / np.maximum(given.sum(axis=1), 1)

@@ -25,16 +25,8 @@ import numpy as np
 
 from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.errors import InputError
-from hicp_lib.detectors.combined.arbitration import (
-    ArbitrationRule,
-    Hands,
-    assign,
-    distances,
-    give_hands,
-    merge_duplicates,
-    nearest_first,
-    without_body,
-)
+from hicp_lib.detectors.combined import arbitration
+from hicp_lib.detectors.combined.arbitration import ArbitrationRule, Hands
 from hicp_lib.detectors.combined.hand_squares import Arms, Square, SquareRule, hand_squares, squares_along
 
 LOOKS = ("wrists", "mirrored", "image", "along")
@@ -84,9 +76,8 @@ class Combined:
         self._squares = SquareRule()
         self._rule = ArbitrationRule() if agreement else ArbitrationRule(alone=0, scatter=0)
         self.takes_boxes = getattr(body, "takes_boxes", False)
-        self.settings: dict[str, Any] = {
-            kind: {"name": part.name, **part.settings} for kind, part in self.parts.items()
-        }
+        parts = self.parts.items()
+        self.settings: dict[str, Any] = {kind: {"name": part.name, **part.settings} for kind, part in parts}
         self.settings |= {"looks": sorted(self._looks), "arbitrate": arbitrate, "min_side_px": min_side_px}
         self.settings |= {"squares": asdict(self._squares), "rule": asdict(self._rule)}
 
@@ -102,17 +93,17 @@ class Combined:
 
     def _arbitrated(self, image: np.ndarray, bodies: Detections, arms: Arms, elsewhere: _Looks) -> Detections:
         seen = [hands for _, _, hands in self._at_wrists(image, arms)] + elsewhere()
-        hands = merge_duplicates(Hands.concatenate(seen), self._rule)
-        chosen = assign(distances(arms, hands, self._rule))
+        hands = arbitration.merge_duplicates(Hands.concatenate(seen), self._rule)
+        chosen = arbitration.assign(arbitration.distances(arms, hands, self._rule))
         strangers = hands.take(~self._within_reach(arms, hands))
-        return give_hands(bodies, hands, chosen).concatenate(without_body(strangers))
+        return arbitration.give_hands(bodies, hands, chosen).concatenate(arbitration.without_body(strangers))
 
     def _within_reach(self, arms: Arms, hands: Hands) -> np.ndarray:
         """Which hands (n,) some body could have, were the rest of its arms unknown."""
         unknown = np.full_like(arms.wrists_px, np.nan)
         loose = Arms(unknown, unknown, arms.shoulders_px, arms.scales_px)
-        reached = np.isfinite(distances(loose, hands, self._rule))
-        taken = np.isfinite(distances(arms, hands, self._rule))
+        reached = np.isfinite(arbitration.distances(loose, hands, self._rule))
+        taken = np.isfinite(arbitration.distances(arms, hands, self._rule))
         return (reached | taken).any(axis=(0, 1))
 
     def _as_seen(self, image: np.ndarray, bodies: Detections, arms: Arms, elsewhere: _Looks) -> Detections:
@@ -123,9 +114,9 @@ class Combined:
                 chosen[person, side] = len(seen)
                 seen.append(hands.take(hands.scores.mean(axis=1).argmax(keepdims=True)))
         hands = Hands.concatenate(seen + elsewhere())
-        chosen = nearest_first(arms.wrists_px, hands, chosen)
-        rest = np.setdiff1d(np.arange(len(hands)), chosen)
-        return give_hands(bodies, hands, chosen).concatenate(without_body(hands.take(rest)))
+        chosen = arbitration.nearest_first(arms.wrists_px, hands, chosen)
+        rest = hands.take(np.setdiff1d(np.arange(len(hands)), chosen))
+        return arbitration.give_hands(bodies, hands, chosen).concatenate(arbitration.without_body(rest))
 
     def _at_wrists(self, image: np.ndarray, arms: Arms) -> list[tuple[int, int, Hands]]:
         ways = [way == "mirrored" for way in ("wrists", "mirrored") if way in self._looks]

@@ -28,13 +28,8 @@ _SHORT_PX, _LONG_PX = 800, 1333
 _FAMILIES = ("detectron2", "torchvision")
 _MAX_EXPONENT = 80.0  # exp() of more is no number
 # What comes out of the network, by shape behind the number of people; None stands for any size.
-_ROLES: dict[str, tuple[int | None, ...]] = {
-    "boxes": (4,),
-    "scores": (),
-    "keypoints": (_N_KEYPOINTS, 3),
-    "logits": (_N_KEYPOINTS,),
-    "maps": (_N_KEYPOINTS, None, None),
-}
+_ROLES: dict[str, tuple[int | None, ...]] = {"boxes": (4,), "scores": (), "logits": (_N_KEYPOINTS,)}
+_ROLES |= {"keypoints": (_N_KEYPOINTS, 3), "maps": (_N_KEYPOINTS, None, None)}
 # What fills a fixed input beside the image: the mean colour, 0 once the network has normalised it.
 _FILL = (124, 116, 104)
 
@@ -128,9 +123,7 @@ class KeypointRcnn:
     def _roles(self, outputs: list[np.ndarray]) -> dict[str, np.ndarray]:
         """What is there of `_ROLES`; exports differ in order and names, ranks and sizes tell them apart."""
         floats = [output.astype(float) for output in outputs if output.dtype.kind == "f"]
-        fitting = {
-            name: [output for output in floats if _fits(output.shape, tail)] for name, tail in _ROLES.items()
-        }
+        fitting = {name: [one for one in floats if _fits(one.shape, tail)] for name, tail in _ROLES.items()}
         roles = {name: found[0] for name, found in fitting.items() if found}
         self._check([role.shape for role in roles.values()], outputs)
         if len({len(role) for role in roles.values()}) != 1:

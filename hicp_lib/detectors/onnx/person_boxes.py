@@ -18,10 +18,7 @@ from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, blob, letterbox
 from hicp_lib.detectors.onnx.session import open_model
 
 _FILL = (114, 114, 114)
-_NORMALISATIONS = {
-    "yolox": ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),
-    "rtmdet": IMAGENET_BGR,
-}
+_NORMALISATIONS = {"yolox": ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), "rtmdet": IMAGENET_BGR}
 _STRIDES = (8, 16, 32)
 _PERSON = 0
 # YOLOX begins by folding 2 x 2 pixels into channels.

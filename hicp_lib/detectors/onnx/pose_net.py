@@ -18,15 +18,8 @@ from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import blob
 from hicp_lib.detectors.onnx.session import OnnxModel
 
-CONVENTIONS = {
-    14: "crowdpose14",
-    17: "coco17",
-    21: "right_hand21",
-    26: "halpe26",
-    68: "halpe68_noface",
-    133: "wholebody133",
-    136: "halpe136",
-}
+CONVENTIONS = {14: "crowdpose14", 17: "coco17", 21: "right_hand21", 26: "halpe26", 68: "halpe68_noface"}
+CONVENTIONS |= {133: "wholebody133", 136: "halpe136"}
 # Sets that networks are published for and that have no place among Halpe's points.
 _STRANGERS = {15: "MPI's body", 16: "MPII's body", 98: "WFLW's face", 106: "LaPa's face", 308: "Goliath"}
 _MAX_BATCH = 16
@@ -204,15 +197,9 @@ def _input_size(model: OnnxModel, given: list[int] | None) -> tuple[tuple[int, i
     if len(shape) != 4 or shape[1] not in (None, 3):
         raise model.refusal("expected crops of a fixed size, (n, 3, h, w)")
     read, metadata = (shape[3], shape[2]), model.told.metadata
-    whole = {
-        why: size
-        for why, size in (
-            ("read from the file", _size(read)),
-            ("told by its metadata", _size([metadata.get("input_w"), metadata.get("input_h")])),
-            ("option input_size_px", _size(given or [])),
-        )
-        if size is not None
-    }
+    told = [metadata.get("input_w"), metadata.get("input_h")]
+    sizes = {"read from the file": read, "told by its metadata": told, "option input_size_px": given or []}
+    whole = {why: size for why, sides in sizes.items() if (size := _size(sides)) is not None}
     if given is not None and "option input_size_px" not in whole:
         raise InputError(f"input_size_px {given}: expected width and height in pixels, as in [192, 256]")
     if not whole:

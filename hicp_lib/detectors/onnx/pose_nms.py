@@ -47,7 +47,7 @@ def oks_nms(
     [1, 2]
     """
     areas = (areas_px2[:, None] + areas_px2[None]) / 2
-    similarity = oks_terms(positions_px[:, None], positions_px[None], areas, sigmas).mean(axis=-1)
+    similarity = oks_terms(positions_px - positions_px[:, None], areas, sigmas).mean(axis=-1)
     keep: list[int] = []
     for row in np.argsort(-person_scores, kind="stable"):
         if all(similarity[row, other] <= max_oks for other in keep):

@@ -124,10 +124,8 @@ class OnnxModel:
 
     def describe(self) -> list[Fact]:
         """What it is and where it runs."""
-        return [
-            Fact("model", self.path.name, f"SHA-256 {self.sha256}"),
-            Fact("runs on", self.provider, "option provider"),
-        ]
+        where = Fact("runs on", self.provider, "option provider")
+        return [Fact("model", self.path.name, f"SHA-256 {self.sha256}"), where]
 
     def run(self, pixels: np.ndarray) -> list[np.ndarray]:
         """The outputs for one input array, in the model's order.

@@ -277,10 +277,9 @@ def find_limbs(
     sample : callable, optional
         As of `limb_scores`.
     """
-    return [
-        connect(limb_scores(fields[channels], peaks[a], peaks[b], stride, options, sample))
-        for (a, b), channels in zip(model.pairs, model.fields, strict=True)
-    ]
+    pairs = zip(model.pairs, model.fields, strict=True)
+    limbs = ((fields[at], peaks[a], peaks[b]) for (a, b), at in pairs)
+    return [connect(limb_scores(*limb, stride, options, sample)) for limb in limbs]
 
 
 def part_rows(person: dict[int, int], peaks: list[np.ndarray]) -> np.ndarray:

@@ -125,11 +125,8 @@ def _split(
 ) -> tuple[np.ndarray, np.ndarray, PartModel]:
     """Heat maps (n_parts, h, w), fields and what they are, from one output or one of each, in any order."""
     cells = input_shape[0] // STRIDE, input_shape[1] // STRIDE
-    by_channels = {
-        output.shape[1]: np.nan_to_num(output[0])
-        for output in outputs
-        if output.ndim == 4 and output.shape[0] == 1 and output.shape[2:] == cells
-    }
+    fitting = [out for out in outputs if out.ndim == 4 and out.shape[0] == 1 and out.shape[2:] == cells]
+    by_channels = {out.shape[1]: np.nan_to_num(out[0]) for out in fitting}
     for (n_maps, n_fields), part_model in _PART_MODELS.items():
         if n_maps + n_fields in by_channels:
             maps = by_channels[n_maps + n_fields]

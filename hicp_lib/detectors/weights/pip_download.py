@@ -21,10 +21,8 @@ def run_pip(*arguments: str) -> str | None:
         None when it succeeded, otherwise one line saying what went wrong.
     """
     # -P: a file `json.py` in the folder where one works is none of pip's modules.
-    command = [
-        *(sys.executable, "-P", "-m", "pip", *arguments, "--quiet", "--no-input", "--no-deps"),
-        *("--only-binary", ":all:", "--require-hashes"),
-    ]
+    command = [sys.executable, "-P", "-m", "pip", *arguments, "--quiet", "--no-input", "--no-deps"]
+    command += ["--only-binary", ":all:", "--require-hashes"]
     environment = os.environ | {"PIP_DISABLE_PIP_VERSION_CHECK": "1", "PIP_USER": "0"}
     try:
         run = subprocess.run(

@@ -10,9 +10,8 @@ import numpy as np
 
 from hicp_lib.evaluation.ap import cocoeval
 from hicp_lib.evaluation.ap.evaluate import Evaluation
-from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN, with_interval
+from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN, Draws, with_interval
 
-N_RESAMPLES = 1000
 _BLOCK = 2**16  # detections of several draws that are gone through at a time
 Clusters = Mapping[int, Hashable]
 Samples = Mapping[str, np.ndarray]  # metric -> its value in every draw
@@ -20,7 +19,7 @@ Figures = dict[str, tuple[float, float, float]]  # metric -> its value, and the 
 
 
 def bootstrap_intervals(
-    evaluation: Evaluation, n_resamples: int = N_RESAMPLES, seed: int = 0, clusters: Clusters | None = None
+    evaluation: Evaluation, draws: Draws = Draws(), clusters: Clusters | None = None
 ) -> Figures:
     """Figures with their 95 % intervals.
 
@@ -28,10 +27,8 @@ def bootstrap_intervals(
     ----------
     evaluation : Evaluation
         Whose figures.
-    n_resamples : int, optional
-        Number of draws.
-    seed : int, optional
-        Of the draws.
+    draws : Draws, optional
+        Of clusters.
     clusters : Clusters, optional
         Anything by image id; images of equal value are drawn together. Each by itself when left out.
 
@@ -40,7 +37,7 @@ def bootstrap_intervals(
     Figures
         Of every metric; NaN where nobody counts, and no interval from fewer than `MIN_DRAWN` clusters.
     """
-    return intervals(evaluation.metrics(), resample([evaluation], n_resamples, seed, clusters)[0])
+    return intervals(evaluation.metrics(), resample([evaluation], draws, clusters)[0])
 
 
 def difference(a: Evaluation, b: Evaluation, of_a: Samples, of_b: Samples) -> Figures:
@@ -67,7 +64,7 @@ def difference(a: Evaluation, b: Evaluation, of_a: Samples, of_b: Samples) -> Fi
 
 
 def resample(
-    evaluations: Sequence[Evaluation], n_resamples: int, seed: int, clusters: Clusters | None = None
+    evaluations: Sequence[Evaluation], draws: Draws, clusters: Clusters | None = None
 ) -> list[Samples]:
     """Figures on draws of images that all evaluations share.
 
@@ -75,15 +72,15 @@ def resample(
     ----------
     evaluations : sequence of Evaluation
         Paired by their image ids.
-    n_resamples, seed : int
-        Number of draws, and what they are drawn with.
+    draws : Draws
+        Of clusters.
     clusters : Clusters, optional
         As of `bootstrap_intervals`.
 
     Returns
     -------
     list of Samples
-        Per evaluation and metric `n_resamples` values; none from fewer than `MIN_DRAWN` clusters.
+        Per evaluation and metric `draws.n` values; none from fewer than `MIN_DRAWN` clusters.
     """
     image_ids = np.unique(np.concatenate([e.matches.image_ids for e in evaluations]))
     rows: dict[Hashable, int] = {}
@@ -91,20 +88,17 @@ def resample(
     cluster = np.array([rows.setdefault(name, len(rows)) for name in names], dtype=int)
     n = len(rows)
     places = [np.searchsorted(image_ids, e.matches.image_ids) for e in evaluations]
-    rng = np.random.default_rng(seed)
-    n_draws = n_resamples if n >= MIN_DRAWN else 0
+    rng = np.random.default_rng(draws.seed)
+    n_draws = draws.n if n >= MIN_DRAWN else 0
     weights = [np.bincount(rng.integers(n, size=n), minlength=n)[cluster] for _ in range(n_draws)]
-    return [
-        _samples(e.matches, [w[place] for w in weights]) for e, place in zip(evaluations, places, strict=True)
-    ]
+    pairs = zip(evaluations, places, strict=True)
+    return [_samples(e.matches, [w[place] for w in weights]) for e, place in pairs]
 
 
 def _samples(matches: cocoeval.Matches, weights: Sequence[np.ndarray]) -> Samples:
     block = max(1, _BLOCK // max(1, len(matches.image_rows)))
-    parts = [
-        cocoeval.metrics(*cocoeval.precision_recall(matches, np.stack(weights[i : i + block])))
-        for i in range(0, len(weights), block)
-    ]
+    blocks = (np.stack(weights[i : i + block]) for i in range(0, len(weights), block))
+    parts = [cocoeval.metrics(*cocoeval.precision_recall(matches, of_block)) for of_block in blocks]
     return {name: np.concatenate([np.zeros(0), *(part[name] for part in parts)]) for name in cocoeval.METRICS}
 
 

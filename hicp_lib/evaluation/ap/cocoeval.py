@@ -162,7 +162,7 @@ def precision_recall(matches: Matches, weights: np.ndarray | None = None) -> tup
         NaN when nobody counts.
     """
     weights = np.ones(len(matches.image_ids), dtype=int) if weights is None else weights
-    draws = weights.reshape(-1, weights.shape[-1])
+    draws = weights.reshape(int(np.prod(weights.shape[:-1])), -1)  # of no images, too
     n_people = draws @ matches.n_people
     precision = np.zeros((len(draws), len(OKS_THRESHOLDS), len(RECALLS)))
     recall = np.zeros(precision.shape[:2])
@@ -175,18 +175,16 @@ def precision_recall(matches: Matches, weights: np.ndarray | None = None) -> tup
         rows = np.flatnonzero(is_true)
         true = np.cumsum(times.take(rows, axis=1), axis=1)
         reached = true / np.maximum(n_people, 1)[:, None]
-        rising = np.maximum.accumulate((true / (seen.take(rows, axis=1) + np.spacing(1)))[:, ::-1], axis=1)[
-            :, ::-1
-        ]
+        share = true / (seen.take(rows, axis=1) + np.spacing(1))
+        rising = np.maximum.accumulate(share[:, ::-1], axis=1)[:, ::-1]
         for of_draw, r, envelope in zip(precision[:, t], reached, rising, strict=True):
             at = r.searchsorted(RECALLS)
             n = at.searchsorted(len(r))  # past the last: precision 0
             of_draw[:n] = envelope[at[:n]]
         recall[:, t] = reached[:, -1] if reached.shape[1] else 0.0
     precision[n_people == 0], recall[n_people == 0] = np.nan, np.nan
-    return precision.reshape(*weights.shape[:-1], *precision.shape[1:]), recall.reshape(
-        *weights.shape[:-1], -1
-    )
+    shape = weights.shape[:-1]
+    return precision.reshape(*shape, *precision.shape[1:]), recall.reshape(*shape, -1)
 
 
 def metrics(precision: np.ndarray, recall: np.ndarray) -> dict[str, np.ndarray]:

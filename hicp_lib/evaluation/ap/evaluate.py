@@ -167,9 +167,8 @@ def check_detections(
         if shapes != ((n, N_KEYPOINTS, 2), (n, N_KEYPOINTS)):
             expected = f"expected (n, {N_KEYPOINTS}, 2) and (n, {N_KEYPOINTS})"
             raise InputError(f"detections of image {image_id}: shapes {shapes}; {expected}")
-    parts = [
-        (of.keypoints_px, of.scores, of.person_scores) for of in (Detections.none(), *detections.values())
-    ]
+    everybody = Detections.none(), *detections.values()
+    parts = [(of.keypoints_px, of.scores, of.person_scores) for of in everybody]
     stacked = Detections(*map(np.concatenate, zip(*parts, strict=True)))
     image_ids = np.repeat(np.array(list(detections), dtype=np.int64), list(map(len, detections.values())))
     sound = _sound(stacked)

@@ -124,5 +124,5 @@ def extended_oks(
     leaves_px = np.maximum(low_px - found_px, 0) + np.maximum(found_px - high_px, 0)
     offset_px = np.where(unknown[..., None], leaves_px, offset_px)
     counts = (flags != 0) | unknown
-    terms = oks_terms(np.zeros(2), offset_px, areas_px2, sigmas)
+    terms = oks_terms(offset_px, areas_px2, sigmas)
     return np.where(counts, terms, 0.0).sum(axis=-1) / counts.sum(axis=-1)

@@ -4,12 +4,13 @@ import pandas as pd
 
 from hicp_lib.evaluation.matching import MATCH_OKS
 from hicp_lib.evaluation.statistics.proportions import proportions
+from hicp_lib.evaluation.statistics.resampling import Draws
 
 FOUND, OKS_OF_FOUND, WELL_PLACED = "found", "mean OKS of those found", "OKS of .5 or more, of those found"
 _WELL_PLACED_OKS = 0.5
 
 
-def found_and_placed(people: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+def found_and_placed(people: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
     """Who is found at all, and how well those who are found are placed.
 
     A person is found if the detection that fits best has an OKS of at least `matching.MATCH_OKS` (.1): of a
@@ -19,8 +20,8 @@ def found_and_placed(people: pd.DataFrame, n_resamples: int = 1000, seed: int = 
     ----------
     people : DataFrame
         As from `metric_table.people_oks`.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -30,15 +31,10 @@ def found_and_placed(people: pd.DataFrame, n_resamples: int = 1000, seed: int = 
     """
     by = ["subset", "group", "detector"]
     is_found = people["oks"] >= MATCH_OKS
-    measures = {
-        FOUND: is_found.astype(float),
-        OKS_OF_FOUND: people["oks"].where(is_found),
-        WELL_PLACED: (people["oks"] >= _WELL_PLACED_OKS).astype(float).where(is_found),
-    }
-    tables = [
-        proportions(people.assign(value=values), by, "value", n_resamples, seed).assign(what=what)
-        for what, values in measures.items()
-    ]
+    well = (people["oks"] >= _WELL_PLACED_OKS).astype(float).where(is_found)
+    measures = {FOUND: is_found.astype(float), OKS_OF_FOUND: people["oks"].where(is_found), WELL_PLACED: well}
+    valued = ((what, people.assign(value=values)) for what, values in measures.items())
+    tables = [proportions(rows, by, "value", draws).assign(what=what) for what, rows in valued]
     everyone = tables[0][by].merge(pd.DataFrame({"what": list(measures)}), how="cross")
     table = everyone.merge(pd.concat(tables), how="left", on=[*by, "what"])
     return table.fillna({"n": 0, "n_images": 0}).astype({"n": int, "n_images": int})

@@ -18,9 +18,9 @@ from hicp_lib.detectors.combined.arbitration import ArbitrationRule
 from hicp_lib.detectors.combined.hand_squares import SEED_11, SEED_11_THUNDER, SquareRule
 from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
 from hicp_lib.evaluation.ap.evaluate import evaluate
-from hicp_lib.evaluation.ap.person_oks import person_oks
+from hicp_lib.evaluation.ap.metric_table import person_oks
 from hicp_lib.evaluation.cases import Found, Truth
-from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
+from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, with_interval
 from hicp_lib.formats.annotations import Annotations, source_images
 
 FOUND_OKS = 0.5
@@ -61,9 +61,7 @@ def thresholds() -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["threshold", "value", "chosen"]).astype({"value": str})
 
 
-def compare_hands(
-    truth: Truth, found: Found, baseline: Found, n_resamples: int = 1000, seed: int = 0
-) -> pd.DataFrame:
+def compare_hands(truth: Truth, found: Found, baseline: Found, draws: Draws = Draws()) -> pd.DataFrame:
     """Average precision of hands and hands found, step by step and against a baseline.
 
     Parameters
@@ -74,8 +72,8 @@ def compare_hands(
         By image id, of every subset and variant, in the order in which the variants follow each other.
     baseline : Found
         By image id, of every subset and one detector, which hands found are set in proportion to.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -89,7 +87,7 @@ def compare_hands(
     rows = []
     for subset in dict.fromkeys(subset for subset, _ in found):
         runs = {variant: run for (its, variant), run in found.items() if its == subset}
-        rows += [(subset, *row) for row in _rows(truth[subset], runs, bases[subset], n_resamples, seed)]
+        rows += [(subset, *row) for row in _rows(truth[subset], runs, bases[subset], draws)]
     ends = ("", "_low", "_high")
     ap, step, share, ratio = ([f"{name}{end}" for end in ends] for name in ("AP", "step", "share", "ratio"))
     columns = ["subset", "variant", *ap, *step, "AR50", "n_hands", "n_found", *share, *ratio]
@@ -97,15 +95,11 @@ def compare_hands(
 
 
 def _rows(
-    people: Annotations,
-    runs: Mapping[str, Mapping[int, Detections]],
-    baseline: Mapping,
-    n_resamples: int,
-    seed: int,
+    people: Annotations, runs: Mapping[str, Mapping[int, Detections]], baseline: Mapping, draws: Draws
 ) -> Iterator[tuple]:
     clusters = source_images(people)
     evaluations = [evaluate(people, run, "hand") for run in runs.values()]
-    samples = resample(evaluations, n_resamples, seed, clusters)
+    samples = resample(evaluations, draws, clusters)
     step: Any = (np.nan,) * 3
     for k, (variant, run) in enumerate(runs.items()):
         ap = intervals(evaluations[k].metrics(), samples[k])["AP"]
@@ -113,7 +107,7 @@ def _rows(
             step = difference(evaluations[k], evaluations[k - 1], samples[k], samples[k - 1])["AP"]
         counts = _counts(people, run, baseline, clusters)
         n_hands, n_found, _ = (int(n) for n in counts.sum(axis=0))
-        found_of, ratio = (_with_interval(counts, 1, per, n_resamples, seed) for per in (0, 2))
+        found_of, ratio = (_with_interval(counts, 1, per, draws) for per in (0, 2))
         yield variant, *ap, *step, evaluations[k].AR50, n_hands, n_found, *found_of, *ratio
 
 
@@ -125,11 +119,9 @@ def _counts(people: Annotations, found: Mapping, baseline: Mapping, clusters: Ma
     return table.groupby(sources, sort=True)[["n", "found", "base"]].sum().to_numpy(float)
 
 
-def _with_interval(
-    counts: np.ndarray, of: int, per: int, n_resamples: int, seed: int
-) -> tuple[Any, Any, Any]:
+def _with_interval(counts: np.ndarray, of: int, per: int, draws: Draws) -> tuple[Any, Any, Any]:
     """Ratio of two columns' sums over the rows, with the interval from drawing rows; NaN for 0 / 0."""
     if not counts[:, per].sum():
         return np.nan, np.nan, np.nan
-    some, whole = (draw_counts(len(counts), n_resamples, seed) @ counts)[:, [of, per]].T
+    some, whole = (draw_counts(len(counts), draws) @ counts)[:, [of, per]].T
     return with_interval(np.divide(some, whole, out=np.full(len(whole), np.nan), where=whole > 0))

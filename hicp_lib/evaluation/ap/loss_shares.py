@@ -16,7 +16,7 @@ import pandas as pd
 
 from hicp_lib.evaluation.ap.metric_table import Drawn, draw_cases
 from hicp_lib.evaluation.cases import Found, Truth
-from hicp_lib.evaluation.statistics.resampling import with_interval
+from hicp_lib.evaluation.statistics.resampling import Draws, with_interval
 from hicp_lib.formats.annotations import Annotations
 
 BOX_SOURCES = {"image": "whole image", "detected": "found boxes", "gt": "true boxes"}
@@ -81,9 +81,7 @@ def _values(drawn: Drawn, case: tuple[str, str, str]) -> np.ndarray:
     return np.append(evaluation.AP, samples["AP"])
 
 
-def head_loss_shares(
-    truth: Truth, found: Found, drawn: Drawn, n_resamples: int = 1000, seed: int = 0
-) -> pd.DataFrame:
+def head_loss_shares(truth: Truth, found: Found, drawn: Drawn, draws: Draws = Draws()) -> pd.DataFrame:
     """The loss of AP from Basic to Headless, and what of it is the definition's.
 
     The loss is taken four times, each time with one thing more held equal: as it is; on the keypoints that
@@ -99,7 +97,7 @@ def head_loss_shares(
         By image id, of every subset and detector, from there, too.
     drawn : Drawn
         Of these, from `metric_table.draw_cases`.
-    n_resamples, seed : int, optional
+    draws : Draws, optional
         As given to `draw_cases`.
 
     Returns
@@ -114,7 +112,7 @@ def head_loss_shares(
     for group, without_head in (("body", "below the head"), ("hand", "hand")):
         losses = [_losses({case: of for case, of in drawn.items() if case[-1] == group})]
         for held in ({}, {"area": "source"}, {"area": "source", "score": "group"}):
-            losses.append(_losses(draw_cases(shared, pair, n_resamples, seed, [without_head], **held)))
+            losses.append(_losses(draw_cases(shared, pair, draws, [without_head], **held)))
         for detector, total in losses[0].items():
             chain = [loss[detector] for loss in losses]
             shares = [before - after for before, after in zip(chain, [*chain[1:], 0.0], strict=True)]

@@ -9,12 +9,15 @@ from typing import Any
 
 import pandas as pd
 
-from hicp_lib.core.keypoints import GROUPS
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import GROUPS, SIGMAS
 from hicp_lib.detectors.runtime.results import Timed
 from hicp_lib.evaluation.ap.bootstrap import Samples, difference, intervals, resample
-from hicp_lib.evaluation.ap.evaluate import Evaluation, evaluate
-from hicp_lib.evaluation.ap.person_oks import person_oks
+from hicp_lib.evaluation.ap.evaluate import Evaluation, check_detections, evaluate, people_seen
+from hicp_lib.evaluation.ap.options import choose
 from hicp_lib.evaluation.cases import Found, Truth, all_cases, per_case
+from hicp_lib.evaluation.matching import best_oks
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import Annotations, source_images
 
 # All groups an average precision is given for: hands as one object, and every hand by itself.
@@ -23,7 +26,7 @@ GROUPS_OF_OBJECTS = (*GROUPS, "each hand")
 Drawn = Mapping[tuple[str, str, str], tuple[Evaluation, Samples]]
 
 
-def compare(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+def compare(truth: Truth, found: Found, draws: Draws = Draws()) -> pd.DataFrame:
     """AP and AR of every detector on every subset, for the groups of keypoints it gives.
 
     Parameters
@@ -32,24 +35,19 @@ def compare(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) 
         By subset.
     found : Found
         By image id, of every subset and detector.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
     DataFrame
         Columns `subset, group, labelled, detector, metric, value, low, high, n_people`.
     """
-    return metric_table(draw_cases(truth, found, n_resamples, seed))
+    return metric_table(draw_cases(truth, found, draws))
 
 
 def draw_cases(
-    truth: Truth,
-    found: Found,
-    n_resamples: int = 1000,
-    seed: int = 0,
-    groups: Sequence[str] = tuple(GROUPS),
-    **options: Any,
+    truth: Truth, found: Found, draws: Draws = Draws(), groups: Sequence[str] = tuple(GROUPS), **options: Any
 ) -> dict[tuple[str, str, str], tuple[Evaluation, Samples]]:
     """Every case evaluated, as it is and on draws of source images: what `metric_table` and `pairs` read.
 
@@ -62,8 +60,8 @@ def draw_cases(
         By subset.
     found : Found
         By image id, of every subset and detector.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
     groups : sequence of str, optional
         Keys of `options.OBJECTS` that are looked at, where a detector gives such keypoints.
     **options : str
@@ -78,7 +76,7 @@ def draw_cases(
     for subset, group in dict.fromkeys((subset, group) for subset, _, group in cases):
         detectors = [case[1] for case in cases if case[::2] == (subset, group)]
         evaluations = [evaluate(truth[subset], found[subset, d], group, **options) for d in detectors]
-        samples = resample(evaluations, n_resamples, seed, source_images(truth[subset]))
+        samples = resample(evaluations, draws, source_images(truth[subset]))
         for detector, evaluation, sample in zip(detectors, evaluations, samples, strict=True):
             drawn[subset, detector, group] = evaluation, sample
     return {case: drawn[case] for case in cases}
@@ -175,3 +173,36 @@ def detection_times(runs: Mapping[tuple[str, str], Mapping[int, Timed]]) -> pd.D
         for image_id, result in run.items()
     ]
     return pd.DataFrame(rows, columns=["subset", "detector", "image_id", "time_ms", "workers"])
+
+
+def person_oks(
+    annotations: Annotations, detections: Mapping[int, Detections], group: str = "body", **options: Any
+) -> pd.DataFrame:
+    """OKS of the best-fitting detection for each person who counts, 0 when nobody was found.
+
+    Parameters
+    ----------
+    annotations : Annotations
+        The truth.
+    detections : mapping of int to Detections
+        By image id.
+    group : str
+        A key of `OBJECTS`.
+    **options : str
+        Fields of `Options`.
+
+    Returns
+    -------
+    DataFrame
+        Columns `image_id, annotation_id, oks, n_labelled`.
+    """
+    objects, chosen = choose(group, options)
+    check_detections(detections, annotations)
+    people = people_seen(annotations, objects, chosen)
+    rows = [
+        (people.image_ids[i], people.ids[i], fit, int((people.visibility[i, keypoints] > 0).sum()))
+        for keypoints in objects
+        for i, fit in best_oks(people, detections, keypoints, SIGMAS[chosen.sigmas][keypoints])
+    ]
+    types = {"image_id": int, "annotation_id": int, "oks": float, "n_labelled": int}
+    return pd.DataFrame(rows, columns=list(types)).astype(types)

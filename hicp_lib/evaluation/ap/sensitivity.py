@@ -41,8 +41,6 @@ def sensitivity_table(
     for name, kind in get_type_hints(Options).items():
         values = [v for v in get_args(kind) if v != default[name] and (name, v) not in missing]
         variants |= {f"{name}={value}": {name: value} for value in values}
-    table = pd.DataFrame(
-        {"changed": changed, **evaluate(annotations, detections, group, **variant).row()}
-        for changed, variant in variants.items()
-    )
+    cases = ((changed, evaluate(annotations, detections, group, **way)) for changed, way in variants.items())
+    table = pd.DataFrame({"changed": changed, **its.row()} for changed, its in cases)
     return table.assign(AP_change=table["AP"] - table["AP"].iloc[0])

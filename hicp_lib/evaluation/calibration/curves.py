@@ -24,7 +24,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
 from hicp_lib.core.keypoints import GROUPS
 from hicp_lib.evaluation.cases import labelled
-from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
+from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, with_interval
 
 with needs("analysis"):
     from scipy.optimize import isotonic_regression
@@ -122,16 +122,18 @@ def split_half(groups: pd.Series, seed: int = 0) -> np.ndarray:
 
 
 def calibration_study(
-    hits: pd.DataFrame, n_resamples: int = 1000, seed: int = 0
+    hits: pd.DataFrame, draws: Draws = Draws()
 ) -> tuple[pd.DataFrame, pd.DataFrame, dict[tuple[str, str], Calibration]]:
     """Fit a calibration per detector and group on half of the source images, judge it on the other half.
+
+    A detector without scored keypoints in both halves is left out.
 
     Parameters
     ----------
     hits : DataFrame
         `keypoint_hits.all_hits`, or rows of `keypoint_hits` with columns `detector, group, source_image`.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they and the half are drawn with.
+    draws : Draws, optional
+        Of the bootstrap; its seed draws the half too.
 
     Returns
     -------
@@ -144,55 +146,53 @@ def calibration_study(
     calibrations : dict of (str, str) to Calibration
         By detector and group.
     """
-    fits_on = split_half(hits["source_image"], seed)
+    fits_on = split_half(hits["source_image"], draws.seed)
     errors, curves, calibrations = [], [], {}
     for (detector, group), rows in hits.assign(fit=fits_on).groupby(["detector", "group"], sort=False):
         to_fit, held_out = rows[rows["fit"]], rows[~rows["fit"]]
+        if to_fit.empty or held_out.empty:
+            continue
         calibration = Calibration.fit(to_fit["score"].to_numpy(), to_fit["hit"].to_numpy())
         kinds = {"raw": held_out, "calibrated": held_out.assign(score=calibration(held_out["score"]))}
         counts = (len(held_out), held_out["source_image"].nunique(), held_out["hit"].mean())
-        errors.append((detector, group, *counts, *_errors(kinds, n_resamples, seed)))
+        errors.append((detector, group, *counts, *_errors(kinds, draws)))
         for kind, table in kinds.items():
-            curve = reliability(table["score"], table["hit"], table["source_image"], n_resamples, seed)
+            curve = reliability(table["score"], table["hit"], table["source_image"], draws)
             curves.append(labelled(curve, detector=detector, group=group, scores=kind))
         calibrations[detector, group] = calibration
     names = ["detector", "group", "n_keypoints", "n_images", "hit_rate"] + [
         f"{kind}{end}" for kind in ("raw", "calibrated", "change") for end in ("", "_low", "_high")
     ]
-    return pd.DataFrame(errors, columns=names), pd.concat(curves, ignore_index=True), calibrations
+    none = pd.DataFrame(columns=["detector", "group", "scores"])
+    return pd.DataFrame(errors, columns=names), pd.concat(curves or [none], ignore_index=True), calibrations
 
 
 def calibration_table(calibrations: Mapping[tuple[str, str], Calibration]) -> pd.DataFrame:
     """Calibrations to be saved: columns `detector, group, score, rate`, a row per corner of a curve."""
-    rows = [
-        (*case, score, rate)
-        for case, calibration in calibrations.items()
-        for score, rate in zip(calibration.scores, calibration.rates, strict=True)
-    ]
+    points = ((case, zip(its.scores, its.rates, strict=True)) for case, its in calibrations.items())
+    rows = [(*case, *point) for case, of_case in points for point in of_case]
     return pd.DataFrame(rows, columns=["detector", "group", "score", "rate"])
 
 
 def calibrations_of(table: pd.DataFrame) -> dict[tuple[str, str], Calibration]:
     """Calibrations by (detector, group) from a saved `calibration_table`."""
-    return {
-        case: Calibration(rows["score"].to_numpy(), rows["rate"].to_numpy())
-        for case, rows in table.groupby(["detector", "group"], sort=False)
-    }
+    cases = table.groupby(["detector", "group"], sort=False)
+    return {case: Calibration(rows["score"].to_numpy(), rows["rate"].to_numpy()) for case, rows in cases}
 
 
-def _errors(kinds: Mapping[str, pd.DataFrame], n_resamples: int, seed: int) -> Iterator[float]:
+def _errors(kinds: Mapping[str, pd.DataFrame], draws: Draws) -> Iterator[float]:
     """Value and interval of each kind's calibration error and, on the same draws, of their difference."""
     samples = []
     for rows in kinds.values():
         sums = _sums(rows["score"], rows["hit"], rows["source_image"])
-        samples.append(_error(_resampled(sums, n_resamples, seed)))
+        samples.append(_error(_resampled(sums, draws)))
     samples.append(samples[1] - samples[0])
     for drawn in samples:
         yield from with_interval(drawn)
 
 
 def reliability(
-    scores: np.ndarray, hits: np.ndarray, groups: np.ndarray, n_resamples: int = 1000, seed: int = 0
+    scores: np.ndarray, hits: np.ndarray, groups: np.ndarray, draws: Draws = Draws()
 ) -> pd.DataFrame:
     """Hit rate per bin of the score, with 95 % bootstrap intervals over groups.
 
@@ -204,8 +204,8 @@ def reliability(
         Whether the keypoints are right.
     groups : array, shape (n,)
         Their source images.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -214,7 +214,7 @@ def reliability(
     """
     sums = _sums(scores, hits, groups)
     count, score_sum, _ = sums.sum(axis=0)
-    drawn = _resampled(sums, n_resamples, seed)
+    drawn = _resampled(sums, draws)
     with np.errstate(invalid="ignore"):
         rate, low, high = with_interval(drawn[:, 2] / drawn[:, 0])
         columns = {"score": score_sum / count, "rate": rate, "low": low, "high": high}
@@ -232,9 +232,9 @@ def _sums(scores: np.ndarray, hits: np.ndarray, groups: np.ndarray) -> np.ndarra
     return np.stack(sums).reshape(3, len(names), N_BINS).swapaxes(0, 1)
 
 
-def _resampled(sums: np.ndarray, n_resamples: int, seed: int) -> np.ndarray:
-    """Sums (1 + n_resamples, 3, 10) of all groups, then of groups drawn with replacement."""
-    return np.tensordot(draw_counts(len(sums), n_resamples, seed), sums, axes=1)
+def _resampled(sums: np.ndarray, draws: Draws) -> np.ndarray:
+    """Sums (1 + draws, 3, 10) of all groups, then of groups drawn with replacement."""
+    return np.tensordot(draw_counts(len(sums), draws), sums, axes=1)
 
 
 def _error(sums: np.ndarray) -> np.ndarray:

@@ -111,5 +111,5 @@ def _judged(
         else:
             truth_px, area_px2 = people.keypoints_px[person, keypoints], people.areas_px2[person]
             known = given[row] & (people.visibility[person, keypoints] > 0) & counts[person]
-            terms = oks_terms(truth_px, points_px[row], area_px2, sigmas)
+            terms = oks_terms(points_px[row] - truth_px, area_px2, sigmas)
         yield int(row), known, terms

@@ -8,10 +8,11 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.datasets.visibility import CLASSES, MIN_PEOPLE, people_classes
 from hicp_lib.evaluation.ap.metric_table import draw_cases, metric_table, pairs
 from hicp_lib.evaluation.cases import Found, Truth
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import Annotations, ImageInfo
 
 
-def compare_classes(truth: Truth, found: Found, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+def compare_classes(truth: Truth, found: Found, draws: Draws = Draws()) -> pd.DataFrame:
     """AP and AR per class and detector, and their differences, over the crops of all subsets together.
 
     Every image shows one person who counts, as HiCP's crops do. Crops of one source image, in whatever
@@ -23,8 +24,8 @@ def compare_classes(truth: Truth, found: Found, n_resamples: int = 1000, seed: i
         By subset.
     found : Found
         By image id, of every subset and detector.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -38,12 +39,9 @@ def compare_classes(truth: Truth, found: Found, n_resamples: int = 1000, seed: i
     ids = classes["image_id"] * len(truth) + classes["subset"].map(list(truth).index)
     by_class = {name: set(ids[classes["class"] == name]) for name in CLASSES}
     parts = {name: people.of_images(images) for name, images in by_class.items() if images}
-    cases = {
-        (name, detector): {i: of_image for i, of_image in run.items() if i in by_class[name]}
-        for name in parts
-        for detector, run in detections.items()
-    }
-    drawn = draw_cases(parts, cases, n_resamples, seed)
+    pairs_of = ((name, detector, run) for name in parts for detector, run in detections.items())
+    cases = {(name, d): {i: run[i] for i in run if i in by_class[name]} for name, d, run in pairs_of}
+    drawn = draw_cases(parts, cases, draws)
     own = metric_table(drawn)
     less = pairs(drawn).merge(own[["subset", "group", "detector", "metric", "n_people"]])
     table = pd.concat([own.assign(other="", pair=""), less], ignore_index=True)

@@ -19,18 +19,13 @@ from hicp_lib.evaluation.ap.metric_table import compare
 from hicp_lib.evaluation.cases import Truth
 from hicp_lib.evaluation.failures.error_kinds import all_errors
 from hicp_lib.evaluation.statistics.proportions import proportions
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import Annotations
 
 MEASURES = ("AP", "visible keypoints hit", "hidden keypoints hit")
 N_BINS = 5
-OBSERVED = {
-    "share of keypoints in the picture": "",
-    "distance": "m",
-    "picture": "px",
-    "share of keypoints hidden": "",
-    "distance to the border": "of the picture",
-    "brightness": "of 255",
-}
+OBSERVED: tuple[str, ...] = ("share of keypoints in the picture", "distance", "picture")
+OBSERVED += ("share of keypoints hidden", "distance to the border", "brightness")
 
 
 def by_level(annotations: Annotations) -> dict[tuple[str, float], Annotations]:
@@ -41,10 +36,7 @@ def by_level(annotations: Annotations) -> dict[tuple[str, float], Annotations]:
 
 
 def dose_curves(
-    annotations: Annotations,
-    found: Mapping[str, Mapping[int, Detections]],
-    n_resamples: int = 1000,
-    seed: int = 0,
+    annotations: Annotations, found: Mapping[str, Mapping[int, Detections]], draws: Draws = Draws()
 ) -> pd.DataFrame:
     """AP, and the share of keypoints hit, at every level of every dose.
 
@@ -54,8 +46,8 @@ def dose_curves(
         As `doses.open_doses` writes them.
     found : mapping of str to mapping of int to Detections
         By image id, of every detector.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -64,17 +56,14 @@ def dose_curves(
         keypoints): 95 % bootstrap intervals over people.
     """
     truth = {str(key): people for key, people in by_level(annotations).items()}
-    cases = {
-        (name, detector): {i: run[i] for i in people.images}
-        for detector, run in found.items()
-        for name, people in truth.items()
-    }
-    ap = compare(truth, cases, n_resamples, seed).query("metric == 'AP'")
+    runs = ((name, d, run, its) for d, run in found.items() for name, its in truth.items())
+    cases = {(name, detector): {i: run[i] for i in its.images} for name, detector, run, its in runs}
+    ap = compare(truth, cases, draws).query("metric == 'AP'")
     ap = ap.rename(columns={"n_people": "n"}).assign(measure="AP")
     errors = all_errors(truth, cases)
     state = np.where(errors["visibility"] >= 2, *MEASURES[1:])
     keys = ["subset", "detector", "group", "measure"]
-    table = pd.concat([ap, proportions(errors.assign(measure=state), keys, "hit", n_resamples, seed)])
+    table = pd.concat([ap, proportions(errors.assign(measure=state), keys, "hit", draws)])
     levels = pd.DataFrame(by_level(annotations).keys(), index=list(truth), columns=["dose", "level"])
     table = table.join(levels, on="subset")
     columns = ["dose", "level", "detector", "group", "measure", "value", "low", "high", "n"]
@@ -98,9 +87,8 @@ def observed_doses(truth: Truth, folders: Mapping[str, Path], source: Annotation
     DataFrame
         Columns `subset, image_id, keypoint` and those of `OBSERVED` (NaN where not known).
     """
-    distances = {
-        int(i): extra.get("distance_m", np.nan) for i, extra in zip(source.ids, source.extras, strict=True)
-    }
+    extras = zip(source.ids.tolist(), source.extras, strict=True)
+    distances = {i: extra.get("distance_m", np.nan) for i, extra in extras}
     tables = []
     for subset, of_subset in truth.items():
         people = of_subset.take(~of_subset.is_crowd)
@@ -131,9 +119,7 @@ def _doses_of(people: Annotations, row: int, size_px: np.ndarray) -> pd.DataFram
     )
 
 
-def observed_curves(
-    errors: pd.DataFrame, observed: pd.DataFrame, n_resamples: int = 1000, seed: int = 0
-) -> pd.DataFrame:
+def observed_curves(errors: pd.DataFrame, observed: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
     """Share of body keypoints hit, by five bins of each dose that hold equally many keypoints.
 
     Parameters
@@ -142,8 +128,8 @@ def observed_curves(
         `error_kinds.all_errors`.
     observed : DataFrame
         `observed_doses`.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -158,5 +144,5 @@ def observed_curves(
             bins = pd.qcut(rows[dose], N_BINS, labels=False, duplicates="drop")
             middle = rows.groupby(bins)[dose].median()
             rows = rows.assign(dose=dose, level=bins.map(middle)).sort_values("level", kind="stable")
-            tables.append(proportions(rows, keys, "hit", n_resamples, seed))
+            tables.append(proportions(rows, keys, "hit", draws))
     return pd.concat(tables, ignore_index=True)

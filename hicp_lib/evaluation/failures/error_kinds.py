@@ -113,10 +113,8 @@ def _similarities(
     """Similarity (k,) of points to the truth, to its other side, and to either of anybody else."""
     other_side = _OTHER_SIDE[keypoints]
     sides = np.where((other_side != keypoints)[:, None], people.keypoints_px[:, other_side], np.nan)
-    terms = [
-        oks_terms(places, points, people.areas_px2, sigmas)
-        for places in (people.keypoints_px[:, keypoints], sides)
-    ]
+    places = people.keypoints_px[:, keypoints], sides
+    terms = [oks_terms(points - at_px, people.areas_px2, sigmas) for at_px in places]
     yield from (term[person] for term in terms)
     others = np.arange(len(people)) != person
     yield np.maximum(*terms)[others].max(axis=0, initial=0.0)

@@ -20,7 +20,7 @@ from hicp_lib.core.keypoints import INDEX, LEFT_HAND, RIGHT_HAND
 from hicp_lib.evaluation.cases import Found, Truth, groups_of
 from hicp_lib.evaluation.failures.placed_keypoints import landed
 from hicp_lib.evaluation.statistics.proportions import mean_with_interval, proportions
-from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
+from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, with_interval
 from hicp_lib.formats.annotations import source_images
 
 SURE = 0.3  # the paper's threshold
@@ -42,15 +42,15 @@ MEASURES = {
 }
 
 
-def scores_by_state(placed: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+def scores_by_state(placed: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
     """Hit rate against score, for keypoints that are visible, hidden and outside the picture.
 
     Parameters
     ----------
     placed : DataFrame
         `placed_keypoints.placed_keypoints`.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -63,16 +63,11 @@ def scores_by_state(placed: pd.DataFrame, n_resamples: int = 1000, seed: int = 0
     keys = ["detector", "state", "bin"]
     rows = rows.assign(bin=bins).sort_values(keys, kind="stable")
     means = rows.groupby(keys)["score"].mean().reset_index()
-    return means.merge(proportions(rows, keys, "hit", n_resamples, seed), on=keys)
+    return means.merge(proportions(rows, keys, "hit", draws), on=keys)
 
 
 def paper_remarks(
-    placed: pd.DataFrame,
-    errors: pd.DataFrame,
-    truth: Truth,
-    found: Found,
-    n_resamples: int = 1000,
-    seed: int = 0,
+    placed: pd.DataFrame, errors: pd.DataFrame, truth: Truth, found: Found, draws: Draws = Draws()
 ) -> pd.DataFrame:
     """Every measure for every detector that was run, and "not run" for the system the paper says it of.
 
@@ -86,8 +81,8 @@ def paper_remarks(
         By subset.
     found : Found
         By image id, of every subset and detector.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -99,7 +94,7 @@ def paper_remarks(
         its_placed, its_errors = (table[table["detector"] == detector] for table in (placed, errors))
         body = its_errors[its_errors["group"] == "body"]
         hands = _hands(detector, truth, found) if "hand" in groups_of(found, detector) else None
-        values[detector] = list(_values(its_placed, body, hands, n_resamples, seed))
+        values[detector] = list(_values(its_placed, body, hands, draws))
     rows: list[tuple] = []
     for i, (measure, system) in enumerate(MEASURES.items()):
         rows += [(measure, system, detector, *of[i], "run") for detector, of in values.items()]
@@ -110,7 +105,7 @@ def paper_remarks(
 
 
 def _values(
-    placed: pd.DataFrame, errors: pd.DataFrame, hands: pd.DataFrame | None, n_resamples: int, seed: int
+    placed: pd.DataFrame, errors: pd.DataFrame, hands: pd.DataFrame | None, draws: Draws
 ) -> Iterator[tuple[float, float, float, int]]:
     """Value, interval and number of rows of each of `MEASURES`, in their order."""
     outside = placed[placed["state"] == "outside"]
@@ -118,29 +113,25 @@ def _values(
     joints = visible[visible["keypoint"] >= _FIRST_BELOW_HEAD]
     shoulder = joints["keypoint"].isin(_SHOULDERS)
     sure = errors["score"] >= SURE
-    yield _mean(outside, outside["given"], n_resamples, seed)
-    yield _mean(given, landed(given) != "inside", n_resamples, seed)
-    yield _difference(given, visible, n_resamples, seed)
-    yield _mean(errors, sure, n_resamples, seed)
-    yield _mean(errors[sure], errors["hit"][sure], n_resamples, seed)
-    yield _difference(joints[shoulder], joints[~shoulder], n_resamples, seed)
-    yield _NOTHING if hands is None else _mean(hands, ~hands["wrist"], n_resamples, seed)
+    yield _mean(outside, outside["given"], draws)
+    yield _mean(given, landed(given) != "inside", draws)
+    yield _difference(given, visible, draws)
+    yield _mean(errors, sure, draws)
+    yield _mean(errors[sure], errors["hit"][sure], draws)
+    yield _difference(joints[shoulder], joints[~shoulder], draws)
+    yield _NOTHING if hands is None else _mean(hands, ~hands["wrist"], draws)
 
 
-def _mean(
-    rows: pd.DataFrame, flags: pd.Series, n_resamples: int, seed: int
-) -> tuple[float, float, float, int]:
-    return *mean_with_interval(flags, rows["source_image"], n_resamples, seed), len(rows)
+def _mean(rows: pd.DataFrame, flags: pd.Series, draws: Draws) -> tuple[float, float, float, int]:
+    return *mean_with_interval(flags, rows["source_image"], draws), len(rows)
 
 
-def _difference(
-    a: pd.DataFrame, b: pd.DataFrame, n_resamples: int, seed: int
-) -> tuple[float, float, float, int]:
+def _difference(a: pd.DataFrame, b: pd.DataFrame, draws: Draws) -> tuple[float, float, float, int]:
     """Mean score of a less that of b, both on the same draws of source images."""
     images = np.unique(np.concatenate([a["source_image"], b["source_image"]]))
     if not len(a) or not len(b):
         return _NOTHING
-    times = draw_counts(len(images), n_resamples, seed)
+    times = draw_counts(len(images), draws)
     means = []
     for rows in (a, b):
         place = np.searchsorted(images, rows["source_image"])

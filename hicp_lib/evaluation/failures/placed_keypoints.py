@@ -72,7 +72,7 @@ def _of_case(people: Annotations, run: Mapping[int, Detections], subset: str, de
     flags, true_px = people.visibility[who][:, COCO_17], people.keypoints_px[who][:, COCO_17]
     state = np.select([flags >= 2, flags > 0, flags < 0], STATES[:3], STATES[3])
     given = np.isfinite(points_px).all(axis=-1)
-    terms = oks_terms(true_px, points_px, people.areas_px2[who], _SIGMAS)
+    terms = oks_terms(points_px - true_px, people.areas_px2[who], _SIGMAS)
     images = [people.images[i] for i in people.image_ids[who].tolist()]
     sizes_px = np.array([(image.width_px, image.height_px) for image in images]).reshape(-1, 1, 2)
     x, y = np.moveaxis((points_px + 0.5) / sizes_px, -1, 0)

@@ -6,6 +6,8 @@ isotonic curve (`calibration.curves`) of how often a keypoint placed in the pict
 for each detector and part of the body. It is cross-fitted: source images are split into two halves, and a
 person is judged by the curve of the half they are not in. It holds for people cut off as often as in these
 data.
+
+`false_presence` counts parts of people that are outside the picture, and are given inside it all the same.
 """
 
 from __future__ import annotations
@@ -21,10 +23,14 @@ from hicp_lib.core.images import inside
 from hicp_lib.core.keypoints import COCO_17, COCO_NAMES
 from hicp_lib.datasets.crops import with_outside
 from hicp_lib.evaluation.ap.bootstrap import difference, intervals
+from hicp_lib.evaluation.ap.extended_oks import PRESENCE_CUT
 from hicp_lib.evaluation.ap.metric_table import Drawn, draw_cases
 from hicp_lib.evaluation.calibration.curves import Calibration, split_half
-from hicp_lib.evaluation.cases import Found, Truth
+from hicp_lib.evaluation.cases import Found, Truth, labelled
+from hicp_lib.evaluation.failures.false_confidence import SURE
 from hicp_lib.evaluation.failures.placed_keypoints import landed, placed_keypoints
+from hicp_lib.evaluation.statistics.proportions import proportions
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import Annotations, source_images
 
 # Of each of the 17 keypoints, the part of the body: the head, or what a pair of keypoints is called.
@@ -128,7 +134,7 @@ def declared(truth: Truth, found: Found, presence: Presence | None = None) -> Fo
 
 
 def extended_table(
-    truth: Truth, found: Found, source: Annotations, drawn: Drawn, n_resamples: int = 1000, seed: int = 0
+    truth: Truth, found: Found, source: Annotations, drawn: Drawn, draws: Draws = Draws()
 ) -> pd.DataFrame:
     """AP of bodies by OKS and by extended OKS, with every given keypoint present and with a decision.
 
@@ -142,8 +148,8 @@ def extended_table(
         What the crops were made from.
     drawn : Drawn
         From `draw_cases` of the same.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they and the halves are drawn with.
+    draws : Draws, optional
+        Of the bootstrap; its seed draws the halves too.
 
     Returns
     -------
@@ -151,17 +157,11 @@ def extended_table(
         Columns `subset, detector, measure` (of `MEASURES`), `value, low, high, n_people`; the last measure is
         the third less the second, on the same draws.
     """
-    presence = Presence.fit(placed_keypoints(truth, found, source), seed)
-    runs = {
-        (subset, f"{detector}, {way}"): run
-        for way, runs in {
-            "given": declared(truth, found),
-            "decided": declared(truth, found, presence),
-        }.items()
-        for (subset, detector), run in runs.items()
-    }
+    presence = Presence.fit(placed_keypoints(truth, found, source), draws.seed)
+    ways = {"given": declared(truth, found), "decided": declared(truth, found, presence)}
+    runs = {(s, f"{d}, {way}"): run for way, its in ways.items() for (s, d), run in its.items()}
     known = {subset: with_outside(people, source) for subset, people in truth.items()}
-    counted = draw_cases(known, runs, n_resamples, seed, groups=["body"], outside="count")
+    counted = draw_cases(known, runs, draws, groups=["body"], outside="count")
     rows = []
     for subset, detector in found:
         if (subset, detector, "body") in drawn:
@@ -173,3 +173,68 @@ def extended_table(
                 rows.append((subset, detector, measure, *figure["AP"], of.n_people))
     columns = ["subset", "detector", "measure", "value", "low", "high", "n_people"]
     return pd.DataFrame(rows, columns=columns)
+
+
+# What counts as given: the paper's threshold on scores as they come, or on what they are worth.
+DECISIONS = (f"score of at least {SURE}", f"calibrated score of at least {PRESENCE_CUT}")
+_FIRST_OF_PAIRS = 5  # the keypoints before are the head's
+
+
+def false_presence(
+    truth: Truth, found: Found, placed: pd.DataFrame, source: Annotations, draws: Draws = Draws()
+) -> pd.DataFrame:
+    """How often parts of people that are outside the picture are given inside it.
+
+    A head is outside when no keypoint of it is in the picture and one is known to be outside, and it is given
+    when one of its keypoints is. All other parts are one keypoint each, on either side.
+
+    Parameters
+    ----------
+    truth : Truth
+        Of crops, by subset.
+    found : Found
+        By image id, of every subset and detector.
+    placed : DataFrame
+        `placed_keypoints.placed_keypoints` of them.
+    source : Annotations
+        What the crops were made from.
+    draws : Draws, optional
+        Of the bootstrap; its seed draws the halves too.
+
+    Returns
+    -------
+    DataFrame
+        Columns `subset, detector, part` (of `PARTS`), `decision` (of `DECISIONS`), `value` (share of the
+        parts outside), `low, high` (95 %, over source images), `n` (parts outside), `n_images, n_found`
+        (those of people whom a detection fits; of the others none is given).
+    """
+    calibrated = declared(truth, found, Presence.fit(placed, draws.seed))
+    kinds = {SURE: placed, PRESENCE_CUT: placed_keypoints(truth, calibrated, source)}
+    missing = {subset: _missing(with_outside(people, source)) for subset, people in truth.items()}
+    keys = ["subset", "detector", "image_id", "unit"]
+    rows = []
+    for decision, (cut, table) in zip(DECISIONS, kinds.items(), strict=True):
+        is_given = (table["score"] >= cut) & (landed(table) != "outside")
+        table = table.assign(unit=np.maximum(table["keypoint"] - _FIRST_OF_PAIRS + 1, 0), given=is_given)
+        given = table.groupby(keys)["given"].any().reset_index()
+        for subset, detector in found:
+            labels = {"subset": subset, "detector": detector, "decision": decision}
+            rows.append(labelled(missing[subset], **labels).merge(given, how="left", on=keys))
+    parts = pd.concat(rows).assign(found=lambda t: t["given"].notna())
+    parts["given"] = parts["given"].eq(True)
+    by = ["subset", "detector", "part", "decision"]
+    n_found = parts.groupby(by)["found"].sum().rename("n_found").reset_index()
+    return proportions(parts, by, "given", draws).merge(n_found, on=by)
+
+
+def _missing(people: Annotations) -> pd.DataFrame:
+    """The parts that are outside the picture: columns `image_id, source_image, part, unit`."""
+    people = people.take(~people.is_crowd)
+    flags, sources = people.visibility[:, COCO_17], source_images(people)
+    n = _FIRST_OF_PAIRS
+    paired = (np.column_stack([of[:, :n].any(axis=1), of[:, n:]]) for of in (flags > 0, flags < 0))
+    seen, gone = paired
+    who, unit = np.nonzero(gone & ~seen)
+    image_ids = people.image_ids[who].tolist()
+    of_image = {"image_id": image_ids, "source_image": [sources[i] for i in image_ids]}
+    return pd.DataFrame(of_image | {"part": PART_OF[_FIRST_OF_PAIRS - 1 :][unit], "unit": unit})

@@ -5,19 +5,20 @@ import pandas as pd
 from hicp_lib.core.keypoints import NAMES
 from hicp_lib.evaluation.failures.placed_keypoints import from_the_cut, landed
 from hicp_lib.evaluation.statistics.proportions import proportions
+from hicp_lib.evaluation.statistics.resampling import Draws
 
 HEAD_POINTS = range(5)  # nose, eyes, ears
 
 
-def change_per_keypoint(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+def change_per_keypoint(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
     """Hit rate of each body keypoint with and without the head, on the same keypoints of the same people.
 
     Parameters
     ----------
     errors : DataFrame
         `error_kinds.all_errors` with the subsets "basic" and "headless".
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -32,7 +33,7 @@ def change_per_keypoint(errors: pd.DataFrame, n_resamples: int = 1000, seed: int
     both = basic.merge(headless, on=same, suffixes=("_basic", "_headless")).sort_values(by)
     both["change"] = both["hit_headless"].astype(float) - both["hit_basic"]
     rates = both.groupby(by)[["hit_basic", "hit_headless"]].mean().reset_index()
-    table = proportions(both, by, "change", n_resamples, seed).merge(rates, on=by)
+    table = proportions(both, by, "change", draws).merge(rates, on=by)
     table["keypoint"] = [NAMES[k] for k in table["keypoint"]]
     table = table.rename(columns={"value": "change", "hit_basic": "basic", "hit_headless": "headless"})
     return table[[*by, "basic", "headless", "change", "low", "high", "n", "n_images"]]

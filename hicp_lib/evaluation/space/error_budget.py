@@ -25,7 +25,7 @@ from hicp_lib.evaluation.space import error_sources as s
 from hicp_lib.evaluation.space.mocap_error import JOINTS
 from hicp_lib.evaluation.space.stability import MIN_SCORE, counted, position_array
 from hicp_lib.evaluation.statistics.design import smallest_difference
-from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
+from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, with_interval
 from hicp_lib.lifting.robust import METHODS
 from hicp_lib.lifting.table import lift_found
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, PER_FRAME, Recording, read_truth
@@ -39,11 +39,9 @@ TOTALS = {
 }
 """Sources that come together: all, those of the paper's comparison, and those the robot lives with."""
 _ALONE, _WITHOUT = "{}, alone", "without {}"
-STATES: dict[str, set[str]] = (
-    TOTALS
-    | {_ALONE.format(source): {source} for source in s.SOURCES}
-    | {_WITHOUT.format(source): {*s.SOURCES} - {source} for source in s.SOURCES}
-)
+_ALL_BUT = {source: {*s.SOURCES} - {source} for source in s.SOURCES}
+STATES: dict[str, set[str]] = TOTALS | {_ALONE.format(source): {source} for source in s.SOURCES}
+STATES |= {_WITHOUT.format(source): others for source, others in _ALL_BUT.items()}
 """What is switched on, by the column that has the error then."""
 
 _FINGERS = tuple(NAMES[k] for hand in (LEFT_HAND, RIGHT_HAND) for k in hand[1:])
@@ -162,15 +160,15 @@ def _seen(
     return seen_m
 
 
-def error_budget(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+def error_budget(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
     """The error by each source alone, and what is gained by switching it off alone.
 
     Parameters
     ----------
     errors : DataFrame
         As from `keypoint_errors`, of several people: columns `view, subject` besides.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws of people, and what they are drawn with.
+    draws : Draws, optional
+        Of people, in the bootstrap.
 
     Returns
     -------
@@ -185,7 +183,7 @@ def error_budget(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -
     for case, part in errors.groupby(["view", "method", "part"], sort=False):
         medians_m = part.groupby("subject")[list(STATES)].median()
         n_people, acts = len(medians_m), medians_m.max() > _NOTHING_M
-        drawn = draw_counts(np.arange(n_people), n_resamples, seed) / n_people
+        drawn = draw_counts(np.arange(n_people), draws) / n_people
         totals = TOTALS if acts[_ALONE.format(s.REGISTRATION)] else (ALL,)
         values_m = {(total, "total"): medians_m[total] for total in totals}
         for source in s.SOURCES:
@@ -199,7 +197,7 @@ def error_budget(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -
     return pd.DataFrame(rows, columns=["view", "method", "part", *names])
 
 
-def covariates(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> pd.DataFrame:
+def covariates(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
     """What the error in the robot's frame is multiplied by as distance, view or sight change.
 
     Least squares of its logarithm on all of them at once, every person with the same weight.
@@ -208,8 +206,8 @@ def covariates(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> 
     ----------
     errors : DataFrame
         The same; views are taken together.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws of people, and what they are drawn with.
+    draws : Draws, optional
+        Of people, in the bootstrap.
 
     Returns
     -------
@@ -224,7 +222,7 @@ def covariates(errors: pd.DataFrame, n_resamples: int = 1000, seed: int = 0) -> 
         table = np.column_stack([np.ones(len(part)), *steps.values(), np.log(part[IN_BASE])]).astype(float)
         people = [table[part["subject"] == subject] for subject in part["subject"].unique()]
         products = np.stack([of.T @ of / len(of) for of in people])
-        sums = np.tensordot(draw_counts(np.arange(len(people)), n_resamples, seed), products, 1)
+        sums = np.tensordot(draw_counts(np.arange(len(people)), draws), products, 1)
         factors = np.exp(np.linalg.pinv(sums[:, :-1, :-1]) @ sums[:, :-1, -1:])[:, 1:, 0]
         bounds = zip(steps, *with_interval(factors, len(people)), strict=True)
         rows += [(*case, *row, len(people), len(part)) for row in bounds]

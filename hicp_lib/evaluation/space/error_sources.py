@@ -78,9 +78,8 @@ def true_detections(
         With scores of 1.
     """
     keypoints_px = np.full((n_frames, 1, N_KEYPOINTS, 2), np.nan)
-    keypoints_px[:, 0, keypoints] = position_array(
-        truth, [NAMES[k] for k in keypoints], n_frames, ["u_px", "v_px"]
-    )
+    names = [NAMES[k] for k in keypoints]
+    keypoints_px[:, 0, keypoints] = position_array(truth, names, n_frames, ["u_px", "v_px"])
     scores = np.isfinite(keypoints_px).all(axis=-1).astype(float)
     return [Detections(*person, np.ones(1)) for person in zip(keypoints_px, scores, strict=True)]
 

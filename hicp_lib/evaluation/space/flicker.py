@@ -26,6 +26,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.extras import needs
 from hicp_lib.core.keypoints import COCO_17
 from hicp_lib.evaluation.statistics.proportions import mean_with_interval
+from hicp_lib.evaluation.statistics.resampling import Draws
 
 with needs("analysis"):
     from OneEuroFilter import OneEuroFilter
@@ -116,8 +117,7 @@ def latency_s(tracks_px: np.ndarray, filtered_px: np.ndarray, times_s: np.ndarra
 def flicker(
     found: Mapping[str, Sequence[Detections]],
     times_s: np.ndarray,
-    n_resamples: int = 1000,
-    seed: int = 0,
+    draws: Draws = Draws(),
     min_score: float = MIN_SCORE,
 ) -> pd.DataFrame:
     """Flicker and jitter of every detector, as detected and through the causal filter.
@@ -128,8 +128,8 @@ def flicker(
         Of each frame, by detector.
     times_s : array, shape (n,)
         Rising.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
     min_score : float, optional
         From which a keypoint is given.
 
@@ -146,7 +146,7 @@ def flicker(
         filtered = causal_filter(raw, times_s)
         for kind, tracks in (("as detected", raw), ("filtered", filtered)):
             for measure, (values, at_s) in _measures(tracks, times_s).items():
-                interval = mean_with_interval(values, np.floor(at_s / _BLOCK_S), n_resamples, seed)
+                interval = mean_with_interval(values, np.floor(at_s / _BLOCK_S), draws)
                 rows.append((detector, kind, measure, *interval, len(values)))
             lag_s = 0.0 if kind == "as detected" else latency_s(raw, filtered, times_s)
             rows.append((detector, kind, "latency [s]", lag_s, np.nan, np.nan, len(times_s)))
@@ -162,7 +162,5 @@ def _measures(tracks_px: np.ndarray, times_s: np.ndarray) -> dict[str, tuple[np.
     jumps = np.linalg.norm(np.diff(tracks_px, n=2, axis=0), axis=-1) / np.sqrt(6)
     jumped = np.isfinite(jumps) & close[1:] & close[:-1]
     at_s = np.broadcast_to(times_s[:, None], given.shape)
-    return {
-        "flicker rate": ((given[1:] != given[:-1])[either], at_s[1:][either]),
-        "jitter [px]": (jumps[jumped], at_s[2:][jumped]),
-    }
+    changes = (given[1:] != given[:-1])[either]
+    return {"flicker rate": (changes, at_s[1:][either]), "jitter [px]": (jumps[jumped], at_s[2:][jumped])}

@@ -18,13 +18,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "fingers": tuple(NAMES[i] for i in HANDS if not NAMES[i].endswith("hand_root")),
 }
 
-N_STEPS = {
-    "paper": 0,
-    "+ below the surface": 1,
-    "+ near surfaces": 2,
-    "+ limb lengths": 3,
-    "robust": len(STEPS),
-}
+N_STEPS = {"paper": 0, "+ below the surface": 1, "+ near surfaces": 2, "+ limb lengths": 3}
+N_STEPS |= {"robust": len(STEPS)}
 """The paper's method, then one step more each up to the whole, for `hicp_lib.lifting.table.lift_found`."""
 
 MIN_SCORE = 0.3

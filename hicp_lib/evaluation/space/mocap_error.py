@@ -19,8 +19,13 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.cases import labelled
 from hicp_lib.evaluation.space.stability import POSITION, THRESHOLDS_M
 from hicp_lib.evaluation.statistics.design import smallest_difference
-from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
-from hicp_lib.evaluation.statistics.time_blocks import block_length
+from hicp_lib.evaluation.statistics.resampling import (
+    Draws,
+    block_length,
+    draw_counts,
+    weighted_median,
+    with_interval,
+)
 from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.qualisys import MotionCapture
 
@@ -113,7 +118,7 @@ def mocap_errors(
 
 
 def median_errors(
-    errors: pd.DataFrame, min_scores: Sequence[float] = MIN_SCORES, n_resamples: int = 1000, seed: int = 0
+    errors: pd.DataFrame, min_scores: Sequence[float] = MIN_SCORES, draws: Draws = Draws()
 ) -> pd.DataFrame:
     """Count and median distance of the keypoints above a score: Tables III and IV.
 
@@ -123,8 +128,8 @@ def median_errors(
         `mocap_errors`.
     min_scores : sequence of float, optional
         Keypoints above each count.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -135,7 +140,7 @@ def median_errors(
         joint's centre), `block_frames`.
     """
     rows, block_frames = [], _block_length(errors)
-    for case, part, found_m, weights in _cases(errors, min_scores, n_resamples, seed):
+    for case, part, found_m, weights in _cases(errors, min_scores, draws):
         found, known = np.isfinite(found_m), part["reference_x_m"].notna().to_numpy()
         n_people = len(set(_subjects(part)[known]))
         medians = with_interval(weighted_median(found_m, weights), n_people)
@@ -152,8 +157,7 @@ def median_differences(
     errors: pd.DataFrame,
     between: str = "detector",
     min_scores: Sequence[float] = MIN_SCORES,
-    n_resamples: int = 1000,
-    seed: int = 0,
+    draws: Draws = Draws(),
 ) -> pd.DataFrame:
     """Medians of cases that differ in one label only, one less the other's on the same draws of frames.
 
@@ -165,8 +169,8 @@ def median_differences(
         The label: "detector", "method", or "min_score".
     min_scores : sequence of float, optional
         Keypoints above each count.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -177,7 +181,7 @@ def median_differences(
     """
     labels = [*_CASE, "min_score"]
     k, rows, drawn, of_people = labels.index(between), [], {}, {}
-    for case, part, found_m, weights in _cases(errors, min_scores, n_resamples, seed):
+    for case, part, found_m, weights in _cases(errors, min_scores, draws):
         drawn[case] = weighted_median(found_m, weights)
         of_people[case] = pd.Series(found_m).groupby(_subjects(part)).median()
     for case, medians_m in drawn.items():
@@ -195,8 +199,7 @@ def distance_shares(
     min_scores: Sequence[float] = MIN_SCORES,
     thresholds_m: Sequence[float] = THRESHOLDS_M,
     beyond: bool = False,
-    n_resamples: int = 1000,
-    seed: int = 0,
+    draws: Draws = Draws(),
 ) -> pd.DataFrame:
     """Share of the frames with motion capture in which a joint was found within a distance of it.
 
@@ -210,8 +213,8 @@ def distance_shares(
         The distances.
     beyond : bool, optional
         Whether to give the share beyond the distance instead, of the frames in which the joint was found.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -220,7 +223,7 @@ def distance_shares(
         none was found.
     """
     rows = []
-    for case, part, found_m, weights in _cases(errors, min_scores, n_resamples, seed):
+    for case, part, found_m, weights in _cases(errors, min_scores, draws):
         of = np.isfinite(found_m) if beyond else part["reference_x_m"].notna().to_numpy()
         n_people = len(set(_subjects(part)[of]))
         for threshold_m in thresholds_m:
@@ -232,11 +235,11 @@ def distance_shares(
 
 
 def _cases(
-    errors: pd.DataFrame, min_scores: Sequence[float], n_resamples: int, seed: int
+    errors: pd.DataFrame, min_scores: Sequence[float], draws: Draws
 ) -> Iterator[tuple[tuple, pd.DataFrame, np.ndarray, np.ndarray]]:
     """Labels, rows, errors of what was found (n_frames,) and weights of frames, the same for all cases."""
     whose, length = _subjects(errors.drop_duplicates("frame").sort_values("frame")), _block_length(errors)
-    weights = draw_counts(whose, n_resamples, seed, length)
+    weights = draw_counts(whose, draws, length)
     for case, part in errors.groupby(_CASE, sort=False):
         part = part.sort_values("frame")
         for min_score in min_scores:

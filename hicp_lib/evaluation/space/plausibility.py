@@ -13,14 +13,15 @@ is known, the same measure on it says how often a perfect answer would be called
 - The *shoulder line* of somebody who sits upright is level: its angle to the horizontal is its tilt.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pandas as pd
 
 from hicp_lib.evaluation.space.sightings import ROW
-from hicp_lib.evaluation.space.stability import MIN_SCORE, PARTS, PIXEL, POSITION, Parts, cases
+from hicp_lib.evaluation.space.stability import PARTS, PIXEL, POSITION, LiftedViews, Parts
 from hicp_lib.evaluation.statistics.proportions import mean_with_interval
+from hicp_lib.evaluation.statistics.resampling import Draws
 
 SHORTEST_TRUNK_M = 0.288 * 1.52
 IN_ABDOMEN_M = SHORTEST_TRUNK_M - 0.05
@@ -29,28 +30,15 @@ BACKWARDS_RAD = float(np.radians(20))
 _FINGERS = np.arange(5, 21).reshape(4, 4)
 
 
-def implausible(
-    points: pd.DataFrame,
-    subjects: Mapping[str, np.ndarray],
-    truth: Mapping[str, pd.DataFrame] | None = None,
-    min_score: float = MIN_SCORE,
-    n_resamples: int = 1000,
-    seed: int = 0,
-) -> pd.DataFrame:
+def implausible(lifted: LiftedViews, draws: Draws = Draws()) -> pd.DataFrame:
     """The measures of this module, of every detector in every view.
 
     Parameters
     ----------
-    points : DataFrame
-        What was lifted, as `hicp_lib.evaluation.space.stability` says, with its pixels.
-    subjects : mapping of str to array, shape (n_frames,)
-        Whose each image is, by view.
-    truth : mapping of str to DataFrame, optional
-        By view, a table with `frame, keypoint` and the same coordinates.
-    min_score : float, optional
-        Keypoints above it count.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    lifted : LiftedViews
+        With pixels.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -61,11 +49,11 @@ def implausible(
     """
     rows = []
     for measure, (values_of, parts, columns) in _MEASURES.items():
-        for case, part, found, true in cases(points, subjects, truth, min_score, parts, columns):
+        for case, part, subjects, found, true in lifted.cases(parts, columns):
             values = values_of(found)
             seen = np.flatnonzero(np.isfinite(values))
-            whose = subjects[case[0]][seen]
-            interval = mean_with_interval(values[seen], seen, n_resamples, seed, whose)
+            whose = subjects[seen]
+            interval = mean_with_interval(values[seen], seen, draws, whose)
             of_truth = np.nan if true is None else np.nanmean(values_of(true))
             rows.append((*case, part, measure, *interval, len(seen), len(set(whose)), of_truth))
     return pd.DataFrame(rows, columns=[*ROW, "value", "low", "high", "n_images", "n_people", "of_truth"])

@@ -1,41 +1,25 @@
 """Stability and accuracy of still people's keypoints as distances: spread, bias and error.
 
-Beside the shares of `hicp_lib.evaluation.space.stability`, over the same `points` and views.
+Beside the shares of `hicp_lib.evaluation.space.stability`, of the same `LiftedViews`.
 """
-
-from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
 
-from hicp_lib.evaluation.space.stability import CASE, MIN_SCORE, cases, of_each
-from hicp_lib.evaluation.statistics.resampling import draw_counts, weighted_median, with_interval
+from hicp_lib.evaluation.space.stability import CASE, LiftedViews, of_each
+from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, weighted_median, with_interval
 
 _LEAST_IMAGES = 3  # of a person: of one, the distance to their median is 0
 
 
-def spread_and_bias(
-    points: pd.DataFrame,
-    subjects: Mapping[str, np.ndarray],
-    truth: Mapping[str, pd.DataFrame] | None = None,
-    min_score: float = MIN_SCORE,
-    n_resamples: int = 1000,
-    seed: int = 0,
-) -> pd.DataFrame:
+def spread_and_bias(lifted: LiftedViews, draws: Draws = Draws()) -> pd.DataFrame:
     """Stability and accuracy as distances, over the images in which a keypoint was found.
 
     Parameters
     ----------
-    points : DataFrame
-        What was lifted, as the module `stability` says.
-    subjects : mapping of str to array, shape (n_frames,)
-        Whose each image is, by view.
-    truth : mapping of str to DataFrame, optional
-        By view, a table with `frame, keypoint, x_m, y_m, z_m`.
-    min_score : float, optional
-        Keypoints above it count.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    lifted : LiftedViews
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -50,14 +34,14 @@ def spread_and_bias(
         small, as the median lies between them.
     """
     rows = []
-    for case, part, found_m, true_m in cases(points, subjects, truth, min_score):
-        whose, n_images = subjects[case[0]], np.isfinite(found_m[..., 0]).sum(axis=0).mean()
-        weights, n_people = draw_counts(whose, n_resamples, seed), _n_people(found_m, whose)
+    for case, part, whose, found_m, true_m in lifted.cases():
+        weights, n_people = draw_counts(whose, draws), _n_people(found_m, whose)
+        n_images = np.isfinite(found_m[..., 0]).sum(axis=0).mean()
         labels = [*CASE, "part", "n_images", "n_people"]
         row = dict(zip(labels, (*case, part, n_images, n_people), strict=True))
         several = n_people > 1 or len(set(whose)) == 1
-        for name, draws in _distances_drawn(found_m, true_m, weights, whose).items():
-            interval = with_interval(draws, n_people if several else 0)
+        for name, drawn in _distances_drawn(found_m, true_m, weights, whose).items():
+            interval = with_interval(drawn, n_people if several else 0)
             row |= zip((name, f"{name}_low", f"{name}_high"), interval, strict=True)
         rows.append(row)
     return pd.DataFrame(rows)

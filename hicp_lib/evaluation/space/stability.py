@@ -12,15 +12,16 @@ counts; a keypoint counts as found when its score is above `min_score` and it co
 95 % percentile ones from drawing subjects, and images of each.
 """
 
-import itertools
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 import pandas as pd
 
 from hicp_lib.core.keypoints import GROUPS, LEFT_HAND, NAMES, RIGHT_HAND
 from hicp_lib.evaluation.cases import groups_of
-from hicp_lib.evaluation.statistics.resampling import draw_counts, with_interval
+from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, with_interval
 
 CASE = ["view", "detector", "method"]
 POSITION = ["x_m", "y_m", "z_m"]
@@ -28,7 +29,6 @@ PIXEL = ["u_px", "v_px"]
 THRESHOLDS_M = (0.025, 0.05, 0.1)
 MIN_SCORE = 0.1
 
-_Truth = Mapping[str, pd.DataFrame]  # view -> true positions
 Parts = Mapping[str, Sequence[str]]
 
 # What the paper reports. All 21 keypoints of a hand count, each against its own median position.
@@ -68,6 +68,65 @@ def counted(
     return points[(points["person"] == 0) & (points["score"] > min_score) & placed]
 
 
+@dataclass(frozen=True)
+class LiftedViews:
+    """What was lifted of people in views.
+
+    Attributes
+    ----------
+    points : DataFrame
+        As the module says.
+    subjects : mapping of str to array, shape (n_frames,)
+        Whose each image is, by view.
+    truth : mapping of str to DataFrame or None
+        By view, a table with `frame, keypoint` and true coordinates; None where they are not known.
+    min_score : float
+        Keypoints above it count.
+    """
+
+    points: pd.DataFrame
+    subjects: Mapping[str, np.ndarray]
+    truth: Mapping[str, pd.DataFrame] | None = None
+    min_score: float = MIN_SCORE
+
+    def cases(self, parts: Parts = PARTS, columns: Sequence[str] = POSITION) -> Iterator[tuple]:
+        """Every part that a detector gives, in every view.
+
+        A detector of the registry gives the groups of keypoints named there, any other those it finds one of
+        in some view. A group that is given and not found counts.
+
+        Parameters
+        ----------
+        parts : mapping of str to tuple of str, optional
+            Keypoints by part.
+        columns : sequence of str, optional
+            The coordinates, d of them.
+
+        Yields
+        ------
+        case : tuple of str
+            View, detector and method.
+        part : str
+        subjects : array, shape (n_frames,)
+        found, true : array, shape (n_frames, n_keypoints, d)
+            Places; the true ones None without `truth`.
+        """
+        by_detector, names = self.points.groupby("detector"), list(dict.fromkeys(chain(*parts.values())))
+        given = {name: _gives(name, set(rows["keypoint"].unique())) for name, rows in by_detector}
+        found = dict(list(counted(self.points, self.min_score, columns).groupby(CASE, sort=False)))
+        runs = self.points[["detector", "method"]].drop_duplicates()
+        for view, whose in self.subjects.items():
+            n = len(whose)
+            true = None if self.truth is None else position_array(self.truth[view], names, n, columns)
+            for run in runs.itertuples(index=False, name=None):
+                # A detector that finds nobody in a view has no rows there, and is counted all the same.
+                places = position_array(found.get((view, *run), self.points[:0]), names, n, columns)
+                for part, keypoints in parts.items():
+                    if given[run[0]] & set(keypoints):
+                        at = [names.index(name) for name in keypoints]
+                        yield (view, *run), part, whose, places[:, at], None if true is None else true[:, at]
+
+
 def median_positions(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.DataFrame:
     """Coordinate-wise median over the views of every subject's keypoints, in the base frame.
 
@@ -83,13 +142,7 @@ def median_positions(points: pd.DataFrame, min_score: float = MIN_SCORE) -> pd.D
 
 
 def within_distance(
-    points: pd.DataFrame,
-    subjects: Mapping[str, np.ndarray],
-    truth: _Truth | None = None,
-    thresholds_m: Sequence[float] = THRESHOLDS_M,
-    min_score: float = MIN_SCORE,
-    n_resamples: int = 1000,
-    seed: int = 0,
+    lifted: LiftedViews, thresholds_m: Sequence[float] = THRESHOLDS_M, draws: Draws = Draws()
 ) -> pd.DataFrame:
     """Fraction of images in which a keypoint was found within a distance of where it should be.
 
@@ -98,19 +151,12 @@ def within_distance(
 
     Parameters
     ----------
-    points : DataFrame
-        What was lifted, as the module says.
-    subjects : mapping of str to array, shape (n_frames,)
-        Whose each image is, by view.
-    truth : mapping of str to DataFrame, optional
-        By view, a table with `frame, keypoint, x_m, y_m, z_m`. Given, distances are to the true positions;
-        None, to the median over the subject's images.
+    lifted : LiftedViews
+        With truth, distances are to the true positions; else to the median over the subject's images.
     thresholds_m : sequence of float, optional
         The distances.
-    min_score : float, optional
-        Keypoints above it count.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -119,10 +165,9 @@ def within_distance(
         high`, `found` (fraction of images, at any distance), `n_people`.
     """
     rows: list[tuple] = []
-    reference = "median" if truth is None else "truth"
-    for case, part, found_m, true_m in cases(points, subjects, truth, min_score):
-        whose = subjects[case[0]]
-        weights, n_people = draw_counts(whose, n_resamples, seed), len(set(whose))
+    reference = "median" if lifted.truth is None else "truth"
+    for case, part, whose, found_m, true_m in lifted.cases():
+        weights, n_people = draw_counts(whose, draws), len(set(whose))
         off_m = np.linalg.norm(found_m - (own_medians(found_m, whose) if true_m is None else true_m), axis=-1)
         within = (off_m[..., None] <= np.asarray(thresholds_m)).mean(axis=1)
         shares = weights @ within / weights.sum(axis=1, keepdims=True)
@@ -159,57 +204,6 @@ def position_array(
     rows = rows[rows["keypoint"].isin(place)]
     result[rows["frame"], rows["keypoint"].map(place).astype(int)] = rows[list(columns)]
     return result
-
-
-def cases(
-    points: pd.DataFrame,
-    subjects: Mapping[str, np.ndarray],
-    truth: _Truth | None = None,
-    min_score: float = MIN_SCORE,
-    parts: Parts = PARTS,
-    columns: Sequence[str] = POSITION,
-) -> Iterator[tuple[tuple[str, str, str], str, np.ndarray, np.ndarray | None]]:
-    """Every part that a detector gives, in every view.
-
-    A detector of the registry gives the groups of keypoints named there, any other those it finds one of in
-    some view. A group that is given and not found counts.
-
-    Parameters
-    ----------
-    points : DataFrame
-        What was lifted, as the module says.
-    subjects : mapping of str to array, shape (n_frames,)
-        Whose each image is, by view.
-    truth : mapping of str to DataFrame, optional
-        By view, a table with `frame, keypoint` and `columns`.
-    min_score : float, optional
-        Keypoints above it count.
-    parts : mapping of str to tuple of str, optional
-        Keypoints by part.
-    columns : sequence of str, optional
-        The coordinates, d of them.
-
-    Yields
-    ------
-    tuple
-        View, detector and method; part; places found and true places, arrays (n_frames, n_keypoints, d), the
-        latter None without `truth`.
-    """
-    given = {name: _gives(name, set(rows["keypoint"].unique())) for name, rows in points.groupby("detector")}
-    found = dict(list(counted(points, min_score, columns).groupby(CASE, sort=False)))
-    runs = list(points[["detector", "method"]].drop_duplicates().itertuples(index=False, name=None))
-    names = list(dict.fromkeys(itertools.chain(*parts.values())))
-    places = {part: [names.index(name) for name in keypoints] for part, keypoints in parts.items()}
-    for view, n in ((view, len(whose)) for view, whose in subjects.items()):
-        true = None if truth is None else position_array(truth[view], names, n, columns)
-        for detector, method in runs:
-            # A detector that finds nobody in a view has no rows there, and is counted all the same.
-            rows = found.get((view, detector, method), points[:0])
-            places_found = position_array(rows, names, n, columns)
-            for part, of_part in places.items():
-                if given[detector] & set(parts[part]):
-                    true_places = None if true is None else true[:, of_part]
-                    yield (view, detector, method), part, places_found[:, of_part], true_places
 
 
 def _gives(detector: str, found: set[str]) -> set[str]:

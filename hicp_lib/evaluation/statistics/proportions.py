@@ -8,14 +8,12 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from hicp_lib.evaluation.statistics.design import smallest_difference
-from hicp_lib.evaluation.statistics.resampling import PERCENTILES, draw_counts, with_interval
+from hicp_lib.evaluation.statistics.resampling import PERCENTILES, Draws, draw_counts, with_interval
 
 _TAIL = PERCENTILES[0] / 100  # what an interval leaves out on either side
 
 
-def proportions(
-    rows: pd.DataFrame, by: Sequence[str], of: str, n_resamples: int = 1000, seed: int = 0
-) -> pd.DataFrame:
+def proportions(rows: pd.DataFrame, by: Sequence[str], of: str, draws: Draws = Draws()) -> pd.DataFrame:
     """Mean of a column per group of rows, with its 95 % bootstrap interval.
 
     Parameters
@@ -27,8 +25,8 @@ def proportions(
         Columns that make the groups.
     of : str
         Column of booleans or numbers; rows where it is missing are left out.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -47,14 +45,14 @@ def proportions(
     units = ["source_image", "subject"] if "subject" in rows else ["source_image"]
     table = []
     for group, part in rows.groupby(list(by), sort=False, observed=True):
-        interval = mean_with_interval(part[of], part["source_image"], n_resamples, seed, part.get("subject"))
+        interval = mean_with_interval(part[of], part["source_image"], draws, part.get("subject"))
         table.append((*group, *interval, len(part), *part[units].nunique()))
     counts = ["n_images", "n_people"][: len(units)]
     return pd.DataFrame(table, columns=[*by, "value", "low", "high", "n", *counts])
 
 
 def paired_differences(
-    rows: pd.DataFrame, by: Sequence[str], over: str, of: str, n_resamples: int = 1000, seed: int = 0
+    rows: pd.DataFrame, by: Sequence[str], over: str, of: str, draws: Draws = Draws()
 ) -> pd.DataFrame:
     """Mean of a column where another has one value, less that where it has another, on the same images.
 
@@ -69,8 +67,8 @@ def paired_differences(
         Column whose values are compared, all with all.
     of : str
         Column of booleans or numbers; source images that lack one of a pair are left out of it.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
 
     Returns
     -------
@@ -92,7 +90,7 @@ def paired_differences(
         for a, b in combinations(dict.fromkeys(part[over]), 2):
             less = (values[a] - values[b]).dropna().rename("less").reset_index()
             whose = less.get("subject")
-            interval = mean_with_interval(less["less"], less["source_image"], n_resamples, seed, whose)
+            interval = mean_with_interval(less["less"], less["source_image"], draws, whose)
             value, low, high = interval
             counts: list[float] = [len(less)]
             if whose is not None:
@@ -104,11 +102,7 @@ def paired_differences(
 
 
 def mean_with_interval(
-    values: ArrayLike,
-    clusters: ArrayLike,
-    n_resamples: int = 1000,
-    seed: int = 0,
-    subjects: ArrayLike | None = None,
+    values: ArrayLike, clusters: ArrayLike, draws: Draws = Draws(), subjects: ArrayLike | None = None
 ) -> tuple[float, float, float]:
     """Mean, and its 95 % percentile interval from drawing subjects, then clusters of each.
 
@@ -122,8 +116,8 @@ def mean_with_interval(
         What is averaged.
     clusters : array, shape (n,)
         Values of equal cluster are drawn together.
-    n_resamples, seed : int, optional
-        Number of bootstrap draws, and what they are drawn with.
+    draws : Draws, optional
+        Of the bootstrap.
     subjects : array, shape (n,), optional
         Whose each value is; all of one when left out.
 
@@ -144,7 +138,7 @@ def mean_with_interval(
     units = pd.DataFrame({"subject": np.asarray(subjects), "cluster": np.asarray(clusters)})
     cluster = units.groupby(["subject", "cluster"], sort=False).ngroup().to_numpy()
     whose = units["subject"][np.unique(cluster, return_index=True)[1]]
-    times, n_people = draw_counts(whose, n_resamples, seed), whose.nunique()
+    times, n_people = draw_counts(whose, draws), whose.nunique()
     sums = np.bincount(cluster, weights=values.astype(float))
     value, low, high = with_interval(times @ sums / (times @ np.bincount(cluster)), n_people)
     if values.dtype == bool and value in (0, 1) and low == low:

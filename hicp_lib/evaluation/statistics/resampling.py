@@ -7,10 +7,12 @@ a while, so stretches of them may be drawn: a moving block bootstrap (Künsch, A
 Percentiles that fit many people would make the intervals of few too narrow, so theirs lie further out
 (Hesterberg, The American Statistician 2015): where people differ more than their frames, those of a mean over
 10 people cover it in 95 % of samples. Where people hardly differ, frames count twice, and it is 99 %.
+
+How long the blocks of frames must be, `block_length` says.
 """
 
 from statistics import NormalDist
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -23,40 +25,54 @@ PERCENTILES = (2.5, 97.5)  # of 95 % intervals
 MIN_DRAWN = 10  # a percentile interval from fewer covers far less than 95 %, and from one nothing
 
 
-def draw_counts(frames: int | ArrayLike, n_resamples: int, seed: int, block_length: int = 1) -> np.ndarray:
+class Draws(NamedTuple):
+    """The draws of a bootstrap.
+
+    Attributes
+    ----------
+    n : int
+        How many.
+    seed : int
+        What they are drawn with.
+    """
+
+    n: int = 1000
+    seed: int = 0
+
+
+def draw_counts(frames: int | ArrayLike, draws: Draws, block_length: int = 1) -> np.ndarray:
     """How often each frame is drawn.
 
     Parameters
     ----------
     frames : int or array, shape (n,)
         Number of frames of one subject, or whose each frame is; those of a subject in the order of time.
-    n_resamples : int
-        Number of draws. None are made of fewer than `MIN_DRAWN` subjects, or of one with fewer blocks of
-        frames: there is no interval.
-    seed : int
-        Of the draws.
+    draws : Draws
+        None are made of fewer than `MIN_DRAWN` subjects, or of one with fewer blocks of frames: there is no
+        interval.
     block_length : int, optional
         Frames that are drawn together; cut to a subject's frames.
 
     Returns
     -------
-    array of int, shape (1 + n_resamples, n)
+    array of int, shape (1 + draws.n, n)
         The first row is the sample itself, each once. A subject that is drawn gives as many frames as it has:
         blocks that start anywhere, the last one cut.
 
     Examples
     --------
-    >>> draw_counts(3, 1000, seed=0)
+    >>> draw_counts(3, Draws())
     array([[1, 1, 1]])
-    >>> draw_counts(np.repeat(np.arange(10), 2), 1000, seed=0).sum(axis=1).min()
+    >>> draw_counts(np.repeat(np.arange(10), 2), Draws()).sum(axis=1).min()
     np.int64(20)
     """
     whose = np.zeros(frames) if isinstance(frames, int | np.integer) else np.asarray(frames)
-    return _draw_counts(tuple(pd.factorize(whose)[0].tolist()), n_resamples, seed, block_length)
+    return _draw_counts(tuple(pd.factorize(whose)[0].tolist()), draws, block_length)
 
 
 @memoised(4)
-def _draw_counts(subjects: tuple[int, ...], n_resamples: int, seed: int, block_length: int) -> np.ndarray:
+def _draw_counts(subjects: tuple[int, ...], draws: tuple[int, int], block_length: int) -> np.ndarray:
+    n_resamples, seed = draws
     rng, sizes = np.random.default_rng(seed), np.bincount(subjects)
     n_units = len(sizes) if len(sizes) > 1 else -(-len(subjects) // block_length)
     n_resamples = n_resamples if n_units >= MIN_DRAWN else 0
@@ -160,3 +176,53 @@ def weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     places = [reached.argmax(axis=1) for reached in (counts >= half, counts > half)]
     lower, upper = (rows[row, order[row, place]] for place in places)
     return np.where(total > 0, (lower + upper) / 2, np.nan)
+
+
+_LEAST_BLOCKS = 4  # a recording is made of
+_MAX_CORRELATION = 0.999
+
+
+def block_length(errors: np.ndarray, subjects: ArrayLike | None = None) -> int:
+    """Length of the blocks, in frames, for medians and fractions of `errors`.
+
+    What a median or a fraction averages over time is on which side of a bound each error lies, and outliers
+    must not matter. So the serial correlation is taken from the *signs* of the errors about their median,
+    by the arcsine law of normal processes: rho = sin(pi/2 * correlation of neighbouring signs). As if of
+    an autoregressive process, the length is n^(1/3) (sqrt(6) rho / (1 - rho^2))^(2/3): Carlstein's rule
+    (Annals of Statistics 1986) in the form of Sherman, Speed and Speed (1998).
+
+    Parameters
+    ----------
+    errors : array, shape (n_frames, n_series)
+        NaN where missing; their correlations are averaged.
+    subjects : array, shape (n_frames,), optional
+        Whose each frame is; of one subject when left out. Each has medians of its own, and as neighbours
+        count frames of one subject only.
+
+    Returns
+    -------
+    int
+        From 1 to a quarter of the frames, of the subject with the fewest.
+
+    Examples
+    --------
+    >>> block_length(np.sin(np.arange(400) / 20)[:, None])
+    100
+    """
+    whose = np.zeros(len(errors)) if subjects is None else np.asarray(subjects)
+    names, sizes = np.unique(whose, return_counts=True)
+    n = min(sizes, default=0)
+    if n < 2 * _LEAST_BLOCKS:
+        return 1
+    alike, count = np.sum([_neighbours(errors[whose == name]) for name in names], axis=0)
+    rho = np.clip(np.sin(np.pi / 2 * alike / max(count, 1)), 0.0, _MAX_CORRELATION)
+    length = n ** (1 / 3) * (np.sqrt(6) * rho / (1 - rho**2)) ** (2 / 3)
+    return int(np.clip(np.ceil(length), 1, n // _LEAST_BLOCKS))
+
+
+def _neighbours(errors: np.ndarray) -> tuple[float, int]:
+    """Sum of the products of neighbours' signs about the median, and number of pairs of them."""
+    seen = np.isfinite(errors)
+    medians = np.nanmedian(np.where(seen.any(axis=0), errors, 0.0), axis=0)
+    signs = np.where(seen, np.sign(errors - medians), 0.0)
+    return (signs[1:] * signs[:-1]).sum(), (seen[1:] & seen[:-1]).sum()

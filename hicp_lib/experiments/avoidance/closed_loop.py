@@ -175,10 +175,8 @@ class Follower:
     def moment(self, time_s: float) -> Moment:
         """What there is at a time, no later than `_POSED_S` after what was seen last."""
         before = min(int(time_s / _POSED_S + 1e-9), len(self._followed_m) - 1)
-        first_m, then_m = (
-            self._followed_m[before],
-            self._followed_m[min(before + 1, len(self._followed_m) - 1)],
-        )
+        after = min(before + 1, len(self._followed_m) - 1)
+        first_m, then_m = self._followed_m[before], self._followed_m[after]
         hand_m = first_m + min(time_s / _POSED_S - before, 1.0) * (then_m - first_m)
         # A robot that nobody threatens moves by less: everybody then sees the same.
         return Moment(self.trial.script, self.trial.subject, time_s, tuple(hand_m.round(3).tolist()))

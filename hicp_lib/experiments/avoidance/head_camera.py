@@ -21,7 +21,7 @@ from hicp_lib.lifting.robust import METHODS, lift_in_steps
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.loop import Perception
 from hicp_lib.robot.posture import Posture
-from hicp_lib.robot.self_filter import filter_self
+from hicp_lib.robot.segments import filter_self
 from hicp_lib.simulation.rendering.render import render
 
 RgbdImage = tuple[np.ndarray, np.ndarray]

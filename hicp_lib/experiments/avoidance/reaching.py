@@ -15,16 +15,8 @@ import numpy as np
 from hicp_lib.core.camera import transform
 from hicp_lib.core.memo import memoised
 from hicp_lib.core.rotations import about
+from hicp_lib.experiments import laboratory as lab
 from hicp_lib.experiments.avoidance.skin_distance import robot_spheres, skin_distance_m
-from hicp_lib.experiments.laboratory import (
-    PELVIS_LEAN,
-    T_WORLD_ROOT,
-    chair,
-    facing_robot,
-    furnished,
-    in_root,
-    posed,
-)
 from hicp_lib.experiments.minimum_jerk import Posture, between, minimum_jerk
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
@@ -56,7 +48,7 @@ _HANGING_DEG = {"left_shoulder_abduction": 6.0, "right_shoulder_abduction": 6.0,
 _HAND_DEG = {"forearm_supination": -15.0, "wrist_flexion": 0.0, "wrist_deviation": 0.0}
 _LEANS_DEG = np.arange(0.0, 100.1, 5.0)  # how far the trunk bends in all; the neck no further
 _FINE_DEG = np.arange(0.0, 100.1, 0.25)
-_LEAN_SHARES = {PELVIS_LEAN: 0.35, "spine_flexion": 0.65, "neck_flexion": -0.45}  # the eyes look ahead
+_LEAN_SHARES = {lab.PELVIS_LEAN: 0.35, "spine_flexion": 0.65, "neck_flexion": -0.45}  # the eyes look ahead
 _FROM = np.array([-0.66, 0.55, 0.45])  # whence the hand comes, root frame: from the palm's side
 _WRISTS_M = np.arange(0.70, 0.04, -0.03)  # how far the wrist is from the robot's palm, tried from afar
 _PASSES_M = np.arange(1.5, 0.4, -0.05)  # how far off somebody passes, likewise
@@ -175,7 +167,7 @@ class Moment:
 @memoised(64)
 def _person(moment: Moment) -> PosedBody:
     scene = script(moment.script, moment.subject)
-    return posed(scene.appearance.shape, scene.posture_at(moment.time_s, np.array(moment.hand_m)))
+    return lab.posed(scene.appearance.shape, scene.posture_at(moment.time_s, np.array(moment.hand_m)))
 
 
 @memoised(4)
@@ -190,7 +182,7 @@ def script(name: str, subject: Subject = Subject()) -> Script:
     Examples
     --------
     >>> fingertip_m = Moment("standing, hand", Subject(), NEAR_S).person.keypoints_m[127]
-    >>> bool(np.linalg.norm(in_root(fingertip_m) - HOME_M["left"]) < 0.3)
+    >>> bool(np.linalg.norm(lab.in_root(fingertip_m) - HOME_M["left"]) < 0.3)
     True
     """
     staging, identity = (SCRIPTS | BYSTANDERS)[name], subject.identity
@@ -200,9 +192,9 @@ def script(name: str, subject: Subject = Subject()) -> Script:
     x, y = staging.place_m
     seat = []
     if staging.sits:
-        seat = chair(rng, (x, y), float(posed(appearance.shape, rest).heads_m[0, 2]) - _SEAT_M)
+        seat = lab.chair(rng, (x, y), float(lab.posed(appearance.shape, rest).heads_m[0, 2]) - _SEAT_M)
     passed = [(px, y - 0.4, 0.7) for px in _PASSES_X_M if staging.by == "passing"]
-    room = furnished(identity, seat, [(x, y - 0.2, 0.8), (x, y + 0.4, 0.7), *passed])
+    room = lab.furnished(identity, seat, [(x, y - 0.2, 0.8), (x, y + 0.4, 0.7), *passed])
     return Script(name, room, appearance, rest, ready, touch)
 
 
@@ -237,10 +229,10 @@ def _by_passing(shape: str, rest: Posture) -> tuple[Posture, Posture, Reach]:
 def _by_head(shape: str, rest: Posture) -> tuple[Posture, Posture, Reach]:
     """Far, ready and near for the head: the trunk bends forward until it is there, and no other way."""
     near_deg = _contact(_LEANS_DEG, lambda lean_deg: _distance_m(shape, _leaning(rest, lean_deg)))
-    bodies = [posed(shape, _leaning(rest, lean_deg)) for lean_deg in _LEANS_DEG]
-    skin_m = in_root(posed(shape, _leaning(rest, near_deg)).vertices_m)
+    bodies = [lab.posed(shape, _leaning(rest, lean_deg)) for lean_deg in _LEANS_DEG]
+    skin_m = lab.in_root(lab.posed(shape, _leaning(rest, near_deg)).vertices_m)
     first = int(np.linalg.norm(skin_m - HOME_M["left"], axis=1).argmin())  # what would touch the hand
-    coarse_m = in_root(np.array([body.vertices_m[first] for body in bodies]))
+    coarse_m = lab.in_root(np.array([body.vertices_m[first] for body in bodies]))
     way_m = np.stack([np.interp(_FINE_DEG, _LEANS_DEG, column) for column in coarse_m.T], axis=1)
     to_hand_m = np.array(HOME_M["left"]) - way_m[np.abs(_FINE_DEG - near_deg).argmin()]
 
@@ -269,7 +261,7 @@ def _contact(way: Iterable[float], distance_m: Callable[[float], float], gap_m: 
 
 def _distance_m(shape: str, posture: Posture) -> float:
     """Between the person and the robot at its post."""
-    return skin_distance_m(_robot_at_post(), in_root(posed(shape, posture).vertices_m))
+    return skin_distance_m(_robot_at_post(), lab.in_root(lab.posed(shape, posture).vertices_m))
 
 
 @memoised()
@@ -300,7 +292,7 @@ def _leaning(posture: Posture, lean_deg: float) -> Posture:
 
 def _leaning_reach(shape: str, rest: Posture) -> Reach:
     """How the right wrist comes to a point of the root frame, the trunk no further bent than that takes."""
-    body, pelvis_m, to_body = load_body(), posed(shape, rest).heads_m[0], facing_robot(0.0)[:3, :3].T
+    body, pelvis_m, to_body = load_body(), lab.posed(shape, rest).heads_m[0], lab.facing_robot(0.0)[:3, :3].T
     arm = [body.bone_numbers[f"{name}.R"] for name in ("upperarm01", "lowerarm01", "wrist")]
     shoulders_m = []
     for lean_deg in _LEANS_DEG:
@@ -310,7 +302,7 @@ def _leaning_reach(shape: str, rest: Posture) -> Reach:
     length_m = np.linalg.norm(np.diff(heads[arm], axis=0), axis=1).sum()
 
     def with_wrist(wrist_m: np.ndarray) -> Posture:
-        from_pelvis_m = to_body @ (transform(T_WORLD_ROOT, wrist_m) - pelvis_m)
+        from_pelvis_m = to_body @ (transform(lab.T_WORLD_ROOT, wrist_m) - pelvis_m)
         lacks_m = np.linalg.norm(from_pelvis_m - shoulders_m, axis=1) - _STRETCHED * length_m
         first = int((lacks_m <= 0).argmax() if (lacks_m <= 0).any() else lacks_m.argmin())
         least_deg = np.interp(0, lacks_m[[first, max(first - 1, 0)]], _LEANS_DEG[[first, max(first - 1, 0)]])
@@ -318,7 +310,7 @@ def _leaning_reach(shape: str, rest: Posture) -> Reach:
             bent, lean = _bent(rest, lean_deg)
             found = reach(body, shape, bent, "right", about(1, lean).T @ from_pelvis_m, _ELBOW_REACHING)
             if found:
-                return replace(rest, joints=found | {PELVIS_LEAN: lean})
+                return replace(rest, joints=found | {lab.PELVIS_LEAN: lean})
         return _leaning(rest, least_deg)
 
     return with_wrist
@@ -327,4 +319,4 @@ def _leaning_reach(shape: str, rest: Posture) -> Reach:
 def _bent(rest: Posture, lean_deg: float) -> tuple[dict[str, float], float]:
     """Joints of a bent trunk without the pelvis, and how far that leans (radians)."""
     joints = dict(_leaning(rest, lean_deg).joints)
-    return joints, joints.pop(PELVIS_LEAN)
+    return joints, joints.pop(lab.PELVIS_LEAN)

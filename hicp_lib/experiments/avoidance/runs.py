@@ -24,14 +24,8 @@ from hicp_lib.core.images import decode_image
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.results import identity
-from hicp_lib.experiments.avoidance.closed_loop import (
-    HAND_COLUMNS,
-    Latency,
-    Trial,
-    TrueKeypoints,
-    between_s,
-    simulate,
-)
+from hicp_lib.experiments.avoidance import closed_loop as loop
+from hicp_lib.experiments.avoidance.closed_loop import Latency, Trial
 from hicp_lib.experiments.avoidance.error_model import in_sight
 from hicp_lib.experiments.avoidance.head_camera import HeadCamera, ImageCache, Observation
 from hicp_lib.experiments.avoidance.reaching import Moment
@@ -167,7 +161,7 @@ def keypoints_m(frame: pd.Series) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def moment_at(run: Run, time_s: float) -> Moment:
     """What there is in a run at a time: where the person is depends on what the robot did."""
     row = run.cycles.iloc[int((run.cycles["t_s"] - time_s).abs().argmin())]
-    hand_m = tuple(float(row[column]) for column in HAND_COLUMNS)
+    hand_m = tuple(float(row[column]) for column in loop.HAND_COLUMNS)
     return Moment(run.job.trial.script, run.job.trial.subject, float(time_s), hand_m)
 
 
@@ -181,10 +175,10 @@ def _simulate(out: Path, run: str, job: Job, images: ImageCache) -> None:
     observations: list[Observation] = []
     avoids, settings = job.detector != NO_AVOIDANCE, settings_of(job.gains)
     if job.detector in IDEAL:
-        cycles = simulate(job.trial, TrueKeypoints(job.latency), avoids, settings)
+        cycles = loop.simulate(job.trial, loop.TrueKeypoints(job.latency), avoids, settings)
     else:
         camera = HeadCamera(_detector(job), job.latency, job.lifting, images)
-        cycles, observations = simulate(job.trial, camera, settings=settings), camera.observations
+        cycles, observations = loop.simulate(job.trial, camera, settings=settings), camera.observations
     frames = pd.DataFrame(list(map(_frame, observations)))
     for name, table in zip(reversed(_TABLES), (frames, cycles), strict=True):
         with atomic_path(out / run / name) as temporary:
@@ -226,7 +220,7 @@ def _detector(job: Job) -> Detector:
     """Made once in every process; one that tracks anew for each run, which begins with nobody seen."""
     if not job.detector.endswith(TRACKING):
         return _kept_detector(job.detector)
-    every_s = between_s(job.trial, job.latency)
+    every_s = loop.between_s(job.trial, job.latency)
     return make_detector(job.detector.removesuffix(TRACKING), tracking_hz=float(1 / every_s))
 
 

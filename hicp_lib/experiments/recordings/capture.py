@@ -16,14 +16,8 @@ from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.body.model import PosedBody, load_body
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.surfaces import Surface
+from hicp_lib.simulation.sensors import motion_capture as mc
 from hicp_lib.simulation.sensors.markers import CAMERA_MARKER, JOINT_MARKERS, camera_marker_m, markers_m
-from hicp_lib.simulation.sensors.motion_capture import (
-    QUALISYS,
-    measure,
-    mocap_frame,
-    room_cameras_m,
-    track_markers,
-)
 
 _LEAD_S = (0.3, 0.9)  # how long before the first frame motion capture starts; as long after the last it ends
 _BALL_M = 0.006  # radius of a marker
@@ -63,15 +57,17 @@ def capture(
         Its clock shows zero so long before the first frame.
     """
     rng = subject.stream("motion capture")
-    T_mocap_world, lead_s = mocap_frame(rng), float(rng.uniform(*_LEAD_S))
-    n = int(round((duration_s + 2 * lead_s) * QUALISYS.rate_hz)) + 1
-    clock_s = np.arange(n) / QUALISYS.rate_hz
-    cameras_m = room_cameras_m(QUALISYS, person_at(0.0).keypoints_m[INDEX["mid_hip"], :2])
+    T_mocap_world, lead_s = mc.mocap_frame(rng), float(rng.uniform(*_LEAD_S))
+    n = int(round((duration_s + 2 * lead_s) * mc.QUALISYS.rate_hz)) + 1
+    clock_s = np.arange(n) / mc.QUALISYS.rate_hz
+    cameras_m = mc.room_cameras_m(mc.QUALISYS, person_at(0.0).keypoints_m[INDEX["mid_hip"], :2])
     fixed_m = camera_marker_m(T_world_camera)[None]
     times_s = clock_s - lead_s
-    points_m, n_seeing = track_markers(person_at, vertices, fixed_m, times_s, cameras_m, obstacles=obstacles)
+    points_m, n_seeing = mc.track_markers(
+        person_at, vertices, fixed_m, times_s, cameras_m, obstacles=obstacles
+    )
     names = (*JOINT_MARKERS, CAMERA_MARKER)
-    exported = measure(clock_s, names, points_m, n_seeing, T_mocap_world, QUALISYS, rng)
+    exported = mc.measure(clock_s, names, points_m, n_seeing, T_mocap_world, mc.QUALISYS, rng)
     return exported, T_mocap_world, lead_s
 
 

@@ -37,10 +37,8 @@ _HANGING_DOWN_DEG: Ranges = {"shoulder_flexion": (55, 85), "elbow_flexion": (0, 
 _AROUND_DEG = {"shoulder_flexion": -25.0, "shoulder_abduction": 35.0, "elbow_flexion": 25.0}
 _ASIDE_M = ((0.5, DISTANCE_M), (0.8, DISTANCE_M + 0.2))  # half out of the image; two corners, (x, y)
 _CLOSE_M = ((-0.15, 0.75), (0.15, 1.05))  # torso and arms are in it
-_STEP_M, _LIFTED_DEG = (
-    0.5,
-    {"hip_flexion": 15.0, "knee_flexion": 26.0, "hip_abduction": 7.0},
-)  # the longest step
+_STEP_M = 0.5  # the longest
+_LIFTED_DEG = {"hip_flexion": 15.0, "knee_flexion": 26.0, "hip_abduction": 7.0}
 _PENETRATION_M = 0.03  # skin and clothes give way this far on the way from one posture to the next
 _N_TRIES = 12
 
@@ -190,7 +188,6 @@ class Gestures:
     def _is_free(self, posture: Posture) -> bool:
         """Whether the person can go to a posture without running through themselves."""
         ways = (between(self.now, posture, share).joints for share in np.linspace(0.125, 1, 8))
-        gaps_m = (
-            self_collision_distance_m(self.body, self.collision_model, pose_from_joints(way)) for way in ways
-        )
+        poses = map(pose_from_joints, ways)
+        gaps_m = (self_collision_distance_m(self.body, self.collision_model, pose) for pose in poses)
         return within_limits(posture.joints) and all(gap_m > -_PENETRATION_M for gap_m in gaps_m)

@@ -55,12 +55,10 @@ def seated_person(subject: Subject) -> tuple[World, PosedBody]:
 def _sit_down(body: Body, shape: str, rng: np.random.Generator) -> PosedBody:
     """The posture, with the arms brought down until the hands lie on the table."""
     upright = [name for name in _POSTURE_DEG if name.startswith(("spine", "neck"))]
-    joints = radians(
-        _POSTURE_DEG | {name: rng.normal(_POSTURE_DEG[name], _POSTURE_SD_DEG) for name in upright}
-    )
-    wrists_m = {
-        side: rng.uniform(-_WRISTS_APART_M, _WRISTS_APART_M, 2) + at for side, at in _WRISTS_M.items()
-    }
+    held = {name: rng.normal(_POSTURE_DEG[name], _POSTURE_SD_DEG) for name in upright}
+    joints = radians(_POSTURE_DEG | held)
+    apart_m = _WRISTS_APART_M
+    wrists_m = {side: rng.uniform(-apart_m, apart_m, 2) + at for side, at in _WRISTS_M.items()}
     for side in _WRISTS_M:
         joints |= sample_hand(rng, "open", f"{side}_") | radians(_HAND_DEG, f"{side}_")
     wrist_heights_m = dict.fromkeys(_WRISTS_M, TABLE_HEIGHT_M + 0.05)

@@ -16,15 +16,8 @@ from hicp_lib.core.cache import key
 from hicp_lib.core.executor import Workers, resolved, run_jobs
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.experiments.laboratory import T_WORLD_ROOT
+from hicp_lib.experiments.recordings import frames
 from hicp_lib.experiments.recordings.frames import camera_poses, record_frame
-from hicp_lib.experiments.recordings.ground_truth import (
-    DEPTH_UNITS_PER_M,
-    MOCAP_PART,
-    PARTS_DIR,
-    START_S,
-    finish_recording,
-    part_path,
-)
 from hicp_lib.experiments.recordings.scenarios import scenario
 from hicp_lib.recordings.c3d import MAX_FRAMES as MAX_C3D_FRAMES
 from hicp_lib.recordings.qualisys import write_c3d, write_tsv
@@ -73,22 +66,22 @@ def simulate_recording(
     n = plan.n_frames if n_frames is None else n_frames
     workers = resolved(workers)
     check_numbers(n_frames=(n, 1, plan.max_frames))
-    check_output(out, PARTS_DIR, "for the recording", "simulated")
+    check_output(out, frames.PARTS_DIR, "for the recording", "simulated")
     (out / RGB_LIST).unlink(missing_ok=True)  # it is no recording until it is finished
     who = {"subject": asdict(subject), "identity": asdict(subject.identity)}
     stamp = {"scenario": name, **who, "version": key([simulate_recording])}
-    keep_parts(out, PARTS_DIR, stamp, ["rgb/*", "depth/*", f"{EXACT_DEPTH_DIR}/*", *_MOCAP_FILES])
-    missing = [k for k in range(n) if not part_path(out, k).exists()]
-    todo: list[tuple[str, Callable]] = [
-        (str(part_path(Path(), k)), partial(record_one, name=name, subject=subject, k=k)) for k in missing
-    ]
+    keep_parts(out, frames.PARTS_DIR, stamp, ["rgb/*", "depth/*", f"{EXACT_DEPTH_DIR}/*", *_MOCAP_FILES])
+    missing = [k for k in range(n) if not frames.part_path(out, k).exists()]
+    one = partial(record_one, name=name, subject=subject)
+    todo: list[tuple[str, Callable]]
+    todo = [(str(frames.part_path(Path(), k)), partial(one, k=k)) for k in missing]
     if plan.capture is not None and not _is_captured(out, n):  # the longest first
         capture = partial(_capture_all, name=name, subject=subject, n=int(n))
-        todo.insert(0, (str(Path(PARTS_DIR, MOCAP_PART)), capture))
+        todo.insert(0, (str(Path(frames.PARTS_DIR, frames.MOCAP_PART)), capture))
     done = run_jobs(todo, workers, folder=out)
     for _ in tqdm(done, name, len(todo), unit="frame", disable=not progress or None):
         pass
-    finish_recording(out, plan, int(n), stamp)
+    frames.finish_recording(out, plan, int(n), stamp)
     return open_recording(out)
 
 
@@ -106,19 +99,19 @@ def record_one(out: Path, name: str, subject: Subject, k: int) -> None:
         The frame's number is `k`.
     """
     rgb, depth_m, exact_m, truth = record_frame(name, subject, k)
-    write_frame(out, k, rgb, depth_m, DEPTH_UNITS_PER_M)
-    write_depth(out / EXACT_DEPTH_DIR / Path(depth_name(k)).name, exact_m, DEPTH_UNITS_PER_M)
-    write_json(part_path(out, k), truth)
+    write_frame(out, k, rgb, depth_m, frames.DEPTH_UNITS_PER_M)
+    write_depth(out / EXACT_DEPTH_DIR / Path(depth_name(k)).name, exact_m, frames.DEPTH_UNITS_PER_M)
+    write_json(frames.part_path(out, k), truth)
 
 
 def _is_captured(out: Path, n: int) -> bool:
-    part = out / PARTS_DIR / MOCAP_PART
+    part = out / frames.PARTS_DIR / frames.MOCAP_PART
     return part.exists() and read_json(part)["n_frames"] == n
 
 
 def _capture_all(out: Path, name: str, subject: Subject, n: int) -> None:
     """Write motion capture of `n` frames."""
-    part, plan = out / PARTS_DIR / MOCAP_PART, scenario(name)
+    part, plan = out / frames.PARTS_DIR / frames.MOCAP_PART, scenario(name)
     if plan.capture is None:
         return
     T_world_camera = T_WORLD_ROOT @ camera_poses(plan, 1)[0]
@@ -128,4 +121,4 @@ def _capture_all(out: Path, name: str, subject: Subject, n: int) -> None:
     if len(exported.times_s) < MAX_C3D_FRAMES:  # a longer one is in the TSV file alone
         write_c3d(c3d, exported)
     T_base_mocap = np.linalg.inv(T_mocap_world @ T_WORLD_ROOT).tolist()
-    write_json(part, {"n_frames": n, "T_base_mocap": T_base_mocap, "mocap_offset_s": START_S - lead_s})
+    write_json(part, {"n_frames": n, "T_base_mocap": T_base_mocap, "mocap_offset_s": frames.START_S - lead_s})

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from hicp_lib.core.keypoints import INDEX
-from hicp_lib.core.memo import memoised, plain_fields
+from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.body.model import Body, PosedBody, load_body
 from hicp_lib.simulation.rendering import mesh as g
 
@@ -48,9 +48,6 @@ class Garment:
     ease_m: float = 0.012
     smoothing: int = 10
 
-    def __post_init__(self) -> None:
-        plain_fields(self)
-
 
 @dataclass(frozen=True)
 class Pattern:
@@ -79,44 +76,44 @@ class Pattern:
 def cut_pattern(garment: Garment) -> Pattern:
     """Cut a garment out of the body's surface."""
     # What it is made of does not change the cut.
-    return _cut_pattern(Garment(garment.kind, garment.start, garment.end, garment.sleeve, garment.opening))
+    return _cut_pattern(garment.kind, garment.start, garment.end, garment.sleeve, garment.opening)
 
 
 @memoised()
-def _cut_pattern(garment: Garment) -> Pattern:
+def _cut_pattern(kind: str, start: float, end: float, sleeve: float, opening: float) -> Pattern:
     body = load_body()
-    field = _FIELDS[garment.kind](body, garment)
+    if kind == "top":
+        field = _top_field(body, start, end, sleeve, opening)
+    else:
+        field = _bottom_field(body, start, end)
     cut = g.cut(body.triangles, field)
     deep = field > 0.03
     return Pattern(
         cut=cut,
-        smoothing=_smoothing(g.neighbours(cut.triangles, len(cut.i))),
+        smoothing=g.smoothing(cut.triangles, len(cut.i)),
         distance=np.maximum(cut.apply(field.astype(np.float32)), 0),
         rim=g.boundary_edges(cut.triangles),
         hidden=deep[body.triangles].all(axis=1),
     )
 
 
-def _top_field(body: Body, garment: Garment) -> np.ndarray:
+def _top_field(body: Body, start: float, end: float, sleeve: float, opening: float) -> np.ndarray:
     arm, torso = (body.field(name).astype(float) for name in ("arm", "torso"))
     rest = body.vertices_m[0]
     front = np.clip(rest[:, 0] / 0.08, 0, 1) * np.clip(1 - np.abs(rest[:, 1]) / 0.10, 0, 1)
-    trunk = np.minimum(torso - garment.start, garment.end - garment.opening * front.astype(float) - torso)
+    trunk = np.minimum(torso - start, end - opening * front.astype(float) - torso)
     on_arm = arm > 0
     trunk = np.where(on_arm, np.maximum(trunk, np.minimum(8 * arm, 0.5)), trunk)
-    field = np.minimum(trunk, np.where(on_arm, garment.sleeve - arm, 9))
+    field = np.minimum(trunk, np.where(on_arm, sleeve - arm, 9))
     allowed = body.in_regions("hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh")
     return np.where(allowed, field, -1)
 
 
-def _bottom_field(body: Body, garment: Garment) -> np.ndarray:
+def _bottom_field(body: Body, end: float, waist: float) -> np.ndarray:
     arm, leg, torso = (body.field(name).astype(float) for name in ("arm", "leg", "torso"))
-    field = np.minimum(garment.end - torso, garment.start - leg)
+    field = np.minimum(waist - torso, end - leg)
     allowed = body.in_regions("hips", "torso", "thigh", "shin", "foot") & (arm == 0)
     return np.where(allowed, field, -1)
-
-
-_FIELDS = {"top": _top_field, "bottom": _bottom_field}
 
 
 def put_on(
@@ -176,14 +173,6 @@ def _drape(garment: Garment, pattern: Pattern, cloth, skin, skin_normals, rest, 
     cloth = cloth + (heights * np.minimum(away / 0.01, 1.5))[:, None] * skin_normals
     away = np.maximum(0.6 * away, below + 0.003 * (below > 0))
     return _keep_away(pattern.smoothing @ cloth.astype(np.float32), skin, skin_normals, away)
-
-
-def _smoothing(neighbours: np.ndarray) -> sparse.csr_array:
-    """One step of smoothing as a matrix, from each vertex's neighbours (n, k)."""
-    n, k = neighbours.shape
-    rows = np.repeat(np.arange(n), k)
-    mean = sparse.csr_array((np.full(n * k, 1 / k, np.float32), (rows, neighbours.ravel())), shape=(n, n))
-    return sparse.csr_array(np.float32(0.4) * sparse.eye_array(n, dtype=np.float32) + np.float32(0.6) * mean)
 
 
 def _keep_away(cloth: np.ndarray, skin: np.ndarray, normals: np.ndarray, away: np.ndarray) -> np.ndarray:

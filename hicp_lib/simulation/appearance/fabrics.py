@@ -1,55 +1,34 @@
 """Fabrics: patterns that follow the cloth, weave, folds and seams."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from hicp_lib.core.keypoints import INDEX
-from hicp_lib.simulation.appearance.materials import any_colour, hsv, linear
+from hicp_lib.simulation.appearance.materials import Rng, any_colour, hsv, linear
 from hicp_lib.simulation.rendering import textures
 from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 
-Rng = np.random.Generator
-
-
-@dataclass(frozen=True)
-class Panels:
-    """How a person's garments are laid out flat: axes of trunk and limbs at rest, body frame.
-
-    There is one row per panel: 0 trunk, 1 left arm, 2 right arm, 3 left leg, 4 right leg;
-    coordinates run along the axis and around it, from the front.
-
-    Attributes
-    ----------
-    origins_m : array, shape (5, 3)
-    axes, fronts : array, shape (5, 3)
-        Unit vectors, at right angles to each other.
-    radii_m : array, shape (5,)
-        How thick the limbs are taken to be.
-    """
-
-    origins_m: np.ndarray
-    axes: np.ndarray
-    fronts: np.ndarray
-    radii_m: np.ndarray
-
+Panels = tuple[np.ndarray, np.ndarray]
+"""How a person's garments are laid out flat, at rest in the body frame: origins in metres, (5, 3), and
+axis, front and side of each panel, (5, 3, 3), unit vectors at right angles to each other. 0 is the trunk,
+then come left arm, right arm, left leg and right leg; coordinates run along the axis and around it, from
+the front."""
 
 _PANEL_ENDS = (("mid_hip", "neck"), ("left_shoulder", "left_wrist"), ("right_shoulder", "right_wrist"),
                ("left_hip", "left_ankle"), ("right_hip", "right_ankle"))  # fmt: skip
-_PANEL_RADII_M = (0.15, 0.06, 0.06, 0.085, 0.085)
+_PANEL_RADII_M = np.array([0.15, 0.06, 0.06, 0.085, 0.085], np.float32)  # how thick limbs are taken to be
 
 
 def make_panels(landmarks_m: np.ndarray) -> Panels:
     """Panels for a person with these keypoints at rest, shape (136, 3)."""
-    starts, ends = ([landmarks_m[INDEX[pair[k]]] for pair in _PANEL_ENDS] for k in (0, 1))
-    axes = np.array([(b - a) / np.linalg.norm(b - a) for a, b in zip(starts, ends, strict=True)])
+    starts, ends = (landmarks_m[[INDEX[pair[k]] for pair in _PANEL_ENDS]] for k in (0, 1))
+    axes = np.array([axis / np.linalg.norm(axis) for axis in ends - starts])
     axes[0] = [0, 0, 1]
-    forward = np.array([1.0, 0, 0])
-    fronts = np.array([forward - axis * (forward @ axis) for axis in axes])
-    fronts /= np.linalg.norm(fronts, axis=1, keepdims=True)
-    return Panels(np.array(starts), axes, fronts, np.array(_PANEL_RADII_M))
+    fronts = [1.0, 0, 0] - axes.astype(float) * axes[:, :1]
+    fronts = (fronts / np.linalg.norm(fronts, axis=1, keepdims=True)).astype(np.float32)
+    return starts, np.stack([axes, fronts, np.cross(axes, fronts)], axis=1)
 
 
 def panel_coordinates(panels: Panels, coords: np.ndarray, limbs: str) -> tuple[np.ndarray, np.ndarray]:
@@ -78,12 +57,11 @@ def panel_coordinates(panels: Panels, coords: np.ndarray, limbs: str) -> tuple[n
     elif limbs == "legs":
         panel = np.where(left, 3, 4)
     uv = np.empty((2, len(arm)), np.float32)
-    for number in range(len(panels.axes)):
+    for number in np.unique(panel):
         rows = np.flatnonzero(panel == number)
-        local = rest.take(rows, axis=1) - column(panels.origins_m[number])
-        axis, front = np.float32(panels.axes[number]), np.float32(panels.fronts[number])
-        side = np.cross(axis, front).astype(np.float32)
-        around = np.arctan2(side @ local, front @ local) * np.float32(panels.radii_m[number])
+        local = rest.take(rows, axis=1) - column(panels[0][number])
+        axis, front, side = panels[1][number]
+        around = np.arctan2(side @ local, front @ local) * _PANEL_RADII_M[number]
         along = axis @ local
         if number == 0 and limbs:  # two flat panels, front and back, that bend round the sides
             x, y = local[0], local[1]
@@ -104,8 +82,8 @@ class Fabric:
     colours : array, shape (3, 3)
         Linear RGB.
     pattern : callable or None
-        Maps panel coordinates (2, n) and footprints (n,) to weights of the second and third
-        colour, (2, n); None for plain cloth.
+        Maps panel coordinates (2, n) and footprints (n,) to weights of the second colour, and of the
+        third if it has one, (1, n) or (2, n); None for plain cloth.
     weave_m, crease_m : float
         Bump heights.
     roughness, gloss, fuzz : float
@@ -126,36 +104,33 @@ def random_fabric(rng: Rng, plain: float) -> Fabric:
     colours = np.array([any_colour(rng) for _ in range(3)])
     if rng.random() < 0.3:  # white, black and grey are what people wear
         colours[0] = linear(np.full(3, rng.choice([0.93, 0.06, 0.15, 0.55])))
-    finish = dict(
+    return Fabric(
+        colours,
         weave_m=rng.choice([0.0, 0.0001, 0.0002]),
         crease_m=rng.uniform(0.002, 0.006),
         fuzz=rng.uniform(0.05, 0.3),
+        pattern=None if rng.random() < plain else _random_pattern(rng),
     )
-    return Fabric(colours, None if rng.random() < plain else _random_pattern(rng), **finish)
 
 
-# How often a pattern is worn, and between what its period lies (m).
-_PATTERNS = {"stripes": (0.3, (0.02, 0.12)), "uprights": (0.12, (0.01, 0.05)), "checks": (0.28, (0.03, 0.16)),
-             "dots": (0.12, (0.015, 0.06)), "blobs": (0.18, (0.2, 0.6))}  # fmt: skip
+# How often a pattern is worn, between what its period lies (m), which it is and of what numbers.
+_PATTERNS: dict[str, tuple[float, tuple[float, float], textures.Pattern, Sequence[float]]] = {
+    "stripes": (0.3, (0.02, 0.12), textures.stripes, (0.2, 0.35, 0.5)),
+    "uprights": (0.12, (0.01, 0.05), textures.stripes, (0.12, 0.3)),
+    "checks": (0.28, (0.03, 0.16), textures.checks, range(3)),
+    "dots": (0.12, (0.015, 0.06), textures.dots, (0.16,)),
+    "blobs": (0.18, (0.2, 0.6), textures.blobs, range(6)),
+}
 
 
 def _random_pattern(rng: Rng) -> Weights:
-    kind = str(rng.choice(list(_PATTERNS), p=[often for often, _ in _PATTERNS.values()]))
-    texture: Callable[[], textures.Texture] = textures.dots
-    if kind in ("stripes", "uprights"):
-        duty = rng.choice([0.2, 0.35, 0.5] if kind == "stripes" else [0.12, 0.3])
-        texture = partial(textures.stripes, float(duty))
-    elif kind == "checks":
-        texture = partial(textures.checks, int(rng.integers(3)))
-    elif kind == "blobs":
-        texture = partial(textures.blobs, int(rng.integers(6)))
-    return _tiled(texture, rng.uniform(*_PATTERNS[kind][1]), kind == "uprights")
+    kind = str(rng.choice(list(_PATTERNS), p=[often for often, *_ in _PATTERNS.values()]))
+    _, period, pattern, numbers = _PATTERNS[kind]
+    number, period_m = rng.choice(numbers), rng.uniform(*period)
 
-
-def _tiled(texture: Callable[[], textures.Texture], period_m: float, upright: bool) -> Weights:
     def weights(uv: np.ndarray, footprint: np.ndarray) -> np.ndarray:
-        found = texture().sample((uv[::-1] if upright else uv) / period_m, footprint / period_m)
-        return found if len(found) > 1 else np.concatenate([found, 0 * found])
+        turned = uv[::-1] if kind == "uprights" else uv
+        return textures.sample(pattern, turned / period_m, footprint / period_m, number)
 
     return weights
 
@@ -166,7 +141,7 @@ def printed(rng: Rng) -> Weights:
 
     def weights(uv: np.ndarray, footprint: np.ndarray) -> np.ndarray:
         place = np.stack([0.15 + uv[0] / size, 0.15 - (uv[1] - 0.34) / size])
-        found = textures.prints(number).sample(place, footprint / size)
+        found = textures.sample(textures.prints, place, footprint / size, number)
         inside = (np.abs(place - 0.15) < 0.15).all(axis=0)
         return found * inside
 
@@ -182,11 +157,10 @@ def denim(rng: Rng) -> Fabric:
     worn = np.minimum(blue * 1.8 + 0.03, 0.6)
 
     def fade(uv: np.ndarray, footprint: np.ndarray) -> np.ndarray:
-        cloud = textures.cloud().sample(uv * 0.8, footprint)
-        grain = textures.carpet().sample(uv * np.float32(1.5), footprint * 1.5)[0] - 0.5
+        cloud = textures.sample(textures.cloud, uv * 0.8, footprint)
+        grain = textures.sample(textures.carpet, uv * np.float32(1.5), footprint * 1.5)[0] - 0.5
         thigh = np.exp(-((uv[0] / 0.05) ** 2)) * np.exp(-(((uv[1] - 0.2) / 0.25) ** 2))
-        weight = np.clip(0.55 * thigh + 0.10 * cloud[0] + 1.1 * grain, 0, 1)
-        return np.stack([weight, 0 * weight])
+        return np.clip(0.55 * thigh + 0.10 * cloud[0] + 1.1 * grain, 0, 1)[None]
 
     return Fabric(np.array([blue, worn, worn]), fade, 0.0002, rng.uniform(0.004, 0.007), 0.8, 0.02, 0.1)
 
@@ -235,17 +209,18 @@ def cloth_material(fabric: Fabric, panels: Panels, limbs: str, trim: Trim) -> Ma
     callable
         For meshes with `clothing.put_on`'s coords.
     """
-    base = column(fabric.colours[0])
-    extra = (np.float32(fabric.colours[1:3]) - np.float32(fabric.colours[:1])).T
+    colours: np.ndarray = fabric.colours.astype(np.float32)
+    base, extra = colours[:1].T, (colours[1:] - colours[:1]).T
 
     def look(hits: Hits) -> Look:
         rest, distance = hits.coords[:3], hits.coords[6]
         uv, panel = panel_coordinates(panels, hits.coords, limbs)
         albedo = np.repeat(base, uv.shape[1], axis=1)
         if fabric.pattern is not None:
-            albedo += extra @ fabric.pattern(uv, hits.footprint_m)[:2]
-        weave = textures.weave().sample(uv, hits.footprint_m)[0]
-        soft, creased = textures.wrinkles().sample(uv, hits.footprint_m)
+            weights = fabric.pattern(uv, hits.footprint_m)
+            albedo += extra[:, : len(weights)] @ weights
+        weave = textures.sample(textures.weave, uv, hits.footprint_m)[0]
+        soft, creased = textures.sample(textures.wrinkles, uv, hits.footprint_m)
         height = fabric.crease_m * (0.55 * soft + 0.30 * creased)
         albedo *= 1 + 0.10 * weave * (fabric.weave_m > 0) + 0.04 * soft
         height, albedo = _sew(trim, distance, rest, panel, height, albedo)

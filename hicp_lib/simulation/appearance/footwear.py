@@ -123,7 +123,7 @@ def shoe_material(shoes: Shoes) -> Material:
 
     def look(hits: Hits) -> Look:
         along, across, height = hits.coords
-        noise = textures.cloud().sample(np.stack([along * 0.4, across]), hits.footprint_m)[0]
+        noise = textures.sample(textures.cloud, np.stack([along * 0.4, across]), hits.footprint_m)[0]
         is_sole = height < SOLE_M * (0.75 + 0.35 * (along < 0.3))
         albedo = np.where(is_sole, sole, upper * (1 + 0.06 * noise))
         seam = (np.abs(along - 0.76 - 4 * across**2) < 0.006) & ~is_sole

@@ -48,8 +48,21 @@ _CLOTH_M = 0.018
 _FAR_M = 9.0  # where a column holds no trunk
 
 
-def _measure(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> Obstacles:
-    """Head, neck and trunk of a body at rest."""
+def obstacles(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> Obstacles:
+    """Head, neck and trunk of a body at rest.
+
+    Parameters
+    ----------
+    body : Body
+    rest_m : array, shape (n_v, 3)
+        The person at rest, body frame.
+    landmarks_m : array, shape (136, 3)
+        The person's keypoints at rest.
+
+    Returns
+    -------
+    Obstacles
+    """
     ears, top = landmarks_m[3:5].mean(axis=0), landmarks_m[17]
     centre = np.array([ears[0] + 0.005, 0.0, 0.5 * (ears[2] + top[2]) - 0.015])
     trunk = body.in_regions("hips", "torso") & (rest_m[:, 2] > centre[2] - 0.75)
@@ -60,8 +73,8 @@ def _measure(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> Obstacl
 def _radii(offset: np.ndarray) -> np.ndarray:
     row, column = (x.astype(int) for x in _place(offset))
     radius = np.zeros(_GRID)
-    cells = np.clip(row, 0, _GRID[0] - 1) * _GRID[1] + column % _GRID[1]
-    np.maximum.at(radius.ravel(), cells, np.linalg.norm(offset, axis=1))
+    cells = np.clip(row, 0, _GRID[0] - 1), column % _GRID[1]
+    np.maximum.at(radius, cells, np.linalg.norm(offset, axis=1))
     while not radius.all():  # directions no vertex lies in take their neighbours'
         padded = np.pad(radius, ((1, 1), (0, 0)), mode="edge")
         around = [np.roll(radius, s, axis=1) for s in (-1, 1)] + [padded[2:], padded[:-2]]
@@ -75,9 +88,8 @@ def _columns(trunk_m: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     cells = ((trunk_m[:, 1:] - corner) / _CELL_M).astype(int)
     shape = tuple(cells.max(axis=0) + 1)
     back, front = np.full(shape, _FAR_M), np.full(shape, -_FAR_M)
-    numbers = cells[:, 0] * shape[1] + cells[:, 1]
-    np.minimum.at(back.ravel(), numbers, trunk_m[:, 0])
-    np.maximum.at(front.ravel(), numbers, trunk_m[:, 0])
+    np.minimum.at(back, tuple(cells.T), trunk_m[:, 0])
+    np.maximum.at(front, tuple(cells.T), trunk_m[:, 0])
     kernel = np.ones((3, 3))
     return corner, cv2.erode(back, kernel), cv2.dilate(front, kernel)
 
@@ -89,40 +101,40 @@ def _place(offset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return (rise / np.pi + 0.5) * _GRID[0], (azimuth / (2 * np.pi) + 0.5) * _GRID[1]
 
 
-def _radius(obstacles: Obstacles, offset: np.ndarray) -> np.ndarray:
+def _radius(head: Obstacles, offset: np.ndarray) -> np.ndarray:
     """Bilinear between the middles of cells."""
     row, column = _place(offset)
     row, column = np.clip(row - 0.5, 0, _GRID[0] - 1.001), np.mod(column - 0.5, _GRID[1])
     r, c = row.astype(int), column.astype(int)
     fr, fc, right = row - r, column - c, (c + 1) % _GRID[1]
     c = c % _GRID[1]
-    radius = obstacles.radius_m
+    radius = head.radius_m
     low = radius[r, c] * (1 - fc) + radius[r, right] * fc
     high = radius[r + 1, c] * (1 - fc) + radius[r + 1, right] * fc
     return low * (1 - fr) + high * fr
 
 
-def _keep_off(obstacles: Obstacles, points: np.ndarray, layer: np.ndarray) -> np.ndarray:
+def _keep_off(head: Obstacles, points: np.ndarray, layer: np.ndarray) -> np.ndarray:
     """Push points out of the head, away from its middle, and out of the trunk, to its front or back."""
-    offset = points - obstacles.centre_m
+    offset = points - head.centre_m
     distance = np.linalg.norm(offset, axis=1)
-    wanted = _radius(obstacles, offset) + layer
+    wanted = _radius(head, offset) + layer
     scale = np.where(distance < wanted, wanted / np.maximum(distance, 1e-3), 1)
-    points = obstacles.centre_m + offset * scale[:, None]
-    cell = ((points[:, 1:] - obstacles.corner_m) / _CELL_M).astype(int)
-    shape = obstacles.back_m.shape
+    points = head.centre_m + offset * scale[:, None]
+    cell = ((points[:, 1:] - head.corner_m) / _CELL_M).astype(int)
+    shape = head.back_m.shape
     within = ((cell >= 0) & (cell < shape)).all(axis=1)
     cell = np.clip(cell, 0, np.array(shape) - 1)
     row, column = cell.T
-    back = obstacles.back_m[row, column] - _CLOTH_M - layer
-    front = obstacles.front_m[row, column] + _CLOTH_M + layer
+    back = head.back_m[row, column] - _CLOTH_M - layer
+    front = head.front_m[row, column] + _CLOTH_M + layer
     x = points[:, 0]
     inside = within & (x > back) & (x < front)
     points[:, 0] = np.where(inside, np.where(x < 0.45 * back + 0.55 * front, back, front), x)
     return points
 
 
-def grow(style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, rng: Rng) -> g.Mesh:
+def grow(style: Style, body: Body, rest_m: np.ndarray, head: Obstacles, rng: Rng) -> g.Mesh:
     """Hair on the body at rest.
 
     Parameters
@@ -131,8 +143,8 @@ def grow(style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, 
     body : Body
     rest_m : array, shape (n_v, 3)
         The person at rest, body frame.
-    landmarks_m : array, shape (136, 3)
-        The person's keypoints at rest.
+    head : Obstacles
+        The person's.
     rng : numpy.random.Generator
 
     Returns
@@ -140,7 +152,6 @@ def grow(style: Style, body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray, 
     g.Mesh
         Its coords: across a lock (-1 to 1), metres along it, a random number per lock, root 0 to tip 1.
     """
-    head = _measure(body, rest_m, landmarks_m)
     roots, normals, inside = _roots(style, body, rest_m, rng)
     points, reach = _strands(style, head, roots, normals, inside, rng)
     if style.tie:
@@ -323,7 +334,7 @@ def hair_material(colour: np.ndarray) -> Material:
     def look(hits: Hits) -> Look:
         across, along, lock, t = hits.coords
         uv = np.stack([across * 0.007 + lock * 7.3, along + lock * 3.1])
-        strand = textures.strands().sample(uv, hits.footprint_m * 0.5)[0]
+        strand = textures.sample(textures.strands, uv, hits.footprint_m * 0.5)[0]
         shade = (0.8 + 0.35 * lock) * (1 + 0.35 * strand) * (0.7 + 0.35 * np.minimum(3 * t, 1))
         albedo = colour * np.clip(shade, 0.15, 2) + 0.004
         return Look(np.minimum(albedo, 0.9), gloss=0.022 + 0.015 * strand, roughness=0.42, softness=0.5)

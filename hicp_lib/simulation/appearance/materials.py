@@ -1,14 +1,12 @@
 """Looks of lifeless things: paint, wood, floors, cloth on furniture, the view from a window."""
 
 import colorsys
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hicp_lib.simulation.rendering import textures
 from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
-from hicp_lib.simulation.rendering.textures import Texture
 
 Rng = np.random.Generator
 
@@ -56,7 +54,7 @@ def wood_colour(rng: Rng) -> np.ndarray:
     return hsv(rng.uniform(0.055, 0.095), rng.uniform(0.3, 0.6), rng.uniform(0.3, 0.8))
 
 
-def plain(colour: np.ndarray, roughness: float = 0.5, gloss: float = 0.04) -> Material:
+def plain(colour: np.ndarray, roughness: float = 0.5, gloss: float = 0.04, glow: float = 0.0) -> Look:
     """One colour all over.
 
     Parameters
@@ -65,30 +63,25 @@ def plain(colour: np.ndarray, roughness: float = 0.5, gloss: float = 0.04) -> Ma
         Linear RGB.
     roughness, gloss : float, optional
         See `surfaces.Look`.
+    glow : float, optional
+        Light given off, as a share of the colour.
 
     Returns
     -------
-    callable
+    Look
     """
-    look = Look(column(colour), gloss=gloss, roughness=roughness)
-    return lambda hits: look
-
-
-def glowing(colour: np.ndarray, glow: float) -> Material:
-    """A lamp's shade."""
-    look = Look(column(colour), glow=column(glow * colour))
-    return lambda hits: look
+    return Look(column(colour), gloss=gloss, roughness=roughness, glow=glow and column(glow * colour))
 
 
 def mixed(
-    texture: Callable[[], Texture], colours: np.ndarray, roughness: float, height_m=0.0, gloss=0.04
+    pattern: textures.Pattern, colours: np.ndarray, roughness: float, height_m=0.0, gloss=0.04
 ) -> Material:
-    """Colours mixed by a texture.
+    """Colours mixed by a pattern.
 
     Parameters
     ----------
-    texture : callable
-        Makes a texture of n channels.
+    pattern : callable
+        One of `textures`, of n channels.
     colours : array, shape (n + 1, 3)
         Linear RGB: where all channels are 0, and where each is 1.
     roughness : float
@@ -103,7 +96,7 @@ def mixed(
     base, extra = column(colours[0]), (colours[1:].astype(np.float32) - colours[0].astype(np.float32)).T
 
     def look(hits: Hits) -> Look:
-        weights = texture().sample(hits.coords[:2], hits.footprint_m)[: extra.shape[1]]
+        weights = textures.sample(pattern, hits.coords[:2], hits.footprint_m)[: extra.shape[1]]
         height = height_m * weights[0] if height_m else 0.0
         return Look(base + extra @ weights, height_m=height, roughness=roughness, gloss=gloss)
 
@@ -159,7 +152,8 @@ def pictured(number: int) -> Material:
     """A picture behind glass."""
 
     def look(hits: Hits) -> Look:
-        return Look(textures.picture(number).sample(hits.coords[:2], hits.footprint_m) ** 2, roughness=0.3)
+        seen = textures.sample(textures.picture, hits.coords[:2], hits.footprint_m, number)
+        return Look(seen**2, roughness=0.3)
 
     return look
 
@@ -182,7 +176,7 @@ def outside(rng: Rng) -> Material:
     horizon, rough = rng.uniform(0.2, 0.7), rng.uniform(0.1, 0.3)
 
     def look(hits: Hits) -> Look:
-        cloud = textures.cloud().sample(hits.coords[:2] * 0.4, 0.05)
+        cloud = textures.sample(textures.cloud, hits.coords[:2] * 0.4, 0.05)
         mix = np.clip((hits.coords[1] - horizon + rough * cloud[0]) * 4 + 0.5, 0, 1)
         glow = (green + (sky - green) * mix) * (1 + 0.08 * cloud[1])
         return Look(np.zeros((3, 1), np.float32), glow=glow, roughness=0.1)

@@ -6,12 +6,10 @@ import numpy as np
 
 from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.appearance import clothing, fabrics, footwear, hair, hair_styles, skin
-from hicp_lib.simulation.body.identities import Identity, is_woman, traits
+from hicp_lib.simulation.body.identities import PEOPLE, Identity, Rng, is_woman, traits
 from hicp_lib.simulation.body.model import REGIONS, Body, PosedBody, load_body, rest_shape
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.surfaces import Material, Surface
-
-Rng = np.random.Generator
 
 # Body parts as the renderer numbers them: the body's regions, then the same on the right side.
 RIGHT = len(REGIONS)
@@ -39,14 +37,8 @@ class Worn:
     collar: bool = False
 
 
-@dataclass(frozen=True)
-class Skirt:
-    """A skirt: its length, how much wider its hem is, the phase of its folds (radians), its fabric."""
-
-    length_m: float
-    flare: float
-    phase: float
-    fabric: fabrics.Fabric
+Skirt = tuple[float, float, float, fabrics.Fabric]
+"""Length (m), how much wider than the legs the hem is (a share), phase of its folds (radians), fabric."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,40 +101,27 @@ def appearance_of(identity: Identity, skirts: bool = True) -> Appearance:
     return Appearance(identity.body, complexion, style, worn, skirt, shoes, int(rng.integers(2**31)))
 
 
-# How often, and what of a top differs from `_PLAIN_TOP`: of several values one is drawn, in this order.
-_TOPS = {"tshirt": 0.34, "longsleeve": 0.2, "shirt": 0.2, "hoodie": 0.12, "tank": 0.06, "polo": 0.08}
-_PLAIN_TOP = {"end": 1.03, "sleeve": 2.0, "ease_m": 0.010, "thickness_m": 0.005}
-_TOP: dict[str, dict[str, float | list[float]]] = {
-    "tshirt": {"sleeve": [0.45, 0.55, 0.7], "ease_m": [0.008, 0.014, 0.02]},
-    "longsleeve": {"sleeve": [1.95, 1.9, 1.4], "thickness_m": [0.005, 0.008]},
-    "shirt": {"sleeve": [1.95, 1.95, 1.3, 0.6], "ease_m": 0.012, "opening": [0.06, 0.1]},
-    "hoodie": {"thickness_m": 0.011, "ease_m": 0.016, "end": 1.06, "opening": 0.05},
-    "tank": {"sleeve": 0.06, "ease_m": 0.006, "opening": 0.14, "thickness_m": 0.004},
-    "polo": {"sleeve": [0.5, 0.6], "opening": 0.06},
-}
 _TRIMS = {"polo": fabrics.Trim(0.025, 0.9), "shirt": fabrics.Trim(0.02, 1.0, "buttons")}
-_IS_PLAIN = {"hoodie": 0.9, "shirt": 0.3}  # how often it has no pattern; others: 0.6
-_BOTTOMS = {"jeans": (0.42, 0.45), "chinos": (0.28, 0.37), "shorts": (0.18, 0.18), "leggings": (0.12, 0.0)}
-"""How often women and men wear them."""
 
 
 def _outfit(rng: Rng, woman: bool, skirts: bool) -> tuple[list[Worn], Skirt | None]:
-    top = _top(rng, str(rng.choice(list(_TOPS), p=list(_TOPS.values()))), woman)
+    top = _top(rng, str(rng.choice(list(PEOPLE["tops"]), p=list(PEOPLE["tops"].values()))), woman)
     if not (woman and skirts and rng.random() < 0.22):
-        odds = [pair[0 if woman else 1] for pair in _BOTTOMS.values()]
-        return [top, _bottom(rng, str(rng.choice(list(_BOTTOMS), p=odds)))], None
+        odds = [pair[0 if woman else 1] for pair in PEOPLE["bottoms"].values()]
+        return [top, _bottom(rng, str(rng.choice(list(PEOPLE["bottoms"]), p=odds)))], None
     fabric = top.fabric if rng.random() < 0.4 else fabrics.random_fabric(rng, 0.6)
-    skirt = Skirt(rng.uniform(0.38, 0.75), rng.uniform(0.05, 0.5), rng.uniform(0, 6), fabric)
+    skirt = (rng.uniform(0.38, 0.75), rng.uniform(0.05, 0.5), rng.uniform(0, 6), fabric)
     return [top, _bottom(rng, "leggings")] if rng.random() < 0.4 else [top], skirt
 
 
 def _top(rng: Rng, kind: str, woman: bool) -> Worn:
-    fabric = fabrics.random_fabric(rng, _IS_PLAIN.get(kind, 0.6))
+    fabric = fabrics.random_fabric(rng, PEOPLE["unpatterned"].get(kind, 0.6))
     if fabric.pattern is None and kind in ("tshirt", "longsleeve", "hoodie") and rng.random() < 0.5:
         fabric = replace(fabric, pattern=fabrics.printed(rng))
-    cut = _PLAIN_TOP | {"start": rng.choice([-0.16, -0.1, -0.05]), "opening": rng.choice([0.04, 0.07, 0.1])}
+    cut = PEOPLE["plain_top"] | {"start": rng.choice([-0.16, -0.1, -0.05])}
+    cut["opening"] = rng.choice([0.04, 0.07, 0.1])
     trim = fabrics.Trim(0.03, rng.choice([1.0, 0.9, 0.8]))
-    cut |= {name: rng.choice(x) if isinstance(x, list) else x for name, x in _TOP[kind].items()}
+    cut |= {name: rng.choice(x) if isinstance(x, list) else x for name, x in PEOPLE["top"][kind].items()}
     if kind == "hoodie":
         trim = fabrics.Trim(0.07, 0.88, rng.choice(["none", "zip"]))
     if woman and rng.random() < 0.5:
@@ -172,28 +151,22 @@ def part_of_vertices(body: Body) -> np.ndarray:
     return (body.regions + RIGHT * (body.vertices_m[0, :, 1] < 0)).astype(np.int16)
 
 
-@dataclass(frozen=True)
-class _Fitted:
-    """What stays the same of a person in all poses: sizes, where cloth is cut, paint and hair at rest."""
-
-    rest_m: np.ndarray
-    heads_m: np.ndarray
-    landmarks_m: np.ndarray
-    panels: fabrics.Panels
-    paint: np.ndarray
-    hair: g.Mesh | None
+@memoised(64)
+def _measured(shape: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, fabrics.Panels, hair.Obstacles]:
+    """Of a shape at rest: vertices, bone heads, keypoints, where cloth is laid out, what hair lies on."""
+    body = load_body()
+    rest, heads = rest_shape(body, shape)
+    landmarks = body.keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
+    return rest, heads, landmarks, fabrics.make_panels(landmarks), hair.obstacles(body, rest, landmarks)
 
 
 @memoised(4)  # those who are seen in many frames
-def _fit(appearance: Appearance) -> _Fitted:
+def _fit(appearance: Appearance) -> tuple[np.ndarray, g.Mesh | None]:
+    """What stays the same of a person in all poses: paint, and hair at rest."""
     body = load_body()
-    rest, heads = rest_shape(body, appearance.shape)
-    landmarks = body.keypoint_weights @ np.concatenate([rest, heads.astype(np.float32)])
-    grown = None
-    if appearance.style is not None:
-        grown = hair.grow(appearance.style, body, rest, landmarks, np.random.default_rng(appearance.seed))
-    paint = skin.paint_coords(body, rest, landmarks)
-    return _Fitted(rest, heads, landmarks, fabrics.make_panels(landmarks), paint, grown)
+    rest, _, landmarks, _, head = _measured(appearance.shape)
+    paint, rng = skin.paint_coords(body, rest, landmarks), np.random.default_rng(appearance.seed)
+    return paint, hair.grow(appearance.style, body, rest, head, rng) if appearance.style else None
 
 
 @memoised()
@@ -224,29 +197,30 @@ def dress(appearance: Appearance, posed: PosedBody, person: int) -> list[Surface
     list of Surface
         In the frame the person is posed in.
     """
-    body, fitted = load_body(), _fit(appearance)
+    body, (paint, grown) = load_body(), _fit(appearance)
+    rest, heads, landmarks, panels, _ = _measured(appearance.shape)
     part = part_of_vertices(body)[body.triangles[:, 0]]
     mouth, feet = _always_hidden()
     surfaces, hidden = [], mouth.copy()
-    layers = np.zeros(len(fitted.rest_m), np.float32)
+    layers = np.zeros(len(rest), np.float32)
     for worn in sorted(appearance.worn, key=lambda w: w.garment.kind):  # trousers before tops
-        mesh, source = clothing.put_on(worn.garment, posed, fitted.rest_m, worn.folds, layers)
+        mesh, source = clothing.put_on(worn.garment, posed, rest, worn.folds, layers)
         hidden |= clothing.cut_pattern(worn.garment).hidden
         limbs = _LIMBS[worn.garment.kind]
-        material = fabrics.cloth_material(worn.fabric, fitted.panels, limbs, worn.trim)
+        material = fabrics.cloth_material(worn.fabric, panels, limbs, worn.trim)
         surfaces.append(Surface(mesh, material, person, part[source]))
         if worn.collar:
             strip = clothing.collar(worn.garment, mesh, posed, 0.022, 0.02)
-            material = fabrics.cloth_material(worn.fabric, fitted.panels, "arms", fabrics.Trim(0.0))
+            material = fabrics.cloth_material(worn.fabric, panels, "arms", fabrics.Trim(0.0))
             surfaces.append(_of_region("neck", strip, material, person))
     if appearance.skirt is not None:
-        surfaces.append(_skirt(appearance.skirt, body, posed, fitted.panels, person))
+        surfaces.append(_skirt(appearance.skirt, body, posed, panels, person))
     if appearance.shoes is not None:
         hidden |= feet
         surfaces.append(_shoes(appearance.shoes, posed, person))
-    surfaces.insert(0, _skin(appearance, posed, fitted.paint, ~hidden, part, person))
-    if fitted.hair is not None:
-        carried = hair.carry(fitted.hair, body, posed, fitted.heads_m, fitted.landmarks_m)
+    surfaces.insert(0, _skin(appearance, posed, paint, ~hidden, part, person))
+    if grown is not None:
+        carried = hair.carry(grown, body, posed, heads, landmarks)
         surfaces.append(_of_region("scalp", carried, hair.hair_material(appearance.complexion.hair), person))
     return surfaces
 
@@ -263,8 +237,9 @@ def _skin(appearance: Appearance, posed: PosedBody, paint, shown, part, person: 
 
 def _skirt(skirt: Skirt, body: Body, posed: PosedBody, panels: fabrics.Panels, person: int) -> Surface:
     hips = posed.rotations[body.bone_numbers["root"]]
-    mesh = clothing.skirt(posed, hips, skirt.length_m, skirt.flare, skirt.phase)
-    material = fabrics.cloth_material(skirt.fabric, panels, "", fabrics.Trim(0.02, 0.95))
+    *cut, fabric = skirt
+    mesh = clothing.skirt(posed, hips, *cut)
+    material = fabrics.cloth_material(fabric, panels, "", fabrics.Trim(0.02, 0.95))
     return _of_region("hips", mesh, material, person)
 
 

@@ -8,19 +8,13 @@ from scipy.spatial import KDTree
 from hicp_lib.core.keypoints import FACE, HANDS
 from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.appearance.materials import hsv, linear
+from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.body.model import Body
 from hicp_lib.simulation.rendering import textures
 from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 
-# sRGB from the fairest to the darkest, evenly spaced on the scale of `Complexion.tone`.
-_TONES = linear([
-    [0.925, 0.755, 0.665], [0.895, 0.705, 0.590], [0.845, 0.640, 0.515], [0.765, 0.565, 0.430],
-    [0.620, 0.435, 0.325], [0.455, 0.310, 0.235], [0.320, 0.215, 0.170],
-])  # fmt: skip
-_IRISES = linear([[0.30, 0.18, 0.09], [0.20, 0.11, 0.06], [0.38, 0.50, 0.62], [0.40, 0.45, 0.30]])
-# Of hair that is neither dark nor grey: how often, hue, saturation, between what the value lies.
-_HAIR = ((0.4, 0.07, 0.55, (0.26, 0.38)), (0.25, 0.075, 0.55, (0.40, 0.55)),
-         (0.25, 0.105, 0.45, (0.62, 0.85)), (0.1, 0.045, 0.7, (0.45, 0.62)))  # fmt: skip
+_TONES, _IRISES = (linear(PEOPLE[name]) for name in ("skin_srgb", "irises_srgb"))
+_HAIR = PEOPLE["hair_hsv"]
 
 
 @dataclass(frozen=True)
@@ -120,7 +114,13 @@ def paint_coords(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.
     flush = np.zeros(len(rest_m), np.float32)
     p = rest_m[head].astype(np.float32)
     face = landmarks_m[FACE].astype(np.float32)
-    flush[head] = _cheeks(p, face) + 0.9 * _bump(p, face[30], 0.014) + 0.6 * body.field("ear")[head]
+    # Cheeks lie below the outer corner of each eye, level with the nose.
+    left, right = 0.55 * face[45] + 0.45 * face[54], 0.55 * face[36] + 0.45 * face[48]
+    flush[head] = (
+        0.8 * (_bump(p, left, 0.028) + _bump(p, right, 0.028))
+        + 0.9 * _bump(p, face[30], 0.014)
+        + 0.6 * body.field("ear")[head]
+    )
     flush += _knuckles(body, rest_m, landmarks_m)
     return np.column_stack([rest_m, painted, flush]).astype(np.float32)
 
@@ -136,12 +136,6 @@ def _painted(body: Body) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _bump(points: np.ndarray, centre: np.ndarray, width_m: float) -> np.ndarray:
     return np.exp(-((points - centre) ** 2).sum(axis=1) / width_m**2)
-
-
-def _cheeks(points: np.ndarray, face: np.ndarray) -> np.ndarray:
-    # Below the outer corner of each eye, level with the nose.
-    left, right = 0.55 * face[45] + 0.45 * face[54], 0.55 * face[36] + 0.45 * face[48]
-    return 0.8 * (_bump(points, left, 0.028) + _bump(points, right, 0.028))
 
 
 def _knuckles(body: Body, rest_m: np.ndarray, landmarks_m: np.ndarray) -> np.ndarray:
@@ -162,7 +156,7 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
     def look(hits: Hits) -> Look:
         c = dict(zip(COORDS, hits.coords, strict=True))
         uv = np.stack([c["y"] + 0.5 * c["x"], c["z"] + 0.3 * c["x"]])
-        blotches, pores, freckles = textures.skin().sample(uv, hits.footprint_m)
+        blotches, pores, freckles = textures.sample(textures.skin, uv, hits.footprint_m)
         flush = np.clip(c["flush"] * (1 + 0.25 * blotches) + 0.07 * blotches, -0.2, 1)
         flush *= 1 - 0.4 * complexion.tone
         albedo = column(tone) + (column(red) - column(tone)) * flush
@@ -210,7 +204,7 @@ def _paint_hair(complexion: Complexion, scalp: float, albedo, c, uv, footprint) 
     """Eyebrows, lashes, stubble and the hair's roots."""
     hair = column(complexion.hair) * 0.7
     slanted = np.stack([uv[0] + uv[1], uv[1] * 2 - uv[0]])
-    fibre = textures.strands().sample(slanted, footprint)[0]
+    fibre = textures.sample(textures.strands, slanted, footprint)[0]
     brow = complexion.brows * _step(c["brow_m"] + 0.0008 * fibre, -0.0026, 0.0008)
     lash = 0.85 * _step(c["lash_m"], -0.0008, 0.0006)
     roots = scalp * _step(c["hairline_m"] + 0.002 * fibre, -0.001, 0.006)

@@ -10,41 +10,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from hicp_lib.simulation.body.hands import sample_hand
+from hicp_lib.simulation.body.identities import PEOPLE, Rng
 from hicp_lib.simulation.body.joints import Joints, pose_from_joints, radians
 from hicp_lib.simulation.body.model import Body, pose_bones
 from hicp_lib.simulation.body.reach import reach
 from hicp_lib.simulation.body.self_collision import CollisionModel
 
-Rng = np.random.Generator
 Range = tuple[float, float]
 Ranges = dict[str, Range]
 
 _OTHER = {"left": "right", "right": "left"}
 _OUTWARD = {"left": 1, "right": -1}  # along y, which points to the person's left
 
-_HANGING_DEG: Ranges = {
-    "shoulder_flexion": (-8, 14), "shoulder_abduction": (-2, 8), "shoulder_rotation": (0, 35),
-    "elbow_flexion": (4, 35), "forearm_supination": (-35, 10),
-    "wrist_flexion": (-5, 20), "wrist_deviation": (-10, 5),
-}  # fmt: skip
-_RAISED_DEG: tuple[Ranges, ...] = (
-    {"shoulder_flexion": (100, 165), "shoulder_abduction": (-5, 20), "shoulder_rotation": (-10, 30),
-     "elbow_flexion": (5, 70), "forearm_supination": (-60, 60)},
-    {"shoulder_abduction": (85, 150), "shoulder_flexion": (0, 20), "shoulder_rotation": (-30, 30),
-     "elbow_flexion": (5, 60), "forearm_supination": (-40, 60)},
-    {"shoulder_abduction": (50, 80), "shoulder_flexion": (0, 25), "shoulder_rotation": (-90, -75),
-     "elbow_flexion": (85, 130), "forearm_supination": (-70, -20)},
-)  # fmt: skip
-# Beyond the elbow, by what the arm does; what comes first is drawn first.
-_WRISTS_DEG: dict[str, Ranges] = {
-    "pointing": {"wrist_flexion": (-10, 8), "wrist_deviation": (-5, 5), "forearm_supination": (-70, 10)},
-    "front": {"wrist_flexion": (-50, 15), "wrist_deviation": (-10, 10), "forearm_supination": (-75, 75)},
-    "crossed": {"wrist_flexion": (-5, 20), "forearm_supination": (-30, 10), "wrist_deviation": (-8, 8)},
-    "raised": {"wrist_flexion": (-30, 20), "wrist_deviation": (-10, 10)},
-    "hips": {"wrist_flexion": (25, 45), "wrist_deviation": (-8, 15), "forearm_supination": (-45, -15)},
-    "face": {"wrist_flexion": (-15, 25), "wrist_deviation": (-8, 8), "forearm_supination": (-30, 60)},
-    "lap": {"wrist_flexion": (-5, 25), "wrist_deviation": (-5, 5), "forearm_supination": (-75, -50)},
-}
+_WRISTS_DEG = PEOPLE["wrists_deg"]  # what comes first is drawn first
 
 
 @dataclass(frozen=True)
@@ -88,7 +66,7 @@ def uniform(rng: Rng, ranges: Ranges, prefix: str = "") -> Joints:
 
 def hanging_arm(draft: Draft, side: str) -> Joints:
     """One arm hanging at ease."""
-    joints = uniform(draft.rng, _HANGING_DEG, f"{side}_")
+    joints = uniform(draft.rng, PEOPLE["poses_deg"]["hanging"], f"{side}_")
     # An arm half a metre long: this angle moves its middle away by the room.
     joints[f"{side}_shoulder_abduction"] += draft.room_m / 0.25
     return joints
@@ -157,7 +135,8 @@ def crossed(draft: Draft, joints: Joints) -> Joints | None:
 
 def raised(draft: Draft, joints: Joints) -> Joints:
     """One or both arms raised: forward, sideways, or with the forearms up."""
-    ranges = _RAISED_DEG[draft.rng.integers(len(_RAISED_DEG))] | _WRISTS_DEG["raised"]
+    ways = PEOPLE["raised_deg"]
+    ranges = ways[draft.rng.integers(len(ways))] | _WRISTS_DEG["raised"]
     for side in ("left", "right") if draft.rng.random() < 0.5 else (_side(draft.rng),):
         joints = joints | uniform(draft.rng, ranges, f"{side}_")
     return joints

@@ -18,9 +18,13 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
 from hicp_lib.core.memo import memoised, plain_fields
 
+Rng = np.random.Generator
+
 SPLITS = ("development", "held out")
 HELD_OUT = SPLITS[1]
 KINDS = ("clothes", "room", "lights", "poses", "camera")
+PEOPLE = read_json(DATA_DIR / "people.json")
+"""What people can do and how they look: joints, poses, hands, hair, clothes, skin; see data/README.md."""
 _read = memoised()(read_json)
 
 

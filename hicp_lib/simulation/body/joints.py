@@ -13,39 +13,27 @@ import numpy as np
 
 from hicp_lib.core.memo import memoised
 from hicp_lib.core.rotations import about, rotation
+from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.body.model import Pose
 
 Joints = dict[str, float]
 
 FINGERS = ("index", "middle", "ring", "little")
 
-_LIMB_LIMITS_DEG = {
-    "shoulder_flexion": (-60, 180), "shoulder_abduction": (-45, 180), "shoulder_rotation": (-90, 90),
-    "elbow_flexion": (0, 150), "forearm_supination": (-80, 80),
-    "wrist_flexion": (-70, 80), "wrist_deviation": (-30, 20),
-    "hip_flexion": (-30, 120), "hip_abduction": (-30, 45), "hip_rotation": (-45, 45),
-    "knee_flexion": (0, 135), "ankle_flexion": (-20, 50),
-    "thumb_base": (-25, 45), "thumb_spread": (-25, 50), "thumb_knuckle": (-15, 50), "thumb_end": (-15, 80),
-    **{f"{finger}_spread": (-20, 20) for finger in FINGERS},
-    **{f"{finger}_knuckle": (-20, 90) for finger in FINGERS},
-    **{f"{finger}_middle": (0, 100) for finger in FINGERS},
-    **{f"{finger}_end": (0, 80) for finger in FINGERS},
-}  # fmt: skip
-LIMITS_DEG: dict[str, tuple[float, float]] = {
-    "spine_flexion": (-25, 80), "spine_bend": (-35, 35), "spine_turn": (-45, 45),
-    "neck_flexion": (-45, 45), "neck_bend": (-45, 45), "neck_turn": (-60, 60),
-    "eye_pitch": (-25, 25), "eye_turn": (-35, 35),
-    **{f"{side}_{joint}": limits for side in ("left", "right") for joint, limits in _LIMB_LIMITS_DEG.items()},
-}  # fmt: skip
+_LIMBS = {limb: tuple(ranges) for limb, ranges in PEOPLE["limb_joints_deg"].items()}
+LIMITS_DEG: dict[str, tuple[float, float]] = PEOPLE["trunk_joints_deg"] | {
+    f"{side}_{joint}": limits
+    for side in ("left", "right")
+    for ranges in PEOPLE["limb_joints_deg"].values()
+    for joint, limits in ranges.items()
+}
 """Range of every joint in degrees: the normal ranges of the American Academy of Orthopaedic
 Surgeons (Joint Motion: Method of Measuring and Recording, 1965), where it gives one; thumb, finger
 spread and eyes are estimates."""
 
 # How a movement of several bones is shared among them, from the first to the last.
-_SPINE_SHARES = {"spine05": 0.15, "spine04": 0.2, "spine03": 0.25, "spine02": 0.2, "spine01": 0.2}
-_NECK_SHARES = {"neck01": 0.25, "neck02": 0.2, "neck03": 0.2, "head": 0.35}
+_SHARES = PEOPLE["movement_shares"]
 # The shoulder girdle goes along with an arm that is raised beyond this.
-_GIRDLE_SHARES = {"clavicle": 0.12, "shoulder01": 0.22}
 _GIRDLE_FROM_RAD = np.radians(25.0)
 # Left limbs in the reference stance: tilt and direction of the arm, and the hinge the thumb bends about.
 ARM_TILT_RAD = np.radians(9.0)
@@ -152,8 +140,8 @@ def _trunk(angles: Joints) -> dict[str, np.ndarray]:
         bend, flexion, turn = (angles.get(f"{part}_{kind}", 0.0) for kind in ("bend", "flexion", "turn"))
         return np.array([-bend, flexion, turn])
 
-    pose = {bone: share * vector("spine") for bone, share in _SPINE_SHARES.items()}
-    pose |= {bone: share * vector("neck") for bone, share in _NECK_SHARES.items()}
+    pose = {bone: share * vector("spine") for bone, share in _SHARES["spine"].items()}
+    pose |= {bone: share * vector("neck") for bone, share in _SHARES["neck"].items()}
     eye = np.array([0.0, angles.get("eye_pitch", 0.0), angles.get("eye_turn", 0.0)])
     return pose | {"eye.L": eye, "eye.R": eye}
 
@@ -182,9 +170,9 @@ def _with_girdle(swing: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
     if angle <= _GIRDLE_FROM_RAD or length < 1e-9:
         return {}, swing
     beyond = axis / length * (angle - _GIRDLE_FROM_RAD)
-    girdle = {bone: share * beyond for bone, share in _GIRDLE_SHARES.items()}
+    girdle = {bone: share * beyond for bone, share in _SHARES["girdle"].items()}
     # All turn about the same axis, so the shares simply add up.
-    return girdle, rotation(-sum(_GIRDLE_SHARES.values()) * beyond) @ swing
+    return girdle, rotation(-sum(_SHARES["girdle"].values()) * beyond) @ swing
 
 
 def _hand(limb: dict[str, float]) -> dict[str, np.ndarray]:
@@ -212,11 +200,3 @@ def _leg(limb: dict[str, float]) -> dict[str, np.ndarray]:
 
 
 _BONES = {"arm": _arm, "hand": _hand, "leg": _leg}
-_LIMBS = {
-    limb: tuple(joint for joint in _LIMB_LIMITS_DEG if joint.split("_")[0] in parts)
-    for limb, parts in (
-        ("arm", ("shoulder", "elbow", "forearm", "wrist")),
-        ("hand", ("thumb", *FINGERS)),
-        ("leg", ("hip", "knee", "ankle")),
-    )
-}

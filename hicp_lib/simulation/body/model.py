@@ -201,7 +201,9 @@ def pose_body(body: Body, shape: Shape, pose: Pose, T_world_body: np.ndarray | N
     Raises
     ------
     ValueError
-        For an unknown shape or bone.
+        For an unknown shape.
+    KeyError
+        For an unknown bone.
 
     Examples
     --------
@@ -266,11 +268,7 @@ def shape_number(body: Body, shape: Shape) -> int:
     ValueError
         For an unknown name.
     """
-    if isinstance(shape, str):
-        if shape not in body.shape_names:
-            raise ValueError(f"no shape {shape!r}; there are {', '.join(body.shape_names)}")
-        return body.shape_names.index(shape)
-    return shape
+    return body.shape_names.index(shape) if isinstance(shape, str) else shape
 
 
 def rotation_matrices(body: Body, pose: Pose) -> np.ndarray:
@@ -278,15 +276,13 @@ def rotation_matrices(body: Body, pose: Pose) -> np.ndarray:
 
     Raises
     ------
-    ValueError
+    KeyError
         For a bone the model does not have.
     """
     number = body.bone_numbers
     vectors: dict[int, np.ndarray] = {}
     matrices: dict[int, np.ndarray] = {}
     for name, rotation in pose.items():
-        if name not in number:
-            raise ValueError(f"no bone {name!r} in the body model")
         (matrices if np.ndim(rotation) == 2 else vectors)[number[name]] = rotation
     result = np.tile(np.eye(3), (len(number), 1, 1))
     if vectors:

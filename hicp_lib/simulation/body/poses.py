@@ -10,8 +10,9 @@ from collections.abc import Callable
 import numpy as np
 
 from hicp_lib.simulation.body import arms
-from hicp_lib.simulation.body.arms import Draft, Ranges, uniform
+from hicp_lib.simulation.body.arms import Draft, uniform
 from hicp_lib.simulation.body.hands import sample_hand
+from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.body.joints import LIMITS_DEG, Joints, pose_from_joints, within_limits
 from hicp_lib.simulation.body.model import Body, Pose, Shape
 from hicp_lib.simulation.body.self_collision import collision_model, self_collision_distance_m
@@ -20,17 +21,7 @@ _N_TRIES = 30
 _ROOM_STEP_M = 0.006  # arms keep this much further from the body with every try
 _PENETRATION_M = 0.02  # skin and clothes give way this far
 
-_TRUNK_DEG: Ranges = {
-    "spine_flexion": (-4, 8), "spine_bend": (-4, 4), "spine_turn": (-8, 8),
-    "neck_flexion": (-10, 14), "neck_bend": (-8, 8), "neck_turn": (-22, 22),
-    "eye_pitch": (-8, 8), "eye_turn": (-15, 15),
-}  # fmt: skip
-_STANDING_DEG: Ranges = {
-    "hip_flexion": (-4, 8), "hip_abduction": (-1, 5), "hip_rotation": (-18, 2), "knee_flexion": (1, 10),
-}  # fmt: skip
-_SITTING_DEG: Ranges = {
-    "hip_flexion": (78, 95), "hip_abduction": (0, 14), "hip_rotation": (-12, 5), "knee_flexion": (70, 100),
-}  # fmt: skip
+_RANGES_DEG = PEOPLE["poses_deg"]
 
 
 def sample_pose(rng: np.random.Generator, body: Body, kind: str | None = None, shape: Shape = 0) -> Pose:
@@ -72,7 +63,7 @@ def sample_joints(rng: np.random.Generator, body: Body, kind: str | None = None,
 
     Raises
     ------
-    ValueError
+    KeyError
         For an unknown kind.
 
     Examples
@@ -83,8 +74,6 @@ def sample_joints(rng: np.random.Generator, body: Body, kind: str | None = None,
     True
     """
     kind = str(rng.choice(list(KINDS))) if kind is None else kind
-    if kind not in KINDS:
-        raise ValueError(f"no kind of pose {kind!r}; there are {', '.join(KINDS)}")
     model = collision_model(body, shape)
     best, best_gap_m = None, -np.inf
     for attempt in range(_N_TRIES):
@@ -103,7 +92,7 @@ def sample_joints(rng: np.random.Generator, body: Body, kind: str | None = None,
 def _draw(draft: Draft, kind: str) -> Joints | None:
     """One draw of a kind, hands included; None where an arm cannot go where it should."""
     legs, place_arms, hands = KINDS[kind]
-    joints = uniform(draft.rng, _TRUNK_DEG) | legs(draft.rng)
+    joints = uniform(draft.rng, _RANGES_DEG["trunk"]) | legs(draft.rng)
     for side in ("left", "right"):
         hand = sample_hand(draft.rng, str(draft.rng.choice(hands)), f"{side}_")
         joints |= arms.hanging_arm(draft, side) | hand
@@ -111,7 +100,7 @@ def _draw(draft: Draft, kind: str) -> Joints | None:
 
 
 def _stand(rng: np.random.Generator) -> Joints:
-    joints = uniform(rng, _STANDING_DEG, "left_") | uniform(rng, _STANDING_DEG, "right_")
+    joints = uniform(rng, _RANGES_DEG["standing"], "left_") | uniform(rng, _RANGES_DEG["standing"], "right_")
     return joints | _level_feet(joints)
 
 
@@ -126,7 +115,7 @@ def _walk(rng: np.random.Generator) -> Joints:
 
 
 def _sit(rng: np.random.Generator) -> Joints:
-    joints = uniform(rng, _SITTING_DEG, "left_") | uniform(rng, _SITTING_DEG, "right_")
+    joints = uniform(rng, _RANGES_DEG["sitting"], "left_") | uniform(rng, _RANGES_DEG["sitting"], "right_")
     return joints | _level_feet(joints) | uniform(rng, {"spine_flexion": (-5, 22)})
 
 

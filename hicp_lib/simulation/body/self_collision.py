@@ -7,20 +7,21 @@ trunk is a stack of elliptic slices, the head an ellipsoid, limbs are rows of sp
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
 
-from hicp_lib.simulation.body.model import Body, Pose, Shape, pose_bones, rest_shape
+from hicp_lib.core.datafiles import DATA_DIR, read_arrays
+from hicp_lib.core.memo import memoised
+from hicp_lib.simulation.body.model import Body, Pose, Shape, pose_bones, shape_number
 
 Spheres = tuple[np.ndarray, np.ndarray]  # centres (n, 3) and radii (n,)
 
-_N_SLICES = 12
 # Limbs as spheres: region, first and last bone head, fractions of the way between them. Most of the
 # upper arm may touch the trunk; a bit more than the whole way to the last knuckle is a fingertip.
 _UPPER_ARM = ("upper_arm", "upperarm01", "lowerarm01", (0.85,))
 _FOREARM = ("forearm", "lowerarm01", "wrist", (0.0, 0.2, 0.4, 0.6, 0.8, 1.0))
 _HAND = ("hand", "wrist", "finger3-3", (0.35, 0.7, 1.05))
 _THIGH = ("thigh", "upperleg01", "lowerleg01", (0.25, 0.4, 0.55, 0.7, 0.85))
-_HAND_FLATNESS = 0.5  # half the thickness of a hand over its vertices' distance from its middle line
+LIMBS = (_UPPER_ARM, _FOREARM, _HAND, _THIGH)
+_SIZES = {"bones": (-1, 13), "centres_m": (-1, 13, 3), "half_axes_m": (-1, 13, 3), "radii_m": (-1, 4)}
 
 
 @dataclass(frozen=True)
@@ -56,24 +57,22 @@ class CollisionModel:
         return self.centres_m[part], self.half_axes_m[part]
 
 
+@memoised(64)
 def collision_model(body: Body, shape: Shape) -> CollisionModel:
-    """Measure a shape, which is given as in `pose_body`."""
-    vertices, heads = rest_shape(body, shape)
-    vertices, heads = vertices - heads[0], heads - heads[0]
-    trunk, head = (
-        np.flatnonzero(body.in_regions(*names)) for names in (("torso", "hips"), ("face", "scalp"))
-    )
-    z = vertices[trunk, 2]
-    edges = np.linspace(z.min(), _extent(z[:, None])[1, 0], _N_SLICES + 1)
-    parts = [trunk[(z >= low) & (z <= high)] for low, high in zip(edges[:-1], edges[1:], strict=True)]
-    parts.append(head)
-    bones = _moved_by(body, parts)
-    low, high = np.stack([_extent(vertices[part]) for part in parts], axis=1)
-    half_axes = (high - low) / 2
-    half_axes[:-1, 2] = (edges[1] - edges[0]) / 2
-    radii = {limb[0]: _radius(body, vertices, heads, limb) for limb in (_UPPER_ARM, _FOREARM, _HAND, _THIGH)}
-    radii["hand"] *= _HAND_FLATNESS
-    return CollisionModel(shape, bones, heads[bones], (low + high) / 2, half_axes, radii)
+    """Sizes of a shape, which is given as in `pose_body`.
+
+    Raises
+    ------
+    InputError
+        If the file of what was measured is missing or not such a file.
+    """
+    number = shape_number(body, shape)
+    tables = read_arrays(DATA_DIR / "body_sizes.npz", _SIZES, "sizes of bodies", "tools/measure_sizes.py")
+    bones, centres, half_axes, radii = (table[number] for table in tables)
+    heads = body.heads_m[number] - body.heads_m[number, 0]
+    regions = [region for region, *_ in LIMBS]
+    radii_m = dict(zip(regions, radii.tolist(), strict=True))
+    return CollisionModel(shape, bones, heads[bones], centres, half_axes, radii_m)
 
 
 def self_collision_distance_m(body: Body, model: CollisionModel, pose: Pose) -> float:
@@ -138,29 +137,3 @@ def _spheres(body: Body, shape: CollisionModel, heads, limbs, side: str) -> Sphe
         points += [a + t * (b - a) for t in fractions]
         radii += [shape.radii_m[region]] * len(fractions)
     return np.array(points), np.array(radii)
-
-
-def _radius(body: Body, vertices, heads, limb) -> float:
-    region, first, last, _ = limb
-    a, b = (heads[body.bone_numbers[f"{bone}.L"]] for bone in (first, last))
-    limb_m = vertices[body.in_regions(region)]
-    own = limb_m[limb_m[:, 1] > 0] - a
-    along = (b - a) / np.linalg.norm(b - a)
-    return float(np.median(np.linalg.norm(own - np.outer(own @ along, along), axis=1)))
-
-
-def _extent(points: np.ndarray) -> np.ndarray:
-    """The 3rd and 97th percentile of each component, (2, k), of points (n, k); `np.percentile` is slower."""
-    ordered = np.sort(points.T, axis=1)
-    below, share = np.divmod(np.array([0.03, 0.97]) * (len(points) - 1), 1)
-    low, high = ordered[:, below.astype(int)], ordered[:, below.astype(int) + 1]
-    return (low + share * (high - low)).T
-
-
-def _moved_by(body: Body, parts: list[np.ndarray]) -> np.ndarray:
-    """The bone that moves most of each part, given as numbers of vertices; (n_parts,)."""
-    ends = np.cumsum([0, *map(len, parts)])
-    numbers = np.concatenate(parts)
-    shape = (len(parts), body.skin_weights.shape[0])
-    members = sparse.csr_array((np.ones(len(numbers), np.float32), numbers, ends), shape=shape)
-    return (members @ body.skin_weights).toarray().argmax(axis=1)

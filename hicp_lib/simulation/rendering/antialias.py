@@ -66,7 +66,10 @@ def smooth_edges(
     """
     if len(edges) == 0:
         return image
-    borders, around = np.unique(_borders(edges, *image.shape[:2]), return_inverse=True)
+    row, column = np.divmod(edges, image.shape[1])
+    wide = 2 * image.shape[1] + 1  # row by row, borders are numbered together with what lies between them
+    middle = (2 * row + 1) * wide + 2 * column + 1
+    borders, around = np.unique([middle - 1, middle + 1, middle - wide, middle + wide], return_inverse=True)
     shown = _alike(borders, trace, scene, camera)
     flat = image.reshape(-1, 3)
     # Averaged after compression: a bright window does not eat its frame.
@@ -82,24 +85,13 @@ def _compressed(light: np.ndarray) -> np.ndarray:
     return light / (1 + light)
 
 
-def _borders(pixels: np.ndarray, height: int, width: int) -> list[np.ndarray]:
-    """Numbers of the left, right, upper and lower borders of pixels.
-
-    Upright borders come first, row by row, then level ones.
-    """
-    left = pixels + pixels // width
-    upper = pixels + height * (width + 1)
-    return [left, left + 1, upper, upper + width]
-
-
 def _alike(borders: np.ndarray, trace: Trace, scene: RayScene, camera: PlacedCamera) -> np.ndarray:
     """Which of the two pixels at each border shows what a ray through the border meets, (n,)."""
     height, width = camera.height_px, camera.width_px
-    n_upright = height * (width + 1)
-    upright = borders < n_upright
+    row, column = np.divmod(borders, 2 * width + 1)
+    upright = row % 2 == 1
     # Of the pixel to the right of an upright border, or below a level one.
-    row = np.where(upright, borders // (width + 1), (borders - n_upright) // width)
-    column = np.where(upright, borders - row * (width + 1), borders - n_upright - row * width)
+    row, column = row // 2, column // 2
     shift = _SHIFT_PX * ((row + column) % 2 * 2 - 1)
     u, v = column + np.where(upright, -0.5, -shift), row + np.where(upright, shift, -0.5)
     found = scene.trace(join_rays(camera.centre_m, np.add(*ray_parts(camera, u, v))))

@@ -101,8 +101,6 @@ def _noise_tile() -> np.ndarray:
 def _noise(height: int, width: int, rng: np.random.Generator) -> np.ndarray:
     """A random piece of the noise, (height, width, 3); drawing it anew would cost more than shading."""
     tile = _noise_tile()
-    if max(height, width) > _TILE_PX:
-        raise ValueError(f"an image of {width} x {height} pixels is larger than the noise kept for it")
     row, column = (rng.integers(0, _TILE_PX - size + 1) for size in (height, width))
     piece = tile[row : row + height, column : column + width]
     return piece[:: rng.choice([-1, 1]), :: rng.choice([-1, 1])]

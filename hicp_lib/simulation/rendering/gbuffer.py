@@ -1,7 +1,6 @@
 """The G-buffer: geometry and material of what each pixel shows, where its ray met it."""
 
 from dataclasses import dataclass, fields
-from functools import partial
 
 import numpy as np
 
@@ -77,26 +76,20 @@ class GBuffer:
         return pick(grid.reshape(len(grid), -1), self.pixels)
 
 
-@dataclass
-class Shading:
-    """What a G-buffer's n pixels are shaded by, see `surfaces.Look`; components first, (3, n) or (n,)."""
+@dataclass(kw_only=True)
+class Shading(Look):
+    """What a G-buffer's n pixels are shaded by: (3, n) or (n,) each, and their normals."""
 
     normals: np.ndarray
-    albedo: np.ndarray
-    glow: np.ndarray
-    height_m: np.ndarray
-    gloss: np.ndarray
-    roughness: np.ndarray
-    softness: np.ndarray
 
     def part(self, block: slice) -> "Shading":
         """Some of the pixels."""
-        return Shading(*(getattr(self, field.name)[..., block] for field in fields(self)))
+        return Shading(**{name: values[..., block] for name, values in vars(self).items()})
 
     def put(self, rows: np.ndarray, look: Look) -> None:
         """What one surface looks like at some of the pixels."""
-        for field in fields(look):
-            value, target = getattr(look, field.name), getattr(self, field.name)
+        for name, value in vars(look).items():
+            target = getattr(self, name)
             if target.ndim == 2 and np.ndim(value):
                 place(target, rows, value)
             elif np.ndim(value) or value:
@@ -122,19 +115,22 @@ def evaluate_materials(scene: RayScene, gbuffer: GBuffer, pixel_rad: float) -> S
     corners = np.ascontiguousarray(scene.triangles.take(gbuffer.triangle, axis=0).T, np.intp)
     second, third = gbuffer.barycentric.T
     weights = np.stack([1 - second - third, second, third])
-    shading = Shading(
-        _normals(scene, gbuffer, corners, weights),
-        *(np.zeros((3, n), np.float32) for _ in range(2)),
-        *(np.zeros(n, np.float32) for _ in range(4)),
-    )
+    colours = ("albedo", "glow")
+    empty = {f.name: np.zeros((3, n) if f.name in colours else n, np.float32) for f in fields(Look)}
+    shading = Shading(normals=_normals(scene, gbuffer, corners, weights), **empty)
     surface = gbuffer.surface.ravel().take(gbuffer.pixels)
     footprint_m = gbuffer.depth_m.ravel().take(gbuffer.pixels) * np.float32(pixel_rad)
     order = np.argsort(surface, kind="stable")
     bounds = np.searchsorted(surface, np.arange(len(scene.surfaces) + 1), sorter=order)
     for number in np.flatnonzero(np.diff(bounds)):
         rows = order[bounds[number] : bounds[number + 1]]
-        coords = partial(_coords, scene, int(number), corners, weights, rows)
-        shading.put(rows, scene.surfaces[number].material(Hits(footprint_m.take(rows), coords)))
+        material = scene.surfaces[number].material
+        if not isinstance(material, Look):
+            local = pick(corners, rows) - scene.first_vertex[number]
+            coords = np.ascontiguousarray(scene.surfaces[number].mesh.coords.T, np.float32)
+            seen = interpolate(coords, local, pick(weights, rows))
+            material = material(Hits(footprint_m.take(rows), seen))
+        shading.put(rows, material)
     return shading
 
 
@@ -145,10 +141,3 @@ def _normals(scene: RayScene, gbuffer: GBuffer, corners: np.ndarray, weights: np
     scale = 1 / np.maximum(np.sqrt(dot(normals, normals)), np.float32(1e-9))
     normals *= np.where(away, -scale, scale)
     return normals
-
-
-def _coords(scene: RayScene, number: int, corners, weights, rows: np.ndarray) -> np.ndarray:
-    """The coords of one surface's mesh, interpolated at some of the hits."""
-    local = pick(corners, rows) - scene.first_vertex[number]
-    coords = np.ascontiguousarray(scene.surfaces[number].mesh.coords.T, np.float32)
-    return interpolate(coords, local, pick(weights, rows))

@@ -85,32 +85,6 @@ def sample_offsets(cell: np.ndarray, kind: int, rng: np.random.Generator) -> np.
     return offsets
 
 
-def towards_light(light: Light, positions_m: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Vectors from positions to points of a light.
-
-    Parameters
-    ----------
-    light : Light
-    positions_m : array, shape (3, n)
-    offsets : array, shape (2, n)
-        Of the points in the unit square that stands for the light.
-
-    Returns
-    -------
-    array, shape (3, n), dtype float32
-    """
-    s, t = 2 * offsets - 1
-    c, u, v = (x.astype(np.float32)[:, None] for x in (light.centre_m, light.half_u_m, light.half_v_m))
-    return c + s * u + t * v - positions_m
-
-
-def hemisphere(normals: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Cosine-distributed directions about unit normals, (3, n), float32."""
-    angle, z = np.float32(2 * np.pi) * offsets[0], 1 - 2 * offsets[1]
-    radius = np.float32(0.98) * np.sqrt(np.maximum(1 - z * z, 0))
-    return normals + np.stack([radius * np.cos(angle), radius * np.sin(angle), np.float32(0.98) * z])
-
-
 def diffuse_and_highlight(
     light: Light,
     positions_m: np.ndarray,
@@ -138,13 +112,13 @@ def diffuse_and_highlight(
     highlight : array, shape (3, n)
         Reflected light.
     """
-    to_light = light.centre_m.astype(np.float32)[:, None] - positions_m
+    to_light = column(light.centre_m) - positions_m
     strength = 1 / dot(to_light, to_light)
     to_light *= np.sqrt(strength)
     if light.direction is not None:
         strength *= np.clip(-dot(to_light, light.direction.astype(np.float32)), 0, 1)
     n_l = dot(shading.normals, to_light)
-    power = light.power.astype(np.float32)[:, None]
+    power = column(light.power)
     lit = np.clip(n_l, 0, 1) * strength
     soft = shading.softness.any()
     diffuse = _creeping(n_l, shading.softness) * (strength * power) if soft else lit * power
@@ -184,6 +158,6 @@ def _mirrored(n_h: np.ndarray, v_h: np.ndarray, roughness: np.ndarray) -> np.nda
 def ambient_light(ambient: Ambient, normals: np.ndarray) -> np.ndarray:
     """Diffuse light from all around by normal, (3, n)."""
     up = 0.5 + 0.5 * normals[2]
-    lo, hi, extra = (x.astype(np.float32)[:, None] for x in (ambient.down, ambient.up, ambient.side))
+    lo, hi, extra = map(column, (ambient.down, ambient.up, ambient.side))
     side = np.clip(dot(normals, ambient.side_direction.astype(np.float32)), 0, 1)
     return lo + up * (hi - lo) + side * extra

@@ -77,24 +77,23 @@ class Cut:
         return values[self.i] * (1 - t) + values[self.j] * t
 
 
+# Corners of what is left of a triangle, by how many of its own are inside, as edges between them; the odd
+# corner out is number 0.
+_LEFT = {3: [((0, 0), (1, 1), (2, 2))], 1: [((0, 0), (0, 1), (0, 2))],
+         2: [((0, 1), (1, 1), (2, 2)), ((0, 1), (2, 2), (0, 2))]}  # fmt: skip
+
+
 def cut(triangles: np.ndarray, field: np.ndarray) -> Cut:
     """The part of a mesh where `field` (one value per vertex) is positive, cut along its zero line."""
     inside = field > 0
     count = inside[triangles].sum(axis=1)
-    source = [np.flatnonzero(count == 3)]
-    # Each corner is an edge (i, j); i == j is a vertex.
-    corners = [np.stack([triangles[source[0]]] * 2, axis=-1)]
-    for n_inside in (1, 2):
+    source, corners = [], []  # each corner is an edge (i, j); i == j is a vertex
+    for n_inside, pieces in _LEFT.items():
         rows = np.flatnonzero(count == n_inside)
-        # Rotate each triangle so that its odd vertex out comes first.
         odd = np.argmax(inside[triangles[rows]] == (n_inside == 1), axis=1)
-        a, b, c = (triangles[rows, (odd + k) % 3] for k in range(3))
-        if n_inside == 1:
-            corners.append(_edges((a, a), (a, b), (a, c)))
-            source.append(rows)
-        else:
-            corners += [_edges((a, b), (b, b), (c, c)), _edges((a, b), (c, c), (a, c))]
-            source += [rows, rows]
+        turned = np.take_along_axis(triangles[rows], (odd[:, None] + np.arange(3)) % 3, axis=1)
+        corners += [turned[:, np.array(piece)] for piece in pieces]
+        source += [rows] * len(pieces)
     edges = np.sort(np.concatenate(corners), axis=-1)
     n = len(field)
     keys = edges[..., 0].astype(np.int64) * n + edges[..., 1]
@@ -105,32 +104,29 @@ def cut(triangles: np.ndarray, field: np.ndarray) -> Cut:
     return Cut(i, j, t.astype(np.float32), numbers.astype(np.int32), np.concatenate(source))
 
 
-def _edges(*corners: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    return np.stack([np.stack(corner, axis=-1) for corner in corners], axis=1)
-
-
-def neighbours(triangles: np.ndarray, n_vertices: int, most: int = 8) -> np.ndarray:
-    """Neighbouring vertices.
+def smoothing(triangles: np.ndarray, n_vertices: int) -> sparse.csr_array:
+    """A step of smoothing as a matrix: vertices move most of the way to the middle of their neighbours.
 
     Parameters
     ----------
     triangles : array of int, shape (n, 3)
+        Each vertex belongs to one.
     n_vertices : int
-    most : int, optional
-        More neighbours than this are left out.
 
     Returns
     -------
-    array of int, shape (n_vertices, most)
-        A row with fewer repeats them, or the vertex itself.
+    sparse array, shape (n_vertices, n_vertices), dtype float32
     """
     pairs = _directed_edges(triangles)
     ends = np.concatenate([pairs, pairs[:, ::-1]]).T
-    joined = sparse.coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(n_vertices, n_vertices)).tocsr()
-    first, count, other = joined.indptr[:-1], np.diff(joined.indptr), joined.indices
-    place = first[:, None] + np.arange(most) % np.maximum(np.minimum(count, most), 1)[:, None]
-    rows = other[np.minimum(place, len(other) - 1)]
-    return np.where(count[:, None] > 0, rows, np.arange(n_vertices)[:, None])
+    shape = (n_vertices, n_vertices)
+    mean = sparse.coo_array((np.ones(len(ends[0]), np.float32), ends), shape=shape).tocsr()
+    # Eighths are dealt in turn: of more neighbours than eight the last get none.
+    count = np.diff(mean.indptr)
+    number = np.arange(mean.nnz) - np.repeat(mean.indptr[:-1], count)
+    mean.data = ((7 - number) // np.repeat(count, count) + 1).astype(np.float32) / 8
+    own = sparse.eye_array(n_vertices, dtype=np.float32)
+    return sparse.csr_array(np.float32(0.4) * own + np.float32(0.6) * mean)
 
 
 def boundary_edges(triangles: np.ndarray) -> np.ndarray:
@@ -182,25 +178,16 @@ def quad(corner_m: ArrayLike, u_m: ArrayLike, v_m: ArrayLike) -> Mesh:
     return Mesh(vertices, QUAD.astype(np.int32), normals, coords)
 
 
-def _unit_cube() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Corners (24, 3), normals (24, 3), triangles (12, 3), and which of the corners' numbers are u and v."""
-    corners, normals, axes = [], [], []
-    for normal, u, v in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
-        for side in (0, 1):
-            # Around the face in the order in which it looks outwards.
-            square = [(0, 0), (1, 0), (1, 1), (0, 1)][:: 1 if (normal + side) % 2 else -1]
-            face = np.zeros((4, 3))
-            face[:, normal], face[:, [u, v]] = side, square
-            corners.append(face)
-            normals.append(np.tile(np.eye(3)[normal] * (2 * side - 1), (4, 1)))
-            axes.append(np.tile([u, v], (4, 1)))
-    triangles = (4 * np.arange(6)[:, None, None] + QUAD).reshape(-1, 3)
-    stacked = [np.concatenate(x) for x in (corners, normals)]
-    places = 3 * np.arange(24)[:, None] + np.concatenate(axes)
-    return *(x.astype(np.float32) for x in stacked), triangles.astype(np.int32), places
-
-
-_CUBE = _unit_cube()
+# Corners (24, 3), normals (24, 3) and triangles (12, 3) of a unit cube, and which of the corners' numbers are
+# u and v. A face's corners go around in the order in which it looks outwards.
+_FACES = [(axis, side) for axis in range(3) for side in (0, 1)]
+_SQUARE = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], np.float32)
+_CUBE = (
+    np.concatenate([np.insert(_SQUARE[:: 1 if sum(f) % 2 else -1], *f, axis=1) for f in _FACES]),
+    np.repeat([(2 * side - 1) * np.eye(3, dtype=np.float32)[axis] for axis, side in _FACES], 4, axis=0),
+    (4 * np.arange(6, dtype=np.int32)[:, None, None] + QUAD.astype(np.int32)).reshape(-1, 3),
+    3 * np.arange(24)[:, None] + np.repeat([[1, 2], [0, 2], [0, 1]], 8, axis=0),
+)
 
 
 def box(low_m: ArrayLike, high_m: ArrayLike, yaw_rad: float = 0.0) -> Mesh:

@@ -7,6 +7,7 @@ from hicp_lib.simulation.rendering.camera import join_rays
 from hicp_lib.simulation.rendering.filters import sum_within
 from hicp_lib.simulation.rendering.gbuffer import GBuffer
 from hicp_lib.simulation.rendering.raycast import RayScene, dot, pick
+from hicp_lib.simulation.rendering.surfaces import column
 
 AMBIENT_REACH_M = 0.7
 _OFF_SURFACE_M = 0.003  # where rays begin
@@ -60,9 +61,13 @@ def visibility(
 
 def _sees(scene: RayScene, source: lights.Light | None, origins_m, normals, offsets) -> np.ndarray:
     """Whether points (3, n) see a point of a light, or of their surroundings (None); (n,), bool."""
-    if source is None:
-        return ~scene.occluded(join_rays(origins_m, lights.hemisphere(normals, offsets)), AMBIENT_REACH_M)
-    towards = lights.towards_light(source, origins_m, offsets)
+    if source is None:  # cosine-distributed directions about the normals
+        angle, z = np.float32(2 * np.pi) * offsets[0], 1 - 2 * offsets[1]
+        radius = np.float32(0.98) * np.sqrt(np.maximum(1 - z * z, 0))
+        around = np.stack([radius * np.cos(angle), radius * np.sin(angle), np.float32(0.98) * z])
+        return ~scene.occluded(join_rays(origins_m, normals + around), AMBIENT_REACH_M)
+    s, t = 2 * offsets - 1
+    towards = column(source.centre_m) + s * column(source.half_u_m) + t * column(source.half_v_m) - origins_m
     facing = np.flatnonzero(dot(towards, normals) > 0)  # what faces away is dark without asking
     seen = np.ones(len(origins_m.T), bool)
     seen[facing] = ~scene.occluded(join_rays(origins_m, towards).take(facing, axis=0), 0.98)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,17 +21,12 @@ class Hits:
     ----------
     footprint_m : array, shape (n,)
         How wide one pixel is at the hit.
-    interpolate : callable
-        Gives the mesh's coords at the hits, (n_coords, n).
+    coords : array, shape (n_coords, n)
+        The mesh's, interpolated.
     """
 
     footprint_m: np.ndarray
-    interpolate: Callable[[], np.ndarray]
-
-    @cached_property
-    def coords(self) -> np.ndarray:
-        """The mesh's coords, interpolated, (n_coords, n); only made for looks that ask for them."""
-        return self.interpolate()
+    coords: np.ndarray
 
 
 @dataclass
@@ -55,14 +50,15 @@ class Look:
     """
 
     albedo: np.ndarray
-    height_m: np.ndarray | float = 0.0
-    gloss: np.ndarray | float = 0.04
-    roughness: np.ndarray | float = 0.6
-    softness: np.ndarray | float = 0.0
-    glow: np.ndarray | float = 0.0
+    height_m: Any = 0.0
+    gloss: Any = 0.04
+    roughness: Any = 0.6
+    softness: Any = 0.0
+    glow: Any = 0.0
 
 
-Material = Callable[[Hits], Look]
+Material = Look | Callable[[Hits], Look]
+"""One look all over, or what tells it from where the surface was hit."""
 
 
 def column(colour: ArrayLike) -> np.ndarray:
@@ -77,8 +73,8 @@ class Surface:
     Attributes
     ----------
     mesh : Mesh
-    material : callable
-        Tells what it looks like where it is hit.
+    material : Look or callable
+        What it looks like.
     person : int
         Whose it is; -1: nobody's.
     parts : array or None, shape (n_triangles,), dtype int16

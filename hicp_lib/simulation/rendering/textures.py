@@ -4,6 +4,7 @@ A tile holds mixing weights or a height, not colours: a scene chooses the colour
 tile serves every paint, wood and cloth. Tiles are made once per process from fixed seeds.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -11,6 +12,7 @@ import numpy as np
 from scipy import fft
 
 from hicp_lib.core.memo import memoised
+from hicp_lib.simulation.rendering.raycast import place
 
 _REMAP_COLUMNS = 8192  # OpenCV's remap takes no array longer than 32767
 
@@ -30,56 +32,68 @@ class Texture:
     levels: list[np.ndarray]
     width_m: float
 
-    def sample(self, uv_m: np.ndarray, footprint_m: np.ndarray | float) -> np.ndarray:
-        """Look the tile up, bilinearly, blurred to the footprint.
 
-        Parameters
-        ----------
-        uv_m : array, shape (2, n)
-        footprint_m : float or array, shape (n,)
-            How many metres of surface one pixel sees.
-
-        Returns
-        -------
-        array, shape (channels, n), dtype float32
-
-        Examples
-        --------
-        >>> where = np.array([[0.0, 0.0], [0.1, 0.6]], np.float32)
-        >>> stripes(0.5).sample(where, 0.001)
-        array([[1., 0.]], dtype=float32)
-        """
-        texel_m = self.width_m / (self.levels[0].shape[0] - 1)
-        level = np.log2(np.maximum(np.asarray(footprint_m, np.float32) / texel_m, 1e-6))
-        level = np.clip(np.rint(level), 0, len(self.levels) - 1).astype(np.int8)
-        if level.ndim == 0 or level.min() == level.max():
-            return self._lookup(int(level.flat[0]), uv_m)
-        result = np.empty((self.levels[0].shape[2], uv_m.shape[1]), np.float32)
-        for number in range(level.min(), level.max() + 1):
-            rows = np.flatnonzero(level == number)
-            for channel, found in zip(result, self._lookup(number, uv_m.take(rows, axis=1)), strict=True):
-                channel[rows] = found
-        return result
-
-    def _lookup(self, number: int, uv_m: np.ndarray) -> np.ndarray:
-        tile = self.levels[number]
-        size, channels = tile.shape[0] - 1, tile.shape[2]
-        n = uv_m.shape[1]
-        if n == 0:
-            return np.empty((channels, 0), np.float32)
-        rows = -(-n // _REMAP_COLUMNS)
-        columns = -(-n // rows)
-        xy = np.zeros((2, rows * columns), np.float32)
-        scaled = uv_m * np.float32(1 / self.width_m)
-        xy[:, :n] = (scaled - np.floor(scaled)) * np.float32(size)
-        maps = xy.reshape(2, rows, columns)
-        found = cv2.remap(tile, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        return np.ascontiguousarray(found.reshape(rows * columns, channels)[:n].T)
+Tile = tuple[np.ndarray, float]
+Pattern = Callable[..., Tile]
+"""Makes one period, (size, size[, channels]), size a power of two, and says its width in metres."""
 
 
-def make_texture(tile: np.ndarray, width_m: float) -> Texture:
-    """A texture from one period of a pattern, shape (size, size[, channels]), size a power of two."""
-    tile = np.atleast_3d(tile).astype(np.float32)
+def sample(
+    pattern: Pattern, uv_m: np.ndarray, footprint_m: np.ndarray | float, *numbers: float
+) -> np.ndarray:
+    """Look a pattern up, bilinearly, blurred to the footprint.
+
+    Parameters
+    ----------
+    pattern : callable
+        One of this module's.
+    uv_m : array, shape (2, n)
+    footprint_m : float or array, shape (n,)
+        How many metres of surface one pixel sees.
+    *numbers : float
+        What the pattern takes.
+
+    Returns
+    -------
+    array, shape (channels, n), dtype float32
+
+    Examples
+    --------
+    >>> where = np.array([[0.0, 0.0], [0.1, 0.6]], np.float32)
+    >>> sample(stripes, where, 0.001, 0.5)
+    array([[1., 0.]], dtype=float32)
+    """
+    texture = _texture(pattern, *numbers)
+    texel_m = texture.width_m / (texture.levels[0].shape[0] - 1)
+    level = np.log2(np.maximum(np.asarray(footprint_m, np.float32) / texel_m, 1e-6))
+    level = np.clip(np.rint(level), 0, len(texture.levels) - 1).astype(np.int8)
+    if level.ndim == 0 or level.min() == level.max():
+        return _lookup(texture, int(level.flat[0]), uv_m)
+    result = np.empty((texture.levels[0].shape[2], uv_m.shape[1]), np.float32)
+    for number in np.flatnonzero(np.bincount(level)).tolist():
+        rows = np.flatnonzero(level == number)
+        place(result, rows, _lookup(texture, number, uv_m.take(rows, axis=1)))
+    return result
+
+
+def _lookup(texture: Texture, number: int, uv_m: np.ndarray) -> np.ndarray:
+    tile = texture.levels[number]
+    size, channels = tile.shape[0] - 1, tile.shape[2]
+    n = uv_m.shape[1]
+    rows = -(-n // _REMAP_COLUMNS)
+    columns = -(-n // rows)
+    xy = np.zeros((2, rows * columns), np.float32)
+    scaled = uv_m * np.float32(1 / texture.width_m)
+    xy[:, :n] = (scaled - np.floor(scaled)) * np.float32(size)
+    maps = xy.reshape(2, rows, columns)
+    found = cv2.remap(tile, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    return np.ascontiguousarray(found.reshape(rows * columns, channels)[:n].T)
+
+
+@memoised()
+def _texture(pattern: Pattern, *numbers: float) -> Texture:
+    period, width_m = pattern(*numbers)
+    tile: np.ndarray = np.atleast_3d(period).astype(np.float32)
     levels = []
     while True:
         levels.append(np.ascontiguousarray(np.pad(tile, ((0, 1), (0, 1), (0, 0)), mode="wrap")))
@@ -88,15 +102,20 @@ def make_texture(tile: np.ndarray, width_m: float) -> Texture:
         tile = (tile[::2, ::2] + tile[1::2, ::2] + tile[::2, 1::2] + tile[1::2, 1::2]) / 4
 
 
+_SIZE = 512
+
+
 def noise(
-    size: int, rng: np.random.Generator, slope: float, low: float, stretch: tuple[float, float] = (1, 1)
+    rng: np.random.Generator,
+    slope: float,
+    low: float,
+    stretch: tuple[float, float] = (1, 1),
+    size: int = _SIZE,
 ) -> np.ndarray:
     """Periodic Gaussian noise.
 
     Parameters
     ----------
-    size : int
-        Of the tile, in texels.
     rng : numpy.random.Generator
     slope : float
         The amplitude spectrum falls as frequency ** -slope.
@@ -104,6 +123,8 @@ def noise(
         Below so many cycles per tile it is flat.
     stretch : tuple of float, optional
         How much longer features are along rows and columns.
+    size : int, optional
+        Of the tile, in texels.
 
     Returns
     -------
@@ -112,7 +133,7 @@ def noise(
 
     Examples
     --------
-    >>> field = noise(64, np.random.default_rng(0), slope=1.5, low=2)
+    >>> field = noise(np.random.default_rng(0), slope=1.5, low=2, size=64)
     >>> abs(float(field.mean())) < 1e-6, round(float(field.std()), 3)
     (True, 1.0)
     """
@@ -125,20 +146,13 @@ def noise(
     return field / field.std()
 
 
-_SEED, _SIZE = 20220, 512
-
-
 def _rng(number: int) -> np.random.Generator:
-    return np.random.default_rng([_SEED, number])
+    return np.random.default_rng([20220, number])
 
 
-def _noise(number: int, slope: float, low: float, stretch: tuple[float, float] = (1, 1)) -> np.ndarray:
-    return noise(_SIZE, _rng(number), slope, low, stretch)
-
-
-def _grid(size: int = _SIZE) -> np.ndarray:
-    """Coordinates v and u of texels, from 0 to 1, (2, size, size)."""
-    return np.mgrid[:size, :size] / size
+def _grid() -> np.ndarray:
+    """Coordinates v and u of texels, from 0 to 1, (2, `_SIZE`, `_SIZE`)."""
+    return np.mgrid[:_SIZE, :_SIZE] / _SIZE
 
 
 def _from_whole(x: np.ndarray) -> np.ndarray:
@@ -146,19 +160,12 @@ def _from_whole(x: np.ndarray) -> np.ndarray:
     return np.abs(np.mod(x + 0.5, 1) - 0.5)
 
 
-def _symmetric(profile: np.ndarray, combine: np.ufunc) -> np.ndarray:
-    """A pattern (n, n) that is the same along both axes."""
-    return combine(profile[:, None], profile[None, :])
-
-
-@memoised()
-def cloud() -> Texture:
+def cloud() -> Tile:
     """Smooth noise of all sizes, two independent channels; 1 m."""
-    return make_texture(np.dstack([_noise(k, 1.6, 2) for k in (1, 2)]), 1.0)
+    return np.dstack([noise(_rng(k), 1.6, 2) for k in (1, 2)]), 1.0
 
 
-@memoised()
-def planks() -> Texture:
+def planks() -> Tile:
     """Wooden boards: (light to dark, gap between boards); 1.2 m, boards along v."""
     boards, (v, u) = 8, _grid()
     board = np.floor(u * boards).astype(int)
@@ -167,121 +174,106 @@ def planks() -> Texture:
     gap = np.minimum(
         _from_whole(u * boards) / boards, np.minimum(np.abs(end - 0.5), np.minimum(end, 1 - end))
     )
-    fibre = _noise(6, 1.1, 4, (14, 1))
-    return make_texture(np.dstack([np.clip(0.5 * tone + 0.25 + 0.12 * fibre, 0, 1), gap < 0.0025]), 1.2)
+    fibre = noise(_rng(6), 1.1, 4, (14, 1))
+    return np.dstack([np.clip(0.5 * tone + 0.25 + 0.12 * fibre, 0, 1), gap < 0.0025]), 1.2
 
 
-@memoised()
-def wood() -> Texture:
+def wood() -> Tile:
     """Sawn wood, light to dark, grain along v; 0.8 m."""
-    rings, fibre = _noise(7, 1.7, 1, (10, 1)), _noise(8, 0.8, 8, (20, 1))
-    return make_texture(np.clip(0.5 + 0.28 * np.sin(4 * rings) + 0.12 * fibre, 0, 1), 0.8)
+    rings, fibre = noise(_rng(7), 1.7, 1, (10, 1)), noise(_rng(8), 0.8, 8, (20, 1))
+    return np.clip(0.5 + 0.28 * np.sin(4 * rings) + 0.12 * fibre, 0, 1), 0.8
 
 
-@memoised()
-def tiles() -> Texture:
+def tiles() -> Tile:
     """Square tiles: (tone, grout); four tiles across, 1.2 m."""
     v, u = _grid() * 4
     tone = _rng(9).random((4, 4))[v.astype(int), u.astype(int)]
     edge = np.minimum(_from_whole(u), _from_whole(v))
-    return make_texture(np.dstack([0.35 + 0.3 * tone + 0.08 * _noise(10, 1.2, 3), edge < 0.012]), 1.2)
+    return np.dstack([0.35 + 0.3 * tone + 0.08 * noise(_rng(10), 1.2, 3), edge < 0.012]), 1.2
 
 
-@memoised()
-def carpet() -> Texture:
+def carpet() -> Tile:
     """Short pile, light to dark; 0.6 m."""
-    return make_texture(0.5 + 0.13 * _noise(11, 0.4, 40) + 0.05 * _noise(12, 1.2, 2), 0.6)
+    return 0.5 + 0.13 * noise(_rng(11), 0.4, 40) + 0.05 * noise(_rng(12), 1.2, 2), 0.6
 
 
-@memoised()
-def plaster() -> Texture:
+def plaster() -> Tile:
     """Painted wall: slight unevenness, light to dark; 1.6 m."""
-    return make_texture(0.5 + 0.12 * _noise(13, 1.4, 2) + 0.12 * _noise(14, 0.7, 40), 1.6)
+    return 0.5 + 0.12 * noise(_rng(13), 1.4, 2) + 0.12 * noise(_rng(14), 0.7, 40), 1.6
 
 
-@memoised()
-def bricks() -> Texture:
+def bricks() -> Tile:
     """Brick wall: (tone, mortar); 1 m, 4 bricks by 12 courses."""
     across, courses, (v, u) = 4, 12, _grid()
     course = np.floor(v * courses)
     x = np.mod(u * across + 0.5 * np.mod(course, 2), across)
     tone = _rng(15).random((courses, across))[course.astype(int), x.astype(int) % across]
-    edge, rough = np.minimum(_from_whole(x) / across, _from_whole(v * courses) / courses), _noise(16, 1.0, 8)
+    edge, rough = (
+        np.minimum(_from_whole(x) / across, _from_whole(v * courses) / courses),
+        noise(_rng(16), 1.0, 8),
+    )
     mortar = edge < 0.006 + 0.001 * rough
-    return make_texture(np.dstack([np.clip(tone * 0.7 + 0.15 + 0.1 * rough, 0, 1), mortar]), 1.0)
+    return np.dstack([np.clip(tone * 0.7 + 0.15 + 0.1 * rough, 0, 1), mortar]), 1.0
 
 
-@memoised()
-def weave() -> Texture:
+def weave() -> Tile:
     """Woven or knitted cloth seen close, around 0; 0.06 m at a tenth of a millimetre."""
     v, u = _grid() * 2 * np.pi * 60  # threads
     cross = np.sin(u) * np.sin(v) + 0.5 * np.sin(u + v)
-    return make_texture(0.6 * cross + 0.5 * _noise(17, 0.8, 10), 0.06)
+    return 0.6 * cross + 0.5 * noise(_rng(17), 0.8, 10), 0.06
 
 
-@memoised()
-def wrinkles() -> Texture:
+def wrinkles() -> Tile:
     """Height of small folds in cloth, around 0, two channels (soft, creased); 0.5 m, folds run along v."""
-    soft = _noise(18, 2.6, 3, (2.0, 1))
-    ridges = [1 - 2 * np.abs(_noise(k, 2.2, 2, (1.5, 1))) for k in (19, 20)]
+    soft = noise(_rng(18), 2.6, 3, (2.0, 1))
+    ridges = [1 - 2 * np.abs(noise(_rng(k), 2.2, 2, (1.5, 1))) for k in (19, 20)]
     creased = cv2.GaussianBlur(np.tile(np.minimum(*ridges), (3, 3)), (0, 0), 3)[512:1024, 512:1024]
-    return make_texture(np.dstack([soft, creased]), 0.5)
+    return np.dstack([soft, creased]), 0.5
 
 
-@memoised()
-def strands() -> Texture:
+def strands() -> Tile:
     """Hair: brightness of single strands and locks, around 0; 0.1 m, strands along v."""
-    return make_texture(0.6 * _noise(21, 0.2, 30, (60, 1)) + 0.6 * _noise(22, 1.0, 5, (25, 1)), 0.1)
+    return 0.6 * noise(_rng(21), 0.2, 30, (60, 1)) + 0.6 * noise(_rng(22), 1.0, 5, (25, 1)), 0.1
 
 
-@memoised()
-def skin() -> Texture:
+def skin() -> Tile:
     """Skin: (blotches of redness, pores and lines, freckles 0..1), the first two around 0; 0.12 m."""
-    freckles = np.clip(_noise(25, 0.8, 40) - 1.7, 0, 1)
-    return make_texture(np.dstack([_noise(23, 1.8, 4), _noise(24, 0.5, 60), freckles]), 0.12)
+    freckles = np.clip(noise(_rng(25), 0.8, 40) - 1.7, 0, 1)
+    return np.dstack([noise(_rng(23), 1.8, 4), noise(_rng(24), 0.5, 60), freckles]), 0.12
 
 
-@memoised()
-def stripes(duty: float = 0.5) -> Texture:
+def stripes(duty: float) -> Tile:
     """Stripes along u, 0 and 1; one period per metre (scale the coordinates)."""
     profile = ((np.arange(256) + 0.5) / 256 < duty).astype(np.float32)
-    return make_texture(np.repeat(profile[:, None], 256, axis=1), 1.0)
+    return np.repeat(profile[:, None], 256, axis=1), 1.0
 
 
-@memoised()
-def checks(kind: int) -> Texture:
+def checks(kind: int) -> Tile:
     """Gingham, tartan or window pane: weights of (second, third) colour; one period per metre."""
     t = (np.arange(256) + 0.5) / 256
-    second = np.zeros((256, 256))
-    if kind == 0:
-        first = _symmetric((t < 0.5) * 0.5, np.add)
-    elif kind == 1:
-        first = _symmetric(0.5 * ((np.abs(t - 0.3) < 0.17) | (np.abs(t - 0.8) < 0.04)), np.add)
-        lines = 0.55 * (np.abs(t - 0.3) < 0.025) + 0.4 * (np.abs(t - 0.65) < 0.02)
-        second = _symmetric(lines, np.maximum)
-    else:
-        first = _symmetric(0.9 * (np.abs(t - 0.5) < 0.03), np.maximum)
-    return make_texture(np.dstack([first, second]), 1.0)
+    lines = 0.55 * (np.abs(t - 0.3) < 0.025) + 0.4 * (np.abs(t - 0.65) < 0.02)
+    tartan = (np.abs(t - 0.3) < 0.17) | (np.abs(t - 0.8) < 0.04)
+    pane = 0.9 * (np.abs(t - 0.5) < 0.03)
+    band, line = ((t < 0.5, 0 * t), (tartan, lines), (0 * t, pane))[kind]
+    weights = [np.add.outer(0.5 * band, 0.5 * band), np.maximum.outer(line, line)]
+    return np.dstack(weights[::-1] if kind == 2 else weights), 1.0
 
 
-@memoised()
-def dots() -> Texture:
+def dots(radius: float) -> Tile:
     """Dots on a staggered grid, 0 and 1; one period per metre."""
     v, u = (np.mgrid[:256, :256] + 0.5) / 256
     distance = [np.hypot(np.mod(u - x, 1) - 0.5, np.mod(v - x, 1) - 0.5) for x in (0, 0.5)]
-    return make_texture(np.minimum(*distance) < 0.16, 1.0)
+    return np.minimum(*distance) < radius, 1.0
 
 
-@memoised()
-def blobs(number: int) -> Texture:
+def blobs(number: int) -> Tile:
     """Flower-, leaf- or camouflage-like blobs: weights of (second, third) colour; one period per metre."""
     slope, low = ((2.5, 4), (1.2, 9), (3.5, 2))[number % 3]
-    a, b = (noise(256, _rng(30 + 2 * number + k), slope, low) for k in (0, 1))
-    return make_texture(np.dstack([a > 0.6, (b > 0.8) & (a <= 0.6)]), 1.0)
+    a, b = (noise(_rng(30 + 2 * number + k), slope, low, size=256) for k in (0, 1))
+    return np.dstack([a > 0.6, (b > 0.8) & (a <= 0.6)]), 1.0
 
 
-@memoised()
-def prints(number: int) -> Texture:
+def prints(number: int) -> Tile:
     """What is printed on a shirt's chest: weights of (second, third) colour; one print per 0.3 m."""
     rng, size = _rng(60 + number), 256
     ink = np.zeros((2, size, size), np.uint8)
@@ -303,14 +295,13 @@ def prints(number: int) -> Texture:
             cv2.rectangle(ink[row % 2], (40, 50 + 42 * row), (216, 72 + 42 * row), 255, -1)
     weights = np.moveaxis(ink, 0, -1).astype(np.float32) / 255
     weights[..., 1] *= 1 - weights[..., 0]
-    return make_texture(weights, 0.3)
+    return weights, 0.3
 
 
-@memoised()
-def picture(number: int) -> Texture:
+def picture(number: int) -> Tile:
     """A picture to hang on a wall, three channels in [0, 1]; one per metre."""
     rng = _rng(100 + number)
-    tile = np.dstack([noise(256, rng, 2.2, 1.5) for _ in range(3)]) * 0.15 + rng.random(3)
+    tile = np.dstack([noise(rng, 2.2, 1.5, size=256) for _ in range(3)]) * 0.15 + rng.random(3)
     tile = np.ascontiguousarray(np.clip(255 * tile, 0, 255).astype(np.uint8))
     for _ in range(rng.integers(3, 12)):
         colour = tuple(int(c) for c in rng.integers(0, 256, 3))
@@ -318,4 +309,4 @@ def picture(number: int) -> Texture:
         turn_deg = float(rng.integers(180))
         cv2.ellipse(tile, centre.tolist(), axes.tolist(), turn_deg, 0, 360, colour, -1, cv2.LINE_AA)
     blurred = 0.6 * tile + 0.4 * cv2.GaussianBlur(tile, (0, 0), 6)
-    return make_texture(np.clip(blurred / 255, 0.02, 0.95), 1.0)
+    return np.clip(blurred / 255, 0.02, 0.95), 1.0

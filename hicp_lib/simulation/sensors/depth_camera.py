@@ -111,24 +111,6 @@ def simulate_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCamera,
     return align_to_colour(_measure(scene, view, first_column, settings, rng), view, colour)
 
 
-def simulate_raw_depth(scene: RayScene, colour: PlacedCamera, settings: DepthCamera, rng: Rng) -> np.ndarray:
-    """Depth as the imager sees it, before alignment.
-
-    Parameters
-    ----------
-    scene : RayScene
-    colour : PlacedCamera
-    settings : DepthCamera
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    array, shape (settings.height_px, settings.width_px), dtype float32
-        Else as of `simulate_depth`.
-    """
-    return _measure(scene, depth_imager(colour, settings), 0, settings, rng)
-
-
 def depth_imager(colour: PlacedCamera, settings: DepthCamera) -> PlacedCamera:
     """The imager as a camera: beside the colour camera."""
     T_colour_imager = np.eye(4)

@@ -102,14 +102,6 @@ D435_VGA = replace(D435, width_px=640, focal_px=384.0, nearest_m=0.152)
 """640 x 480."""
 
 
-def without_errors(settings: StereoCamera) -> StereoCamera:
-    """The same camera, all its errors switched off; sampling and alignment stay."""
-    return replace(
-        settings, subpixel_rms_px=0, edge_px=0, disparity_step_px=0, depth_units_per_m=0, nearest_m=0,
-        max_range_m=0, left_band=False, shadow=False, hair_holes=0,
-    )  # fmt: skip
-
-
 def _edges(true_px: np.ndarray, settings: StereoCamera, rng: Rng) -> tuple[np.ndarray, np.ndarray]:
     """Disparity as windows that reach over depth steps find it, and where they find any.
 

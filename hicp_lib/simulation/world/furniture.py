@@ -149,7 +149,7 @@ def _lamp(rng: Rng, place: np.ndarray, yaw: float) -> list[Surface]:
     shade = g.lathe([[0.2, h - 0.12], [0.13, h + 0.16]], place)
     return [
         Surface(stand, m.plain(np.full(3, 0.06), 0.3, 0.2)),
-        Surface(shade, m.glowing(np.array([0.8, 0.72, 0.6]), rng.uniform(0.0, 0.8))),
+        Surface(shade, m.plain(np.array([0.8, 0.72, 0.6]), 0.6, glow=rng.uniform(0.0, 0.8))),
     ]
 
 

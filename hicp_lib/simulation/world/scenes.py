@@ -20,10 +20,11 @@ from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.recordings.writer import write_rgb
 from hicp_lib.simulation.body.identities import HELD_OUT, split_members, stream
+from hicp_lib.simulation.rendering.camera import project_world
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import Frame, render
 from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts
-from hicp_lib.simulation.world.staging import Stage, distance_m, random_stage
+from hicp_lib.simulation.world.staging import Stage, random_stage
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
 MAX_SCENES = 1_000_000
@@ -151,7 +152,8 @@ def annotate(stage: Stage, frame: Frame) -> list[dict]:
         keypoints = np.where(seen[:, None] > 0, np.column_stack([pixels, seen]), 0)
         last = [stage.camera.width_px - 1, stage.camera.height_px - 1, 2]
         keypoints = np.clip(keypoints.round(2), 0, last).tolist()
-        away_m = round(distance_m(stage.camera, person), 3)
+        # The middle of the keypoints, along the camera's z axis.
+        away_m = round(float(np.median(project_world(stage.camera, person.keypoints_m)[1])), 3)
         about = {"distance_m": away_m, "identity": asdict(identity)}
         rows.append({"bbox": box, "area": len(u), "keypoints": keypoints} | about)
     return rows

@@ -8,18 +8,16 @@ import numpy as np
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.simulation.appearance.materials import hsv
 from hicp_lib.simulation.appearance.people import appearance_of, dress
-from hicp_lib.simulation.body.identities import HELD_OUT, Identity, draw_identity
+from hicp_lib.simulation.body.identities import HELD_OUT, PEOPLE, Identity, Rng, draw_identity
 from hicp_lib.simulation.body.model import PosedBody, load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
 from hicp_lib.simulation.rendering import lights
-from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at, project_world
+from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at
 from hicp_lib.simulation.rendering.colour_sensor import Sensor
 from hicp_lib.simulation.rendering.render import World
 from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.world.furniture import stool
 from hicp_lib.simulation.world.room import Room, make_room
-
-Rng = np.random.Generator
 
 
 @dataclass(frozen=True)
@@ -102,19 +100,12 @@ def _person(identity: Identity, place: tuple[float, float], number: int) -> tupl
     T_world_body = np.eye(4)
     T_world_body[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
     T_world_body[:2, 3] = place
-    kind = str(rng.choice(list(_POSES), p=list(_POSES.values())))
+    kind = str(rng.choice(list(PEOPLE["photographed"]), p=list(PEOPLE["photographed"].values())))
     if kind == "sitting" and appearance.skirt is not None:  # a skirt would have to drape over the seat
         kind = "standing"
     body = load_body()
     posed = pose_body(body, appearance.shape, sample_pose(rng, body, kind, appearance.shape), T_world_body)
     return posed, dress(appearance, posed, number) + ([stool(rng, posed)] if kind == "sitting" else [])
-
-
-# How often each kind of pose is photographed.
-_POSES = {
-    "standing": 0.14, "walking": 0.10, "reaching": 0.17, "reaching_both": 0.15, "pointing": 0.08,
-    "crossed": 0.06, "raised": 0.10, "hips": 0.07, "face": 0.07, "sitting": 0.06,
-}  # fmt: skip
 
 
 def _camera(rng: Rng, person: PosedBody) -> PlacedCamera:
@@ -167,18 +158,6 @@ def _temperature(warm_to_cool: float) -> np.ndarray:
 
 def _sensor(rng: Rng) -> Sensor:
     tint = hsv(rng.random(), rng.uniform(0, 0.08), 1.0)
-    return Sensor(
-        white_balance=tint / tint.mean(),
-        exposure=float(np.exp(rng.normal(0.05, 0.18))),
-        blur_px=rng.uniform(0.35, 0.75),
-        vignette=rng.uniform(0.05, 0.35),
-        shot_noise=rng.uniform(0.006, 0.022),
-        read_noise=rng.uniform(0.001, 0.005),
-        contrast=rng.uniform(0.9, 1.4),
-        saturation=rng.uniform(0.8, 1.15),
-    )
-
-
-def distance_m(camera: PlacedCamera, person: PosedBody) -> float:
-    """Depth of the middle of a person's keypoints, along the camera's z axis."""
-    return float(np.median(project_world(camera, person.keypoints_m)[1]))
+    exposure = float(np.exp(rng.normal(0.05, 0.18)))
+    others = {name: rng.uniform(*limits) for name, limits in PEOPLE["camera"].items()}
+    return Sensor(tint / tint.mean(), exposure, **others)

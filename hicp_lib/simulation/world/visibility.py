@@ -4,25 +4,13 @@ import numpy as np
 
 from hicp_lib.core.keypoints import HANDS, INDEX, N_KEYPOINTS
 from hicp_lib.simulation.appearance.people import RIGHT
+from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.body.model import REGIONS
 from hicp_lib.simulation.rendering.camera import PlacedCamera, pixel_rays, project_world
 from hicp_lib.simulation.rendering.raycast import RayScene
 
 _TOUCHING_M = 0.002  # a keypoint that lies no further behind what is seen is on the surface
 _HEAD = ("face", "eyebrow", "lips", "mouth", "eye", "neck")
-# Joint: parts it may be seen through, and how deep below them it may lie (metres).
-_BODY_RULES: dict[str, tuple[tuple[str, ...], float]] = {
-    "shoulder": (("torso", "upper_arm", "neck"), 0.15),
-    "elbow": (("upper_arm", "forearm"), 0.09),
-    "wrist": (("forearm", "hand"), 0.06),
-    "hip": (("hips", "torso", "thigh"), 0.22),
-    "knee": (("thigh", "shin"), 0.12),
-    "ankle": (("shin", "foot"), 0.09),
-    "toe": (("foot", "nail"), 0.06),
-    "heel": (("foot", "shin"), 0.06),
-    "neck": (("neck", "torso"), 0.14),
-    "head_top": ((*_HEAD, "scalp"), 0.08),
-}
 _FACE_RULE = (_HEAD, 0.03)
 _HAND_RULE = (("hand", "nail", "forearm"), 0.025)
 _SIDED = ("upper_arm", "forearm", "hand", "thigh", "shin", "foot", "nail")
@@ -34,7 +22,7 @@ def _tables() -> tuple[np.ndarray, np.ndarray]:
     depth_m = np.zeros(N_KEYPOINTS)
     for name, index in INDEX.items():
         otherwise = _HAND_RULE if index in HANDS else _FACE_RULE
-        rules = (rule for ending, rule in _BODY_RULES.items() if name.endswith(ending))
+        rules = (rule for ending, rule in PEOPLE["seen_through"].items() if name.endswith(ending))
         parts, depth_m[index] = next(rules, otherwise)
         for part in parts:
             number, sided = REGIONS.index(part), part in _SIDED

@@ -2,8 +2,8 @@
 
 `data/claims.json` holds `tables` (where quantities are read, by short names), `claims`, `sentences` (the
 paper's numbers and orderings, each with the claims that cover it or the reason why none does) and what
-`hicp_lib.study.claims.fixed` reads. The tests of one claim must all hold. A test compares `left` with `right`
-(each a number or a selection of rows in a result table) by a `relation`:
+`hicp_lib.study.claims.reading` reads. The tests of one claim must all hold. A test compares `left` with
+`right` (each a number or a selection of rows in a result table) by a `relation`:
 
     >, <       the difference left - right lies above `margin`, or below -`margin`
     similar    left and right differ by less than `margin`

@@ -1,6 +1,7 @@
 """Figures of avoidance: clearances of people, and against what is swept; separation's terms."""
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import pandas as pd
 
@@ -34,31 +35,25 @@ def clearances(metrics: pd.DataFrame, note: str) -> Figure:
     """
     shown = {"reach_m": "in the first reach", "min_distance_m": "until they leave"}
     tables = {of: over_people(metrics, ["detector", "gains"], of) for of in shown}
-    conditions = [
-        row.detector + (f", {row.gains}" if row.detector != NO_AVOIDANCE else "")
-        for row in tables["reach_m"].itertuples()
-    ]
+    gains = [f", {row.gains}" * (row.detector != NO_AVOIDANCE) for row in tables["reach_m"].itertuples()]
+    conditions = list(tables["reach_m"]["detector"] + gains)
     figure, axes = new_figure(1, 2, 10.0, 1.6 + 0.42 * len(conditions), sharey=True, sharex=True)
     for axis, (of, title) in zip(axes, shown.items(), strict=True):
-        for place, row in enumerate(tables[of].itertuples()):
-            colour = condition_colour(row.detector)
-            mine = metrics[(metrics["detector"] == row.detector) & (metrics["gains"] == row.gains)]
-            for marker, (script, people) in zip(
-                _SCRIPT_MARKERS, mine.groupby("script", sort=False), strict=False
-            ):
-                label = script if place == 0 else None
-                options = {"s": 22, "alpha": 0.45, "color": colour, "lw": 0, "marker": marker, "label": label}
-                axis.scatter(100 * people[of], [place + 0.18] * len(people), **options)
-            axis.plot([100 * row.low, 100 * row.high], [place - 0.15] * 2, color=colour, lw=2)
-            axis.plot(100 * row.value, place - 0.15, "|", color=colour, ms=12, mew=2.5)
+        for place, ((detector, _), mine) in enumerate(metrics.groupby(["detector", "gains"], sort=False)):
+            colour = condition_colour(detector)
+            for script, marker in zip(mine["script"].unique(), _SCRIPT_MARKERS, strict=False):
+                at_cm, label = 100 * mine.loc[mine["script"] == script, of], None if place else script
+                pen = {"s": 22, "alpha": 0.45, "color": colour, "lw": 0, "marker": marker, "label": label}
+                axis.scatter(at_cm, [place + 0.18] * len(at_cm), **pen)
+            bar: dict[str, Any] = {"fmt": "|", "ms": 12, "mew": 2.5, "capsize": 0, "elinewidth": 2}
+            marks.dots(axis, tables[of].iloc[[place]], place - 0.15, factor=100, color=colour, **bar)
         for mark_m in MARKS_M:
             axis.axvline(100 * mark_m, color="#888888", lw=1, ls=":")
         axis.set(title=title, xlabel="least distance (cm)")
     marks.name_rows(axes[0], conditions)
     marks.legend_below(figure, axes[:1])
-    table = pd.concat({title: tables[of] for of, title in shown.items()}, names=["until"]).reset_index(
-        level=0
-    )
+    until = {title: tables[of] for of, title in shown.items()}
+    table = pd.concat(until, names=["until"]).reset_index(level=0)
     means = [f"{name} {100 * value:.1f}" for name, value in zip(conditions, table["value"], strict=False)]
     return Figure(
         figure,

@@ -16,17 +16,17 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.experiments.avoidance.closed_loop import start_posture
-from hicp_lib.experiments.avoidance.onlooker import CAMERA, onlooker_view
 from hicp_lib.experiments.avoidance.reaching import LEAVES_S, NEAR_S
-from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
+from hicp_lib.experiments.avoidance.robot_surfaces import CAMERA, onlooker_view, robot_surfaces
 from hicp_lib.experiments.avoidance.runs import Run, image, moment_at
 from hicp_lib.experiments.laboratory import T_WORLD_ROOT
+from hicp_lib.inspection.skeletons import draw_people
 from hicp_lib.robot.kinematics import ARM_JOINTS, load_icub
 from hicp_lib.robot.skin import read_skin
 from hicp_lib.simulation.rendering.camera import project_world
 from hicp_lib.study.avoidance import SURE, sure_keypoints
 from hicp_lib.study.plots.avoidance import condition_colour
-from hicp_lib.study.plots.people import draw_people, picture_grid
+from hicp_lib.study.plots.people import picture_grid
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 
 _THREATENED = 0.05  # activation from which a taxel is drawn

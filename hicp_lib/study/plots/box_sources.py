@@ -17,11 +17,7 @@ def box_sources(table: pd.DataFrame, data_note: str) -> Figure:
     rows = table[table["metric"] == "AP"]
     figure = _bars_by_case(rows, "subset", rows["subset"].unique(), "detector", "AP")
     said = series_text(rows.set_index(["detector", "subset"])["value"], "{0} {2:.2f} on {1}")
-    caption = (
-        "A top-down detector on boxes of three sources, and a bottom-up one that needs none: average "
-        "precision of bodies on the whole images, and on the same people's crops with and without the head, "
-        f"with 95 % bootstrap intervals, on {data_note}."
-    )
+    caption = f"Average precision of bodies by where the box comes from, 95 % intervals, on {data_note}."
     return Figure(figure, caption, f"Bars of average precision: {said}.", rows)
 
 
@@ -34,9 +30,8 @@ def loss_shares(table: pd.DataFrame, data_note: str) -> Figure:
     last = table[table["subset"] == table["subset"].iloc[-1]]
     said = series_text(last.set_index(["share", "detector", "subset"])["value"], "{0} of {1} {3:.2f} on {2}")
     caption = (
-        "What keeps average precision of bodies from 1, share by share: the network's own (true boxes, and "
-        "the head in the picture), what the missing head adds, what boxes of a person finder add. With 95 % "
-        f"bootstrap intervals of these differences, on {data_note}."
+        "What keeps average precision of bodies from 1: the network, on true boxes with the head; the head "
+        f"that is missing; boxes of a person finder. With 95 % bootstrap intervals, on {data_note}."
     )
     return Figure(figure, caption, f"Bars of lost average precision: {said}.", table)
 

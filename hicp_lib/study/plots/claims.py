@@ -10,10 +10,8 @@ from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 # By `VERDICTS`: Okabe and Ito's palette; the hatch says the same without colour.
 _COLOURS = ("#009E73", "#56B4E9", "#D55E00", "#F0E442", "#CC79A7", "#D9D9D9")
 _HATCHES = ("", "//", "xx", "oo", "--", "..")
-_FILLS = {
-    verdict: {"color": colour, "hatch": hatch, "edgecolor": "white"}
-    for verdict, colour, hatch in zip(VERDICTS, _COLOURS, _HATCHES, strict=True)
-}
+_LOOKS = zip(VERDICTS, _COLOURS, _HATCHES, strict=True)
+_FILLS = {name: {"color": colour, "hatch": hatch, "edgecolor": "white"} for name, colour, hatch in _LOOKS}
 
 
 @in_style

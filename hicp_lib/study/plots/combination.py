@@ -26,38 +26,29 @@ def ingredients(table: pd.DataFrame, note: str) -> Figure:
     """
     variants, bodies = list(table["variant"].unique()), list(table["body"].unique())
     height_in = 0.7 + (0.7 + 0.36 * len(variants)) * len(bodies)
-    figure, axes = new_figure(
-        len(bodies), len(_MEASURES), 10.5, height_in, sharey=True, sharex="col", squeeze=False
-    )
+    shape = len(bodies), len(_MEASURES)
+    figure, axes = new_figure(*shape, 10.5, height_in, sharey=True, sharex="col", squeeze=False)
+    pens = {name: {"color": SUBSET_COLOURS.get(name), "label": name} for name in table["subset"].unique()}
     for row, body in zip(axes, bodies, strict=True):
         for axis, measure in zip(row, _MEASURES, strict=True):
-            _draw_steps(axis, table[table["body"] == body], measure, variants)
+            part, bounds = table[table["body"] == body], (measure, f"{measure}_low", f"{measure}_high")
+            marks.dots_in_rows(axis, part, "variant", "subset", variants, pens, bounds=bounds)
         row[0].set_title(f"bodies by {body}", loc="left", fontsize=9)
+        row[1].axvline(0, color="#888888", lw=1)
     for axis, label in zip(axes[-1], _MEASURES.values(), strict=True):
         axis.set(xlabel=label)
     for axis in axes[-1, ::2]:
         axis.set(xlim=(0, None))
     marks.name_rows(axes[0, 0], variants)
-    _legend_above(figure, axes[0, 0])
+    marks.legend_below(figure, axes[0, 0])
     ends = table[table["variant"].isin([variants[0], variants[-1]])]
     said = series_text(ends.set_index(["body", "variant", "subset"])["AP"], "{0}, {1}: {3:.2f} on {2}")
     caption = (
-        "What each step buys: average precision of hands, how much of it the step adds on the same crops, "
-        "and the share of labelled hands found, with 95 % bootstrap intervals over source images; a row of "
-        f"panels for the bodies of each detector: {note}."
+        "What each step buys: average precision of hands, what the step adds, hands found; panels by whose "
+        f"the bodies are; 95 % bootstrap intervals over source images: {note}."
     )
     alt = f"Dots with whiskers per step, for the bodies of {in_words(bodies)}. Average precision, {said}."
     return Figure(figure, caption, alt, table)
-
-
-def _draw_steps(axis, table: pd.DataFrame, measure: str, variants: list[str]) -> None:
-    if measure == "step":
-        axis.axvline(0, color="#888888", lw=1)
-    for k, (subset, rows) in enumerate(table.groupby("subset", sort=False)):
-        reach = marks.whiskers(rows, measure, f"{measure}_low", f"{measure}_high")
-        pen = {"fmt": "o", "color": SUBSET_COLOURS.get(subset), "label": subset, "capsize": 3}
-        y = rows["variant"].map(variants.index) + marks.offset(k, 2, 0.24)
-        axis.errorbar(rows[measure], y, xerr=reach, **pen)
 
 
 @in_style
@@ -86,7 +77,7 @@ def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, min_term: flo
         lower.set(xlabel="score", xlim=(-0.02, 1.02))
     axes[0, 0].set(ylabel="share of hits", ylim=(-0.02, 1.02))
     axes[1, 0].set(ylabel="keypoints")
-    _legend_above(figure, axes[0, 0])
+    marks.legend_below(figure, axes[0, 0])
     said = [
         f"{row.detector} {_GROUPS.get(row.group, row.group)} {row.raw:.2f} to {row.calibrated:.2f}"
         for row in errors.itertuples()
@@ -109,8 +100,3 @@ def _draw_curves(upper, lower, rows: pd.DataFrame, colour: str) -> None:
         x = (part["bin"] + 0.5) / N_BINS + marks.offset(k, 2, 0.04)
         lower.bar(x, part["count"], 0.036, color=fill, ec=colour)
     lower.grid(axis="x", visible=False)
-
-
-def _legend_above(figure, axis) -> None:
-    handles, labels = axis.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))

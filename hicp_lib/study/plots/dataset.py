@@ -1,28 +1,30 @@
-"""Figures of the data: whole scenes, the cut that takes the head off, examples, what is labelled."""
+"""Figures of the data: layouts, whole scenes, the cut that takes the head off, examples, what is labelled."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib.patches
 import numpy as np
 import pandas as pd
 
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import read_json
 from hicp_lib.core.images import read_image
-from hicp_lib.core.keypoints import COCO_17, FACE, LEFT_HAND, NAMES, RIGHT_HAND
+from hicp_lib.core.keypoints import BODY, COCO_17, FACE, HANDS, LEFT_HAND, LIMBS, NAMES, RIGHT_HAND, TO_HALPE
 from hicp_lib.formats.annotations import Annotations
+from hicp_lib.simulation.body.joints import pose_from_joints, radians
+from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.study.plots import marks
+from hicp_lib.study.plots.marks import legend_below
 from hicp_lib.study.plots.palette import BODY_COLOUR, HEAD_COLOUR, SUBSET_COLOURS
 from hicp_lib.study.plots.people import draw_truth, picture_grid
 from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
 
 _TRUTH_COLOUR = "#F0E442"
 _EDGES = ("left", "top", "right", "bottom")
-_PARTS = {
-    **{NAMES[i].replace("_", " "): [i] for i in COCO_17},
-    "face (68)": FACE,
-    "left hand (21)": LEFT_HAND,
-    "right hand (21)": RIGHT_HAND,
-}
+_PARTS: dict[str, Any] = {NAMES[i].replace("_", " "): [i] for i in COCO_17}
+_PARTS |= {"face (68)": FACE, "left hand (21)": LEFT_HAND, "right hand (21)": RIGHT_HAND}
 
 
 def with_truth(annotations: Annotations, images_dir: str | Path, image_id: int) -> np.ndarray:
@@ -93,10 +95,7 @@ def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
         axis.set(xticks=[], yticks=[], xlim=(left - 0.5, right - 0.5), ylim=(bottom - 0.5, top - 0.5))
         axis.set_title(f"person {row['annotation_id']}", fontsize=9)
         axis.grid(False)
-    caption = (
-        "How Headless is made, on real rows of the data: extent and centre of the head's keypoints (red), "
-        f"of the other body keypoints (green), and the cut (dashed). {note}"
-    )
+    caption = f"How Headless is made: the head (red), the body below it (green), the cut (dashed). {note}"
     alt = (
         f"{len(table)} people with a red box around the head, a green box around the body and a dashed cut "
         f"between them; the removed sides are {in_words(map(str, table['cut_side']))}."
@@ -154,7 +153,8 @@ def labelled_share(subsets: Mapping[str, Annotations], note: str) -> Figure:
         if len(labelled)
     )
     figure, axis = new_figure(1, 1, 9.0, 3.6)
-    wide = table.pivot(index="part", columns="subset", values="share").reindex(list(_PARTS))[list(subsets)]
+    wide = table.pivot(index="part", columns="subset", values="share")
+    wide = wide.reindex(list(_PARTS), columns=list(subsets))
     for k, name in enumerate(subsets):
         x = np.arange(len(wide)) + marks.offset(k, len(subsets), 0.4)
         axis.bar(x, wide[name], 0.38, color=SUBSET_COLOURS.get(name), label=name)
@@ -192,7 +192,48 @@ def crop_sizes(table: pd.DataFrame, min_pixels: int, note: str) -> Figure:
     axis.legend(loc="best")
     share = float((sizes >= min_pixels).mean())
     caption = f"Sizes of the crops and the limit of {min_pixels:,} pixels (dashed): {note}."
-    alt = (
-        f"Histogram of crop sizes; {share:.0%} reach the limit, the median is {np.median(sizes):,.0f} pixels."
-    )
+    said = f"{share:.0%} reach the limit, the median is {np.median(sizes):,.0f} pixels"
+    alt = f"Histogram of crop sizes; {said}."
     return Figure(figure, caption, alt, pd.DataFrame({"pixels": sizes}))
+
+
+_DRAWN_PARTS = {
+    "COCO's body": (COCO_17, "#0072B2", "o", 4.5),
+    "more of the body, feet": (np.setdiff1d(BODY, COCO_17), "#D55E00", "s", 4),
+    "face": (FACE, "#009E73", "x", 1.8),
+    "hands": (HANDS, "#CC79A7", "^", 2.2),
+}
+_ARMS_DEG = {"shoulder_abduction": 25, "forearm_supination": 80, "index_spread": 12, "little_spread": -15}
+
+
+@in_style
+def layouts() -> Figure:
+    """Layouts of keypoints, as in the paper's Fig. 2, and a hand enlarged; the person faces the reader."""
+    pose = pose_from_joints(radians(_ARMS_DEG, "left_") | radians(_ARMS_DEG, "right_"))
+    points_m = pose_body(load_body(), "man_38_07", pose).keypoints_m[:, 1:]
+    figure, axes = new_figure(2, 3, 6.4, 7.2)
+    rows, made_of = [], read_json(DATA_DIR / "survey.json")["layouts"]
+    for axis, (name, conventions) in zip(axes.flat, made_of.items(), strict=False):
+        given = np.concatenate([TO_HALPE[convention] for convention in conventions])
+        rows.append((name.replace("\n", " "), len(given), int((given >= 0).sum())))
+        _draw_layout(axis, points_m, given, f"{name}, {len(given)}")
+    _draw_layout(axes.flat[-1], points_m, LEFT_HAND, "a left hand, the same\nof all that give it")
+    legend_below(figure, axes.flat[3], ncols=2)
+    table = pd.DataFrame(rows, columns=["layout", "points", "drawn"])
+    caption = (
+        "Layouts of keypoints, how many, and those of them that are among the 136 all are brought to here. "
+        "OpenPose's pupils are not, nor are MediaPipe's mouth, corners of the eyes and knuckles of the body."
+    )
+    said = series_text(table.set_index("layout")["points"], "{} {}")
+    return Figure(figure, caption, f"Five people with the points of a layout each: {said}.", table)
+
+
+def _draw_layout(axis, points_m: np.ndarray, given: np.ndarray, title: str) -> None:
+    for limb in (limb for limb in LIMBS if np.isin(limb, given).all()):
+        axis.plot(*points_m[list(limb)].T, color="#BBBBBB", lw=1, zorder=1)
+    for part, (indices, colour, marker, size) in _DRAWN_PARTS.items():
+        shown_m = points_m[np.intersect1d(indices, given)]
+        axis.plot(*shown_m.T, marker, color=colour, markersize=size, label=part)
+    axis.set_title(title, loc="center", fontsize=9)
+    axis.set_aspect("equal")
+    axis.axis("off")

@@ -19,9 +19,7 @@ _LABELS = {
     "resolution": "height of the picture [px]",
     "upper part": "share of the height seen, from above",
     "lower part": "share of the height seen, from below",
-    "share of keypoints in the picture": "share of keypoints in the picture",
     "picture": "size of the picture [px, square root of its area]",
-    "share of keypoints hidden": "share of keypoints hidden",
     "distance to the border": "distance to the border [of the shorter side]",
     "brightness": "mean brightness [of 255]",
 }
@@ -78,11 +76,7 @@ def dose_curves(table: pd.DataFrame, group: str) -> Figure:
             axis.set_xscale("log")
             axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
-    caption = (
-        "Detection against dose, one thing varied and the rest fixed: average precision (solid) and the "
-        "share of visible keypoints hit (dotted), with 95 % bootstrap intervals over people. Rendered "
-        "people."
-    )
+    caption = "AP (solid) and visible keypoints hit (dotted), with 95 % intervals over rendered people."
     lows = rows[rows["measure"] == "AP"].groupby(["detector", "dose"], sort=False)["value"].min()
     said = series_text(lows, "{0} {2:.2f} for {1}")
     return Figure(figure, caption, f"Curves per dose. Lowest average precision: {said}.", table)
@@ -96,10 +90,7 @@ def observed_curves(table: pd.DataFrame, note: str) -> Figure:
     labels = {subset: f", {subset}" for subset in subsets}
     figure, axes = _dose_panels(table, "subset", styles, labels, "share of hits")
     marks.legend_below(figure, axes[0, 0], ncols=3)
-    caption = (
-        "Share of labelled body keypoints hit, by fifths of what the data set happens to hold of each "
-        f"dose, with 95 % bootstrap intervals over source images: {note}."
-    )
+    caption = f"Share of body keypoints hit by fifths of each dose; 95 % intervals over images: {note}."
     spread = table.groupby(["detector", "dose"], sort=False)["value"].agg(np.ptp)
     said = series_text(spread, "{0} {2:.2f} for {1}")
     return Figure(figure, caption, f"Curves per dose. Range of the hit rate: {said}.", table)
@@ -134,18 +125,9 @@ def flicker_rates(table: pd.DataFrame, note: str) -> Figure:
     figure, axes = new_figure(1, len(measures), 9.0, 1.3 + 0.55 * len(detectors), sharey=True)
     cases = {case: rows.set_index("detector") for case, rows in table.groupby(["tracks", "measure"])}
     for axis, measure in zip(axes, measures, strict=True):
-        for k, tracks in ((1, "as detected"), (0, "filtered")):
-            for y, detector in enumerate(detectors):
-                case, colour = cases[tracks, measure].loc[[detector]], detector_colour(detector)
-                fill = colour if tracks == "as detected" else "white"
-                pen = {
-                    "xerr": marks.whiskers(case),
-                    "fmt": detector_marker(detector),
-                    "color": colour,
-                    "mfc": fill,
-                    "capsize": 2,
-                }
-                axis.errorbar(case["value"], y + marks.offset(k, 2, 0.26), **pen)
+        for y, (name, pen) in enumerate(marks.detector_dots(detectors).items()):
+            marks.dots(axis, cases["as detected", measure].loc[[name]], y + 0.13, **pen)
+            marks.dots(axis, cases["filtered", measure].loc[[name]], y - 0.13, **pen | {"mfc": "white"})
         axis.set(xlabel=measure, xlim=(0, None), ylim=(-0.5, len(detectors) - 0.5))
     axes[0].set(yticks=range(len(detectors)), yticklabels=list(map(in_lines, detectors)))
     lag_ms = 1000 * cases["filtered", "latency [s]"]["value"]

@@ -42,13 +42,9 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
         ticks = np.arange(start, 1.01, 0.2)
         row[0].set(xlim=(start, 1.02), ylim=(start, 1.02), xticks=ticks, yticks=ticks)
     detectors = table["detector"].unique()
-    colours = marks.detector_lines(axes[0, 0], detectors)
-    names = [f"OKS {name}" for name in THRESHOLD_MARKERS]
-    shapes = marks.legend_lines(
-        axes[0, 0], names, ({"marker": m, "ls": ""} for m in THRESHOLD_MARKERS.values())
-    )
-    places = {"loc": "outside lower center", "fontsize": 9}
-    figure.legend(handles=[*colours, *shapes], ncols=_legend_columns(detectors), **places)
+    shapes = {f"OKS {name}": {"marker": marker, "ls": ""} for name, marker in THRESHOLD_MARKERS.items()}
+    marks.add_keys(axes[0, 0], detectors, shapes)
+    marks.legend_below(figure, axes[0, 0], ncols=_legend_columns(detectors))
     caption = (
         f"Average precision against average recall per detector, on {data_note}. The shape is the OKS "
         "threshold (square .5, circle .75, triangle the mean over .5:.05:.95), as in Fig. 4 of the paper; "
@@ -95,9 +91,8 @@ def _scatter_detector(axis, rows: pd.DataFrame, detector: str) -> None:
 def _describe_best(table: pd.DataFrame) -> str:
     rows = table[(table["metric"] == "AP") & table["value"].notna()]
     best = rows.loc[rows.groupby(["subset", "group"], sort=False)["value"].idxmax()]
-    said = series_text(
-        best.set_index(["detector", "subset", "group"])["value"], "{0} with {3:.2f} on {1} {2}"
-    )
+    values = best.set_index(["detector", "subset", "group"])["value"]
+    said = series_text(values, "{0} with {3:.2f} on {1} {2}")
     return f"Scatter of average precision against average recall. Highest average precision: {said}."
 
 
@@ -112,10 +107,7 @@ def loss_without_head(table: pd.DataFrame, data_note: str) -> Figure:
     drops = rows.pivot_table(index=["detector", "group"], columns="subset", values="value", sort=False)
     change = drops.get("headless", np.nan) - drops.get("basic", np.nan)
     said = series_text(change.dropna(), "{} {} {:+.2f}")
-    caption = (
-        "What removing the head costs: average precision on Basic (filled) and Headless (open) for each "
-        f"detector, with 95 % bootstrap intervals, on {data_note}."
-    )
+    caption = f"Average precision on Basic (filled) and Headless (open), 95 % intervals, on {data_note}."
     alt = f"Average precision with and without the head. Change per detector: {said}."
     return Figure(figure, caption, alt, rows)
 
@@ -155,20 +147,19 @@ def _with_and_without(rows: pd.DataFrame, labels: dict[str, str], across: str):
     for axis, part, group, what in marks.facets(axes, rows, "group", across):
         for detector, pair in part.dropna(subset="value").groupby("detector", sort=False):
             y = names[group].index(detector) + 0.24 * (pair["subset"].map(_SUBSETS).fillna(0.5) - 0.5)
-            pen = {"color": detector_colour(detector), "markersize": 7}
-            axis.plot(pair["value"], y, "-", lw=3, alpha=0.45, **pen)
-            for (_, row), height in zip(pair.iterrows(), y, strict=True):
-                fill = "white" if row["subset"] == "headless" else pen["color"]
-                reach = marks.whiskers(row.to_frame().T)
-                axis.errorbar(row["value"], height, xerr=reach, fmt="o", mfc=fill, elinewidth=0.9, **pen)
+            colour = detector_colour(detector)
+            axis.plot(pair["value"], y, "-", lw=3, alpha=0.45, color=colour)
+            for subset, one in pair.groupby("subset"):
+                fill = "white" if subset == "headless" else colour
+                marks.dots(axis, one, y[one.index], color=colour, mfc=fill, ms=7, capsize=0)
         marks.name_rows(axis, names[group])
         axis.set(xlim=(-0.03, 1.03), xlabel=labels[what])
         axis.label_outer()
     for axis, group in zip(axes[:, 0], groups, strict=True):
         axis.set_title(GROUP_TITLES.get(group, group))
-    styles = [{"marker": "o", "ls": "", "mfc": fill} for fill in (None, "white")]
-    handles = marks.legend_lines(axes[0, 0], ["Basic", "Headless"], styles)
-    figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=9)
+    fills = {"Basic": {}, "Headless": {"mfc": "white"}}
+    marks.add_keys(axes[0, 0], (), {name: {"marker": "o", "ls": ""} | fill for name, fill in fills.items()})
+    marks.legend_below(figure, axes[0, 0], ncols=2)
     return figure
 
 
@@ -189,10 +180,7 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
             medians.append(f"{detector} {np.median(oks):.2f} ({subset} {group})")
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
     marks.legend_below(figure, axes, ncols=_legend_columns(table["detector"].unique()))
-    caption = (
-        f"Share of annotated people whose best-fitting detection reaches a given OKS, on {data_note}; "
-        "a person nobody found counts with OKS 0."
-    )
+    caption = f"Share of people whose best detection reaches an OKS, 0 where there is none, on {data_note}."
     return Figure(figure, caption, f"Curves per detector. Median OKS: {in_words(medians)}.", table)
 
 
@@ -219,8 +207,9 @@ def examples(folders, truth, found, n_people: int, note: str) -> Figure:
             read_image(Path(folder) / "images" / truth[subset].images[i].file_name),
             {name: found[subset, name].get(i, Detections.none()) for name in detectors},
         )
-        for i in shared[:n_people]
+        for i in (shared or list(truth["basic"].images))[:n_people]
         for subset, folder in folders.items()
+        if i in truth[subset].images
     }
     return detections_grid(pictures, min_score=0.3, note=f"Data: {note}.")
 
@@ -236,7 +225,5 @@ def time_per_image(table: pd.DataFrame, machine_note: str) -> Figure:
     axis.set(xlabel="time per image [ms]", xlim=(0, None))
     pairs = zip(detectors, samples, strict=True)
     medians = [f"{name} {np.median(times):.0f} ms" for name, times in pairs if len(times)]
-    caption = (
-        f"Time to detect people in one image, {machine_note}: box 25–75 %, whiskers 5–95 %, line the median."
-    )
+    caption = f"Time per image, {machine_note}: box 25–75 %, whiskers 5–95 %, line the median."
     return Figure(figure, caption, f"Box plot of detection times; medians: {in_words(medians)}.", table)

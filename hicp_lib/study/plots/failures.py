@@ -11,18 +11,16 @@ from hicp_lib.datasets.visibility import CLASSES, MIN_PEOPLE
 from hicp_lib.evaluation.failures.error_kinds import KINDS
 from hicp_lib.evaluation.failures.placed_keypoints import STATES
 from hicp_lib.formats.annotations import Annotations
+from hicp_lib.inspection.skeletons import draw_rings
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.evaluation import GROUP_TITLES
-from hicp_lib.study.plots.palette import detector_colour, detector_marker
-from hicp_lib.study.plots.people import draw_detections, draw_rings, draw_truth, picture_grid
+from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
 from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
 
 _TRUTH_COLOUR = "#39D353"
 _ONE_CROP = ["subset", "image_id", "annotation_id"]
-_WORST = (
-    "The worst cases, by rule: the surest mistakes, and people whom no detection fits although much of them "
-    "is visible"
-)
+_WORST = "The worst cases: the surest mistakes, and people in sight whom no detection fits"
 _KIND_COLOURS = ("#1B9E4B", "#9BD3A0", "#0072B2", "#CC79A7", "#D5272D", "#BDBDBD", "#5F5F5F")
 _KIND_STYLES = {kind: {"color": colour} for kind, colour in zip(KINDS, _KIND_COLOURS, strict=True)}
 _STATE_STYLES = dict(zip(STATES, (("-", "o"), ("--", "s"), (":", "^"), (":", "x")), strict=True))
@@ -68,25 +66,21 @@ def class_precision(table: pd.DataFrame, note: str) -> Figure:
     groups, detectors = (list(rows[name].unique()) for name in ("group", "detector"))
     names = [name for name in CLASSES if name in set(rows["class"])]
     size = 4.8 * len(groups) + 1, 1.3 + (0.1 + 0.16 * len(detectors)) * len(names)
-    step = 0.8 / len(detectors)
     figure, axes = new_figure(1, len(groups), *size, sharey=True, squeeze=False)
-    for axis, group in zip(axes[0], groups, strict=True):
-        of_group = rows[rows["group"] == group]
-        for (detector, metric), part in of_group.groupby(["detector", "metric"], sort=False):
-            below = marks.offset(detectors.index(detector), len(detectors), step) + 0.4 * step * (
-                metric == "AR"
-            )
-            y = part["class"].map(names.index) + below
-            _dots(axis, part, y, detector, filled=metric == "AP", label=f"{detector}, {metric}")
+    pens = {
+        f"{name}, {metric}": pen | fill | {"label": f"{name}, {metric}"}
+        for name, pen in marks.detector_dots(detectors).items()
+        for metric, fill in (("AP", {}), ("AR", {"mfc": "white"}))
+    }
+    cases = rows.assign(case=rows["detector"] + ", " + rows["metric"])
+    for axis, of_group, group in marks.facets(axes, cases, "group"):
+        marks.dots_in_rows(axis, of_group, "class", "case", names, pens)
         _say_too_few(axis, names, set(of_group.loc[of_group["value"].isna(), "class"]))
         axis.set(xlabel="AP (filled), AR (open)", xlim=(-0.02, 1.02), title=GROUP_TITLES.get(group, group))
     counts = rows[rows["group"] == groups[0]].drop_duplicates("class").set_index("class")["n_people"]
     marks.name_rows(axes[0, 0], [f"{name} ({counts.get(name, 0)})" for name in names])
     marks.legend_below(figure, axes, ncols=2)
-    caption = (
-        "Average precision and recall (OKS .5:.95) by what the picture shows, with the number of people "
-        f"whose body counts; all subsets together; 95 % bootstrap intervals over source images: {note}."
-    )
+    caption = f"AP, AR by what is seen (people in brackets), all subsets, 95 % intervals over images: {note}."
     best = rows.query("group == 'body' and metric == 'AP'").dropna(subset="value")
     best = best.sort_values("value", ascending=False).groupby("class").head(1)
     said = series_text(best.set_index(["detector", "class"])["value"], "{0} {2:.2f} for {1}")
@@ -100,21 +94,6 @@ def _say_too_few(axis, names: list[str], few: set[str]) -> None:
     for y, name in enumerate(names):
         if name in few:
             axis.text(0.02, y, "too few to judge", va="center", fontsize=8, color="#666666", bbox=behind)
-
-
-def _dots(axis, rows: pd.DataFrame, y, detector: str, filled: bool = True, label: str = "") -> None:
-    colour = detector_colour(detector)
-    pen = {"color": colour, "mfc": colour if filled else "white", "label": label or detector}
-    value = rows["value"].astype(float)
-    axis.errorbar(value, y, xerr=marks.whiskers(rows), fmt=detector_marker(detector), capsize=2, ms=5, **pen)
-
-
-def _dots_in_rows(axis, table: pd.DataFrame, names: list[str], detectors: list[str]) -> None:
-    """Each detector's dots in the rows of a chart, beside each other."""
-    for k, detector in enumerate(detectors):
-        part = table[table["detector"] == detector]
-        beside = marks.offset(k, len(detectors), 0.8 / len(detectors))
-        _dots(axis, part, part["row"].map(names.index) + beside, detector)
 
 
 def _detector_panels(table: pd.DataFrame, width_in: float, height_in: float, **shared):
@@ -151,10 +130,7 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
     marks.legend_below(figure, axes)
     worst = table[(table["kind"] == "miss") & table["share"].notna()]
     said = series_text(worst.set_index(["detector", by])["share"], "{0} {2:.2f} on {1}")
-    caption = (
-        "What becomes of labelled keypoints, by the kinds of error of Ronchi and Perona, and those that "
-        f"are not given or belong to people who are not found: {note}."
-    )
+    caption = f"What becomes of labelled keypoints, by the kinds of error of Ronchi and Perona: {note}."
     return Figure(figure, caption, f"Stacked bars per {by}. Shares of misses: {said}.", table)
 
 
@@ -163,16 +139,14 @@ def head_change(table: pd.DataFrame, note: str) -> Figure:
     """Change of the hit rate of each keypoint when the head is cut off; from `change_per_keypoint`."""
     names, detectors = (list(table[name].unique()) for name in ("keypoint", "detector"))
     figure, axis = new_figure(1, 1, 7.5, 1.2 + (0.1 + 0.1 * len(detectors)) * len(names))
-    _dots_in_rows(axis, table.rename(columns={"change": "value", "keypoint": "row"}), names, detectors)
+    pens, change = marks.detector_dots(detectors), ("change", "low", "high")
+    marks.dots_in_rows(axis, table, "keypoint", "detector", names, pens, bounds=change)
     axis.axvline(0, color="#444444", lw=1)
     marks.name_rows(axis, [name.replace("_", " ") for name in names])
     axis.set(xlabel="change of the share of keypoints hit, without the head")
     marks.legend_below(figure, axis, ncols=2)
     said = series_text(table.groupby("detector", sort=False)["change"].mean(), "{} {:+.2f}")
-    caption = (
-        "Without the head: change of the share of keypoints hit, on the same keypoints of the same people, "
-        f"with 95 % bootstrap intervals over source images: {note}."
-    )
+    caption = f"Share of hits without the head less that with it, 95 % intervals over source images: {note}."
     return Figure(figure, caption, f"Dots per keypoint and detector. Mean change: {said}.", table)
 
 
@@ -190,10 +164,7 @@ def hallucinated_heads(table: pd.DataFrame, note: str) -> Figure:
     figure.colorbar(dots, ax=axes, label="score", shrink=0.8)
     marks.legend_below(figure, axes)
     said = series_text((table["below"] < 0).groupby(table["detector"], sort=False).mean())
-    caption = (
-        "Noses, eyes and ears given in pictures whose head was cut off (square: the picture, turned so "
-        f"that the cut is above), coloured by score: {note}."
-    )
+    caption = f"Noses, eyes, ears given where the head was cut off (square: the picture, cut above): {note}."
     return Figure(figure, caption, f"Scatter of places. Share put beyond the cut: {said}.", table)
 
 
@@ -206,17 +177,16 @@ def false_presence(table: pd.DataFrame, note: str) -> Figure:
     names, detectors, decisions = (list(rows[name].unique()) for name in ("row", "detector", "decision"))
     size = 4.4 * max(len(decisions), 1) + 1, 1.5 + (0.1 + 0.13 * len(detectors)) * len(names)
     figure, axes = new_figure(1, max(len(decisions), 1), *size, sharey=True, squeeze=False)
-    for axis, of_panel, _, decision in marks.facets(axes, rows.assign(one=0), "one", "decision"):
-        _dots_in_rows(axis, of_panel, names, detectors)
+    for axis, of_panel, decision in marks.facets(axes, rows, "decision"):
+        marks.dots_in_rows(axis, of_panel, "row", "detector", names, marks.detector_dots(detectors))
         axis.set(xlim=(-0.02, 1.02), xlabel="share that is given all the same", title=decision)
     marks.name_rows(axes[0, 0], names)
     marks.legend_below(figure, axes, ncols=2)
     heads = rows[(rows["part"] == "head") & (rows["subset"] == "headless")]
     said = series_text(heads.set_index(["detector", "decision"])["value"], "{0} {2:.2f} ({1})")
     caption = (
-        "Parts of people that are outside the picture (their number in brackets): the share that a detector "
-        "gives inside it, by what counts as given, with 95 % bootstrap intervals over source images; a head "
-        f"is given when one of its five keypoints is: {note}."
+        "Share of parts outside the picture (how many: in brackets) that are given inside it, by what counts "
+        f"as given, with 95 % intervals over source images; a head by any of its five keypoints: {note}."
     )
     return Figure(figure, caption, f"Dots per part and detector. Heads that were cut off: {said}.", table)
 
@@ -239,9 +209,8 @@ def scores_by_state(table: pd.DataFrame, note: str) -> Figure:
     top = table[table["state"] == "outside"].groupby("detector", sort=False).tail(1)
     said = series_text(top.set_index(["detector", "score"])["value"], "{0} {2:.2f} at {1:.2f}")
     caption = (
-        "What a score is worth by where the keypoint truly is: share of hits per fifth of the score, for "
-        "keypoints that are visible, hidden, and outside the picture, with 95 % bootstrap intervals over "
-        f"source images: {note}."
+        "Share of hits per fifth of the score, for keypoints visible, hidden and outside the picture, with "
+        f"95 % bootstrap intervals over source images: {note}."
     )
     alt = f"Curves of hits against score. Highest scores outside the picture: {said}."
     return Figure(figure, caption, alt, table)

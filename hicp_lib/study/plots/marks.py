@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hicp_lib.study.plots.palette import detector_colour
+from hicp_lib.study.plots.palette import detector_colour, detector_marker
 from hicp_lib.study.plots.style import in_lines
 
+_BOUNDS = ("value", "low", "high")
 _NO_DETECTOR = "#444444"  # what stands in a legend for all detectors
 
 
@@ -32,55 +33,43 @@ def legend_below(figure, axes, ncols: int = 4, fontsize: float = 9) -> None:
     figure.legend(found.values(), found, loc="outside lower center", ncols=ncols, fontsize=fontsize)
 
 
-def legend_lines(axis, names: Iterable[str], styles: Iterable[dict[str, Any]]) -> list:
-    """Lines without points, for a legend: one for each name in its style.
+def add_keys(axis, detectors: Iterable[str], others: Mapping[str, dict[str, Any]]) -> None:
+    """Lines without points, for a legend: broad ones in the detectors' colours, then others.
 
     Parameters
     ----------
     axis : matplotlib.axes.Axes
         Takes the lines.
-    names : iterable of str
-    styles : iterable of dict
-        Options of `Axes.plot`, one of them for each name.
-
-    Returns
-    -------
-    list of matplotlib.lines.Line2D
+    detectors : iterable of str
+    others : mapping of str to dict
+        Options of `Axes.plot` by what they stand for.
     """
-    pairs = zip(names, styles, strict=True)
-    return [axis.plot([], [], **{"color": _NO_DETECTOR, "label": name} | style)[0] for name, style in pairs]
+    colours = {name: {"lw": 4, "color": detector_colour(name)} for name in detectors}
+    for name, style in (colours | dict(others)).items():
+        axis.plot([], [], **{"color": _NO_DETECTOR, "label": name} | style)
 
 
-def detector_lines(axis, detectors: Sequence[str]) -> list:
-    """Broad lines in the detectors' colours, for a legend."""
-    return legend_lines(
-        axis, map(in_lines, detectors), ({"lw": 4, "color": detector_colour(name)} for name in detectors)
-    )
-
-
-def facets(axes, table: pd.DataFrame, down: str, across: str) -> Iterator[tuple[Any, pd.DataFrame, Any, Any]]:
-    """Each axis with its rows of a table: a row of axes per value of a column, a column per value of another.
+def facets(axes, table: pd.DataFrame, *by: str) -> Iterator[tuple]:
+    """Each axis with its rows of a table, which may be none, and the values they have in some columns.
 
     Parameters
     ----------
-    axes : array of matplotlib.axes.Axes, shape (n_down, n_across)
+    axes : array of matplotlib.axes.Axes
+        One for each combination of values.
     table : pd.DataFrame
-    down, across : str
-        Columns of the table; their values in the order they come in.
+    *by : str
+        Columns of the table; their values in the order they come in, those of the last one first.
 
     Yields
     ------
     matplotlib.axes.Axes
     pd.DataFrame
-        Its rows of the table, which may be none.
     object
-        The value of `down`.
-    object
-        The value of `across`.
+        The value of each column.
     """
-    cases = itertools.product(table[down].unique(), table[across].unique())
-    for axis, (row, column) in zip(np.ravel(axes), cases, strict=True):
-        yield axis, table[(table[down] == row) & (table[across] == column)], row, column
+    cases = itertools.product(*(table[name].unique() for name in by))
+    for axis, case in zip(np.ravel(axes), cases, strict=True):
+        yield axis, table[(table[list(by)] == list(case)).all(axis=1)], *case
 
 
 def name_rows(axis, labels: Sequence[str]) -> None:
@@ -130,6 +119,58 @@ def whiskers(rows: pd.DataFrame, value: str = "value", low: str = "low", high: s
     """
     below, above = rows[value] - rows[low], rows[high] - rows[value]
     return np.maximum([below.to_numpy(float), above.to_numpy(float)], 0)
+
+
+def dots(axis, rows: pd.DataFrame, y, bounds: Sequence[str] = _BOUNDS, factor: float = 1, **pen: Any) -> None:
+    """Dots with their intervals lying.
+
+    Parameters
+    ----------
+    axis : matplotlib.axes.Axes
+    rows : pd.DataFrame
+    y : float or array of float, shape (n_rows,)
+        How high they stand.
+    bounds : sequence of str
+        Columns of the values and of their intervals' ends.
+    factor : float
+        Multiplies the numbers, to bring them to another unit.
+    **pen : dict
+        Options of `Axes.errorbar`.
+    """
+    values, reach = factor * rows[bounds[0]].astype(float), factor * whiskers(rows, *bounds)
+    axis.errorbar(values, y, xerr=reach, **{"fmt": "o", "capsize": 2, "ms": 5} | pen)
+
+
+def detector_dots(detectors: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Colour, marker and label of each detector's `dots`."""
+    return {
+        name: {"color": detector_colour(name), "fmt": detector_marker(name), "label": name}
+        for name in detectors
+    }
+
+
+def dots_in_rows(
+    axis, table: pd.DataFrame, down: str, beside: str, names: list, pens: Mapping[str, dict], **shared: Any
+) -> None:
+    """Dots in rows by one column, beside each other by another.
+
+    Parameters
+    ----------
+    axis : matplotlib.axes.Axes
+    table : pd.DataFrame
+    down, beside : str
+        The columns.
+    names : list
+        The values of `down`, the first on top.
+    pens : mapping of str to dict
+        Options of `dots` by the value of `beside`.
+    **shared : dict
+        Options of all `dots`.
+    """
+    for k, (case, pen) in enumerate(pens.items()):
+        part = table[table[beside] == case]
+        y = np.array([names.index(name) for name in part[down]]) + offset(k, len(pens), 0.8 / len(pens))
+        dots(axis, part, y, **pen | shared)
 
 
 def stacked_bars(axis, lengths: pd.DataFrame, styles: Mapping[str, dict[str, Any]]) -> None:

@@ -1,12 +1,13 @@
-"""Figures of the test against motion capture: distributions and trajectories.
+"""Figures of the test against motion capture: distributions, trajectories, the budget of the errors.
 
-Tables are those of `hicp_lib.evaluation.space.mocap_error`. A detector called `palette.PERFECT` among them
-is the floor: what the true keypoints in the image come to.
+Tables are those of `hicp_lib.evaluation.space.mocap_error` and `hicp_lib.evaluation.space.error_budget`. A
+detector called `palette.PERFECT` among them is the floor: what the true keypoints in the image come to.
 """
 
 import numpy as np
 import pandas as pd
 
+from hicp_lib.evaluation.space.error_budget import AGAINST_MOCAP, TOTALS
 from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import PERFECT, TRUTH_COLOUR, detector_colour
@@ -58,9 +59,8 @@ def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: fl
         axis.set(xticks=_BOX_CM, xticklabels=map(str, _BOX_CM))
         marks.name_rows(axis, labels)
         axis.label_outer()
-    medians_cm = (
-        100 * found[found["keypoint"].isin(joints)].groupby(_LINE[:2], sort=False)["error_m"].median()
-    )
+    shown = found[found["keypoint"].isin(joints)]
+    medians_cm = 100 * shown.groupby(_LINE[:2], sort=False)["error_m"].median()
     said = series_text(medians_cm, "{}, {} lifting, {:.1f} cm")
     caption = (
         f"Distance of lifted joints (score above {min_score:g}) from the mean of their two markers: box "
@@ -91,10 +91,6 @@ def _joint_axes(joints: list[str], width_in: float, height_in: float):
 
 def _spaced(name: str) -> str:
     return name.replace("_", " ")
-
-
-def _lifting(table: pd.DataFrame) -> str:
-    return f"{in_words(dict.fromkeys(table['method']))} lifting"
 
 
 @in_style
@@ -139,9 +135,59 @@ def trajectories(
         f"The {name} over time in the robot's base frame: motion capture (line, interrupted where a marker "
         f"was missing) and lifted keypoints with a score above {min_score:g}; points more than "
         f"{100 * _OUT_OF_RANGE_M:.0f} cm beyond the line's range are not shown{_floor(errors)}: "
-        f"{_lifting(errors)}, {note}."
+        f"{in_words(dict.fromkeys(errors['method']))} lifting, {note}."
     )
     counts = found[found["error_m"].notna()].groupby("detector", sort=False).size()
     alt = f"Three curves over time. The {name} was found by {series_text(counts, '{} in {} frames')}."
     columns = ["detector", "frame", *_AXES, *(f"reference_{c}" for c in _AXES), "score", "error_m"]
     return Figure(figure, caption, alt, errors[columns])
+
+
+_COLOURS = {"paper": "#D55E00", "robust": "#0072B2"}
+_HOLLOW = {"fmt": "D", "mfc": "white"}
+_TOTALS_APART = 0.5  # rows
+
+
+@in_style
+def error_budget(table: pd.DataFrame, paper: pd.DataFrame, note: str) -> Figure:
+    """A panel per part, a row per source: its error alone (filled), and what is gained without it (hollow).
+
+    Parameters
+    ----------
+    table : pd.DataFrame
+        As from `hicp_lib.evaluation.space.error_budget.error_budget`, one view.
+    paper : pd.DataFrame
+        The paper's medians against motion capture, columns `detector, keypoint, median_m`.
+    note : str
+        What the data are, for the caption.
+    """
+    parts, sources, methods = (list(table[name].unique()) for name in ("part", "source", "method"))
+    figure, axes = new_figure(1, len(parts), 11.5, 5.0, sharey=True, squeeze=False)
+    rows = {source: k + _TOTALS_APART * (source not in TOTALS) for k, source in enumerate(sources)}
+    for axis, part in zip(axes[0], parts, strict=True):
+        for (method, kind), of in table[table["part"] == part].groupby(["method", "kind"], sort=False):
+            y = of["source"].map(rows) + marks.offset(methods.index(method), len(methods), 0.3)
+            is_gain, bounds = kind == "gain", ("value_m", "low_m", "high_m")
+            label = f"{method} lifting, {'gained without' if is_gain else 'alone'}"
+            pen = {"color": _COLOURS[method], "label": label} | (_HOLLOW if is_gain else {})
+            marks.dots(axis, of, y, bounds, 100, **pen)
+        if AGAINST_MOCAP in rows:
+            theirs_cm = 100 * paper.loc[paper["keypoint"].str.endswith(part), "median_m"]
+            y = [rows[AGAINST_MOCAP]] * len(theirs_cm)
+            axis.plot(theirs_cm, y, "|", color=TRUTH_COLOUR, markersize=13, label="the paper's medians")
+        axis.set(title=f"{part}s", xlabel="error, or gain [cm]")
+        axis.axvline(0, color="#888888", lw=0.8)
+    axes[0, 0].set(yticks=[*rows.values()], yticklabels=[*rows], ylim=(max(rows.values()) + 0.6, -0.6))
+    marks.legend_below(figure, axes, ncols=5)
+    named = in_words(paper["detector"].unique())
+    theirs = f", against motion capture beside the medians of the paper's {named}"
+    beside = theirs if AGAINST_MOCAP in rows else ""
+    caption = (
+        f"Error of keypoints by source, {table['n_people'].max()} people. Filled: all else true; hollow: "
+        "what the error with everything falls by when this alone is true. Median of a person's keypoints, "
+        f"mean over people with 95 % intervals; on top errors by many sources{beside}: {note}."
+    )
+    first = table[table["kind"] == "alone"].sort_values("value_m", ascending=False)
+    first = first.drop_duplicates(["part", "method"]).set_index(["part", "method", "source"])["value_m"]
+    said = series_text(100 * first, "{}s, {} lifting: {} with {:.1f} cm")
+    return Figure(figure, caption, f"Dots per part and source. Largest alone: {said}.", table)

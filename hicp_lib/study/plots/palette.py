@@ -59,7 +59,6 @@ def detector_marker(name: str) -> str:
 
 
 def _style(name: str) -> tuple[str, str]:
-    known = [
-        key for key in DETECTOR_STYLES if name.startswith(key) and name[len(key) : len(key) + 1] in "-:+"
-    ]
+    alike = [key for key in DETECTOR_STYLES if name.startswith(key)]
+    known = [key for key in alike if name[len(key) : len(key) + 1] in "-:+"]
     return DETECTOR_STYLES[max(known, key=len)] if known else (OTHER_COLOUR, _OTHER_MARKER)

@@ -48,10 +48,7 @@ def registration(
         if known
         else "the median error of a marker under the fit of the others"
     )
-    caption = (
-        "Registration of motion capture to the robot: markers clicked in images (circles), where each "
-        f"solution puts them (crosses), and {what}: {note}."
-    )
+    caption = f"Markers clicked (circles), where each solution puts them (crosses), and {what}: {note}."
     said = series_text(1000 * table.set_index("method")[column].dropna(), "{} {:.0f} mm")
     return Figure(figure, caption, f"Images with markers, and bars: {said}.", table)
 

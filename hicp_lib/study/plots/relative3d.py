@@ -8,11 +8,12 @@ import pandas as pd
 from matplotlib.ticker import LogLocator, NullLocator
 
 from hicp_lib.core.detections import Detections
+from hicp_lib.core.keypoints import HANDS, INDEX, LIMBS, N_KEYPOINTS
+from hicp_lib.inspection.skeletons import draw_rings
 from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
-from hicp_lib.study.plots.people import detections_grid, draw_rings
-from hicp_lib.study.plots.skeleton import BODY_LIMBS, HAND_LIMBS, limb_lines
+from hicp_lib.study.plots.people import detections_grid
 from hicp_lib.study.plots.style import Figure, in_style, new_figure, series_text
 from hicp_lib.study.table_format import intervals_over
 
@@ -131,27 +132,24 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
         for _, row in rows.groupby(["part", "detector"], sort=False):
             _draw_spread_and_bias(axis, row)
         axis.set(xscale="log", yscale="log", title=view, xlabel=_SPREAD)
-        for scale in (axis.xaxis, axis.yaxis):
-            _plain_ticks(scale)
+        for scale in (axis.xaxis, axis.yaxis):  # at 1, 2 and 5, written as plain numbers
+            scale.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            scale.set_major_formatter("{x:g}")
+            scale.set_minor_locator(NullLocator())
         axis.axline((1, 1), (2, 2), color="#888888", lw=1, ls="--")
     axes[0, 0].set(ylabel=_BIAS)
-    _part_legend(figure, axes[0, 0], table["detector"].unique())
+    shapes = {name: {"marker": marker, "ls": ""} for name, marker in _PART_MARKERS.items()}
+    sides = {"left": {"marker": "o", "ls": ""}, "right": {"marker": "o", "ls": "", "mfc": "white"}}
+    marks.add_keys(axes[0, 0], table["detector"].unique(), shapes | sides)
+    marks.legend_below(figure, axes[0, 0], ncols=5)
     worse = table.assign(mostly=np.where(table["bias_m"] > table["spread_m"], "bias", "spread"))
     counts = worse.groupby(["detector", "mostly"], sort=False).size()
     said = series_text(counts, "{0} {2} with more {1}")
     caption = (
-        "Stability against accuracy: median distance of the images to their median position, and how far "
-        "that position is from the true one; above the dashed line a keypoint is more off than unsteady. "
-        f"Whiskers: {intervals_over(table)}: {note}."
+        "Median distance of the images to their median position, and of that to the truth; above the dashed "
+        f"line a keypoint is more off than unsteady. Whiskers: {intervals_over(table)}: {note}."
     )
     return Figure(figure, caption, f"Scatter of spread and bias on logarithmic axes. Parts: {said}.", table)
-
-
-def _plain_ticks(axis) -> None:
-    """Ticks of a logarithmic axis at 1, 2 and 5, written as plain numbers."""
-    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_locator(NullLocator())
 
 
 def _draw_spread_and_bias(axis, row: pd.DataFrame) -> None:
@@ -159,17 +157,44 @@ def _draw_spread_and_bias(axis, row: pd.DataFrame) -> None:
     side, kind = row["part"].iloc[0].split()
     colour = detector_colour(row["detector"].iloc[0])
     x_cm, y_cm = 100 * row["spread_m"], 100 * row["bias_m"]
-    reach_cm = {
-        "xerr": 100 * marks.whiskers(row, "spread_m", "spread_m_low", "spread_m_high"),
-        "yerr": 100 * marks.whiskers(row, "bias_m", "bias_m_low", "bias_m_high"),
-    }
+    spread, bias = ((name, f"{name}_low", f"{name}_high") for name in ("spread_m", "bias_m"))
+    reach_cm = {"xerr": 100 * marks.whiskers(row, *spread), "yerr": 100 * marks.whiskers(row, *bias)}
     pen = {"color": colour, "mfc": colour if side == "left" else "white", "markersize": 8, "elinewidth": 0.7}
     axis.errorbar(x_cm, y_cm, fmt=_PART_MARKERS[kind], **reach_cm, **pen)
 
 
-def _part_legend(figure, axis, detectors: Sequence[str]) -> None:
-    colours = marks.detector_lines(axis, detectors)
-    shapes = [{"marker": marker, "ls": ""} for marker in _PART_MARKERS.values()]
-    sides = [{"marker": "o", "ls": ""}, {"marker": "o", "ls": "", "mfc": "white"}]
-    others = marks.legend_lines(axis, [*_PART_MARKERS, "left", "right"], [*shapes, *sides])
-    figure.legend(handles=[*colours, *others], loc="outside lower center", ncols=5, fontsize=9)
+BODY_LIMBS = [limb for limb in LIMBS if limb[0] not in HANDS]
+HAND_LIMBS = [limb for limb in LIMBS if limb[0] in HANDS]
+
+
+def limb_lines(
+    rows: pd.DataFrame, columns: Sequence[str], limbs: Sequence[tuple[int, int]] = LIMBS
+) -> np.ndarray:
+    """Limbs whose both ends are known, as one line that is interrupted by NaN.
+
+    Parameters
+    ----------
+    rows : pd.DataFrame
+        With `keypoint` (Halpe names) and coordinates; of a table with many frames, the first counts.
+    columns : sequence of str
+        The d coordinates.
+    limbs : sequence of (int, int)
+        Keypoints of Halpe-136 that are joined.
+
+    Returns
+    -------
+    array, shape (3 n, d)
+        Start, end and NaN of every limb.
+
+    Examples
+    --------
+    >>> elbow_and_wrist = pd.DataFrame({"keypoint": ["left_elbow", "left_wrist"], "x_m": [0.0, 0.3]})
+    >>> limb_lines(elbow_and_wrist, ["x_m"]).ravel().tolist()
+    [0.0, 0.3, nan]
+    """
+    points = np.full((N_KEYPOINTS, len(columns)), np.nan)
+    rows = rows.drop_duplicates("keypoint")
+    points[rows["keypoint"].map(INDEX)] = rows[list(columns)]
+    ends = points[np.array(limbs)]
+    ends = ends[np.isfinite(ends).all(axis=(1, 2))]
+    return np.concatenate([ends, np.full_like(ends[:, :1], np.nan)], axis=1).reshape(-1, len(columns))

@@ -16,7 +16,7 @@ from hicp_lib.evaluation.space.stability import POSITION
 from hicp_lib.recordings.recording import Recording, read_depth_m, read_rgb
 from hicp_lib.robot.shape import Shape
 from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
-from hicp_lib.study.plots.skeleton import limb_lines
+from hicp_lib.study.plots.relative3d import limb_lines
 from hicp_lib.study.plots.style import in_words
 
 VIEW_STYLES = (("#E377C2", "solid"), ("#17BECF", "dash"))  # of its cameras, and of its skeletons' lines

@@ -51,12 +51,22 @@ class Figure:
     table: pd.DataFrame | None = None
 
 
+_NOTHING = "Nothing to draw: these data have nobody and nothing that this figure is about."
+
+
 def in_style(draw: Callable[..., Figure]) -> Callable[..., Figure]:
-    """Decorator: run a drawing function in the report's style, leaving Matplotlib's settings as they were."""
+    """Decorator: run a drawing function in the report's style, leaving Matplotlib's settings as they were.
+
+    An empty table, list or mapping is not drawn: one sentence stands in the figure's place.
+    """
 
     @functools.wraps(draw)
     def styled(*args, **kwargs) -> Figure:
         with plt.rc_context(_RC):
+            if any(isinstance(given, pd.DataFrame | list | dict) and not len(given) for given in args):
+                figure = new_figure(1, 1, 6.0, 0.5, subplot_kw={"visible": False})[0]
+                figure.text(0.5, 0.5, _NOTHING, ha="center", va="center")
+                return Figure(figure, _NOTHING, _NOTHING)
             return draw(*args, **kwargs)
 
     return styled

@@ -74,7 +74,10 @@ def within_bars(table: pd.DataFrame, note: str) -> Figure:
         axis.set(title=view, ylabel="share of images", ylim=(0, 1.05))
         axis.set_xticks(range(len(parts)), parts)
         axis.grid(axis="x", visible=False)
-    _bar_legend(figure, axes[0, 0], detectors, limits_m)
+    fades = zip(limits_m, _FADES, strict=True)
+    shades = {f"within {100 * limit_m:g} cm": {"lw": 8, "alpha": fade} for limit_m, fade in fades}
+    marks.add_keys(axes[0, 0], detectors, shades | {"found at all": {"ls": ":"}})
+    marks.legend_below(figure, axes[0, 0])
     caption = (
         f"Share of images in which a keypoint was found within {_in_cm(limits_m)} of "
         f"{_REFERENCES[table['reference'].iloc[0]]} (a hand: mean over its 21 keypoints; lifting: "
@@ -92,16 +95,6 @@ def _draw_bars(axis, rows: pd.DataFrame, width: float, colour: str) -> None:
         axis.bar(level["x"], level["value"], width, color=colour, alpha=_FADES[rank])
         pen = {"fmt": "none", "ecolor": "black", "elinewidth": 0.8}
         axis.errorbar(level["x"], level["value"], marks.whiskers(level), **pen)
-
-
-def _bar_legend(figure, axis, detectors: Sequence[str], limits_m: Sequence[float]) -> None:
-    handles = [axis.bar([0], [0], color=detector_colour(name), label=name) for name in detectors]
-    handles += [
-        axis.bar([0], [0], color="#444444", alpha=fade, label=f"within {100 * limit_m:g} cm")
-        for limit_m, fade in zip(limits_m, _FADES, strict=True)
-    ]
-    handles.append(axis.bar([0], [0], fill=False, edgecolor="#444444", ls=":", label="found at all"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=9)
 
 
 def _in_cm(distances_m: Sequence[float]) -> str:

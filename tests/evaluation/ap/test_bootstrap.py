@@ -8,6 +8,7 @@ import pytest
 from hicp_lib.evaluation.ap import bootstrap, cocoeval
 from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals, difference, resample
 from hicp_lib.evaluation.ap.evaluate import evaluate
+from hicp_lib.evaluation.statistics.resampling import Draws
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -32,9 +33,9 @@ def test_a_draw_is_an_evaluation_of_the_images_drawn(scene, seed):
 
 def test_draws_together_are_the_draws_one_by_one(scene, monkeypatch):
     evaluation = evaluate(*scene(1))
-    (together,) = resample([evaluation], 25, seed=4)
+    (together,) = resample([evaluation], Draws(25, 4))
     monkeypatch.setattr(bootstrap, "_BLOCK", 1)
-    (alone,) = resample([evaluation], 25, seed=4)
+    (alone,) = resample([evaluation], Draws(25, 4))
     assert all(np.array_equal(together[metric], alone[metric]) for metric in together)
     assert len(set(together["AP"])) > 20
 
@@ -48,7 +49,7 @@ def found_or_not(annotated, detected, found: np.ndarray):
 
 def test_the_interval_of_a_share_is_the_binomials(annotated, detected):
     found = np.arange(400) % 10 < 7
-    figures = bootstrap_intervals(found_or_not(annotated, detected, found), seed=3)
+    figures = bootstrap_intervals(found_or_not(annotated, detected, found), Draws(seed=3))
     half_width = 1.96 * np.sqrt(0.7 * 0.3 / 400)
     assert figures["AR"] == pytest.approx((0.7, 0.7 - half_width, 0.7 + half_width), abs=0.01)
     assert figures["AR"][0] == 0.7
@@ -59,7 +60,7 @@ def test_images_of_a_cluster_are_drawn_together(annotated, detected):
     found = np.repeat(np.arange(40) % 10 < 7, 10)
     evaluation = found_or_not(annotated, detected, found)
     alone, together = (
-        bootstrap_intervals(evaluation, seed=3, clusters=clusters)["AR"]
+        bootstrap_intervals(evaluation, Draws(seed=3), clusters)["AR"]
         for clusters in (None, {i: i // 10 for i in range(400)})
     )
     # Ten equal images say no more than one: the interval is that of 40, wider by sqrt(10).
@@ -69,7 +70,7 @@ def test_images_of_a_cluster_are_drawn_together(annotated, detected):
 
 def test_a_detector_does_not_differ_from_itself(scene):
     evaluation = evaluate(*scene(0))
-    figures = difference(evaluation, evaluation, *resample([evaluation] * 2, 50, seed=0))
+    figures = difference(evaluation, evaluation, *resample([evaluation] * 2, Draws(50)))
     assert set(figures.values()) == {(0, 0, 0)}
 
 
@@ -77,7 +78,7 @@ def test_pairing_takes_the_images_share_out_of_a_difference(annotated, detected)
     found = np.arange(300) % 2 == 0
     all_but_ten = found & (np.arange(300) >= 20)
     a, b = (found_or_not(annotated, detected, f) for f in (found, all_but_ten))
-    value, low, high = difference(a, b, *resample([a, b], 1000, seed=1))["AR"]
+    value, low, high = difference(a, b, *resample([a, b], Draws(seed=1)))["AR"]
     assert value == pytest.approx(10 / 300)
     # A share of 10 in 300, not the difference of two independent halves (half width .08).
     assert low > 0.01 and high < 0.06
@@ -90,7 +91,7 @@ def test_subsets_are_paired_by_image_id(annotated, detected, monkeypatch):
     later = {name: getattr(a.matches, name)[10:] for name in ("image_ids", "n_people")}
     none = {name: getattr(a.matches, name)[..., :0] for name in ("image_rows", "is_true", "is_false")}
     b = replace(a, matches=replace(a.matches, **later, **none))
-    of_a, of_b = resample([a, b], 40, seed=0, clusters={i: i < 10 for i in range(30)})
+    of_a, of_b = resample([a, b], Draws(40), clusters={i: i < 10 for i in range(30)})
     assert set(of_a["AR"].round(3)) == {0, 0.333, 1}
     nobody = np.isnan(of_b["AR"])
     assert np.array_equal(nobody, of_a["AR"].round(3) == 1) and (of_b["AR"][~nobody] == 0).all()
@@ -98,21 +99,21 @@ def test_subsets_are_paired_by_image_id(annotated, detected, monkeypatch):
 
 def test_a_handful_of_images_has_figures_and_no_interval(annotated, detected):
     for n, has_interval in ((9, False), (10, True)):
-        figures = bootstrap_intervals(found_or_not(annotated, detected, np.arange(n) % 2 == 0), 20)
+        figures = bootstrap_intervals(found_or_not(annotated, detected, np.arange(n) % 2 == 0), Draws(20))
         finite = np.isfinite(np.array(list(figures.values())))
         assert finite.tolist() == [[True, has_interval, has_interval]] * 6
 
 
 def test_the_seed_decides(scene):
     evaluation = evaluate(*scene(2))
-    first, again, other = (bootstrap_intervals(evaluation, 100, seed=seed) for seed in (7, 7, 8))
+    first, again, other = (bootstrap_intervals(evaluation, Draws(100, seed)) for seed in (7, 7, 8))
     assert first == again and first != other
 
 
 def test_nobody_there_gives_no_interval(annotated):
     nobody = evaluate(annotated(np.zeros((0, 136, 2)), [], n_images=3), {})
-    assert np.isnan(list(bootstrap_intervals(nobody, 10).values())).all()
+    assert np.isnan(list(bootstrap_intervals(nobody, Draws(10)).values())).all()
     no_images = replace(
         nobody, matches=replace(nobody.matches, image_ids=np.zeros(0, int), n_people=np.zeros(0, int))
     )
-    assert np.isnan(list(bootstrap_intervals(no_images, 10).values())).all()
+    assert np.isnan(list(bootstrap_intervals(no_images, Draws(10)).values())).all()

@@ -9,7 +9,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import HANDS, SIGMAS
 from hicp_lib.evaluation.ap.evaluate import evaluate
-from hicp_lib.evaluation.ap.person_oks import person_oks
+from hicp_lib.evaluation.ap.metric_table import person_oks
 from hicp_lib.formats.annotations import read_detections, write_detections
 
 RNG = np.random.default_rng(1)

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from hicp_lib.evaluation.ap.found_and_placed import FOUND, OKS_OF_FOUND, WELL_PLACED, found_and_placed
+from hicp_lib.evaluation.statistics.resampling import Draws
 
 CASE = {"subset": "basic", "group": "body", "detector": "mediapipe"}
 
@@ -36,6 +37,8 @@ def test_of_nobody_found_there_is_no_quality():
 def test_intervals_hold_the_value_and_are_of_source_images():
     alone = people(list(np.linspace(0, 1, 40)))
     together = alone.assign(source_image=alone["source_image"] // 20)
-    row = found_and_placed(alone, 200).iloc[0]
+    row = found_and_placed(alone, Draws(200)).iloc[0]
     assert row["low"] < row["value"] < row["high"]
-    assert found_and_placed(together, 200)["low"].isna().all()  # two images say nothing of their spread
+    assert (
+        found_and_placed(together, Draws(200))["low"].isna().all()
+    )  # two images say nothing of their spread

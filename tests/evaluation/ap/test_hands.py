@@ -13,6 +13,7 @@ from hicp_lib.detectors.registry import make_detector
 from hicp_lib.evaluation.ap import hands
 from hicp_lib.evaluation.ap.evaluate import evaluate
 from hicp_lib.evaluation.ap.hands import INGREDIENTS, compare_hands, thresholds
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.report.notebooks import read_notebooks
 from tests.evaluation.made_people import make_annotations, make_detections
 
@@ -33,7 +34,7 @@ def test_each_labelled_hand_is_judged_by_itself():
     visibility[3, LEFT_HAND] = 0
     people = make_annotations(POINTS, range(N), visibility=visibility)
     some = {("basic", "d"): detections(left=range(6), right=[0])}
-    row = compare_hands({"basic": people}, some, some, n_resamples=5).iloc[0]
+    row = compare_hands({"basic": people}, some, some, draws=Draws(5)).iloc[0]
     assert (row["n_hands"], row["n_found"]) == (2 * N - 1, 6)  # of the left ones not the fourth
 
 
@@ -42,13 +43,13 @@ def test_a_hand_on_the_wrong_side_is_not_found():
     points[:, LEFT_HAND], points[:, RIGHT_HAND] = POINTS[:, RIGHT_HAND], POINTS[:, LEFT_HAND]
     swapped = {("basic", "d"): {i: make_detections(points[i : i + 1]) for i in range(N)}}
     people = {"basic": make_annotations(POINTS, range(N))}
-    assert compare_hands(people, swapped, swapped, n_resamples=5)["n_found"].item() == 0
+    assert compare_hands(people, swapped, swapped, draws=Draws(5))["n_found"].item() == 0
 
 
 def test_crowds_have_no_hands_to_find():
     people = make_annotations(POINTS, range(N), crowd=[0, 1])
     everybody = {("basic", "d"): detections(range(N), range(N))}
-    row = compare_hands({"basic": people}, everybody, everybody, n_resamples=5).iloc[0]
+    row = compare_hands({"basic": people}, everybody, everybody, draws=Draws(5)).iloc[0]
     assert (row["n_hands"], row["n_found"]) == (2 * N - 4, 2 * N - 4)
 
 
@@ -56,7 +57,7 @@ def test_shares_and_ratios_with_intervals_around_them():
     people = make_annotations(POINTS, range(N))
     found = {("basic", "few"): detections(range(4)), ("basic", "many"): detections(range(8), range(2))}
     few = {("basic", "few"): found["basic", "few"]}
-    table = compare_hands({"basic": people}, found, few, n_resamples=200).set_index("variant")
+    table = compare_hands({"basic": people}, found, few, draws=Draws(200)).set_index("variant")
     assert table.loc["many", ["n_hands", "n_found"]].tolist() == [24, 10]
     assert table.loc["many", "share"] == pytest.approx(10 / 24)
     assert table.loc["many", "ratio"] == pytest.approx(2.5)
@@ -73,7 +74,7 @@ def test_shares_and_ratios_with_intervals_around_them():
 def test_against_a_baseline_that_finds_nothing_there_is_no_ratio():
     people = make_annotations(POINTS, range(N))
     found = {("basic", "none"): {}, ("basic", "many"): detections(range(8))}
-    table = compare_hands({"basic": people}, found, {("basic", "none"): {}}, n_resamples=20)
+    table = compare_hands({"basic": people}, found, {("basic", "none"): {}}, draws=Draws(20))
     assert table["ratio"].isna().all() and table["share"].tolist() == [0, pytest.approx(8 / 24)]
 
 
@@ -109,5 +110,5 @@ def test_a_hand_is_found_above_one_half(monkeypatch):
             hands, "person_oks", lambda *_, oks=oks, **__: pd.DataFrame(halves | {"oks": oks})
         )
         some = {("basic", "d"): detections(range(4))}
-        table = compare_hands({"basic": people}, some, some, n_resamples=5)
+        table = compare_hands({"basic": people}, some, some, draws=Draws(5))
         assert table["n_found"].tolist() == [found] and table["n_hands"].tolist() == [N]

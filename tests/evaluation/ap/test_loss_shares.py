@@ -15,6 +15,7 @@ from hicp_lib.evaluation.ap.loss_shares import (
     loss_shares,
 )
 from hicp_lib.evaluation.ap.metric_table import draw_cases, head_loss, same_people
+from hicp_lib.evaluation.statistics.resampling import Draws
 from tests.evaluation.made_people import make_annotations, make_detections
 
 N = 40
@@ -38,7 +39,7 @@ def drawn():
         case: {i: Detections.none() if i < n else make_detections(points[i]) for i in range(N)}
         for case, n in lost.items()
     }
-    return draw_cases(*same_people(truth, found), 200, groups=["body"])
+    return draw_cases(*same_people(truth, found), Draws(200), groups=["body"])
 
 
 def test_each_share_is_what_is_lost_where_it_was_made(drawn):
@@ -79,7 +80,9 @@ def test_a_run_too_small_for_intervals_has_shares():
     people = make_annotations(points, range(4))
     found = {(s, label): {} for s in ("basic", "headless") for label in (*box_variants(*PAIR),)}
     given = {case: {0: make_detections(points[0])} for case in found}
-    table = loss_shares(draw_cases({"basic": people, "headless": people}, given, 50, groups=["body"]), *PAIR)
+    table = loss_shares(
+        draw_cases({"basic": people, "headless": people}, given, Draws(50), groups=["body"]), *PAIR
+    )
     assert table["value"].notna().all() and table["low"].isna().all()
 
 
@@ -98,8 +101,8 @@ def head_shares(basic, headless, headless_area_px2=20_000.0) -> dict[str, float]
         ),
     }
     found = {("basic", "mediapipe-pose"): basic, ("headless", "mediapipe-pose"): headless}
-    drawn = draw_cases(truth, found, 50)
-    table = head_loss_shares(truth, found, drawn, 50).set_index(["group", "share"])
+    drawn = draw_cases(truth, found, Draws(50))
+    table = head_loss_shares(truth, found, drawn, Draws(50)).set_index(["group", "share"])
     assert ((table["low"] <= table["value"] + 1e-12) & (table["value"] <= table["high"] + 1e-12)).all()
     shares = table.loc["body", "value"].to_dict()
     assert list(shares) == ["total", *HEAD_SHARES]

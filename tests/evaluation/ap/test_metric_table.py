@@ -16,6 +16,7 @@ from hicp_lib.evaluation.ap.metric_table import (
     people_oks,
     same_people,
 )
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import source_images
 from tests.evaluation.made_people import make_annotations, make_detections
 
@@ -38,7 +39,7 @@ def study():
 
 def test_every_case_has_the_figures_of_a_plain_evaluation(study):
     truth, found = study
-    table = compare(truth, found, n_resamples=20)
+    table = compare(truth, found, draws=Draws(20))
     for (subset, group), rows in table.groupby(["subset", "group"]):
         alone = evaluate(truth[subset], found[subset, "mediapipe"], group)
         assert rows.set_index("metric")["value"].to_dict() == alone.metrics()
@@ -49,13 +50,13 @@ def test_every_case_has_the_figures_of_a_plain_evaluation(study):
 def test_a_detector_is_not_compared_on_a_group_it_does_not_give(study):
     truth, found = study
     bodies = {("basic", "openpose-mobilenet"): found["basic", "mediapipe"]}
-    assert set(compare(truth, bodies, n_resamples=2)["group"]) == {"body"}
+    assert set(compare(truth, bodies, draws=Draws(2))["group"]) == {"body"}
     assert set(people_oks(truth, bodies)["group"]) == {"body"}
 
 
 def test_the_loss_is_taken_on_the_people_in_both(study):
     truth, found = study
-    drawn = draw_cases(*same_people(truth, found), n_resamples=50)
+    drawn = draw_cases(*same_people(truth, found), draws=Draws(50))
     row = head_loss(drawn).set_index("group").loc["body"]
     assert row["n_people"] == 40
     assert row["basic"] == pytest.approx(1.0) and row["headless"] == pytest.approx(0.5, abs=0.06)
@@ -73,7 +74,7 @@ def test_the_same_people_are_drawn_with_and_without_the_head(study):
     }
     assert set(seen["basic", "mediapipe"]) == set(range(40))
     drawn = draw_cases(people, {("basic", "a"): seen["basic", "mediapipe"],
-                                ("headless", "a"): seen["basic", "mediapipe"]}, 20)  # fmt: skip
+                                ("headless", "a"): seen["basic", "mediapipe"]}, Draws(20))  # fmt: skip
     with_head, without = (drawn[subset, "a", "body"][1] for subset in ("basic", "headless"))
     assert all(np.array_equal(with_head[metric], without[metric]) for metric in with_head)
 
@@ -82,7 +83,7 @@ def test_crops_of_one_image_are_drawn_together(study, monkeypatch):
     truth, found = study
     drawn, plain = [], module.resample
     monkeypatch.setattr(module, "resample", lambda *given: drawn.append(given[-1]) or plain(*given))
-    compare(truth, found, n_resamples=2)
+    compare(truth, found, draws=Draws(2))
     assert drawn[0] == {i: i // 3 for i in range(N)}
 
 
@@ -92,7 +93,7 @@ def test_two_detectors_are_compared_on_the_same_draws(study):
     points = truth["basic"].keypoints_px
     most = {i: make_detections(points[i]) for i in range(N) if i % 2}
     more = most | {i: make_detections(points[i]) for i in (0, 18, 36)}
-    drawn = draw_cases(truth, {("basic", "mediapipe"): more, ("basic", "mmpose"): most}, 200)
+    drawn = draw_cases(truth, {("basic", "mediapipe"): more, ("basic", "mmpose"): most}, Draws(200))
     table = pairs(drawn).query("group == 'body' and metric == 'AR'").set_index("detector")
     gain = table.loc["mediapipe"]
     assert (gain["other"], gain["pair"]) == ("mmpose", "mediapipe less mmpose")
@@ -104,7 +105,7 @@ def test_two_detectors_are_compared_on_the_same_draws(study):
 
 
 def test_one_detector_makes_no_pair(study):
-    assert pairs(draw_cases(*study, n_resamples=2)).empty
+    assert pairs(draw_cases(*study, draws=Draws(2))).empty
 
 
 def test_images_without_a_source_stand_for_themselves(study):

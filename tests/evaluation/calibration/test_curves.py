@@ -15,6 +15,7 @@ from hicp_lib.evaluation.calibration.curves import (
     reliability,
     split_half,
 )
+from hicp_lib.evaluation.statistics.resampling import Draws
 from tests.evaluation.made_people import make_detections
 
 POINTS = np.random.default_rng(0).uniform(50, 400, (1, 136, 2))
@@ -87,7 +88,7 @@ def test_calibration_error_by_hand():
     """Of the half held out: bins .9 to 1 and .1 to .2, hit rates 1/2 and 0."""
     scores, hits = np.tile([0.95, 0.95, 0.15, 0.15], 30), np.tile([1, 0, 0, 0], 30)
     table = pd.DataFrame({"detector": "a", "group": "body", "source_image": np.repeat(range(30), 4)})
-    errors, _, _ = calibration_study(table.assign(score=scores, hit=hits.astype(bool)), n_resamples=50)
+    errors, _, _ = calibration_study(table.assign(score=scores, hit=hits.astype(bool)), draws=Draws(50))
     row = errors.iloc[0]
     assert row["raw"] == pytest.approx((2 * 0.45 + 2 * 0.15) / 4)
     assert row["calibrated"] == pytest.approx(0, abs=1e-12)
@@ -97,7 +98,7 @@ def test_calibration_error_by_hand():
 
 def test_reliability_has_a_row_per_bin_in_use():
     scores = np.repeat([0.05, 0.05, 0.55, 1.0], 3)
-    table = reliability(scores, np.repeat([0, 1, 1, 1], 3), np.arange(12), n_resamples=50)
+    table = reliability(scores, np.repeat([0, 1, 1, 1], 3), np.arange(12), draws=Draws(50))
     assert table["bin"].tolist() == [0, 5, 9] and table["count"].tolist() == [6, 3, 3]
     assert table["rate"].tolist() == [0.5, 1, 1]
     assert (table["low"] <= table["rate"]).all() and (table["rate"] <= table["high"]).all()
@@ -119,7 +120,7 @@ def crooked(n: int = 4000, seed: int = 0) -> pd.DataFrame:
 
 
 def test_calibration_mends_a_crooked_scale_on_images_it_has_not_seen():
-    errors, curves, calibrations = calibration_study(crooked(), n_resamples=100)
+    errors, curves, calibrations = calibration_study(crooked(), draws=Draws(100))
     row = errors.iloc[0]
     assert row["raw"] == pytest.approx(1 / 6, abs=0.02)  # the mean of sqrt(s) - s
     assert row["calibrated_high"] < row["raw_low"] and row["change_high"] < 0
@@ -131,7 +132,7 @@ def test_hits_of_the_images_judged_on_do_not_reach_the_calibration():
     hits = crooked()
     judged = ~split_half(hits["source_image"])
     other = hits.assign(hit=np.where(judged, ~hits["hit"], hits["hit"]))
-    curves = [calibration_study(table, n_resamples=2)[2]["d", "body"] for table in (hits, other)]
+    curves = [calibration_study(table, draws=Draws(2))[2]["d", "body"] for table in (hits, other)]
     np.testing.assert_array_equal(curves[0].rates, curves[1].rates)
     np.testing.assert_array_equal(curves[0].scores, curves[1].scores)
 

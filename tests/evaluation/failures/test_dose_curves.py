@@ -6,6 +6,7 @@ import pytest
 from hicp_lib.core.images import write_png
 from hicp_lib.evaluation.failures.dose_curves import OBSERVED, dose_curves, observed_curves, observed_doses
 from hicp_lib.evaluation.failures.error_kinds import all_errors
+from hicp_lib.evaluation.statistics.resampling import Draws
 from tests.evaluation.made_people import make_annotations, make_detections
 
 POINTS = np.random.default_rng(5).uniform(50, 400, (136, 2))
@@ -20,7 +21,7 @@ def test_every_level_is_judged_by_itself_and_hidden_keypoints_apart():
     points = POINTS.copy()
     points[10:17] += 1_000
     run = {i: make_detections(points[None] if i < 2 else np.zeros((0, 136, 2))) for i in range(4)}
-    table = dose_curves(people, {"mediapipe-pose": run}, n_resamples=10)
+    table = dose_curves(people, {"mediapipe-pose": run}, draws=Draws(10))
     value = table.set_index(["level", "measure"])["value"]
     assert value[0, "visible keypoints hit"] == 1 and value[0, "hidden keypoints hit"] == 0
     assert value[1, "visible keypoints hit"] == value[1, "AP"] == 0
@@ -52,7 +53,7 @@ def test_bins_of_a_dose_hold_equally_many_keypoints():
     errors = all_errors({"basic": people}, {("basic", "mediapipe-pose"): run})
     observed = errors[["subset", "image_id", "keypoint"]].assign(**dict.fromkeys(OBSERVED, np.nan))
     observed["distance"] = observed["image_id"].astype(float)
-    table = observed_curves(errors, observed, n_resamples=5)
+    table = observed_curves(errors, observed, draws=Draws(5))
     assert table["dose"].unique().tolist() == ["distance"]
     assert table["n"].tolist() == [12 * 17] * 5 and table["level"].is_monotonic_increasing
     assert table["value"].tolist() == [1, 1, 0.5, 0, 0]

@@ -7,9 +7,10 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.evaluation.failures.error_kinds import all_errors
 from hicp_lib.evaluation.failures.false_confidence import MEASURES, paper_remarks, scores_by_state
-from hicp_lib.evaluation.failures.false_presence import false_presence
 from hicp_lib.evaluation.failures.placed_keypoints import from_the_cut, landed, placed_keypoints
+from hicp_lib.evaluation.failures.presence import false_presence
 from hicp_lib.evaluation.failures.without_head import hallucinated_heads
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.study.plots import failures as draw
 from tests.evaluation.made_people import HIDDEN, UNKNOWN
 
@@ -42,13 +43,13 @@ def test_where_nobody_is_found_every_table_and_figure_is_empty_but_there(world):
     found = {("headless", "mediapipe-pose"): {5: Detections.none()}}
     placed = placed_keypoints(truth, found, source)
     assert placed.empty and placed["given"].dtype.kind == "b"
-    invented = false_presence(truth, found, placed, source, 10)
+    invented = false_presence(truth, found, placed, source, Draws(10))
     assert invented["n_found"].eq(0).all() and invented["value"].eq(0).all()
     assert draw.false_presence(invented, "drawn").table["part"].tolist() == ["head", "head"]
     heads = draw.hallucinated_heads(hallucinated_heads(placed), "drawn")
     assert "(0)" in heads.figure.axes[0].get_title("left")
-    assert draw.scores_by_state(scores_by_state(placed, 10), "drawn").table.empty
-    remarks = paper_remarks(placed, all_errors(truth, found), truth, found, 10)
+    assert draw.scores_by_state(scores_by_state(placed, Draws(10)), "drawn").table.empty
+    remarks = paper_remarks(placed, all_errors(truth, found), truth, found, Draws(10))
     assert remarks["measure"].nunique() == len(MEASURES)
 
 

@@ -6,6 +6,7 @@ from hicp_lib.core.keypoints import INDEX
 from hicp_lib.evaluation.failures.error_kinds import all_errors
 from hicp_lib.evaluation.failures.placed_keypoints import placed_keypoints
 from hicp_lib.evaluation.failures.without_head import change_per_keypoint, hallucinated_heads
+from hicp_lib.evaluation.statistics.resampling import Draws
 from tests.evaluation.made_people import POINTS, make_annotations, make_detections
 
 
@@ -25,6 +26,6 @@ def test_the_heads_worth_is_taken_on_pairs(world):
     found["basic", "mediapipe-pose"] = {5: make_detections(POINTS[None])}
     wrist = INDEX["left_wrist"]
     found["headless", "mediapipe-pose"][5].keypoints_px[0, wrist] += 300
-    change = change_per_keypoint(all_errors(truth, found), n_resamples=5).set_index("keypoint")["change"]
+    change = change_per_keypoint(all_errors(truth, found), draws=Draws(5)).set_index("keypoint")["change"]
     assert change["left_wrist"] == -1 and change.drop("left_wrist").eq(0).all()
     assert not {"nose", "right_ankle"} & set(change.index)

@@ -9,6 +9,7 @@ import pytest
 from hicp_lib.core.detections import Detections
 from hicp_lib.evaluation.space import error_budget as b
 from hicp_lib.evaluation.space import error_sources as s
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.recordings.recording import read_truth
 from tests.evaluation.space.wall import BEHIND_M, CAMERA, DEPTH_ERROR_M, NOTHING, WALL_M, N, wall_recording
 
@@ -163,7 +164,7 @@ def made_up(n_people, noise=0.0):
 
 
 def test_the_budget_is_the_mean_of_peoples_medians():
-    table = b.error_budget(made_up(12), n_resamples=200).set_index(["source", "kind"])
+    table = b.error_budget(made_up(12), draws=Draws(200)).set_index(["source", "kind"])
     both = [(source, kind) for source in (s.SKIN, s.REGISTRATION) for kind in ("alone", "gain")]
     assert list(table.index) == [
         *((total, "total") for total in b.TOTALS),
@@ -183,14 +184,14 @@ def test_without_motion_capture_there_is_one_total():
 
 
 def test_few_people_have_no_interval():
-    table = b.error_budget(made_up(3), n_resamples=200)
+    table = b.error_budget(made_up(3), draws=Draws(200))
     assert table["low_m"].isna().all() and table["value_m"].notna().all()
 
 
 def test_covariates_come_out_as_factors():
     errors = made_up(12)
     errors[b.IN_BASE] = 0.02 * 1.1 ** (errors["distance_m"] / 0.1) * 2.0 ** errors["hidden"]
-    table = b.covariates(errors, n_resamples=50).set_index("covariate")
+    table = b.covariates(errors, draws=Draws(50)).set_index("covariate")
     assert table["factor"].to_dict() == pytest.approx(
         {"10 cm further away": 1.1, "limb at the camera, not across": 1.0, "hidden": 2.0}
     )
@@ -198,5 +199,5 @@ def test_covariates_come_out_as_factors():
 
 
 def test_a_covariate_that_never_changes_has_no_factor():
-    table = b.covariates(made_up(12).assign(hidden=False), n_resamples=50)
+    table = b.covariates(made_up(12).assign(hidden=False), draws=Draws(50))
     assert "hidden" not in set(table["covariate"]) and len(table) == 2

@@ -7,6 +7,7 @@ import pytest
 
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.evaluation.space.flicker import best_person, causal_filter, flicker, latency_s
+from hicp_lib.evaluation.statistics.resampling import Draws
 from tests.evaluation.made_people import make_detections
 
 RATE_HZ = 20.0
@@ -24,7 +25,7 @@ def frames(shift_px, given=None):
 
 
 def values(found):
-    table = flicker({"d": found}, TIMES_S, n_resamples=20)
+    table = flicker({"d": found}, TIMES_S, draws=Draws(20))
     return table.set_index(["tracks", "measure"])["value"]
 
 
@@ -76,7 +77,7 @@ def test_latency_is_the_delay_of_moving_tracks():
 
 def test_frames_far_apart_are_not_compared():
     found = flicker(
-        {"d": frames(np.zeros((5, 2)), np.array([1, 0, 1, 0, 1], bool))}, np.arange(5.0), n_resamples=5
+        {"d": frames(np.zeros((5, 2)), np.array([1, 0, 1, 0, 1], bool))}, np.arange(5.0), draws=Draws(5)
     )
     assert found.loc[found["measure"] == "flicker rate", "n"].tolist() == [0, 0]
 
@@ -93,7 +94,7 @@ def test_a_threshold_decides_which_keypoints_are_given():
     person = make_detections(POINTS[None])
     found = [replace(person, scores=person.scores * (1.0 + 0.4 * (i % 2))) for i in range(100)]
     rates = {
-        min_score: flicker({"d": found}, TIMES_S, n_resamples=2, min_score=min_score)["value"].iloc[0]
+        min_score: flicker({"d": found}, TIMES_S, draws=Draws(2), min_score=min_score)["value"].iloc[0]
         for min_score in (0.4, 0.6)
     }
     assert rates == {0.4: 0.0, 0.6: 1.0}
@@ -130,7 +131,7 @@ def test_after_half_a_second_the_filter_starts_anew():
 def test_jitter_of_an_error_in_one_frame():
     shift = np.zeros((100, 2))
     shift[50] = [3, 4]
-    found = flicker({"d": frames(shift)}, TIMES_S, n_resamples=2).set_index(["tracks", "measure"])
+    found = flicker({"d": frames(shift)}, TIMES_S, draws=Draws(2)).set_index(["tracks", "measure"])
     row = found.loc[("as detected", "jitter [px]")]
     # The second difference is 5, 10 and 5 long in three of 98 frames.
     assert row["value"] == pytest.approx(20 / np.sqrt(6) / 98) and row["n"] == 98 * 17
@@ -139,7 +140,7 @@ def test_jitter_of_an_error_in_one_frame():
 def test_half_a_second_still_counts_as_consecutive():
     given = np.array([1, 0, 1, 1], bool)
     for step_s, n in ((0.5, 3), (0.51, 0)):
-        found = flicker({"d": frames(np.zeros((4, 2)), given)}, np.arange(4) * step_s, n_resamples=2)
+        found = flicker({"d": frames(np.zeros((4, 2)), given)}, np.arange(4) * step_s, draws=Draws(2))
         assert found.loc[found["measure"] == "flicker rate", "n"].iloc[0] == n * 17
 
 
@@ -147,9 +148,9 @@ def test_intervals_are_over_stretches_of_a_second():
     """Half of twelve seconds flicker throughout: as wide as twelve draws are, not 240."""
     times_s = np.arange(240) / 20
     given = (np.arange(240) % 2 == 0) | (times_s < 6)
-    row = flicker({"d": frames(np.zeros((240, 2)), given)}, times_s, n_resamples=500).iloc[0]
+    row = flicker({"d": frames(np.zeros((240, 2)), given)}, times_s, draws=Draws(500)).iloc[0]
     assert 0.3 < row["high"] - row["low"] < 0.75
-    few = flicker({"d": frames(np.zeros((180, 2)), given[:180])}, times_s[:180], n_resamples=500).iloc[0]
+    few = flicker({"d": frames(np.zeros((180, 2)), given[:180])}, times_s[:180], draws=Draws(500)).iloc[0]
     assert np.isnan([few["low"], few["high"]]).all()  # nine stretches
 
 

@@ -10,6 +10,7 @@ from hicp_lib.core.keypoints import NAMES
 from hicp_lib.evaluation.cases import over_people
 from hicp_lib.evaluation.space import mocap_error as me
 from hicp_lib.evaluation.statistics.design import smallest_difference
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.recordings.qualisys import MotionCapture
 
 N = 60
@@ -92,7 +93,7 @@ def test_medians_count_what_is_above_the_score(reference):
     rng = np.random.default_rng(0)
     points = lifted(reference, rng.uniform(0, 0.1, len(reference)), rng.uniform(0, 1, len(reference)))
     errors = me.mocap_errors(points, reference)
-    medians = me.median_errors(errors, n_resamples=100)
+    medians = me.median_errors(errors, draws=Draws(100))
     for row in medians.to_dict("records"):
         part = errors[(errors["keypoint"] == row["keypoint"]) & (errors["score"] > row["min_score"])]
         assert row["count"] == len(part) and row["n_frames"] == N
@@ -101,7 +102,7 @@ def test_medians_count_what_is_above_the_score(reference):
 
 
 def test_a_joint_never_found_counts_zero_and_has_no_median(reference):
-    medians = me.median_errors(me.mocap_errors(lifted(reference, score=0.05), reference), n_resamples=10)
+    medians = me.median_errors(me.mocap_errors(lifted(reference, score=0.05), reference), draws=Draws(10))
     assert (medians["count"] == 0).all() and medians[["median_m", "low_m", "high_m"]].isna().all().all()
 
 
@@ -110,11 +111,11 @@ def test_fractions_are_of_the_frames_with_motion_capture(reference):
     points = lifted(reference, 0.03)
     points.loc[points["frame"] < 10, "score"] = 0.0
     errors = me.mocap_errors(points, reference)
-    fractions = me.distance_shares(errors, n_resamples=50)
+    fractions = me.distance_shares(errors, draws=Draws(50))
     shares = fractions.groupby("threshold_m")["value"].unique()
     assert shares[0.025] == [0]
     assert shares[0.05] == pytest.approx([0.75]) and shares[0.1] == pytest.approx([0.75])
-    beyond = me.distance_shares(errors, beyond=True, n_resamples=50)
+    beyond = me.distance_shares(errors, beyond=True, draws=Draws(50))
     assert beyond.groupby("threshold_m")["value"].unique().to_dict() == {0.025: [1], 0.05: [0], 0.1: [0]}
 
 
@@ -122,7 +123,7 @@ def test_shares_beyond_are_of_the_frames_in_which_the_joint_was_found(reference)
     points = lifted(reference, np.where(reference["frame"] % 4 == 0, 0.2, 0.01))
     points.loc[points["frame"] % 2 == 1, "score"] = 0.2
     points.loc[points["keypoint"] == "left_wrist", "score"] = 0.0
-    beyond = me.distance_shares(me.mocap_errors(points, reference), beyond=True, n_resamples=50)
+    beyond = me.distance_shares(me.mocap_errors(points, reference), beyond=True, draws=Draws(50))
     beyond = beyond[beyond["threshold_m"] == 0.1].set_index(["min_score", "keypoint"])
     assert beyond.loc[(0.3, "left_elbow"), "value"] == pytest.approx(1 / 2)
     assert beyond.loc[(0.1, "left_elbow"), "value"] == pytest.approx(1 / 4)
@@ -137,12 +138,12 @@ def test_medians_of_two_detectors_are_compared_on_the_same_draws(reference):
         lifted(reference, error_m, detector="one"), lifted(reference, error_m + 0.01, detector="other"),
     ]  # fmt: skip
     errors = me.mocap_errors(pd.concat(tables), reference)
-    table = me.median_differences(errors, n_resamples=50).set_index(["detector", "other"])
+    table = me.median_differences(errors, draws=Draws(50)).set_index(["detector", "other"])
     worse = table.loc[("other", "one")]
     assert len(worse) == 2 * len(me.JOINTS)
     assert worse[["value_m", "low_m", "high_m"]].to_numpy() == pytest.approx(0.01)
     assert table.loc[("one", "other"), "value_m"].to_numpy() == pytest.approx(-0.01)
-    medians = me.median_errors(errors, n_resamples=50)
+    medians = me.median_errors(errors, draws=Draws(50))
     assert (medians["high_m"] - medians["low_m"] > 0.01).all()
 
 
@@ -150,10 +151,10 @@ def test_what_a_higher_threshold_changes_has_an_interval(reference):
     points = lifted(reference, np.where(reference["frame"] % 3 == 0, 0.01, 0.05))
     points["score"] = np.where(reference["frame"] % 3 == 0, 0.9, 0.2)
     errors = me.mocap_errors(points, reference)
-    table = me.median_differences(errors, "min_score", n_resamples=50).set_index(["min_score", "other"])
+    table = me.median_differences(errors, "min_score", draws=Draws(50)).set_index(["min_score", "other"])
     assert table.loc[(0.3, 0.1), "value_m"].to_numpy() == pytest.approx(-0.04)
     assert table.loc[(0.1, 0.3), "value_m"].to_numpy() == pytest.approx(0.04)
-    found = me.median_errors(errors, n_resamples=50).set_index("min_score")[
+    found = me.median_errors(errors, draws=Draws(50)).set_index("min_score")[
         ["found_low", "found", "found_high"]
     ]
     assert found.loc[0.3, "found"].to_numpy() == pytest.approx(1 / 3) and (found.loc[0.1] == 1).all(axis=None)
@@ -162,11 +163,11 @@ def test_what_a_higher_threshold_changes_has_an_interval(reference):
 
 def test_scores_must_be_above_and_distances_at_most_the_limit(reference):
     errors = me.mocap_errors(lifted(reference, score=0.3), reference).assign(error_m=0.05)
-    medians = me.median_errors(errors, n_resamples=5).set_index("min_score")["count"]
+    medians = me.median_errors(errors, draws=Draws(5)).set_index("min_score")["count"]
     assert set(medians[0.3]) == {0} and set(medians[0.1]) == {N}
-    within = me.distance_shares(errors, (0.1,), (np.nextafter(0.05, 0), 0.05), n_resamples=5)
+    within = me.distance_shares(errors, (0.1,), (np.nextafter(0.05, 0), 0.05), draws=Draws(5))
     assert within.groupby("threshold_m")["value"].max().tolist() == [0, 1]
-    assert me.distance_shares(errors, (0.3,), (0.05,), n_resamples=5)["value"].eq(0).all()
+    assert me.distance_shares(errors, (0.3,), (0.05,), draws=Draws(5))["value"].eq(0).all()
 
 
 def test_people_are_drawn_and_a_comparison_says_what_it_could_detect(reference):
@@ -181,17 +182,17 @@ def test_people_are_drawn_and_a_comparison_says_what_it_could_detect(reference):
         ]  # fmt: skip
         people.append(me.mocap_errors(pd.concat(both), reference))
     errors = over_people(people, [N] * 12)
-    medians = me.median_errors(errors, n_resamples=200)
+    medians = me.median_errors(errors, draws=Draws(200))
     assert (medians["n_people"] == 12).all() and (medians["n_frames"] == 12 * N).all()
     pairs = (
-        me.median_differences(errors, n_resamples=200).set_index(["detector", "other"]).loc[("other", "one")]
+        me.median_differences(errors, draws=Draws(200)).set_index(["detector", "other"]).loc[("other", "one")]
     )
     assert (pairs["n_people"] == 12).all()
     assert pairs["value_m"].to_numpy() == pytest.approx(0.01, abs=0.002)
     least_m = smallest_difference(worse_m)
     assert pairs["detectable_m"].to_numpy() == pytest.approx(least_m, rel=1e-6)
     assert (pairs["low_m"] > 0.005).all() and (pairs["high_m"] - pairs["low_m"] > least_m / 2).all()
-    shares = me.distance_shares(errors, n_resamples=20)
+    shares = me.distance_shares(errors, draws=Draws(20))
     assert (shares["n_people"] == 12).all()
-    few = me.median_errors(errors[errors["subject"] < 5], n_resamples=20)
+    few = me.median_errors(errors[errors["subject"] < 5], draws=Draws(20))
     assert few["low_m"].isna().all() and (few["n_people"] == 5).all()

@@ -6,7 +6,8 @@ import pytest
 
 from hicp_lib.core.keypoints import LEFT_HAND, NAMES
 from hicp_lib.evaluation.space.plausibility import IN_ABDOMEN_M, backwards, implausible
-from hicp_lib.evaluation.space.stability import PARTS
+from hicp_lib.evaluation.space.stability import PARTS, LiftedViews
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.simulation.body.hands import HANDS_DEG, sample_hand
 from hicp_lib.simulation.body.joints import pose_from_joints
 from hicp_lib.simulation.body.model import load_body, pose_body
@@ -36,7 +37,7 @@ def table_of(*bodies):
     truth = rows_of(body())
     truths = pd.concat([truth.assign(frame=k) for k in range(len(bodies))])
     points = pd.concat([rows_of(one, k) for k, one in enumerate(bodies)])
-    table = implausible(points, alone(upper=len(bodies)), {"upper": truths}, n_resamples=0)
+    table = implausible(LiftedViews(points, alone(upper=len(bodies)), {"upper": truths}), draws=Draws(0))
     return table.set_index(["measure", "part"])
 
 
@@ -98,7 +99,7 @@ def test_broken_fingers_are_told_of_each_hand():
     ]  # fmt: skip
     columns = ["view", "detector", "method", "frame", "person", "keypoint", "score"]
     points = pd.DataFrame(rows, columns=[*columns, "x_m", "y_m", "z_m", "u_px", "v_px"])
-    table = implausible(points, alone(upper=2), n_resamples=0).set_index("part")
+    table = implausible(LiftedViews(points, alone(upper=2)), draws=Draws(0)).set_index("part")
     assert table.loc["left hand", "value"] == 1 and table.loc["right hand", "value"] == 0
     assert (table["n_images"] == 1).all() and table["of_truth"].isna().all()
     assert PARTS["left hand"] == tuple(NAMES[i] for i in LEFT_HAND)
@@ -107,7 +108,7 @@ def test_broken_fingers_are_told_of_each_hand():
 def test_people_are_drawn_who_have_such_bodies():
     people = np.repeat(np.arange(12), 5)
     bodies = [rows_of(body(0.2 if person < 4 else 0.0), k) for k, person in enumerate(people)]
-    table = implausible(pd.concat(bodies), {"upper": people}, n_resamples=300)
+    table = implausible(LiftedViews(pd.concat(bodies), {"upper": people}), draws=Draws(300))
     row = table.set_index(["measure", "part"]).loc["hips in the abdomen", "left hip"]
     assert row["value"] == pytest.approx(1 / 3) and (row["n_images"], row["n_people"]) == (60, 12)
     assert row["high"] - row["low"] > 0.45  # of twelve, not of sixty

@@ -7,10 +7,12 @@ import pytest
 from hicp_lib.evaluation.space.spread import spread_and_bias
 from hicp_lib.evaluation.space.stability import (
     PARTS,
+    LiftedViews,
     counted,
     median_positions,
     within_distance,
 )
+from hicp_lib.evaluation.statistics.resampling import Draws
 from tests.evaluation.still_person import KEYPOINTS, TRUE_M, alone, make_points, make_truth
 
 FAR = [9.0, 0, 0]
@@ -45,7 +47,9 @@ def test_median_positions_shrug_off_outliers():
 
 def test_images_without_the_keypoint_count_as_not_within():
     points = make_points([*along_x(0, 0, 0, 0.03, 0.2), NONE])  # the median is the true position
-    table = within_distance(points, alone(upper=8), n_resamples=0)  # two more images in which nobody is found
+    table = within_distance(
+        LiftedViews(points, alone(upper=8)), draws=Draws(0)
+    )  # two more images in which nobody is found
     for part in PARTS:
         assert value(table, part, 0.025) == pytest.approx(3 / 8)
         assert value(table, part, 0.05) == pytest.approx(4 / 8)
@@ -56,18 +60,18 @@ def test_images_without_the_keypoint_count_as_not_within():
 def test_a_detector_that_is_always_wrong_alike_is_stable_but_not_accurate():
     points, n = make_points([[0.06, 0, 0]] * 10), alone(upper=10)
     truth = {"upper": make_truth(10)}
-    stable = within_distance(points, n, n_resamples=0)
-    accurate = within_distance(points, n, truth, n_resamples=0)
+    stable = within_distance(LiftedViews(points, n), draws=Draws(0))
+    accurate = within_distance(LiftedViews(points, n, truth), draws=Draws(0))
     assert stable["value"].to_numpy() == pytest.approx(1) and set(stable["reference"]) == {"median"}
     assert accurate.groupby("threshold_m")["value"].mean().tolist() == pytest.approx([0, 0, 1])
-    row = spread_and_bias(points, n, truth, n_resamples=0).iloc[0]
+    row = spread_and_bias(LiftedViews(points, n, truth), draws=Draws(0)).iloc[0]
     assert (row["spread_m"], row["bias_m"], row["error_m"]) == pytest.approx((0, 0.06, 0.06))
 
 
 def test_spread_without_bias_is_told_from_bias_without_spread():
     offsets = along_x(*np.tile([-0.04, 0.04], 10), 0)
     row = spread_and_bias(
-        make_points(offsets), alone(upper=21), {"upper": make_truth(21)}, n_resamples=0
+        LiftedViews(make_points(offsets), alone(upper=21), {"upper": make_truth(21)}), draws=Draws(0)
     ).iloc[0]
     assert (row["spread_m"], row["bias_m"], row["error_m"]) == pytest.approx((0.04, 0, 0.04))
 
@@ -77,7 +81,7 @@ def test_a_hand_counts_all_its_keypoints():
     points = pd.concat(
         [make_points([[0, 0, 0]] * 3, hand[:7]), make_points([[0, 0, 0], NONE, NONE], hand[7:])]
     )
-    table = within_distance(points, alone(upper=3), n_resamples=0)
+    table = within_distance(LiftedViews(points, alone(upper=3)), draws=Draws(0))
     assert value(table, "left hand", 0.1) == pytest.approx((7 * 3 + 14) / (21 * 3))
     assert value(table, "right hand", 0.1) == 0  # hands are given, this one was never found
 
@@ -88,7 +92,7 @@ def test_what_a_detector_gives_but_never_finds_counts_as_nought_and_what_it_does
         [make_points([[0, 0, 0]], wrist, detector=name) for name in ("mediapipe", "movenet-thunder", "mine")]
         + [make_points([[0, 0, 0]], wrist, detector="combined:movenet-thunder+mediapipe-hands")]
     )
-    table = within_distance(points, alone(upper=1), thresholds_m=[0.1], n_resamples=0)
+    table = within_distance(LiftedViews(points, alone(upper=1)), thresholds_m=[0.1], draws=Draws(0))
     parts = table.groupby("detector")["part"].apply(set)
     body = {part for part in PARTS if "hand" not in part}
     assert parts["mediapipe"] == parts["combined:movenet-thunder+mediapipe-hands"] == set(PARTS)
@@ -105,7 +109,7 @@ def test_views_and_detectors_are_kept_apart():
             make_points(along_x(0, 0), view="lower", detector="openpose-mobilenet", keypoints=["left_wrist"]),
         ]
     )
-    table = within_distance(points, alone(upper=4, lower=4), n_resamples=0)
+    table = within_distance(LiftedViews(points, alone(upper=4, lower=4)), draws=Draws(0))
     wrist = table[(table["part"] == "left wrist") & (table["threshold_m"] == 0.1)]
     assert wrist.set_index(["view", "detector"])["value"].to_dict() == pytest.approx(
         {
@@ -122,7 +126,7 @@ def test_intervals_hold_the_value_and_narrow_with_more_images():
     widths = []
     for n in (20, 180):
         points = make_points(rng.normal(0, 0.03, (n, 3)), ["left_wrist", "right_wrist"])
-        table = within_distance(points, alone(upper=n), thresholds_m=[0.05], n_resamples=300)
+        table = within_distance(LiftedViews(points, alone(upper=n)), thresholds_m=[0.05], draws=Draws(300))
         row = table.set_index("part").loc["left wrist"]
         assert row["low"] < row["value"] < row["high"]
         widths.append(row["high"] - row["low"])
@@ -131,8 +135,8 @@ def test_intervals_hold_the_value_and_narrow_with_more_images():
 
 def test_nothing_found_is_a_share_of_zero_and_no_distance():
     points = make_points([NONE] * 3, ["left_wrist"])
-    assert (within_distance(points, alone(upper=3), n_resamples=5)["value"] == 0).all()
-    distances = spread_and_bias(points, alone(upper=3), {"upper": make_truth(3)}, n_resamples=5)
+    assert (within_distance(LiftedViews(points, alone(upper=3)), draws=Draws(5))["value"] == 0).all()
+    distances = spread_and_bias(LiftedViews(points, alone(upper=3), {"upper": make_truth(3)}), draws=Draws(5))
     assert (distances["n_images"] == 0).all() and distances[["spread_m", "bias_m", "error_m"]].isna().all(
         axis=None
     )
@@ -154,27 +158,37 @@ def test_everybody_is_held_against_a_median_of_their_own():
     medians = median_positions(points).set_index("subject")
     assert len(medians) == 12 and (medians["n"] == 10).all()
     n = len(people["upper"])
-    stable = within_distance(points, people, n_resamples=0).query("part == 'left wrist'")
+    stable = within_distance(LiftedViews(points, people), draws=Draws(0)).query("part == 'left wrist'")
     assert (stable["value"] > 0.85).all() and (stable["n_people"] == 12).all()
     truth = {"upper": make_truth(n)}
-    row = spread_and_bias(points, people, truth, n_resamples=0).set_index("part").loc["left wrist"]
+    row = (
+        spread_and_bias(LiftedViews(points, people, truth), draws=Draws(0))
+        .set_index("part")
+        .loc["left wrist"]
+    )
     assert row["spread_m"] < 0.02 and row["bias_m"] > 0.2 and row["n_people"] == 12
     # The same frames as if of one person: nothing is steady.
-    as_one = within_distance(points, alone(upper=n), n_resamples=0).query("part == 'left wrist'")
+    as_one = within_distance(LiftedViews(points, alone(upper=n)), draws=Draws(0)).query(
+        "part == 'left wrist'"
+    )
     assert as_one["value"].max() < 0.2
 
 
 def test_intervals_are_over_people_and_of_a_person_as_if_alone():
     points, people = of_people(apart_m=0.05)
     truth = {"upper": make_truth(120)}
-    over_people = within_distance(points, people, truth, [0.1], n_resamples=400).set_index("part")
-    over_frames = within_distance(points, alone(upper=120), truth, [0.1], n_resamples=400).set_index("part")
+    over_people = within_distance(LiftedViews(points, people, truth), [0.1], draws=Draws(400)).set_index(
+        "part"
+    )
+    over_frames = within_distance(
+        LiftedViews(points, alone(upper=120), truth), [0.1], draws=Draws(400)
+    ).set_index("part")
     wide, narrow = (table.loc["left wrist", "high"] - table.loc["left wrist", "low"]
                     for table in (over_people, over_frames))  # fmt: skip
     assert wide > 2 * narrow
     first = points[points["subject"] == 0]
     for reference in (None, {"upper": make_truth(10)}):
-        tables = [within_distance(first, {"upper": whose}, reference, n_resamples=50)
+        tables = [within_distance(LiftedViews(first, {"upper": whose}, reference), draws=Draws(50))
                   for whose in (np.zeros(10, int), np.full(10, 7))]  # fmt: skip
         pd.testing.assert_frame_equal(*tables)
         assert tables[0]["low"].notna().all()
@@ -184,11 +198,19 @@ def test_somebody_who_is_never_found_counts_as_not_within_and_has_no_bias():
     points, people = of_people(apart_m=0.05, n_people=11)
     people = {"upper": np.r_[people["upper"], np.full(10, 11)]}
     truth = {"upper": make_truth(120)}
-    shares = within_distance(points, people, None, [0.1], n_resamples=100).set_index("part").loc["left wrist"]
+    shares = (
+        within_distance(LiftedViews(points, people), [0.1], draws=Draws(100))
+        .set_index("part")
+        .loc["left wrist"]
+    )
     assert shares["value"] == pytest.approx(11 / 12) and shares["n_people"] == 12
-    row = spread_and_bias(points, people, truth, n_resamples=100).set_index("part").loc["left wrist"]
+    row = (
+        spread_and_bias(LiftedViews(points, people, truth), draws=Draws(100))
+        .set_index("part")
+        .loc["left wrist"]
+    )
     without = spread_and_bias(
-        points, {"upper": people["upper"][:110]}, {"upper": make_truth(110)}, n_resamples=0
+        LiftedViews(points, {"upper": people["upper"][:110]}, {"upper": make_truth(110)}), draws=Draws(0)
     )
     assert row["bias_m"] == without.set_index("part").loc["left wrist", "bias_m"]
     assert row["bias_m_low"] < row["bias_m"] < row["bias_m_high"]
@@ -199,7 +221,9 @@ def test_a_person_found_once_has_no_spread():
     people = {"upper": np.repeat([0, 1], 6)}
     offsets = [*along_x(0, 0.02, 0.04, 0.06, 0.08, 0.1), [0.5, 0, 0], *[NONE] * 5]
     points = make_points(offsets, ["left_wrist"], subjects=people["upper"])
-    row = spread_and_bias(points, people, {"upper": make_truth(12)}, n_resamples=0).set_index("part")
+    row = spread_and_bias(LiftedViews(points, people, {"upper": make_truth(12)}), draws=Draws(0)).set_index(
+        "part"
+    )
     alone_m = [0.05, 0.03, 0.01, 0.01, 0.03, 0.05]
     assert row.loc["left wrist", "spread_m"] == pytest.approx(np.median(alone_m))
     assert row.loc["left wrist", "bias_m"] == pytest.approx(0.05)
@@ -210,10 +234,12 @@ def test_a_person_found_once_has_no_spread():
 def test_intervals_of_distances_need_ten_people_in_whom_it_is_found(n_found, known):
     points, people = of_people(apart_m=0.05)
     points.loc[points["subject"] >= n_found, ["x_m", "y_m", "z_m"]] = np.nan
-    table = spread_and_bias(points, people, {"upper": make_truth(120)}, n_resamples=200)
+    table = spread_and_bias(LiftedViews(points, people, {"upper": make_truth(120)}), draws=Draws(200))
     row = table.set_index("part").loc["left wrist"]
     assert row["n_people"] == n_found and row[["spread_m", "bias_m", "error_m"]].notna().all()
     for name in ("spread_m", "bias_m", "error_m"):
         assert (row[f"{name}_low"] == row[f"{name}_low"]) == known
-    alone = spread_and_bias(points[points["frame"] < 10], {"upper": np.zeros(10, int)}, n_resamples=200)
+    alone = spread_and_bias(
+        LiftedViews(points[points["frame"] < 10], {"upper": np.zeros(10, int)}), draws=Draws(200)
+    )
     assert alone.set_index("part").loc["left wrist", "spread_m_low"] > 0

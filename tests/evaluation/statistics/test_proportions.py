@@ -9,11 +9,12 @@ from hicp_lib.evaluation.statistics.proportions import (
     paired_differences,
     proportions,
 )
+from hicp_lib.evaluation.statistics.resampling import Draws
 
 
 def test_shares_are_means_of_what_is_known():
     rows = pd.DataFrame({"who": ["b", "a", "a", "a"], "source_image": [1, 1, 2, 3], "hit": [1, 0, 1, np.nan]})
-    table = proportions(rows, ["who"], "hit", n_resamples=50)
+    table = proportions(rows, ["who"], "hit", draws=Draws(50))
     assert table["who"].tolist() == ["b", "a"] and table["value"].tolist() == [1, 0.5]
     assert table["n"].tolist() == [1, 2] and table["n_images"].tolist() == [1, 2]
 
@@ -38,8 +39,8 @@ def test_paired_differences_see_what_intervals_side_by_side_do_not():
     rows = pd.concat(
         [pd.DataFrame({"who": who, "source_image": np.arange(n), "hit": hit}) for who, hit in hits.items()]
     ).assign(view="upper")
-    less = paired_differences(rows, ["view"], "who", "hit", 400).set_index("pair")
-    apart = proportions(rows, ["view", "who"], "hit", 400).set_index("who")
+    less = paired_differences(rows, ["view"], "who", "hit", Draws(400)).set_index("pair")
+    apart = proportions(rows, ["view", "who"], "hit", Draws(400)).set_index("who")
     a, b = less.loc["a less b"], less.loc["b less a"]
     assert a["value"] == pytest.approx(hits["a"].mean() - hits["b"].mean()) and a["low"] > 0
     assert (b["value"], b["low"], b["high"]) == (-a["value"], -a["high"], -a["low"])

@@ -74,7 +74,7 @@ def test_what_was_seen_is_kept_as_it_was(detector, monkeypatch):
     # The picture is half as large, its first pixel's edge where it was.
     np.testing.assert_allclose(2 * seen.keypoints_px + 0.5, detector.found.keypoints_px, atol=1e-4)
 
-    monkeypatch.setattr(avoidance_runs, "simulate", lambda *_: pytest.fail("simulated again"))
+    monkeypatch.setattr(avoidance_runs.loop, "simulate", lambda *_: pytest.fail("simulated again"))
     (again,) = run_all([Job(TRIAL, "two people", LATE)])
     assert again.cycles.equals(run.cycles) and again.frames["jpeg"].equals(run.frames["jpeg"])
 

@@ -7,7 +7,7 @@ import pytest
 
 from hicp_lib.core.camera import project, transform
 from hicp_lib.core.keypoints import INDEX
-from hicp_lib.evaluation.space.similar_views import similar_pairs
+from hicp_lib.evaluation.space.sightings import similar_pairs
 from hicp_lib.experiments.laboratory import COLOUR, T_WORLD_ROOT
 from hicp_lib.experiments.recordings.scenarios import SCENARIOS, relative_poses_rad, scenario
 from hicp_lib.experiments.recordings.seated_person import TABLE_HEIGHT_M, VIEWS, seated_person

@@ -1,10 +1,13 @@
 import numpy as np
 import pytest
 
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import sha256_file
 from hicp_lib.simulation.body.joints import pose_from_joints
 from hicp_lib.simulation.body.model import REGIONS, load_body, pose_body
 from hicp_lib.simulation.body.reach import reach
 from hicp_lib.simulation.body.self_collision import collision_model, self_collision_distance_m
+from tools import measure_sizes
 
 BODY = load_body()
 
@@ -60,3 +63,18 @@ def test_bending_forward_takes_the_trunk_along():
     assert gap(9, joints) > 0.03
     posed = pose_body(BODY, 9, pose_from_joints(joints))
     assert posed.keypoints_m[17, 0] > 0.3
+
+
+def test_sizes_are_those_of_the_body_model():
+    kept = np.load(DATA_DIR / "body_sizes.npz")
+    for number in (0, 41):
+        shape = BODY.shape_names[number]
+        found = measure_sizes.sizes(BODY, shape) | {"markers": measure_sizes.markers(BODY, shape)}
+        for name, values in found.items():
+            assert np.allclose(kept[name][number], values, atol=1e-6), name
+    assert np.array_equal(kept["thinned"], measure_sizes.thinned(BODY))
+
+
+def test_the_data_page_names_the_sizes_by_their_hash():
+    page = (DATA_DIR / "README.md").read_text()
+    assert sha256_file(DATA_DIR / "body_sizes.npz") in page

@@ -12,8 +12,9 @@ from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at, pixel_ra
 from hicp_lib.simulation.rendering.raycast import RayScene
 from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.sensors.depth_alignment import align_to_colour
-from hicp_lib.simulation.sensors.depth_camera import depth_imager, simulate_depth, simulate_raw_depth
-from hicp_lib.simulation.sensors.stereo_camera import D435, D435_VGA, without_errors
+from hicp_lib.simulation.sensors.depth_camera import depth_imager, simulate_depth
+from hicp_lib.simulation.sensors.stereo_camera import D435, D435_VGA
+from tests.simulation.sensors.bare_depth import simulate_raw_depth, without_errors
 
 GREY = materials.plain(np.full(3, 0.5))
 # In the world as in the camera: x right, y down, z forward.

@@ -11,8 +11,9 @@ from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering.camera import PlacedCamera
 from hicp_lib.simulation.rendering.raycast import RayScene
 from hicp_lib.simulation.rendering.surfaces import Surface
-from hicp_lib.simulation.sensors.depth_camera import depth_imager, simulate_depth, simulate_raw_depth
+from hicp_lib.simulation.sensors.depth_camera import depth_imager, simulate_depth
 from hicp_lib.simulation.sensors.time_of_flight import AZURE_KINECT
+from tests.simulation.sensors.bare_depth import simulate_raw_depth
 
 GREY = materials.plain(np.full(3, 0.5))
 COLOUR = PlacedCamera(640, 480, 615.0, 615.0, 319.5, 239.5, np.eye(4))

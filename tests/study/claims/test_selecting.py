@@ -9,6 +9,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.detectors.registry import COMBINED
 from hicp_lib.evaluation.ap.metric_table import compare
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.study.claims.selecting import MissingError, _plain, is_rendered, select
 from hicp_lib.study.claims.statements import Comparison, Selection
 from hicp_lib.study.claims.verdicts import NOT_REPRODUCED
@@ -49,7 +50,7 @@ def test_a_detector_that_finds_nobody_has_a_precision_of_nought_and_refutes_what
     seen = {i: make_detections(points[i]) for i in range(12)}
     found = {("basic", name): seen for name in ("mmpose", "alphapose", "detectron2")}
     found["basic", "posenet"] = {i: Detections.none() for i in range(12)}
-    table = compare({"basic": make_annotations(points, range(12))}, found, n_resamples=20)
+    table = compare({"basic": make_annotations(points, range(12))}, found, draws=Draws(20))
     ap = {"group": "body", "metric": "AP"}
     every = claim(Comparison(">", Selection("02", "loss", ap, "value", low="low", high="high"), 0.5))
     said = verdict(every, write(table))

@@ -6,6 +6,7 @@ import pytest
 
 from hicp_lib.evaluation.ap.loss_shares import SHARES, box_variants, loss_shares
 from hicp_lib.evaluation.ap.metric_table import draw_cases, metric_table
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.study.plots import box_sources
 from tests.evaluation.made_people import make_annotations, make_detections
 
@@ -20,7 +21,7 @@ def drawn(request):
     people = make_annotations(points, range(n_people))
     run = {i: make_detections(points[i]) for i in range(n_found)}
     found = {(place, label): run for place in PLACES for label in box_variants(*PAIR)}
-    return draw_cases(dict.fromkeys(PLACES, people), found, 20, groups=["body"])
+    return draw_cases(dict.fromkeys(PLACES, people), found, Draws(20), groups=["body"])
 
 
 def lengths(axis) -> list[float]:

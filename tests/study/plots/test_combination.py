@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.evaluation.calibration.curves import calibration_study
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.study.plots import combination
 
 
@@ -34,7 +35,7 @@ def test_reliability_is_drawn_for_raw_and_calibrated_scores():
         {"detector": "mediapipe", "group": "body", "image_id": 0, "keypoint": 0,
          "source_image": rng.integers(0, 20, 400), "score": score, "hit": rng.random(400) < score**2}
     )  # fmt: skip
-    errors, curves, _ = calibration_study(hits, n_resamples=20)
+    errors, curves, _ = calibration_study(hits, draws=Draws(20))
     figure = combination.reliability_curves(curves, errors, 0.85, "made up")
     _, lower = figure.figure.axes
     assert [text.get_text() for text in figure.figure.legends[0].get_texts()] == ["raw", "calibrated"]

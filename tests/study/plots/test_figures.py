@@ -9,9 +9,9 @@ import pytest
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import write_png
-from hicp_lib.core.keypoints import INDEX
 from hicp_lib.detectors.registry import DETECTORS, default_detector_names
 from hicp_lib.evaluation.ap.found_and_placed import found_and_placed
+from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.study.plots import evaluation, people
 from hicp_lib.study.plots.palette import DETECTOR_STYLES, detector_colour
 from hicp_lib.study.plots.style import Figure, in_words
@@ -31,36 +31,6 @@ def metrics() -> pd.DataFrame:
         for metric in METRICS
     ]
     return pd.DataFrame(rows, columns=["subset", "group", "detector", "metric", "value", "low", "high"])
-
-
-def person(**points) -> tuple[np.ndarray, np.ndarray]:
-    keypoints, scores = np.full((1, 136, 2), np.nan), np.zeros((1, 136))
-    for name, (u, v, score) in points.items():
-        keypoints[0, INDEX[name]], scores[0, INDEX[name]] = (u, v), score
-    return keypoints, scores
-
-
-def test_a_keypoint_is_drawn_around_its_pixel_in_its_colour():
-    canvas = people.draw_people(
-        np.zeros((60, 80, 3), np.uint8), *person(nose=(30, 20, 1)), "#FF0000", thickness_px=3
-    )
-    assert canvas[20, 30].tolist() == [255, 0, 0]
-    rows, columns = np.nonzero(canvas[..., 0] > 200)
-    assert (rows.mean(), columns.mean()) == pytest.approx((20, 30), abs=0.1)
-
-
-def test_limbs_join_shown_points_only():
-    image = np.zeros((60, 80, 3), np.uint8)
-    shown = person(left_shoulder=(10, 30, 1), left_elbow=(70, 30, 1))
-    weak = person(left_shoulder=(10, 30, 1), left_elbow=(70, 30, 0.05))
-    assert people.draw_people(image, *shown, "white")[30, 40].tolist() == [255, 255, 255]
-    assert people.draw_people(image, *weak, "white")[30, 40].tolist() == [0, 0, 0]
-
-
-def test_drawing_leaves_the_image_and_survives_wild_points():
-    image = np.zeros((20, 20, 3), np.uint8)
-    people.draw_people(image, *person(nose=(1e9, -1e9, 1), left_eye=(-40, 400, 1)), "white")
-    assert not image.any()
 
 
 @pytest.mark.parametrize(("flag", "is_drawn"), [(2, True), (1, True), (0.4, True), (0, False)])
@@ -105,7 +75,7 @@ def test_found_and_placed_are_side_by_side_for_who_is_found(oks):
         )
         for subset, of in (("basic", [0.9, 0.9]), ("headless", oks))
     ]
-    table = found_and_placed(pd.concat(parts), 10)
+    table = found_and_placed(pd.concat(parts), Draws(10))
     figure = evaluation.found_and_placed(table, "made-up people")
     found, placed = ([line.get_xdata()[0] for line in axis.get_lines() if line.get_marker() == "o"
                       and len(line.get_xdata()) == 1] for axis in figure.figure.axes)  # fmt: skip

@@ -27,6 +27,22 @@ def test_whiskers_reach_to_the_interval_and_never_the_wrong_way():
     np.testing.assert_array_equal(above, [2.0, 0.0, 3.5, np.nan])
 
 
+def test_dots_of_a_row_stand_beside_each_other_in_their_detectors_colours():
+    _, axis = new_figure()
+    rows = pd.DataFrame({"part": ["b", "a", "b"], "detector": ["posenet", "posenet", "mmpose"]})
+    rows = rows.assign(v=[0.5, 0.25, 0.125], l=0.0, h=1.0)
+    pens = marks.detector_dots(["posenet", "mmpose"])
+    marks.dots_in_rows(axis, rows, "part", "detector", ["a", "b"], pens, bounds=("v", "l", "h"), factor=100)
+    posenet, mmpose = (bars.lines[0] for bars in axis.containers)
+    assert posenet.get_xydata().tolist() == [[50, 0.8], [25, -0.2]]
+    assert mmpose.get_xydata().tolist() == [[12.5, 1.2]]
+    assert [(dots.get_color(), dots.get_marker()) for dots in (posenet, mmpose)] == [
+        DETECTOR_STYLES["posenet"], DETECTOR_STYLES["mmpose"],
+    ]  # fmt: skip
+    ends = axis.containers[1].lines[2][0].get_segments()[0]
+    assert ends.tolist() == [[0, 1.2], [100, 1.2]]
+
+
 def test_bars_lie_end_to_end_in_the_order_of_the_styles():
     _, axis = new_figure()
     lengths = pd.DataFrame({"b": [1.0, 2.0], "a": [3.0, np.nan], "not drawn": 9.0})
@@ -55,9 +71,9 @@ def test_a_legend_has_each_label_once():
 
 def test_lines_of_a_legend_have_the_detectors_colours_and_no_points():
     _, axis = new_figure()
-    mediapipe, other = marks.detector_lines(axis, ["mediapipe", "unheard of"])
+    marks.add_keys(axis, ["mediapipe", "unheard of"], {"OKS .5": {"marker": "s", "ls": ""}})
+    mediapipe, other, square = axis.lines
     assert (mediapipe.get_color(), other.get_color()) == (DETECTOR_STYLES["mediapipe"][0], OTHER_COLOUR)
-    (square,) = marks.legend_lines(axis, ["OKS .5"], [{"marker": "s", "ls": ""}])
     assert (square.get_label(), square.get_marker(), len(square.get_xdata())) == ("OKS .5", "s", 0)
 
 

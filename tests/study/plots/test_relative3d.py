@@ -8,6 +8,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.study.plots import relative3d, within_distance
 from hicp_lib.study.plots.palette import DETECTOR_STYLES
+from hicp_lib.study.plots.relative3d import BODY_LIMBS, HAND_LIMBS, limb_lines
 
 VIEWS, DETECTORS = ("upper", "lower"), ("mediapipe", "openpose-mobilenet")
 PARTS = ("left wrist", "right wrist", "left hand", "right hand")
@@ -130,3 +131,17 @@ def test_camera_views_have_a_row_per_frame_and_view_and_a_column_per_detector(mo
     figure = relative3d.camera_views(recordings, people, [0, 2], 0.1, "made up", markers)
     first, *_, last = (axis.images[0].get_array() for axis in figure.figure.axes[1::2])
     assert (first == 0).all() and last[15, 27].min() > 200 and (last[15, 20] == 2).all()
+
+
+def test_limbs_are_lines_between_known_ends():
+    rows = [
+        ("left_shoulder", 0, 1),
+        ("left_elbow", 2, 3),
+        ("left_wrist", np.nan, 5),
+        ("nose", 7, 8),
+        ("left_elbow", 9, 9),
+    ]
+    table = pd.DataFrame(rows, columns=["keypoint", "x", "y"])
+    np.testing.assert_array_equal(limb_lines(table, ["x", "y"]), [[0, 1], [2, 3], [np.nan, np.nan]])
+    assert limb_lines(table, ["x", "y"], HAND_LIMBS).shape == (0, 2)
+    assert limb_lines(table, ["y"], BODY_LIMBS)[:2].tolist() == [[1], [3]]

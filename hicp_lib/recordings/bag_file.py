@@ -1,0 +1,166 @@
+"""Messages of ROS bags: ROS 1, ROS 2 in SQLite or MCAP, and what librealsense records, which is either."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from hicp_lib.core.errors import InputError, one_line
+from hicp_lib.core.extras import needs
+
+_SURPLUS_BYTES = 4  # librealsense ends an image with the depth unit, which the message has no place for
+_RGB, _BGR = [0, 1, 2], [2, 1, 0]
+_ENCODINGS: dict[str, tuple[str, int, Any]] = {  # type, channels, and those that are taken
+    "rgb8": ("u1", 3, _RGB), "rgba8": ("u1", 4, _RGB), "bgr8": ("u1", 3, _BGR), "bgra8": ("u1", 4, _BGR),
+    "16UC1": ("u2", 1, 0), "mono16": ("u2", 1, 0), "32FC1": ("f4", 1, 0),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Bag:
+    """A bag that is open.
+
+    Attributes
+    ----------
+    path : Path
+    reader : rosbags.highlevel.AnyReader
+    """
+
+    path: Path
+    reader: Any
+
+    def topics(self, *types: str) -> list[str]:
+        """Topics of messages of these types, which are named without their package."""
+        named = {c.topic: c.msgtype.rpartition("/")[2] for c in self.reader.connections}
+        return sorted(topic for topic, name in named.items() if name in types)
+
+    def messages(self, *topics: str) -> Iterator[tuple[str, int, Any]]:
+        """Topic, time of recording in nanoseconds, and content of every message.
+
+        Raises
+        ------
+        InputError
+            If the file is damaged.
+        """
+        connections = [c for c in self.reader.connections if c.topic in topics]
+        with _told(self.path):
+            for connection, recorded_ns, raw in self.reader.messages(connections) if connections else ():
+                try:
+                    message = self.reader.deserialize(raw, connection.msgtype)
+                except Exception:
+                    message = self.reader.deserialize(raw[:-_SURPLUS_BYTES], connection.msgtype)
+                yield connection.topic, recorded_ns, message
+
+    def first(self, topic: str) -> Any:
+        """Content of a topic's first message; None where there is none."""
+        return next((message for _, _, message in self.messages(topic)), None)
+
+
+@contextmanager
+def open_bag(path: str | Path) -> Iterator[Bag]:
+    """Open a bag.
+
+    Parameters
+    ----------
+    path : str or Path
+        `.bag`, `.db3`, `.mcap`, or the folder of a ROS 2 bag.
+
+    Returns
+    -------
+    context manager of Bag
+
+    Raises
+    ------
+    InputError
+        If it is none, with the reader's reason.
+    """
+    with needs("bags"):
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    path = Path(path)
+    with ExitStack() as stack:
+        with _told(path):
+            types = get_typestore(Stores.LATEST)  # for files that do not define theirs
+            reader = stack.enter_context(AnyReader([path], default_typestore=types))
+        yield Bag(path, reader)
+
+
+def stamp_s(message: Any) -> float:
+    """Time in a message's header, in seconds.
+
+    Parameters
+    ----------
+    message : Any
+        Of a bag.
+
+    Returns
+    -------
+    float
+    """
+    return message.header.stamp.sec + message.header.stamp.nanosec / 1e9
+
+
+def decode(where: str, message: Any) -> np.ndarray:
+    """The picture of an `Image` or a `CompressedImage`.
+
+    Parameters
+    ----------
+    where : str
+        The bag and the topic, for messages.
+    message : Any
+
+    Returns
+    -------
+    array, shape (height, width, 3) or (height, width)
+        Colour as RGB; depth as whole numbers of the file's unit, or as metres.
+
+    Raises
+    ------
+    InputError
+        If it is damaged, or of a kind that is neither.
+    """
+    if hasattr(message, "format"):
+        return _decompressed(where, message)
+    if message.encoding not in _ENCODINGS:
+        known = ", ".join(_ENCODINGS)
+        raise InputError(f"{where}: images are {message.encoding}; record them as one of {known}")
+    kind, n_channels, taken = _ENCODINGS[message.encoding]
+    dtype = np.dtype((">" if message.is_bigendian else "<") + kind)
+    try:
+        rows = np.frombuffer(message.data, np.uint8).reshape(message.height, message.step)
+        values = rows[:, : message.width * n_channels * dtype.itemsize].copy().view(dtype)
+        return values.reshape(message.height, message.width, n_channels)[..., taken].astype(kind)
+    except ValueError as error:
+        raise InputError(f"{where}: an image is not whole ({one_line(error)})") from None
+
+
+def _decompressed(where: str, message: Any) -> np.ndarray:
+    """JPEG or PNG; depth has twelve bytes before it, the last eight for those that stand for floats."""
+    is_depth, content = "compresseddepth" in message.format.lower(), np.asarray(message.data, np.uint8)
+    try:
+        image = cv2.imdecode(content[12:] if is_depth else content, cv2.IMREAD_UNCHANGED)
+    except cv2.error as error:
+        raise InputError(f"{where}: an image cannot be read ({one_line(error)})") from None
+    if image is None:
+        raise InputError(f"{where}: an image of format {message.format!r} is damaged or not JPEG or PNG")
+    if is_depth and message.format.startswith("32FC1"):
+        scale, offset = content[4:12].copy().view("<f4")
+        with np.errstate(divide="ignore"):
+            return np.where(image > 0, scale / (image - offset), 0).astype(np.float32)
+    if image.ndim == 3:
+        return np.ascontiguousarray(image[..., _RGB if "compressed rgb8" in message.format else _BGR])
+    return image
+
+
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Whatever the reader of bags raises, for which it has many kinds, in one line."""
+    try:
+        yield
+    except Exception as error:
+        expected = "expected a bag of ROS or of RealSense that was closed after recording"
+        raise InputError(f"{path}: {expected} ({one_line(error)})") from None

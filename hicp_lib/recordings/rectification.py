@@ -1,0 +1,118 @@
+"""Images as a pinhole camera without distortion would see them, and depth as the colour camera would."""
+
+import re
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from hicp_lib.core.camera import Camera, deproject, project, transform
+from hicp_lib.core.errors import InputError
+
+# From ideal to seen pixels. So do librealsense's own functions take inverse_brown_conrady, too, whatever
+# the name says: they agree with it within 0.001 pixels, and with its inverse not within 5.
+_MODELS = ("plumb_bob", "brown_conrady", "inverse_brown_conrady", "rational_polynomial")
+
+
+def undistortion(
+    where: str, camera: Camera, model: str, coefficients: Sequence[float] | np.ndarray
+) -> np.ndarray | None:
+    """Where an ideal camera of the same intrinsics finds its pixels in a distorted image.
+
+    Parameters
+    ----------
+    where : str
+        What the coefficients were read from, for messages.
+    camera : Camera
+    model : str
+        Its name in ROS, in librealsense or in OpenCV's documentation.
+    coefficients : sequence of float
+        k1, k2, p1, p2, k3 and, of a rational polynomial, k4, k5, k6.
+
+    Returns
+    -------
+    array or None, shape (height, width, 2), dtype float32
+        Pixels (u, v) of the distorted image; None where it has no distortion.
+
+    Raises
+    ------
+    InputError
+        If there is distortion of a model that cannot be undone.
+
+    Examples
+    --------
+    >>> undistortion("a.json", Camera(4, 3, 5.0, 5.0, 1.5, 1.0), "plumb_bob", [0.0] * 5) is None
+    True
+    """
+    numbers = np.array(coefficients, float)
+    if not numbers.any():
+        return None
+    name = re.sub(r"\W+", "_", model.rpartition(".")[2].lower())
+    if name not in _MODELS or len(numbers) not in (4, 5, 8) or not np.isfinite(numbers).all():
+        shown = np.array2string(numbers, precision=4, separator=", ")
+        known = f"what can be undone is {', '.join(_MODELS)} of 4, 5 or 8 numbers"
+        raise InputError(f"{where}: distortion {model or 'without a model'} {shown}; {known}; undo it first")
+    matrix = np.array([[camera.fx_px, 0, camera.cx_px], [0, camera.fy_px, camera.cy_px], [0, 0, 1]])
+    size = camera.width_px, camera.height_px
+    return cv2.initUndistortRectifyMap(matrix, numbers, None, matrix, size, cv2.CV_32FC2)[0]
+
+
+def rectify(image: np.ndarray, pixels_px: np.ndarray | None) -> np.ndarray:
+    """Undo distortion: colour interpolated, depth of the nearest pixel; 0 outside of the image.
+
+    Parameters
+    ----------
+    image : array, shape (height, width, 3) or (height, width)
+        Colour, or depth.
+    pixels_px : array or None, shape (height, width, 2)
+        As `undistortion` gives them.
+
+    Returns
+    -------
+    array
+        Of the image's shape; the image itself without `pixels_px`.
+    """
+    if pixels_px is None:
+        return image
+    interpolation = cv2.INTER_LINEAR if image.ndim == 3 else cv2.INTER_NEAREST
+    return cv2.remap(image, pixels_px[..., 0], pixels_px[..., 1], interpolation)
+
+
+def align_depth(depth_m: np.ndarray, camera: Camera, color: Camera, T_color_depth: np.ndarray) -> np.ndarray:
+    """Depth as the colour camera would see it.
+
+    Each pixel of depth fills the colour pixels that its corners span, as librealsense aligns; the nearest
+    counts. Depth is along the axis of the colour camera.
+
+    Parameters
+    ----------
+    depth_m : array, shape (height, width)
+        0 or NaN where there is none.
+    camera : Camera
+        The depth camera.
+    color : Camera
+    T_color_depth : array, shape (4, 4)
+        The depth camera's coordinates to the colour camera's.
+
+    Returns
+    -------
+    array, shape (height of colour, width of colour)
+        0 where there is none.
+    """
+    v, u = np.nonzero(depth_m > 0)
+    z_m = depth_m[v, u]
+
+    def seen(offset_px: float) -> tuple[np.ndarray, np.ndarray]:
+        points_m = deproject(camera, np.column_stack([u, v]) + offset_px, z_m)
+        moved_m = transform(T_color_depth, points_m)
+        return np.nan_to_num(np.rint(project(color, moved_m)), nan=-1), moved_m[:, 2]
+
+    (first, _), (last, _), (_, z_color_m) = seen(-0.5), seen(0.5), seen(0)
+    size = last - first
+    aligned_m = np.full((color.height_px, color.width_px), np.inf)
+    for step in np.ndindex(*(1 + size.max(axis=0, initial=0).astype(int))):
+        pixels = first + step
+        is_seen = (size >= step).all(axis=1) & color.contains(pixels)
+        column, row = pixels[is_seen].astype(int).T
+        np.minimum.at(aligned_m, (row, column), z_color_m[is_seen])
+    return np.where(np.isfinite(aligned_m), aligned_m, 0)

@@ -1,0 +1,63 @@
+"""Where a camera was, as other tools write it: TUM, EuRoC, KITTI, and Open3D's `trajectory.log`."""
+
+from pathlib import Path
+
+import numpy as np
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_bytes
+from hicp_lib.recordings.tum import read_poses
+
+_ROTATION_TOLERANCE = 0.01  # of R Rᵀ from the identity: files are rounded
+
+
+def read_trajectory(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
+    """Poses of a camera, in the layout that the file shows.
+
+    Lines of 12 numbers are KITTI's matrices of 3 x 4; lines of 3, 4, 4, 4 and 4 numbers are one pose in
+    Open3D's log. Both are of frame after frame and know no times. All else is read by
+    `hicp_lib.recordings.tum.read_poses`.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    times_s : array, shape (n,)
+        Increasing; of length 0 where the poses are those of frame after frame.
+    T_base_cam : array, shape (n, 4, 4)
+        Camera coordinates to the file's own world, metres.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is none of these, or a matrix is no rigid transform.
+    """
+    text = read_bytes(path, "give a file of camera poses").decode("latin-1")
+    rows = [fields for line in text.splitlines() if (fields := line.partition("#")[0].split())]
+    widths = {len(fields) for fields in rows}
+    is_log = [len(fields) for fields in rows[:2]] == [3, 4]
+    if widths != {12} and not is_log:
+        return read_poses(path)
+    T_base_cam = np.tile(np.eye(4), (len(rows) // 5 if is_log else len(rows), 1, 1))
+    try:
+        numbers = np.array(sum(rows, []), float).reshape(len(T_base_cam), -1)
+        T_base_cam[:, : 4 if is_log else 3] = numbers[:, 3 * is_log :].reshape(len(T_base_cam), -1, 4)
+    except ValueError:
+        expected = "blocks of 'k k k+1' and a matrix of 4 x 4" if is_log else "12 numbers in every line"
+        raise InputError(f"{path}: is cut off or damaged; expected {expected}") from None
+    if is_log and not (numbers[:, :2] == numbers[:1, :1] + np.arange(len(numbers))[:, None]).all():
+        raise InputError(
+            f"{path}: is no log of a camera frame after frame; expected 'k k k+1' above each pose"
+        )
+    R, last = T_base_cam[:, :3, :3], T_base_cam[:, 3]
+    off = np.abs(R @ R.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2)) + np.abs(last - [0, 0, 0, 1]).max(axis=1)
+    is_rigid = (
+        (off <= _ROTATION_TOLERANCE) & (np.linalg.det(R) > 0) & np.isfinite(T_base_cam).all(axis=(1, 2))
+    )
+    if not is_rigid.all():
+        raise InputError(
+            f"{path}: pose {1 + np.argmin(is_rigid)} is no rotation and translation; export it again"
+        )
+    return np.zeros(0), T_base_cam
