@@ -282,8 +282,9 @@ def _areas(rows: Rows, boxes_px: np.ndarray, is_crowd: np.ndarray) -> tuple[np.n
 def write_annotations(path: str | Path, annotations: Annotations) -> None:
     """Write people as a COCO keypoint file with 136 keypoints in Halpe's order."""
     a = annotations
-    triples = keypoint_triples(a.keypoints_px, a.visibility)
-    triples[:, 2::3][a.visibility < 0] = FLAG_OUTSIDE
+    flags = np.where(a.visibility < 0, FLAG_OUTSIDE, a.visibility)[..., None]
+    given = np.isfinite(a.keypoints_px).all(axis=-1, keepdims=True) | (flags == FLAG_OUTSIDE)
+    triples = np.where(given, np.concatenate([np.nan_to_num(a.keypoints_px), flags], axis=-1), 0.0)
     people = [
         {
             **extra, "id": i, "image_id": image, "category_id": PERSON_CATEGORY, "bbox": box, "area": area,
@@ -292,7 +293,7 @@ def write_annotations(path: str | Path, annotations: Annotations) -> None:
         for extra, i, image, box, area, crowd, count, flat in zip(
             a.extras, a.ids.tolist(), a.image_ids.tolist(), a.boxes_px.tolist(), a.areas_px2.tolist(),
             a.is_crowd.astype(int).tolist(), (a.visibility[:, COCO_17] > 0).sum(axis=1).tolist(),
-            triples.tolist(), strict=True,
+            triples.reshape(len(a), -1).tolist(), strict=True,
         )
     ]  # fmt: skip
     category = {**PERSON, "keypoints": list(NAMES)}
@@ -305,31 +306,6 @@ def image_rows(annotations: Annotations) -> list[dict]:
         {"id": image.id, "file_name": image.file_name, "width": image.width_px, "height": image.height_px}
         for image in annotations.images.values()
     ]
-
-
-def keypoint_triples(keypoints_px: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Keypoints as COCO has them: x, y and a value of each in one row per person.
-
-    Parameters
-    ----------
-    keypoints_px : array, shape (n, k, 2)
-        NaN where not given.
-    values : array, shape (n, k)
-        Flags or scores.
-
-    Returns
-    -------
-    array, shape (n, 3 k)
-        0, 0, 0 for a keypoint that is not given.
-
-    Examples
-    --------
-    >>> keypoint_triples(np.array([[[1.0, 2.0], [np.nan, np.nan]]]), np.array([[2.0, 0.5]]))
-    array([[1., 2., 2., 0., 0., 0.]])
-    """
-    given = np.isfinite(keypoints_px).all(axis=-1)[..., None]
-    triples = np.where(given, np.concatenate([keypoints_px, values[..., None]], axis=-1), 0.0)
-    return triples.reshape(len(triples), 3 * triples.shape[1])
 
 
 def read_detections(path: str | Path, annotations: Annotations | None = None) -> dict[int, Detections]:

@@ -214,11 +214,8 @@ class Rows:
         """Each row's keypoints in one list; its length is one of `layouts`, times 3."""
         lists = self.column("keypoints", lambda v: isinstance(v, list), "a list of x, y, v per keypoint")
         for i, row in enumerate(self.rows):
-            if (
-                len(lists[i]) == 51
-                and 133 in layouts
-                and all(isinstance(row.get(key), list) for key in PART_KEYS)
-            ):
+            spread = len(lists[i]) == 51 and 133 in layouts
+            if spread and all(isinstance(row.get(key), list) for key in PART_KEYS):
                 lists[i] = list(chain(lists[i], *(row[key] for key in PART_KEYS)))
             n = len(lists[i])
             if n % 3 or n // 3 not in layouts:

@@ -176,11 +176,10 @@ def _meanings(where: str, names: Sequence[str], given: Mapping[str, str | None])
         ours = [of.replace("foot", "ankle") for of in ours]
     topped = ["head_top" if of == "head" else of for of in ours]
     ours = topped if set(topped) in _TOPPED else ours
+    pairs = list(zip(names, ours, strict=True))
     problems = {
-        "not understood": [name for name, of in zip(names, ours, strict=True) if not of],
-        "several mean one": [
-            n for n, of in zip(names, ours, strict=True) if of in INDEX and ours.count(of) > 1
-        ],
+        "not understood": [name for name, of in pairs if not of],
+        "several mean one": [name for name, of in pairs if of in INDEX and ours.count(of) > 1],
         "none is a person's": [] if set(ours) & set(INDEX) else names,
         "not in the file": [name for name in given if name not in names],
     }

@@ -13,6 +13,7 @@ _LEAST_POINTS = 3  # fewer may lie at the corner of an image by chance
 _SLACK_PX = 1.0
 _FEW = 0.02  # of the labels, which lie outside their images in public data sets, too
 _SHOULDERS, _HIPS = ([INDEX[f"left_{part}"], INDEX[f"right_{part}"]] for part in ("shoulder", "hip"))
+_FALLEN = "most shoulders are below hips; is the origin the bottom?"
 _CERTAIN = 10  # people, of whom none contradicts
 _MUCH = 0.25  # of a box's side: less from the image's corner, and its two readings are nearly one
 
@@ -40,8 +41,8 @@ def refuse_fractions(path: Path | str, points_px: np.ndarray, what: str = "keypo
     fractions = people & (small | ~given).all(axis=-1)
     if fractions.any() and 2 * fractions.sum() >= people.sum():
         span = "[0, 1]" if points_px[fractions][given[fractions]].min() >= 0 else "[-1, 1]"
-        problem = f"{what}: all coordinates lie in {span}; expected pixels"
-        raise InputError(f"{path}: {problem}, multiply by the image's width and height")
+        expected = "expected pixels, multiply by the image's width and height"
+        raise InputError(f"{path}: {what}: all coordinates lie in {span}; {expected}")
 
 
 def corners_note(
@@ -98,20 +99,14 @@ def doubts(boxes_px: np.ndarray, keypoints_px: np.ndarray, sizes_px: np.ndarray)
     boxes_px, keypoints_px, sizes_px : array
         As of `corners_note`.
     """
-    ends, room = (
-        np.stack([boxes_px[:, :2], boxes_px[:, :2] + boxes_px[:, 2:]], 1),
-        _MUCH * boxes_px[:, None, 2:],
-    )
-    n_points, n_ends = (_n_beyond(of, 0, sizes_px[:, None]) for of in (keypoints_px, ends))
-    n_astray = _n_beyond(keypoints_px, ends[:, :1] - room, ends[:, 1:] + room)
-    few = _FEW * np.isfinite(keypoints_px[..., 0]).sum()
+    (first, room), sizes = np.split(boxes_px[:, None], 2, axis=-1), sizes_px[:, None]
+    last, few = first + room, _FEW * np.isfinite(keypoints_px[..., 0]).sum()
+    n_points, n_ends = (_n_beyond(of, 0, sizes) for of in (keypoints_px, np.hstack([first, last])))
+    n_astray = _n_beyond(keypoints_px, first - _MUCH * room, last + _MUCH * room)
     turned = "; are the images turned by an orientation flag?" if n_points > few else ""
     rises_px = keypoints_px[:, _HIPS, 1] - keypoints_px[:, _SHOULDERS, 1]
-    found = {
-        f"{n_points} labelled keypoints, {n_ends} corners of boxes outside images{turned}": n_points + n_ends
-        > 0,
-        f"{n_astray} labelled keypoints are far from the box of their person": n_astray > few,
-        "most shoulders are below hips; is the origin the bottom?": (rises_px < 0).sum()
-        > (rises_px >= 0).sum(),
-    }
+    fallen = (rises_px < 0).sum() > (rises_px >= 0).sum()
+    outside = f"{n_points} labelled keypoints, {n_ends} corners of boxes outside images{turned}"
+    astray = f"{n_astray} labelled keypoints are far from the box of their person"
+    found = {outside: n_points + n_ends, astray: n_astray > few, _FALLEN: fallen}
     return "; ".join(note for note, holds in found.items() if holds)

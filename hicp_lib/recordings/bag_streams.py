@@ -138,9 +138,8 @@ def _stream(bag: Bag, topic: str) -> Stream:
     units_per_m = round(1 / float(unit.data), 3) if unit else _MM_PER_M
     pixels_px = undistortion(f"{bag.path}: {topic}", camera, model, coefficients)
     notes = [] if pixels_px is None else ["distortion undone"]
-    metadata = bag.messages(
-        f"{frame}/image/metadata"
-    )  # text in newer releases, where headers have another clock
+    # Text in newer releases of librealsense, where headers have another clock.
+    metadata = bag.messages(f"{frame}/image/metadata")
     said = {recorded_ns: _fields(of.data) for _, recorded_ns, of in metadata if hasattr(of, "data")}
     taken_s = {recorded_ns: float(of["timestamp"]) / 1000 for recorded_ns, of in said.items()}
     numbers = {int(of["Frame number"]) for of in said.values()}

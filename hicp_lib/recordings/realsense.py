@@ -52,8 +52,8 @@ def record_camera(
     rate_hz : int, optional
     duration_s : float, optional
         Ends by itself after that.
-    device : pyrealsense2.device, optional
-        The first that is connected when left out.
+    device : Any, optional
+        pyrealsense2's; the first that is connected when left out.
 
     Returns
     -------

@@ -48,9 +48,7 @@ def read_mmpose(path: Path) -> People:
     """
     files = json_files(path, (".json",), "the folder MMPoseInferencer wrote with pred_out_dir")
     read = {file: _instances(file) for file in files.values()}
-    sources: list[str | int] = [
-        n.removeprefix(_SAVED) if read[file][1] is not None else n for n, file in files.items()
-    ]
+    named = (n.removeprefix(_SAVED) if read[file][1] is not None else n for n, file in files.items())
     of_models = {names for _, names in read.values() if names}
     if len(of_models) > 1:
         raise InputError(f"{path}: keypoint_id2name differs from file to file; import each model by itself")
@@ -67,7 +65,7 @@ def read_mmpose(path: Path) -> People:
     counted = scores > _COUNTED_FROM
     means = np.where(counted, scores, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
     return People(
-        path, "stem", sources, source_of, keypoints, scores,
+        path, "stem", list[str | int](named), source_of, keypoints, scores,
         rows.numbers("bbox_score", default=1.0) * means,  # 1 where a bottom-up model gave no box
         conventions, _extras(rows),
     )  # fmt: skip
