@@ -100,7 +100,7 @@ system: $(INSTALLED)
 lock:
 	@command -v $(UV) >/dev/null || { echo "make: uv is missing; run: pip install uv" >&2; exit 1; }
 	@$(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-annotate \
-	  --all-extras --group mediapipe --group test --group lint --group build --custom-compile-command "make lock" \
+	  --extra all --group mediapipe --group test --group lint --group build --custom-compile-command "make lock" \
 	  --output-file environment.lock pyproject.toml
 
 clean:

@@ -21,20 +21,14 @@ from hicp_lib import __version__
 from hicp_lib.cli.calibration import calibration
 from hicp_lib.cli.looking import draw, inspect_
 from hicp_lib.cli.models import models
-from hicp_lib.cli.options import (
-    PATH,
-    detector_options,
-    given,
-    keypoint_map_option,
-    people_option,
-    tell_assumed,
-    tell_notes,
-    worker_options,
-)
+from hicp_lib.cli.options import PATH, detector_options, given, people_option, tell_assumed, worker_options
 from hicp_lib.cli.recordings import lift, record
 from hicp_lib.core.errors import InputError
 
-_ANNOTATIONS = "COCO's layout; keypoints by their names, or 17, 26, 133 or 136 of them."
+_keypoint_map_option = click.option(
+    "--keypoint-map", type=PATH, metavar="FILE.json",
+    help="What keypoint names of the annotations mean: their names to ours, or null to leave one out.",
+)  # fmt: skip
 
 
 def main() -> NoReturn:
@@ -81,6 +75,13 @@ def run(arguments: list[str]) -> int:
         return _fail(f"{name}: {error.strerror}; check the path, the rights and the disk space", 2)
 
 
+def _tell_notes(path: Path, notes: dict[str, str], area: str = "segment") -> None:
+    """Say what a reader of figures must know of a file; of areas, if they are used."""
+    for about, note in notes.items():
+        if about != "area" or area == "segment":
+            click.echo(f"{path}: {note}", err=True)
+
+
 def _fail(message: object, code: int) -> int:
     click.echo(f"hicp: {message}", err=True)
     return code
@@ -121,20 +122,20 @@ def dataset() -> None:
 
 
 @dataset.command("create")
-@click.option("--annotations", type=PATH, required=True, help=_ANNOTATIONS)
+@click.option("--annotations", type=PATH, required=True, help="In COCO's layout.")
 @click.option("--images", type=PATH, required=True, help="Folder of the images.")
-@keypoint_map_option
+@_keypoint_map_option
 @click.option("--out", type=PATH, required=True, help="Where basic/ and headless/ are written.")
 @click.option("--min-pixels", default=20_000, show_default=True, type=click.IntRange(min=1))
-def dataset_create(annotations: Path, images: Path, keypoint_map, out: Path, min_pixels: int) -> None:
+@click.option("--orientation", type=click.Choice(["stored", "seen"]), help="Where pictures are flagged.")
+def dataset_create(out: Path, annotations: Path, images: Path, **options) -> None:
     """Cut people out of annotated images: Basic, and Headless without their heads."""
-    from hicp_lib.datasets.subsets import create_hicp
+    from hicp_lib.datasets.subsets import create_hicp, notes
 
-    counts = create_hicp(
-        annotations, images, out, min_pixels, keypoint_map=keypoint_map, progress=sys.stderr.isatty()
-    )
-    tell_notes(annotations, counts.get("notes", {}))
+    counts = create_hicp(annotations, images, out, progress=sys.stderr.isatty(), **options)
+    _tell_notes(annotations, counts.get("notes", {}))
     click.echo(json.dumps(counts, indent=2))
+    click.echo("".join(f"{note}\n" for note in notes(counts)), nl=False, err=True)
 
 
 @hicp.command()
@@ -185,7 +186,7 @@ def detect(
 @click.option("--format", "kind", required=True, help="openpose, alphapose, mmpose, detectron2 or coco.")
 @click.option("--predictions", type=PATH, required=True, help="The folder or file the tool wrote.")
 @click.option("--annotations", type=PATH, required=True, help="Annotations of the images the tool saw.")
-@keypoint_map_option
+@_keypoint_map_option
 @click.option("--out", type=PATH, required=True, help="COCO keypoint results to write.")
 @click.option("--score-scale", type=float, help="Divides keypoint scores; the format's own if not given.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
@@ -219,14 +220,12 @@ def export(detections: Path, kind: str, layout: str, annotations: Path | None, o
 
 
 @hicp.command()
-@click.option("--annotations", type=PATH, required=True, help=_ANNOTATIONS)
+@click.option("--annotations", type=PATH, required=True, help="In COCO's layout.")
 @click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
-@keypoint_map_option
+@_keypoint_map_option
 @click.option("--group", default="body", show_default=True, help="body (17 points) or hand (42; and each).")
 @click.option("--sigmas", help="halpe or wholebody; else halpe, of each hand wholebody.")
-@click.option(
-    "--area", default="segment", show_default=True, help="segment, box, box53 (0.53 x box) or source."
-)
+@click.option("--area", default="segment", show_default=True, help="Or box, box53 (0.53 x box), source.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the bootstrap.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def evaluate(
@@ -246,7 +245,7 @@ def evaluate(
 
     people = read_annotations(annotations, keypoint_map)
     found = read_detections(detections, people)
-    tell_notes(annotations, people.notes, area)
+    _tell_notes(annotations, people.notes, area)
     clusters = source_images(people)  # crops of one image are drawn together
     options = {"area": area} | ({"sigmas": sigmas} if sigmas else {})
     results = []
@@ -254,6 +253,8 @@ def evaluate(
         evaluation = evaluate_detections(people, found, of_group, **way, **options)
         metrics = bootstrap_intervals(evaluation, Draws(seed=seed), clusters).items()
         rows = {name: _finite(dict(zip(("value", "low", "high"), of, strict=True))) for name, of in metrics}
+        if any(map(len, found.values())) and not evaluation.n_detections:
+            rows = {name: dict.fromkeys(row) for name, row in rows.items()}
         results.append(_finite(evaluation.row()) | {"metrics": rows, "seed": seed})
     if as_json:
         click.echo(json.dumps(results[0] | {"other_definitions": results[1:]}, indent=2))
@@ -271,6 +272,10 @@ def _tell_evaluation(result: dict[str, Any]) -> None:
     of += " and outside" if result["outside"] == "count" else ""
     where = "{n_people} in {n_images} images; {sigmas} sigmas, {area} area".format(**result)
     click.echo(f"{result['group']}, {of} keypoints: {where}")
+    if all(row["value"] is None for row in result["metrics"].values()):
+        who = "the detections give" if result["n_people"] else "the annotations give"
+        click.echo(f"{who} no {'hands' if 'hand' in result['group'] else 'bodies'}")
+        return
     if all(row["low"] is None for row in result["metrics"].values()):
         click.echo(f"no intervals: they ask for {MIN_DRAWN} source images at least")
     for metric, row in result["metrics"].items():

@@ -1,6 +1,6 @@
 """Kinds of options that the `hicp` command's parts share."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -14,36 +14,6 @@ people_option = click.option(
     "--people", default="held-out", show_default=True, type=click.Choice(["development", "held-out"]),
     help="What is tuned is tuned on people for development.",
 )  # fmt: skip
-
-
-def _keypoint_map(context: click.Context, parameter: click.Parameter, path: Path | None) -> Any:
-    if path is None:
-        return None
-    from hicp_lib.formats.layouts import read_keypoint_map
-
-    return read_keypoint_map(path)
-
-
-keypoint_map_option = click.option(
-    "--keypoint-map", type=PATH, callback=_keypoint_map, metavar="FILE.json",
-    help="What keypoint names of the annotations mean: their names to ours, or null to leave one out.",
-)  # fmt: skip
-
-
-def tell_notes(path: Path, notes: Mapping[str, str], area: str = "segment") -> None:
-    """Say on the error stream what a reader of figures must know of a file; of areas, if they are used.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    notes : mapping of str to str
-        As of `hicp_lib.formats.annotations.Annotations`.
-    area : str, optional
-        As of `hicp_lib.evaluation.ap.options`.
-    """
-    for note in (note for about, note in notes.items() if about != "area" or area == "segment"):
-        click.echo(f"{path}: {note}", err=True)
 
 
 def worker_options(kind: str) -> Callable[[Callable], Callable]:

@@ -116,8 +116,12 @@ def _tell(out: Path, n_frames: int, notes: list[str]) -> None:
 
 @record.command("camera")
 @click.argument("out", type=PATH)
-@click.option("--color", "color_px", default=(640, 480), show_default=True, help="Width and height.")
-@click.option("--depth", "depth_px", default=(848, 480), show_default=True, help="Width and height.")
+@click.option(
+    "--color", "color_px", nargs=2, type=int, default=(640, 480), show_default=True, help="Width and height."
+)
+@click.option(
+    "--depth", "depth_px", nargs=2, type=int, default=(848, 480), show_default=True, help="Width and height."
+)
 @click.option("--rate", "rate_hz", default=30, show_default=True, type=int, help="Frames per second.")
 @click.option(
     "--seconds", "duration_s", type=click.FloatRange(min=0), help="How long; until Ctrl-C if not given."
@@ -131,9 +135,7 @@ def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> Non
 
     if joints and poses:
         raise click.UsageError("Give either --poses FILE or --joints FILE.", click.get_current_context())
-    source = read_pose_source(poses, mount)
-    click.echo("Recording; Ctrl-C ends it.", err=True)
-    _tell(out, *record_camera(out, source, joints, mount, **settings))
+    _tell(out, *record_camera(out, read_pose_source(poses, mount), joints, mount, **settings))
 
 
 @click.command()

@@ -45,13 +45,9 @@ _LOGGERS = ("distributed", "distributed.client", "tornado.application", "asyncio
 
 
 def run_on_cluster(
-    address: str,
-    jobs: Iterable[tuple[Key, Callable | None]],
-    kind: str,
-    folder: Path | None,
-    alike: Callable[[], dict] | None,
-    named: Callable[[Key], object],
-) -> Iterator[tuple[Key, Any]]:
+    address: str, jobs: Iterable[tuple[Key, Callable | None]], kind: str, folder: Path | None, alike:
+    Callable[[], dict] | None, named: Callable[[Key], object],
+) -> Iterator[tuple[Key, Any]]:  # fmt: skip
     """As `hicp_lib.core.executor.run_jobs`, by the workers of a cluster; without jobs nobody is asked.
 
     Parameters
@@ -156,12 +152,9 @@ def _quiet() -> Iterator[None]:
 
 
 def _spread(
-    client: Client,
-    address: str,
-    jobs: Iterable[tuple[Key, Callable | None]],
-    how: tuple,
-    named: Callable[[Key], object],
-) -> Iterator[tuple[Key, Any]]:
+    client: Client, address: str, jobs: Iterable[tuple[Key, Callable | None]], how: tuple, named:
+    Callable[[Key], object],
+) -> Iterator[tuple[Key, Any]]:  # fmt: skip
     """What jobs return, or what went wrong, as it comes in."""
     from distributed import wait
 

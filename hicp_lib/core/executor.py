@@ -65,14 +65,9 @@ def resolved(workers: Workers) -> int | str:
 
 
 def run_jobs(
-    jobs: Iterable[tuple[Key, Callable | None]],
-    workers: Workers = None,
-    kind: str = "processes",
-    *,
-    folder: Path | None = None,
-    alike: Callable[[], dict] | None = None,
-    named: Callable[[Key], object] = str,
-) -> Iterator[tuple[Key, Any]]:
+    jobs: Iterable[tuple[Key, Callable | None]], workers: Workers = None, kind: str = "processes", *, folder:
+    Path | None = None, alike: Callable[[], dict] | None = None, named: Callable[[Key], object] = str,
+) -> Iterator[tuple[Key, Any]]:  # fmt: skip
     """Run jobs, several at a time; each one's key and what it returned, as they come in.
 
     Parameters
@@ -144,11 +139,9 @@ def threads_beside() -> int:
 
 
 def as_they_come(
-    jobs: Iterable[tuple[Key, Callable | None]],
-    submit: Callable[[Callable], Any],
-    first_ones: Callable[[Iterable], Iterable],
-    n_most: Callable[[], float],
-) -> Iterator[tuple[Key, Any]]:
+    jobs: Iterable[tuple[Key, Callable | None]], submit: Callable[[Callable], Any], first_ones:
+    Callable[[Iterable], Iterable], n_most: Callable[[], float],
+) -> Iterator[tuple[Key, Any]]:  # fmt: skip
     """Keys and ended futures of jobs; no more are under way than keep all workers busy.
 
     Parameters

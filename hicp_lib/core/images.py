@@ -76,7 +76,7 @@ def image_header(path: str | Path) -> tuple[int, int, int]:
             exif = Image.Exif()
             # A TIFF has nothing there, as it should; `getexif` would decode a PNG to its end.
             exif.load(image.info.get("exif", b""))
-            flag = exif.get(ExifTags.Base.Orientation)
+            flag = int(exif.get(ExifTags.Base.Orientation, 1))
             return *image.size, flag if flag in range(2, 9) else 1
     except Exception:  # Pillow raises many kinds; whoever reads the pixels tells what is wrong with them
         return 0, 0, 1

@@ -1,56 +1,25 @@
-"""The geometry of HiCP: which crop of an image shows a person close by, and where the head is cut off.
+"""The geometry of HiCP: which crop of an image shows a person close by.
 
 After Docekal et al. 2022, section III-A. The paper fixes that people are cropped by their
-boxes, that crops of at least 20,000 pixels are kept, and that the head is removed by the
-positions of head and body. The rest is chosen here:
+boxes, and that crops of at least 20,000 pixels are kept. The rest is chosen here:
 
 - A box is rounded outwards to whole pixels and clipped to the image. Keypoint u lies in pixel
-  column i when i - 0.5 <= u < i + 0.5; keypoints outside the crop are no longer labelled.
-- The head's position is the mean of its labelled keypoints (nose, eyes, ears, head top, face),
-  the body's that of the other labelled body keypoints (hands do not count: 21 points on a
-  raised hand would outweigh the trunk).
-- The head lies on that side of the body (above, below, left, right) in which it is displaced
-  most. The cut is the first pixel border towards the body that leaves every head keypoint on
-  the other side. Faces seen from behind or under a mask are often not labelled: then the chin is
-  assumed as far from nose, eyes and ears as the head top is, since these lie half-way.
+  column i when i - 0.5 <= u < i + 0.5; keypoints outside the crop are no longer labelled. Boxes end at
+  pixels' edges, and tools that draw them around keypoints count those from there, too: a crop grows by a
+  pixel where a keypoint in its person's box, or on its edge, would be lost, and a keypoint between the
+  image's last pixels and its edge is moved onto them.
 - The segment's area shrinks in proportion to the part of the box that remains.
 """
 
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 
 from hicp_lib.core.images import Box, inside
-from hicp_lib.core.keypoints import BODY, HEAD, INDEX
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.formats.cropcoco import OUTSIDE
 
-TRUNK = np.setdiff1d(BODY, HEAD)
-_MID_HEAD = np.arange(0, 5)  # nose, eyes, ears
-_TOP, _CHIN = INDEX["head_top"], INDEX["face_8"]
-
-Side = Literal["left", "top", "right", "bottom"]
-
-
-@dataclass(frozen=True)
-class HeadCut:
-    """Where head and body are in a crop, and what remains without the head.
-
-    Attributes
-    ----------
-    head_px, body_px : array, shape (2,)
-        The two centres.
-    side : {"left", "top", "right", "bottom"}
-        The side of the crop that is removed.
-    kept_px : tuple of int
-        Left, top, right, bottom of what remains, right and bottom exclusive.
-    """
-
-    head_px: np.ndarray
-    body_px: np.ndarray
-    side: Side
-    kept_px: Box
+_EDGE_PX = 0.5  # as far as rounding may put a keypoint outside the box that was drawn around it
 
 
 def whole_pixel_boxes(boxes_px: np.ndarray, widths_px: np.ndarray, heights_px: np.ndarray) -> np.ndarray:
@@ -81,49 +50,42 @@ def whole_pixel_boxes(boxes_px: np.ndarray, widths_px: np.ndarray, heights_px: n
     return np.concatenate([first, past], axis=-1).astype(int)
 
 
-def headless_cut(keypoints_px: np.ndarray, visibility: np.ndarray, crop_px: Box) -> HeadCut | None:
-    """Find the cut that takes the head off a person.
+def on_pixels(annotations: Annotations) -> Annotations:
+    """Annotations with keypoints between the last pixels of an image and its edge moved onto those pixels."""
+    keypoints, sizes = annotations.keypoints_px, image_sizes(annotations)[:, None]
+    past = (keypoints >= sizes - 0.5) & (keypoints <= sizes) & (annotations.visibility > 0)[..., None]
+    return replace(annotations, keypoints_px=np.where(past, sizes - 0.51, keypoints))
+
+
+def image_sizes(annotations: Annotations) -> np.ndarray:
+    """Width and height of the image each person is in, shape (n, 2)."""
+    images = [annotations.images[i] for i in annotations.image_ids.tolist()]
+    return np.array([(image.width_px, image.height_px) for image in images]).reshape(-1, 2)
+
+
+def person_crops(annotations: Annotations) -> tuple[np.ndarray, np.ndarray]:
+    """The crop of everybody: the pixels of the box, and of labelled keypoints within it or on its edge.
 
     Parameters
     ----------
-    keypoints_px : array, shape (136, 2)
-        In Halpe's order.
-    visibility : array, shape (136,)
-        Only keypoints above 0 and inside the crop count.
-    crop_px : tuple of int
-        Left, top, right, bottom of the crop, in the keypoints' frame.
+    annotations : Annotations
+        From `on_pixels`.
 
     Returns
     -------
-    HeadCut or None
-        None when no head keypoint or no other body keypoint is labelled. Nothing may remain (an empty
-        `kept_px`) when the head reaches the far side of the crop.
+    boxes_px, crops_px : array of int, shape (n, 4)
+        Left, top, right, bottom, the last two exclusive: as from `whole_pixel_boxes`, and with the keypoints.
     """
-    labelled = (visibility > 0) & inside(keypoints_px, crop_px)
-    head, body = (keypoints_px[part[labelled[part]]] for part in (HEAD, TRUNK))
-    if not len(head) or not len(body):
-        return None
-    head_px, body_px = head.mean(axis=0), body.mean(axis=0)
-    away = head_px - body_px
-    axis = 0 if abs(away[0]) > abs(away[1]) else 1
-    reach = np.concatenate([head, _assumed_chin(keypoints_px, labelled)])[:, axis]
-    left, top, right, bottom = (int(edge) for edge in crop_px)
-    before, after = int(np.floor(reach.min() + 0.5)), int(np.floor(reach.max() + 0.5)) + 1
-    cuts: dict[tuple[int, bool], tuple[Side, Box]] = {  # by axis, and whether the head is further along it
-        (0, False): ("left", (after, top, right, bottom)),
-        (0, True): ("right", (left, top, before, bottom)),
-        (1, False): ("top", (left, after, right, bottom)),
-        (1, True): ("bottom", (left, top, right, before)),
-    }
-    return HeadCut(head_px, body_px, *cuts[axis, bool(away[axis] > 0)])
-
-
-def _assumed_chin(keypoints_px: np.ndarray, labelled: np.ndarray) -> np.ndarray:
-    """The head top mirrored at nose, eyes and ears, shape (1, 2); (0, 2) with a chin or without a top."""
-    middle = keypoints_px[_MID_HEAD[labelled[_MID_HEAD]]]
-    if labelled[_CHIN] or not labelled[_TOP] or not len(middle):
-        return np.zeros((0, 2))
-    return 2 * middle.mean(axis=0, keepdims=True) - keypoints_px[_TOP]
+    sizes, (start, sides) = image_sizes(annotations), np.split(annotations.boxes_px[:, None], 2, axis=-1)
+    boxes_px, points = whole_pixel_boxes(annotations.boxes_px, *sizes.T), annotations.keypoints_px
+    near = (points >= start - _EDGE_PX) & (points <= start + sides + _EDGE_PX)
+    own = near.all(axis=-1) & (annotations.visibility > 0)
+    own &= (boxes_px[:, None, 2:] > boxes_px[:, None, :2]).all(axis=-1)
+    pixels = np.clip(np.floor(np.nan_to_num(points) + 0.5), 0, sizes[:, None] - 1)
+    first = np.where(own[..., None], pixels, np.inf).min(axis=1)
+    last = np.where(own[..., None], pixels, -np.inf).max(axis=1)
+    grown = [np.minimum(boxes_px[:, :2], first), np.maximum(boxes_px[:, 2:], last + 1)]
+    return boxes_px, np.hstack(grown).astype(int)
 
 
 def n_pixels(crop_px: Box) -> int:

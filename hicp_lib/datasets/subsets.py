@@ -1,6 +1,7 @@
 """HiCP: the Basic and Headless datasets of people close by, from any annotated images.
 
-The rules are those of `hicp_lib.datasets.crops`; about people, where the paper is silent:
+The rules are those of `hicp_lib.datasets.crops` and `hicp_lib.datasets.heads`; about people, where the paper
+is silent:
 
 - Crowds, and people of whom the crop shows no labelled keypoint, are left out of both.
 - People without a labelled head keypoint in the crop are not part of Headless: their head may be in
@@ -8,6 +9,8 @@ The rules are those of `hicp_lib.datasets.crops`; about people, where the paper 
   pixels left.
 - Other people reaching into a crop stay in its annotations with `iscrowd` 1 and `"other": true`,
   so that finding them is no mistake.
+- How the end of the face was known, and who may still show a part of it, is kept with the Headless
+  (`hicp_lib.datasets.heads.CUT_RULES`).
 
 A crop's image id, and its person's annotation id, are the person's annotation id in the source:
 the same person is found in both datasets, whatever the rules select.
@@ -28,15 +31,16 @@ from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.executor import run_jobs
 from hicp_lib.core.files import read_json, write_json
-from hicp_lib.core.images import Box, inside, read_image, write_png
+from hicp_lib.core.images import Box, as_seen, inside, read_image, write_png
 from hicp_lib.core.keypoints import HEAD
-from hicp_lib.datasets.crops import TRUNK, crop_people, headless_cut, image_name, n_pixels, whole_pixel_boxes
+from hicp_lib.datasets.crops import crop_people, image_name, n_pixels, on_pixels, person_crops
+from hicp_lib.datasets.frames import in_frame, outside_image
+from hicp_lib.datasets.heads import CUT_RULES, SIDES, TRUNK, headless_cut
 from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
-from hicp_lib.formats.layouts import KeypointMap
 
 SUBSETS = ("basic", "headless")
+_CENTRES = [f"{part}_{axis}_px" for part in ("head", "body") for axis in "uv"]
 _Crop = tuple[Path, Box]  # the file to write, and what of the image goes into it
-_EDGES = ("left", "top", "right", "bottom")
 
 
 def plan(annotations: Annotations, min_pixels: int = 20_000, headless_min_pixels: int = 1) -> pd.DataFrame:
@@ -47,7 +51,7 @@ def plan(annotations: Annotations, min_pixels: int = 20_000, headless_min_pixels
     annotations : Annotations
         The people.
     min_pixels : int, optional
-        Least size of a Basic crop.
+        Least size of a Basic crop, by the box.
     headless_min_pixels : int, optional
         Least size of a Headless crop. The paper's counts, 1624 and 1608, differ too little for its limit to
         have been asked again after the cut.
@@ -59,43 +63,32 @@ def plan(annotations: Annotations, min_pixels: int = 20_000, headless_min_pixels
         becomes of the person, `basic` and `headless`: "kept" or the reason why not; and in pixels of the
         source image, NaN where undefined: `<box>_left_px, _top_px, _right_px, _bottom_px` for the boxes
         basic_crop, headless_crop (right and bottom exclusive), head and body (extent of the labelled
-        keypoints), the centres `head_u_px, head_v_px, body_u_px, body_v_px`, and `cut_side`, the side of the
-        crop that is removed.
+        keypoints), the centres `head_u_px, head_v_px, body_u_px, body_v_px`, `cut_side`, the side of the crop
+        that is removed, and `cut_rule`, how the end of the face was known.
     """
-    least = (min_pixels, headless_min_pixels)
-    images = [annotations.images[i] for i in annotations.image_ids.tolist()]
-    sizes = np.array([(image.width_px, image.height_px) for image in images]).reshape(-1, 2)
-    crops = whole_pixel_boxes(annotations.boxes_px, *sizes.T)
-    people = zip(annotations.keypoints_px, annotations.visibility, crops, annotations.is_crowd, strict=True)
-    rows = [
-        {
-            "annotation_id": i,
-            "image_id": image.id,
-            "file_name": image.file_name,
-            **_plan_person(*person, least),
-        }
-        for i, image, person in zip(annotations.ids.tolist(), images, people, strict=True)
-    ]
-    return pd.DataFrame(rows, columns=_columns())
+    annotations = on_pixels(annotations)
+    boxes, crops = person_crops(annotations)
+    large = [n_pixels(box) >= max(min_pixels, 1) for box in boxes]
+    columns = (annotations.keypoints_px, annotations.visibility, crops, annotations.is_crowd, large)
+    rows = [_plan_person(*person, headless_min_pixels) for person in zip(*columns, strict=True)]
+    names = [annotations.images[i].file_name for i in annotations.image_ids.tolist()]
+    ids = {"annotation_id": annotations.ids, "image_id": annotations.image_ids, "file_name": names}
+    return pd.DataFrame(rows, columns=_columns()).assign(**ids)
 
 
 def _columns() -> list[str]:
-    boxes = [f"{box}_{edge}_px" for box in ("basic_crop", "headless_crop", "head", "body") for edge in _EDGES]
-    centres = [f"{part}_{axis}_px" for part in ("head", "body") for axis in "uv"]
-    return ["annotation_id", "image_id", "file_name", *SUBSETS, "cut_side", *boxes, *centres]
+    boxes = [f"{box}_{edge}_px" for box in ("basic_crop", "headless_crop", "head", "body") for edge in SIDES]
+    return ["annotation_id", "image_id", "file_name", *SUBSETS, "cut_side", "cut_rule", *boxes, *_CENTRES]
 
 
 def _plan_person(
-    keypoints_px: np.ndarray, visibility: np.ndarray, crop: Box, is_crowd: bool, least: tuple[int, int]
+    keypoints_px: np.ndarray, visibility: np.ndarray, crop: Box, is_crowd: bool, large: bool, least: int
 ) -> dict:
     row: dict = {"basic": "kept", "headless": "not in Basic", **_named("basic_crop", crop)}
     labelled = (visibility > 0) & inside(keypoints_px, crop)
-    if is_crowd:
-        return row | {"basic": "crowd"}
-    if n_pixels(crop) < max(least[0], 1):
-        return row | {"basic": "too small"}
-    if not labelled.any():
-        return row | {"basic": "no keypoints"}
+    why_not = {"crowd": is_crowd, "too small": not large, "no keypoints": not labelled.any()}
+    if reasons := [reason for reason, holds in why_not.items() if holds]:
+        return row | {"basic": reasons[0]}
     for name, part in (("head", HEAD), ("body", TRUNK)):
         points = keypoints_px[part[labelled[part]]]
         if not len(points):
@@ -103,21 +96,20 @@ def _plan_person(
         row |= _named(name, np.concatenate([points.min(axis=0), points.max(axis=0)]))
     cut = headless_cut(keypoints_px, visibility, crop)
     assert cut is not None  # both parts are labelled
-    row |= zip(
-        ("head_u_px", "head_v_px", "body_u_px", "body_v_px"), [*cut.head_px, *cut.body_px], strict=True
-    )
-    fate = "kept" if n_pixels(cut.kept_px) >= max(least[1], 1) else "too small"
-    return row | {"headless": fate, "cut_side": cut.side, **_named("headless_crop", cut.kept_px)}
+    row |= zip(_CENTRES, [*cut.head_px, *cut.body_px], strict=True)
+    fate = "kept" if n_pixels(cut.kept_px) >= max(least, 1) else "too small"
+    how = {"headless": fate, "cut_side": cut.side, "cut_rule": cut.rule}
+    return row | how | _named("headless_crop", cut.kept_px)
 
 
 def _named(box: str, edges: Iterable) -> dict[str, float]:
-    return {f"{box}_{edge}_px": float(value) for edge, value in zip(_EDGES, edges, strict=True)}
+    return {f"{box}_{edge}_px": float(value) for edge, value in zip(SIDES, edges, strict=True)}
 
 
 def crop_boxes(table: pd.DataFrame, subset: str) -> dict[int, Box]:
     """The crops of a subset of a plan: row number -> left, top, right, bottom."""
     kept = np.flatnonzero(table[subset] == "kept")
-    edges = table[[f"{subset}_crop_{edge}_px" for edge in _EDGES]].to_numpy()[kept].astype(int)
+    edges = table[[f"{subset}_crop_{edge}_px" for edge in SIDES]].to_numpy()[kept].astype(int)
     return dict(zip(kept.tolist(), map(tuple, edges.tolist()), strict=True))
 
 
@@ -137,23 +129,24 @@ def crop_annotations(annotations: Annotations, table: pd.DataFrame, subset: str)
     -------
     Annotations
         Further keys of a person: `source_id, source_image_id, source_file, source_area` (before any cut),
-        `crop_px` (left, top, right, bottom in the source image), `subset`, and `cut_side` in Headless.
+        `crop_px` (left, top, right, bottom in the source image), `subset`, and in Headless `cut_side` and
+        `cut_rule`.
     """
+    annotations = on_pixels(annotations)
     in_image = pd.Series(range(len(annotations))).groupby(annotations.image_ids).indices
     next_id = int(annotations.ids.max(initial=0)) + 1
     images, parts = {}, []
     for row, box in crop_boxes(table, subset).items():
         person_id, source_id = int(annotations.ids[row]), int(annotations.image_ids[row])
         images[person_id] = ImageInfo(person_id, image_name(person_id), box[2] - box[0], box[3] - box[1])
-        others = [k for k in in_image[source_id] if k != row]
-        people = crop_people(annotations, np.array([row, *others]), box)
+        people = crop_people(annotations, np.array([row, *(k for k in in_image[source_id] if k != row)]), box)
         about = {
             "subset": subset, "source_id": person_id, "source_image_id": source_id,
             "source_file": annotations.images[source_id].file_name,
             "source_area": float(annotations.areas_px2[row]), "crop_px": list(box),
         }  # fmt: skip
         if subset == "headless":
-            about["cut_side"] = table["cut_side"].iloc[row]
+            about |= table[["cut_side", "cut_rule"]].iloc[row].to_dict()
         others_about = [{"other": True, "source_id": i} for i in people.ids[1:].tolist()]
         ids = np.r_[person_id, next_id : next_id + len(others_about)]
         next_id += len(others_about)
@@ -164,9 +157,26 @@ def crop_annotations(annotations: Annotations, table: pd.DataFrame, subset: str)
 
 
 def summary(table: pd.DataFrame) -> dict:
-    """People per fate: `{"people": n, "basic": {"kept": n, reason: n, ...}, "headless": {...}}`."""
+    """People per fate: `{"people": n, "basic": {"kept": n, reason: n, ...}, "headless": {...}}`.
+
+    `"headless_cut_by"` has those of Headless per rule; with the last a part of the face may be in the crop.
+    """
     counts = {subset: table[subset].value_counts().to_dict() for subset in SUBSETS}
-    return {"people": len(table), **{subset: {"kept": 0} | counts[subset] for subset in SUBSETS}}
+    cut_by = table.loc[table["headless"] == "kept", "cut_rule"].value_counts().to_dict()
+    fates = {subset: {"kept": 0} | counts[subset] for subset in SUBSETS}
+    by_rule = {rule: cut_by.get(rule, 0) for rule in CUT_RULES}
+    return {"people": len(table), **fates, "headless_cut_by": by_rule}
+
+
+def notes(counts: dict) -> list[str]:
+    """What a user must know of the counts of `create_hicp`, a line each."""
+    unsure = {"people": counts["headless_cut_by"][CUT_RULES[-1]]}
+    lines = {
+        "{keypoints} labelled keypoints and {boxes} boxes, of {people} people, lie outside their image; "
+        "do the annotated sizes fit the pictures?": counts["outside_image"],
+        "{people} Headless crops may show a part of the face: cut_rule 'head labels only'": unsure,
+    }
+    return [line.format(**of) for line, of in lines.items() if of["people"]]
 
 
 def count_sensitivity(annotations: Annotations, min_pixels: int = 20_000) -> pd.DataFrame:
@@ -182,11 +192,9 @@ def count_sensitivity(annotations: Annotations, min_pixels: int = 20_000) -> pd.
     basic, headless = tables[0]["basic"], tables[0]["headless"]
     without = "people without keypoints kept, people without labelled head kept in Headless"
     in_headless = headless.isin(["kept", "no head labelled"]) | (basic == "no keypoints")
-    counts.append(
-        pd.Series({"basic": basic.isin(["kept", "no keypoints"]).sum(), "headless": in_headless.sum()})
-    )
-    table = pd.DataFrame(counts, index=pd.Index([*rules, without], name="rule"))
-    return table.reset_index()
+    in_basic = basic.isin(["kept", "no keypoints"])
+    counts.append(pd.Series({"basic": in_basic.sum(), "headless": in_headless.sum()}))
+    return pd.DataFrame(counts, index=pd.Index([*rules, without], name="rule")).reset_index()
 
 
 def create_hicp(
@@ -196,7 +204,8 @@ def create_hicp(
     min_pixels: int = 20_000,
     headless_min_pixels: int = 1,
     progress: bool = False,
-    keypoint_map: KeypointMap | None = None,
+    keypoint_map: str | Path | None = None,
+    orientation: str | None = None,
 ) -> dict:
     """Write the dataset folders out/basic and out/headless, and out/summary.json.
 
@@ -215,38 +224,43 @@ def create_hicp(
         As of `plan`.
     progress : bool, optional
         Whether a bar is shown.
-    keypoint_map : mapping or sequence, optional
+    keypoint_map : str or Path, optional
         As of `read_annotations`.
+    orientation : {"stored", "seen"}, optional
+        What was annotated of pictures with a camera's rotation flag (`hicp_lib.datasets.frames.in_frame`).
 
     Returns
     -------
     dict
-        As from `summary`; and `notes`, those of the annotations if any.
+        As from `summary`; `"outside_image"`, how many labels lie outside their image; `"rotation_flags"`,
+        those of the pictures that have one, by name; and `"notes"`, those of the annotations if any.
 
     Raises
     ------
     InputError
-        For malformed annotations, missing or wrongly sized images, or an `out` in use for something else.
+        For malformed annotations, missing or wrongly sized images, a rotation flag nobody decided on, or an
+        `out` in use for something else.
     """
     out, images_dir = Path(out), Path(images_dir)
-    annotations = read_annotations(annotations_path, keypoint_map)
+    annotations, flags = in_frame(read_annotations(annotations_path, keypoint_map), images_dir, orientation)
+    turned = flags if orientation == "seen" else {}
     table = plan(annotations, min_pixels, headless_min_pixels)
     boxes = {subset: crop_boxes(table, subset) for subset in SUBSETS}
-    _claim(out, _digest(table, boxes, images_dir))
-    jobs = _jobs(annotations, boxes, out)
-    todo = [(image, partial(_write_crops, images_dir, image, crops)) for image, crops in jobs.items()]
+    _claim(out, _digest(table, boxes, images_dir, turned))
+    write = partial(_write_crops, images_dir, turned)
+    todo = [(image, partial(write, image, crops)) for image, crops in _jobs(annotations, boxes, out).items()]
     done = run_jobs(todo, usable_cores(), "threads")
-    for _ in tqdm(done, total=len(jobs), desc="HiCP crops", unit="image", disable=not progress):
+    for _ in tqdm(done, total=len(todo), desc="HiCP crops", unit="image", disable=not progress):
         pass
     for subset in SUBSETS:
-        path = out / subset / "annotations.json"
-        write_annotations(path, crop_annotations(annotations, table, subset))
-    counts = summary(table) | ({"notes": annotations.notes} if annotations.notes else {})
+        write_annotations(out / subset / "annotations.json", crop_annotations(annotations, table, subset))
+    counts = summary(table) | {"outside_image": outside_image(annotations), "rotation_flags": flags}
+    counts |= {"notes": annotations.notes} if annotations.notes else {}
     write_json(out / "summary.json", counts, indent=2)
     return counts
 
 
-def _digest(table: pd.DataFrame, boxes: dict, images_dir: Path) -> str:
+def _digest(table: pd.DataFrame, boxes: dict, images_dir: Path, turned: dict[str, int]) -> str:
     """What the pixels of the crops depend on."""
     names = sorted({table["file_name"].iloc[row] for kept in boxes.values() for row in kept})
     try:
@@ -257,7 +271,7 @@ def _digest(table: pd.DataFrame, boxes: dict, images_dir: Path) -> str:
         ) from None
     ids = table["annotation_id"].tolist()
     crops = {subset: [(ids[row], box) for row, box in kept.items()] for subset, kept in boxes.items()}
-    return digest([files, crops, str(images_dir.resolve())])
+    return digest([files, crops, str(images_dir.resolve()), turned])
 
 
 def _claim(out: Path, digest: str) -> None:
@@ -284,11 +298,11 @@ def _jobs(annotations: Annotations, boxes: dict[str, dict], out: Path) -> dict[I
     return jobs
 
 
-def _write_crops(images_dir: Path, image: ImageInfo, crops: list[_Crop]) -> None:
+def _write_crops(images_dir: Path, turned: dict[str, int], image: ImageInfo, crops: list[_Crop]) -> None:
     missing = [(path, box) for path, box in crops if not path.exists()]
     if not missing:
         return
-    pixels = read_image(images_dir / image.file_name)
+    pixels = as_seen(read_image(images_dir / image.file_name), turned.get(image.file_name, 1))
     if pixels.shape[:2] != (image.height_px, image.width_px):
         size, annotated = f"{pixels.shape[1]}x{pixels.shape[0]}", f"{image.width_px}x{image.height_px}"
         raise InputError(

@@ -23,6 +23,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PureWindowsPath
+from typing import Any
 
 import numpy as np
 
@@ -30,13 +31,12 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS, NAMES
-from hicp_lib.formats.categories import PERSON_CATEGORY, PersonCategory, people_of, person_category
 from hicp_lib.formats.cropcoco import FLAG_OUTSIDE, OUTSIDE, outside_from_flags
 from hicp_lib.formats.detection_files import open_detections, read_rows
-from hicp_lib.formats.json_validation import PART_KEYS, Rows, shown
-from hicp_lib.formats.layouts import KeypointMap, layouts_of
-from hicp_lib.formats.pairing import paired_images
-from hicp_lib.formats.units import corners_note, outside_note, refuse_fractions
+from hicp_lib.formats.importers.matching import match_images
+from hicp_lib.formats.json_validation import CONVENTIONS, PART_KEYS, Layouts, Rows
+from hicp_lib.formats.layouts import PERSON_CATEGORY, PersonCategory, layouts_of, person_category
+from hicp_lib.formats.units import corners_note, doubts, refuse_fractions
 
 SEGMENT_OF_BOX = 0.53  # area of a person's segment over that of the box, as tools take it
 _LEAST_AREA, _MOST_AREA = 0.01, 2.0  # of a person, as a share of their box; another one stands for none
@@ -112,7 +112,7 @@ class Annotations:
     keypoints_px: np.ndarray
     visibility: np.ndarray
     extras: list[dict]
-    category: PersonCategory = PersonCategory()
+    category: PersonCategory = field(default_factory=PersonCategory)
     notes: dict[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -138,7 +138,7 @@ class Annotations:
     @classmethod
     def concatenate(cls, parts: Sequence[Annotations], images: dict[int, ImageInfo]) -> Annotations:
         """The people of all parts, in `images`, with the ids they have; parts may be none at all."""
-        arrays = {
+        arrays: dict[str, Any] = {
             name: np.concatenate([empty, *(getattr(part, name) for part in parts)])
             for name, empty in _NOBODY.items()
         }
@@ -168,15 +168,15 @@ def source_images(annotations: Annotations) -> dict[int, int]:
     return source
 
 
-def read_annotations(path: str | Path, keypoint_map: KeypointMap | None = None) -> Annotations:
+def read_annotations(path: str | Path, keypoint_map: str | Path | None = None) -> Annotations:
     """Read keypoint annotations in COCO's layout, of any keypoints whose names are given.
 
     Parameters
     ----------
     path : str or Path
         A JSON file with `images` and `annotations`.
-    keypoint_map : mapping or sequence, optional
-        What its keypoints' names mean, as of `hicp_lib.formats.layouts.read_keypoint_map`.
+    keypoint_map : str or Path, optional
+        A file that says what its keypoints' names mean, as of `hicp_lib.formats.layouts.layouts_of`.
 
     Returns
     -------
@@ -197,16 +197,24 @@ def read_annotations(path: str | Path, keypoint_map: KeypointMap | None = None) 
     images = _read_images(Rows.of(path, "images", data["images"]))
     category = person_category(path, data.get("categories"))
     layouts, notes = layouts_of(f"{path}: keypoints of its category", category.keypoints, keypoint_map)
-    rows, left_out = people_of(Rows.of(path, "annotations", data["annotations"]), category)
+    every = Rows.of(path, "annotations", data["annotations"])
+    rows = _of_people(every, category, {category.id} | category.others)
     people = _read_people(rows, images, layouts)
-    if not category.keypoints and not keypoint_map and any(map(_is_bare_17, rows.rows)):
-        notes = {"names": "17 keypoints without names are taken for COCO's"}
-    notes = {"categories": left_out} | notes | people.notes
+    if n_others := len(every.rows) - len(rows.rows):
+        notes["categories"] = f"{n_others} objects of other categories left out"
+    if layouts is CONVENTIONS and any(len(p["keypoints"]) == 51 and PART_KEYS[0] not in p for p in rows.rows):
+        notes["names"] = "17 keypoints without names are taken for COCO's"
+    notes |= people.notes
     return replace(people, category=category, notes={about: note for about, note in notes.items() if note})
 
 
-def _is_bare_17(person: dict) -> bool:
-    return len(person["keypoints"]) == 3 * len(COCO_17) and PART_KEYS[0] not in person
+def _of_people(rows: Rows, people: PersonCategory, allowed: set[int]) -> Rows:
+    """The people among objects of allowed categories; one without is a person where there is no other."""
+    expected = f"one of {', '.join(map(str, sorted(allowed)))}; {people.id} is people"
+    default = {} if people.others else {"default": people.id}
+    found = rows.column("category_id", lambda of: type(of) is int and of in allowed, expected, **default)
+    chosen = [row for row, of in zip(rows.rows, found, strict=True) if of not in people.others]
+    return rows if len(chosen) == len(found) else replace(rows, label="people", rows=chosen)
 
 
 def _read_images(rows: Rows) -> dict[int, ImageInfo]:
@@ -229,15 +237,13 @@ def _is_inside(name: object) -> bool:
     return bool(path.name) and not path.anchor and ".." not in path.parts
 
 
-def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Mapping[int, np.ndarray]) -> Annotations:
-    ids, image_ids = rows.unique_integers("id"), rows.integers("image_id")
-    for i, image_id in enumerate(image_ids.tolist()):
-        if image_id not in images:
-            raise rows.error(i, f"image_id {image_id} is not among the annotated images")
+def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> Annotations:
+    ids, image_ids = rows.unique_integers("id"), _images_of(rows, images)
     boxes = rows.vectors("bbox", ("x", "y", "width", "height"))
     for i in np.flatnonzero((boxes[:, 2:] < 0).any(axis=1))[:1]:
         raise rows.error(i, "bbox has a negative width or height; expected [x, y, width, height] in pixels")
-    is_crowd = _crowd_flags(rows)
+    flags = rows.column("iscrowd", lambda f: isinstance(f, int | float) and f in (0, 1), "0 or 1", default=0)
+    is_crowd = np.array(flags, dtype=bool)
     areas, area_note = _areas(rows, boxes, is_crowd)
     triples = rows.keypoints(layouts)
     sizes = np.array([(images[i].width_px, images[i].height_px) for i in image_ids.tolist()]).reshape(-1, 2)
@@ -248,8 +254,8 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Mapping[int,
     labelled = np.where((visibility > 0)[..., None], keypoints, np.nan)
     refuse_fractions(rows.path, labelled)
     refuse_fractions(rows.path, boxes.reshape(-1, 2, 2), "boxes")
-    seen = boxes, labelled, sizes
-    notes = {"area": area_note, "boxes": corners_note(rows.path, *seen), "outside": outside_note(*seen)}
+    shown = boxes, labelled, sizes
+    notes = {"area": area_note, "boxes": corners_note(rows.path, *shown), "pixels": doubts(*shown)}
     return Annotations(
         images, ids, image_ids, boxes, areas, is_crowd, keypoints, visibility, rows.extras(_KNOWN_KEYS),
         notes=notes,
@@ -266,27 +272,19 @@ def _areas(rows: Rows, boxes_px: np.ndarray, is_crowd: np.ndarray) -> tuple[np.n
     beyond = (areas < _LEAST_AREA * of_box) | ((areas > _MOST_AREA * of_box) & (of_box > 0))
     none = beyond & ~is_crowd
     areas = np.where(none, SEGMENT_OF_BOX * of_box, areas)
-    if not none.any():
-        return areas, ""
-    return areas, (
+    note = (
         f"the area of {none.sum()} of {(~is_crowd).sum()} people is below a hundredth of their box, above "
         f"twice or absent; {SEGMENT_OF_BOX} of the box is taken. For all alike, give --area box or box53"
     )
-
-
-def _crowd_flags(rows: Rows) -> np.ndarray:
-    flags = rows.column("iscrowd", default=0)
-    for i, flag in enumerate(flags):
-        if not isinstance(flag, int | float) or flag not in (0, 1):
-            raise rows.error(i, "iscrowd is neither 0 nor 1")
-    return np.array(flags, dtype=bool)
+    return areas, note if none.any() else ""
 
 
 def write_annotations(path: str | Path, annotations: Annotations) -> None:
     """Write people as a COCO keypoint file with 136 keypoints in Halpe's order."""
     a = annotations
-    triples = keypoint_triples(a.keypoints_px, a.visibility)
-    triples[:, 2::3][a.visibility < 0] = FLAG_OUTSIDE
+    flags = np.where(a.visibility < 0, FLAG_OUTSIDE, a.visibility)[..., None]
+    given = np.isfinite(a.keypoints_px).all(axis=-1, keepdims=True) | (flags == FLAG_OUTSIDE)
+    triples = np.where(given, np.concatenate([np.nan_to_num(a.keypoints_px), flags], axis=-1), 0.0)
     people = [
         {
             **extra, "id": i, "image_id": image, "category_id": PERSON_CATEGORY, "bbox": box, "area": area,
@@ -295,7 +293,7 @@ def write_annotations(path: str | Path, annotations: Annotations) -> None:
         for extra, i, image, box, area, crowd, count, flat in zip(
             a.extras, a.ids.tolist(), a.image_ids.tolist(), a.boxes_px.tolist(), a.areas_px2.tolist(),
             a.is_crowd.astype(int).tolist(), (a.visibility[:, COCO_17] > 0).sum(axis=1).tolist(),
-            triples.tolist(), strict=True,
+            triples.reshape(len(a), 3 * N_KEYPOINTS).tolist(), strict=True,
         )
     ]  # fmt: skip
     category = {**PERSON, "keypoints": list(NAMES)}
@@ -308,31 +306,6 @@ def image_rows(annotations: Annotations) -> list[dict]:
         {"id": image.id, "file_name": image.file_name, "width": image.width_px, "height": image.height_px}
         for image in annotations.images.values()
     ]
-
-
-def keypoint_triples(keypoints_px: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Keypoints as COCO has them: x, y and a value of each in one row per person.
-
-    Parameters
-    ----------
-    keypoints_px : array, shape (n, k, 2)
-        NaN where not given.
-    values : array, shape (n, k)
-        Flags or scores.
-
-    Returns
-    -------
-    array, shape (n, 3 k)
-        0, 0, 0 for a keypoint that is not given.
-
-    Examples
-    --------
-    >>> keypoint_triples(np.array([[[1.0, 2.0], [np.nan, np.nan]]]), np.array([[2.0, 0.5]]))
-    array([[1., 2., 2., 0., 0., 0.]])
-    """
-    given = np.isfinite(keypoints_px).all(axis=-1)[..., None]
-    triples = np.where(given, np.concatenate([keypoints_px, values[..., None]], axis=-1), 0.0)
-    return triples.reshape(len(triples), 3 * triples.shape[1])
 
 
 def read_detections(path: str | Path, annotations: Annotations | None = None) -> dict[int, Detections]:
@@ -361,8 +334,8 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     rows = Rows.of(Path(path), "results", read_rows(Path(path)), name_key="image_id")
     person_scores = rows.numbers("score")
     category = PersonCategory() if annotations is None else annotations.category
-    _refuse_other_categories(rows, category)
-    image_ids = rows.integers("image_id") if annotations is None else paired_images(rows, annotations.images)
+    _of_people(rows, replace(category, others=set()), {category.id, PERSON_CATEGORY} - category.others)
+    image_ids = rows.integers("image_id") if annotations is None else _images_of(rows, annotations.images)
     triples = rows.keypoints()
     keypoints = np.where((triples == 0).all(axis=-1, keepdims=True), np.nan, triples[..., :2])
     refuse_fractions(rows.path, keypoints)
@@ -374,15 +347,20 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     return found
 
 
-def _refuse_other_categories(rows: Rows, people: PersonCategory) -> None:
-    """Results are of people: the annotations' category, or 1 where that is no other there."""
-    others = dict(people.others)
-    allowed = {people.id, PERSON_CATEGORY} - set(others)
-    for i, of in enumerate(rows.column("category_id", default=people.id)):
-        if type(of) is not int or of not in allowed:
-            named = f" ({others[of]!r} in the annotations)" if type(of) is int and of in others else ""
-            expected = f"expected {people.id} (person); leave other categories out"
-            raise rows.error(i, f"category_id is {shown(of)}{named}; {expected}")
+def _images_of(rows: Rows, images: Mapping[int, ImageInfo]) -> np.ndarray:
+    """The annotated image of each result: by name where all have one: tools number differently."""
+    if not rows.rows or not all("file_name" in row for row in rows.rows):
+        ids = rows.integers("image_id")
+        for i in np.flatnonzero(~np.isin(ids, list(images)))[:1].tolist():
+            raise rows.error(i, f"image_id {ids[i]} is not among the annotated images")
+        return ids
+    names = rows.column("file_name", lambda name: isinstance(name, str), "a file name")
+    sources = list(dict.fromkeys(names))
+    image_of = dict(zip(sources, match_images(rows.path, sources, "id", images), strict=True))
+    for i, name in enumerate(names):
+        if image_of[name] is None:
+            raise rows.error(i, f"file_name {name[:80]!r} is not among the annotated images")
+    return np.array([image_of[name] for name in names], dtype=np.int64)
 
 
 def write_detections(

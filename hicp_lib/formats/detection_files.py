@@ -8,6 +8,7 @@
 The bytes follow from the detections and their order alone.
 """
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -91,7 +92,11 @@ def json_list(path: Path) -> Iterator[_Append]:
         def append(*items: object) -> None:
             nonlocal between
             for item in items:
-                file.write(between + orjson.dumps(item, option=orjson.OPT_SERIALIZE_NUMPY))
+                try:
+                    text = orjson.dumps(item, option=orjson.OPT_SERIALIZE_NUMPY)
+                except TypeError:  # whole numbers beyond 64 bits, halves of characters, of other tools
+                    text = json.dumps(item, default=np.ndarray.tolist, allow_nan=False).encode()
+                file.write(between + text)
                 between = b",\n"
 
         yield append

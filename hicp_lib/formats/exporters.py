@@ -31,12 +31,9 @@ LAYOUTS = ("halpe136", "halpe26", "coco17", "wholebody133")
 
 
 def export_detections(
-    format: str,
-    detections: Mapping[int, Detections],
-    out: str | Path,
-    annotations: Annotations | None = None,
-    layout: str = "halpe136",
-) -> int:
+    format: str, detections: Mapping[int, Detections], out: str | Path, annotations: Annotations | None =
+    None, layout: str = "halpe136",
+) -> int:  # fmt: skip
     """Write detections for another tool.
 
     People without any keypoint in the layout are left out.

@@ -6,7 +6,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any, TypeGuard
@@ -20,7 +20,7 @@ from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES, TO_HALPE
 MAX_ABS = 1e9
 MAX_INTEGER = 2**53  # every JSON reader has them exact up to here
 CONVENTIONS = {17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"}
-BY_NUMBER = {n: TO_HALPE[convention] for n, convention in CONVENTIONS.items()}
+Layouts = Mapping[int, str | np.ndarray]
 # COCO-WholeBody files spread their 133 keypoints over five keys, in this order.
 PART_KEYS = ("foot_kpts", "face_kpts", "lefthand_kpts", "righthand_kpts")
 _REQUIRED = object()
@@ -44,8 +44,6 @@ class Rows:
         The objects.
     name_key : str
         Key that tells a reader which row is meant ("id", or "image_id").
-    numbers_in_file : sequence of int, optional
-        Where each stands in the file's list; as here if left out.
 
     Examples
     --------
@@ -61,7 +59,6 @@ class Rows:
     label: str
     rows: list[dict]
     name_key: str = "id"
-    numbers_in_file: Sequence[int] | None = None
 
     @classmethod
     def of(cls, path: Path, label: str, value: Any, name_key: str = "id") -> Rows:
@@ -93,12 +90,7 @@ class Rows:
         """The error for row i."""
         name = self.rows[i].get(self.name_key)
         named = f" ({self.name_key} {name})" if type(name) is int and abs(name) <= MAX_INTEGER else ""
-        number = i if self.numbers_in_file is None else self.numbers_in_file[i]
-        return InputError(f"{self.path}: {self.label}[{number}]{named}: {problem}")
-
-    def take(self, chosen: Sequence[int]) -> Rows:
-        """Some of them, which messages name by their place in the file."""
-        return replace(self, rows=[self.rows[i] for i in chosen], numbers_in_file=chosen)
+        return InputError(f"{self.path}: {self.label}[{i}]{named}: {problem}")
 
     def column(
         self, key: str, valid: _Check = lambda _: True, expected: str = "", default: Any = _REQUIRED
@@ -151,26 +143,26 @@ class Rows:
         values = self.column(key, lambda v: isinstance(v, list) and len(v) == n, f"[{', '.join(names)}]")
         return self.finite(values, n, lambda j: f"{key}[{j}] ({names[j]})")
 
-    def keypoints(self, layouts: Mapping[int, np.ndarray] = BY_NUMBER) -> np.ndarray:
+    def keypoints(self, layouts: Layouts = CONVENTIONS) -> np.ndarray:
         """Triples (x, y, v) in the Halpe-136 order, zeros where the file's layout has no such keypoint.
+
+        Accepts 17 (COCO), 26 (Halpe body), 133 (COCO-WholeBody, also spread over its five keys) and 136
+        (Halpe) keypoints, row by row, if not told otherwise.
 
         Parameters
         ----------
-        layouts : mapping of int to array of int, optional
-            By the number of a row's keypoints, their indices in Halpe-136.
+        layouts : Layouts, optional
+            As of `points`.
 
         Returns
         -------
         array, shape (n, 136, 3)
         """
-        values = np.zeros((len(self.rows), N_KEYPOINTS, 3))
         lists = dict(enumerate(self._keypoint_lists(layouts)))
-        for n, indices in layouts.items():
-            self._place(values, "keypoints", lists, n, indices)
-        return values
+        return self.points("keypoints", lists, layouts)[0]
 
     def points(
-        self, key: str, lists: Mapping[int, list], conventions: Mapping[int, str], width: int = 3
+        self, key: str, lists: Mapping[int, list], layouts: Layouts, width: int = 3
     ) -> tuple[np.ndarray, Counter[str]]:
         """Flat lists of numbers of some rows, `width` for each keypoint, in the Halpe-136 order.
 
@@ -180,36 +172,29 @@ class Rows:
             For messages.
         lists : mapping of int to list
             By row.
-        conventions : mapping of int to str
-            By the number of keypoints, a key of `hicp_lib.core.keypoints.TO_HALPE`.
+        layouts : Layouts
+            By the number of keypoints, a key of `hicp_lib.core.keypoints.TO_HALPE`, or what that would hold.
         width : int, optional
             Numbers per keypoint.
 
         Returns
         -------
         values : array, shape (n, 136, width)
-            0 where the convention has no such keypoint, and in rows without a list.
+            0 where the layout has no such keypoint, and in rows without a list.
         found : Counter
-            Rows by convention.
+            Rows by the layout's name.
         """
-        values = np.zeros((len(self.rows), N_KEYPOINTS, width))
-        counts = {
-            convention: self._place(values, key, lists, n, TO_HALPE[convention])
-            for n, convention in conventions.items()
-        }
-        return values, +Counter(counts)
-
-    def _place(
-        self, values: np.ndarray, key: str, lists: Mapping[int, list], n: int, indices: np.ndarray
-    ) -> int:
-        """Put the lists of n keypoints where they belong in `values`; how many there are."""
-        width = values.shape[-1]
-        chosen = {i: numbers for i, numbers in lists.items() if len(numbers) == width * n}
-        if chosen:
-            names = _triples_namer(key, indices) if width == 3 else lambda j: f"{key}[{j}]"
-            points = self.finite(list(chosen.values()), width * n, names, list(chosen)).reshape(-1, n, width)
-            values[np.ix_(list(chosen), indices[indices >= 0])] = points[:, indices >= 0]
-        return len(chosen)
+        values, found = np.zeros((len(self.rows), N_KEYPOINTS, width)), Counter[str]()
+        for n, layout in layouts.items():
+            chosen = {i: numbers for i, numbers in lists.items() if len(numbers) == width * n}
+            if chosen:
+                found[str(layout)] = len(chosen)
+                indices = TO_HALPE[layout] if isinstance(layout, str) else layout
+                names = _triples_namer(key, indices) if width == 3 else lambda j: f"{key}[{j}]"
+                points = self.finite(list(chosen.values()), width * n, names, list(chosen))
+                points = points.reshape(-1, n, width)[:, indices >= 0]
+                values[np.ix_(np.array(list(chosen)), indices[indices >= 0])] = points
+        return values, found
 
     def conventions(self) -> list[str]:
         """Per row, the convention its keypoints come in, a key of `hicp_lib.core.keypoints.TO_HALPE`."""
@@ -229,11 +214,8 @@ class Rows:
         """Each row's keypoints in one list; its length is one of `layouts`, times 3."""
         lists = self.column("keypoints", lambda v: isinstance(v, list), "a list of x, y, v per keypoint")
         for i, row in enumerate(self.rows):
-            if (
-                len(lists[i]) == 51
-                and 133 in layouts
-                and all(isinstance(row.get(key), list) for key in PART_KEYS)
-            ):
+            spread = len(lists[i]) == 51 and 133 in layouts
+            if spread and all(isinstance(row.get(key), list) for key in PART_KEYS):
                 lists[i] = list(chain(lists[i], *(row[key] for key in PART_KEYS)))
             n = len(lists[i])
             if n % 3 or n // 3 not in layouts:

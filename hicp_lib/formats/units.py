@@ -1,15 +1,19 @@
 """Whether the coordinates of a file can be pixels of its images, and its boxes x, y, width, height."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import INDEX
 
 _FRACTION = 1.5  # as large as fractions of an image get, when keypoints lie a little outside of it
 _LEAST_POINTS = 3  # fewer may lie at the corner of an image by chance
 _SLACK_PX = 1.0
 _FEW = 0.02  # of the labels, which lie outside their images in public data sets, too
+_SHOULDERS, _HIPS = ([INDEX[f"left_{part}"], INDEX[f"right_{part}"]] for part in ("shoulder", "hip"))
+_FALLEN = "most shoulders are below hips; is the origin the bottom?"
 _CERTAIN = 10  # people, of whom none contradicts
 _MUCH = 0.25  # of a box's side: less from the image's corner, and its two readings are nearly one
 
@@ -37,11 +41,8 @@ def refuse_fractions(path: Path | str, points_px: np.ndarray, what: str = "keypo
     fractions = people & (small | ~given).all(axis=-1)
     if fractions.any() and 2 * fractions.sum() >= people.sum():
         span = "[0, 1]" if points_px[fractions][given[fractions]].min() >= 0 else "[-1, 1]"
-        some = "" if fractions.sum() == people.sum() else f" of {fractions.sum()} of {people.sum()} people"
-        raise InputError(
-            f"{path}: {what}: all coordinates{some} lie in {span}; expected pixels, multiply by the image's "
-            "width and height"
-        )
+        expected = "expected pixels, multiply by the image's width and height"
+        raise InputError(f"{path}: {what}: all coordinates lie in {span}; {expected}")
 
 
 def corners_note(
@@ -72,39 +73,40 @@ def corners_note(
         ten end far beyond their people.
     """
     first, last = boxes_px[:, :2], boxes_px[:, 2:]
-    low, high = (first - _SLACK_PX)[:, None], (last + _SLACK_PX)[:, None]
-    holds = ((keypoints_px >= low) & (keypoints_px <= high) | np.isnan(keypoints_px)).all(axis=(1, 2))
-    fits = holds & ((last > first) & (last <= sizes_px + _SLACK_PX)).all(axis=-1)
-    far = (first > _MUCH * last).any(axis=-1)
-    leaves = (first + last > sizes_px + _SLACK_PX).any(axis=-1) & far
-    labelled = np.isfinite(keypoints_px).all(axis=-1).sum(axis=-1) >= _LEAST_POINTS
-    n_far = int((far & labelled).sum())
-    if not fits[far].all() or not n_far and 2 * leaves.sum() <= far.sum():
+    leave = (keypoints_px < first[:, None] - _SLACK_PX) | (keypoints_px > last[:, None] + _SLACK_PX)
+    ordered = np.all((last > first) & (last <= sizes_px + _SLACK_PX), axis=-1)
+    fits = ordered & ~leave.any(axis=(1, 2))
+    labelled = np.isfinite(keypoints_px[..., 0]).sum(axis=-1) >= _LEAST_POINTS
+    far = labelled & (first > _MUCH * last).any(axis=-1)
+    n_far, n_beyond = far.sum(), (far & (first + last > sizes_px + _SLACK_PX).any(axis=-1)).sum()
+    if not n_far or (far & ~fits).any():
         return ""
-    if 2 * leaves.sum() > far.sum() or n_far >= _CERTAIN:
+    if 2 * n_beyond > n_far or n_far >= _CERTAIN:
         problem = "the boxes fit images and people as x1, y1, x2, y2 only"
         raise InputError(f"{path}: bbox: {problem}; expected x, y, width, height")
     return "the boxes would fit as x1, y1, x2, y2, too; they are read as x, y, width, height"
 
 
-def outside_note(boxes_px: np.ndarray, keypoints_px: np.ndarray, sizes_px: np.ndarray) -> str:
-    """How many labelled keypoints and boxes leave their images; empty if none.
+def _n_beyond(points_px: np.ndarray, low_px: Any, high_px: Any) -> int:
+    return int(((points_px < low_px - _SLACK_PX) | (points_px > high_px + _SLACK_PX)).any(axis=-1).sum())
+
+
+def doubts(boxes_px: np.ndarray, keypoints_px: np.ndarray, sizes_px: np.ndarray) -> str:
+    """What speaks against coordinates being pixels of the images, from their top left corner; else empty.
 
     Parameters
     ----------
     boxes_px, keypoints_px, sizes_px : array
         As of `corners_note`.
     """
-    ends = np.stack([boxes_px[:, :2], boxes_px[:, :2] + boxes_px[:, 2:]], axis=1)
-    counts = []
-    for points in (keypoints_px, ends):
-        leaves = (points < -_SLACK_PX) | (points > sizes_px[:, None] + _SLACK_PX)
-        counts += [int(leaves.any(axis=-1).sum()), int(np.isfinite(points).all(axis=-1).sum())]
-    n_outside, n_points, n_ends, n_corners = counts
-    if not n_outside and not n_ends:
-        return ""
-    turned = "; are the images turned by an orientation flag?" if n_outside > _FEW * n_points else ""
-    return (
-        f"{n_outside} of {n_points} labelled keypoints and {n_ends} of {n_corners} corners of boxes "
-        f"lie outside their images{turned}"
-    )
+    (first, room), sizes = np.split(boxes_px[:, None], 2, axis=-1), sizes_px[:, None]
+    last, few = first + room, _FEW * np.isfinite(keypoints_px[..., 0]).sum()
+    n_points, n_ends = (_n_beyond(of, 0, sizes) for of in (keypoints_px, np.hstack([first, last])))
+    n_astray = _n_beyond(keypoints_px, first - _MUCH * room, last + _MUCH * room)
+    turned = "; are the images turned by an orientation flag?" if n_points > few else ""
+    rises_px = keypoints_px[:, _HIPS, 1] - keypoints_px[:, _SHOULDERS, 1]
+    fallen = (rises_px < 0).sum() > (rises_px >= 0).sum()
+    outside = f"{n_points} labelled keypoints, {n_ends} corners of boxes outside images{turned}"
+    astray = f"{n_astray} labelled keypoints are far from the box of their person"
+    found = {outside: n_points + n_ends, astray: n_astray > few, _FALLEN: fallen}
+    return "; ".join(note for note, holds in found.items() if holds)

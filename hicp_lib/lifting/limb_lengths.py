@@ -75,7 +75,7 @@ def limbs_outwards(
     for some in map(slice, first, [*first[1:], len(order)]):
         r = reach[some].max()
         costs = _length_costs(ends_m[most], ends_m[most - r : most + r + 1], dots[:, some], limits[:, some])
-        limbs.append(Limbs(*pairs[:, some], costs))
+        limbs.append(Limbs(pairs[0, some], pairs[1, some], costs))
     return limbs
 
 

@@ -69,9 +69,9 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
     path : str or Path
         `.bag`, `.db3`, `.mcap`, or the folder of a ROS 2 bag.
 
-    Returns
-    -------
-    context manager of Bag
+    Yields
+    ------
+    Bag
 
     Raises
     ------

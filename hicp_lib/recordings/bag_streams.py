@@ -133,17 +133,15 @@ def _frame(bag: Bag, topic: str) -> str:
 
 def _stream(bag: Bag, topic: str) -> Stream:
     frame, match = _frame(bag, topic), _REALSENSE.match(topic)
-    camera, *distortion = _camera(bag, topic, frame)
+    camera, model, coefficients = _camera(bag, topic, frame)
     unit = bag.first(f"{match[2]}/option/Depth_Units/value") if match else None
     units_per_m = round(1 / float(unit.data), 3) if unit else _MM_PER_M
-    pixels_px = undistortion(f"{bag.path}: {topic}", camera, *distortion)
+    pixels_px = undistortion(f"{bag.path}: {topic}", camera, model, coefficients)
     notes = [] if pixels_px is None else ["distortion undone"]
-    said = {
-        ns: _fields(of.data) for _, ns, of in bag.messages(f"{frame}/image/metadata") if hasattr(of, "data")
-    }
-    taken_s = {
-        ns: float(of["timestamp"]) / 1000 for ns, of in said.items()
-    }  # headers have another clock there
+    # Text in newer releases of librealsense, where headers have another clock.
+    metadata = bag.messages(f"{frame}/image/metadata")
+    said = {recorded_ns: _fields(of.data) for _, recorded_ns, of in metadata if hasattr(of, "data")}
+    taken_s = {recorded_ns: float(of["timestamp"]) / 1000 for recorded_ns, of in said.items()}
     numbers = {int(of["Frame number"]) for of in said.values()}
     if lost := max(numbers, default=0) - min(numbers, default=1) + 1 - len(numbers):
         notes.append(f"{lost} of {lost + len(numbers)} frames were lost while recording")
@@ -164,7 +162,7 @@ def _camera(bag: Bag, topic: str, frame: str) -> tuple[Camera, str, np.ndarray]:
     info = infos[max(beside, key=len)] if beside else None
     if info is None:
         raise InputError(f"{bag.path}: {topic}: has no CameraInfo beside it; record its camera_info too")
-    K, D, P = (getattr(info, key, getattr(info, key.upper(), None)) for key in "kdp")
+    K, D, P = (getattr(info, key if hasattr(info, key) else key.upper()) for key in "kdp")
     is_rectified = re.search("(?<![a-z])rect", topic.rpartition("/image")[2])
     fx, fy, cx, cy = (P[0], P[5], P[2], P[6]) if is_rectified else (K[0], K[4], K[2], K[5])
     if min(fx, fy) <= 0:

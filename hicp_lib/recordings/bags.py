@@ -81,8 +81,8 @@ def import_bag(
 def _alignment(bag: Bag, color: Stream, depth: Stream) -> np.ndarray | None:
     """The depth camera's coordinates to the colour camera's; None where depth is aligned already."""
     if color.frame == depth.frame:
-        cameras = (list(vars(stream.camera).values()) for stream in (color, depth))
-        if np.allclose(*cameras, rtol=0, atol=_SAME_PX):
+        of_color, of_depth = (list(vars(stream.camera).values()) for stream in (color, depth))
+        if np.allclose(of_color, of_depth, rtol=0, atol=_SAME_PX):
             return None
         if color.frame:
             return np.eye(4)

@@ -102,9 +102,8 @@ def read_points(path: Path) -> Points:
         try:
             command = [sys.executable, "-P", "-c", _CONVERT, str(path), str(out), *limits]
             subprocess.run(command, capture_output=True, timeout=_TIMEOUT_S, check=True)
-        except subprocess.SubprocessError as error:
-            told = (error.stderr or b"").decode(errors="replace").strip().rpartition("\n")[2][:_SHOWN]
-            why = told or "it did not end well"
+        except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
+            why = (error.stderr or b"crash").decode(errors="replace").strip().rpartition("\n")[2][:_SHOWN]
             hint = "if it is cut off, export it again, else as TSV"
             raise InputError(f"{path}: ezc3d cannot read it as C3D ({why}); {hint}") from None
         with np.load(out, allow_pickle=False) as stored:
@@ -129,8 +128,8 @@ def _checked(path: Path, stored: Mapping[str, np.ndarray], n_frames: int) -> Poi
     """Points, names and rate of what `_CONVERT` stored."""
     points, rate = stored["points"][:, :, :n_frames], stored["RATE"]
     names = [decoded(str(name).encode(errors="surrogateescape")).strip() for name in stored["names"]]
-    names = _distinct([*names, *[""] * points.shape[1]][: points.shape[1]]) if any(names) else []
-    if not names or len(set(names)) != len(names):
+    names = _distinct([*names, *[""] * points.shape[1]][: points.shape[1]])
+    if not stored["names"].size or len(set(names)) != max(len(names), 1):
         raise InputError(f"{path}: POINT:LABELS does not name the markers; name them in Qualisys")
     if not len(rate) or not 0 < rate[0] <= _MAX_RATE_HZ:
         raise InputError(f"{path}: POINT:RATE is missing or wrong; expected frames per second")
@@ -163,15 +162,20 @@ def _n_frames(path: Path, raw: bytes, stored: Mapping[str, np.ndarray]) -> int:
     floats = words[[7, 6, 11, 10] if is_dec else [6, 7, 10, 11]].view("<f4") / (4 if is_dec else 1)
     n_points, n_analog, first, last, _, _, _, start = words[1:9].tolist()
     of = {name: float(np.nan_to_num(stored[name][0])) if stored[name].size else 0.0 for name in _PARAMETERS}
-    for name, header in (("RATE", floats[1]), ("DATA_START", start), ("SCALE", floats[0])):
-        if min(header, of[name]) > 0 and abs(header - of[name]) > _SAME_SHARE * of[name]:
-            raise _disagreement(path, f"POINT:{name}", f"{header:g}", f"{of[name]:g}")
+    pairs = [("RATE", floats[1]), ("DATA_START", start), ("SCALE", floats[0])]
+    wrong = [
+        f"POINT:{name} ({header:g}, {of[name]:g})" for name, header in pairs
+        if min(header, of[name]) > 0 and abs(header - of[name]) > _SAME_SHARE * of[name]
+    ]  # fmt: skip
     _, m, n = stored["points"].shape
     stated = (4 * n_points + n_analog) * (4 if floats[0] < 0 else 2)
     frame_bytes = (4 * m + int(stored["n_analog"])) * (4 if of["SCALE"] < 0 else 2)
     data_bytes = len(raw) - _BLOCK_BYTES * (start - 1)
     if stated != frame_bytes and (_fits(data_bytes, n * stated) or not _fits(data_bytes, n * frame_bytes)):
-        raise _disagreement(path, "the bytes from frame to frame", stated, frame_bytes)
+        wrong.append(f"the bytes from frame to frame ({stated}, {frame_bytes})")
+    if wrong:
+        told = f"header and parameters disagree on {', '.join(wrong)}"
+        raise InputError(f"{path}: {told}; export it again, or as TSV")
     header, frames, actual = last - first + 1, int(of["FRAMES"]), _actual(stored)
     n_true = actual if actual >= MAX_FRAMES else n
     fits, actual_fits = (_fits(data_bytes, k * frame_bytes) for k in (n_true, actual))
@@ -197,11 +201,6 @@ def _actual(stored: Mapping[str, np.ndarray]) -> int:
     """Frames by the group TRIAL, which counts with 32 bits; 0 if it does not."""
     first, last = (stored[name].astype(int) % 2**16 @ [1, 2**16][: stored[name].size] for name in _TRIAL)
     return int(last - first + 1) if stored[_TRIAL[1]].size else 0
-
-
-def _disagreement(path: Path, what: str, header: object, parameters: object) -> InputError:
-    told = f"header and parameters disagree on {what} ({header}, {parameters})"
-    return InputError(f"{path}: {told}; export it again, or as TSV")
 
 
 def write_points(path: str | Path, points_m: np.ndarray, names: tuple[str, ...], rate_hz: float) -> None:

@@ -22,14 +22,7 @@ from hicp_lib.recordings.recording import (
     read_rgb,
     read_truth,
 )
-from hicp_lib.recordings.tum import (
-    MAX_DIFFERENCE_S,
-    associate,
-    count_repeated,
-    doubt,
-    read_file_list,
-    read_poses,
-)
+from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, associate, read_file_list, read_poses, remarks
 
 Read = TypeVar("Read")
 
@@ -113,10 +106,8 @@ def _check_files(findings: _Findings, folder: Path) -> None:
             findings.note(folder / missing[0], text, is_fatal=True)
     poses = findings.attempt(read_poses, folder / POSES_FILE)
     for name, read in zip((RGB_LIST, DEPTH_LIST, POSES_FILE), (*lists, poses), strict=True):
-        if read and (n := count_repeated(folder / name)):
-            findings.note(folder / name, f"{n} lines repeat the time before and are passed over")
-        if read and name != POSES_FILE and (why := doubt(read[0])):
-            findings.note(folder / name, why)
+        for text in remarks(folder / name, read[0]) if read else ():
+            findings.note(folder / name, text)
     if poses and all(lists):
         _check_association(findings, folder, [times_s for times_s, _ in filter(None, [*lists, poses])])
 

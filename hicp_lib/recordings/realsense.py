@@ -52,8 +52,8 @@ def record_camera(
     rate_hz : int, optional
     duration_s : float, optional
         Ends by itself after that.
-    device : pyrealsense2.device, optional
-        The first that is connected when left out.
+    device : Any, optional
+        pyrealsense2's; the first that is connected when left out.
 
     Returns
     -------
@@ -75,7 +75,8 @@ def record_camera(
         raise InputError(f"{bag}: is there already; give another folder, or import it with --bag")
     bag.parent.mkdir(parents=True, exist_ok=True)
     rows: list[tuple[float, list[float]]] = []
-    is_over, problems = Event(), []  # type: ignore[var-annotated]
+    problems: list[InputError] = []
+    is_over = Event()
 
     def read() -> None:
         try:
@@ -147,9 +148,9 @@ def _joint_poses(rows: list[tuple[float, list[float]]], mount: str) -> Poses:
 
     if not rows:
         raise InputError("joints: no lines arrived; expected six angles in degrees in each")
-    times_s, angles_deg = zip(*rows, strict=True)
-    times_s, first = np.unique(times_s, return_index=True)
-    return times_s, load_icub().T_root_camera(np.radians(np.array(angles_deg)[first]), mount)
+    times_s, first = np.unique([time_s for time_s, _ in rows], return_index=True)
+    angles_deg = np.array([angles for _, angles in rows])[first]
+    return times_s, load_icub().T_root_camera(np.radians(angles_deg), mount)
 
 
 def _record(

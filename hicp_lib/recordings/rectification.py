@@ -74,14 +74,15 @@ def rectify(image: np.ndarray, pixels_px: np.ndarray | None) -> np.ndarray:
     """
     if pixels_px is None:
         return image
-    return cv2.remap(image, pixels_px, None, cv2.INTER_LINEAR if image.ndim == 3 else cv2.INTER_NEAREST)
+    interpolation = cv2.INTER_LINEAR if image.ndim == 3 else cv2.INTER_NEAREST
+    return cv2.remap(image, pixels_px[..., 0], pixels_px[..., 1], interpolation)
 
 
 def align_depth(depth_m: np.ndarray, camera: Camera, color: Camera, T_color_depth: np.ndarray) -> np.ndarray:
     """Depth as the colour camera would see it.
 
-    Each pixel of depth fills the colour pixels that its corners span, as librealsense aligns; the nearest
-    counts. Depth is along the axis of the colour camera.
+    Each pixel of depth fills the colour pixels whose centres lie between its corners, so that a surface has
+    no holes; the nearest counts. Depth is along the axis of the colour camera.
 
     Parameters
     ----------
@@ -104,14 +105,14 @@ def align_depth(depth_m: np.ndarray, camera: Camera, color: Camera, T_color_dept
     def seen(offset_px: float) -> tuple[np.ndarray, np.ndarray]:
         points_m = deproject(camera, np.column_stack([u, v]) + offset_px, z_m)
         moved_m = transform(T_color_depth, points_m)
-        return np.nan_to_num(np.rint(project(color, moved_m)), nan=-1), moved_m[:, 2]
+        return np.ceil(np.nan_to_num(project(color, moved_m), nan=-1)), moved_m[:, 2]
 
-    (first, _), (last, _), (_, z_color_m) = seen(-0.5), seen(0.5), seen(0)
-    size = last - first
+    (first, _), (beyond, _), (_, z_color_m) = seen(-0.5), seen(0.5), seen(0)
+    size = beyond - first
     aligned_m = np.full((color.height_px, color.width_px), np.inf)
-    for step in np.ndindex(*(1 + size.max(axis=0, initial=0).astype(int))):
+    for step in np.ndindex(*size.max(axis=0, initial=0).astype(int)):
         pixels = first + step
-        is_seen = (size >= step).all(axis=1) & color.contains(pixels)
+        is_seen = (size > step).all(axis=1) & color.contains(pixels)
         column, row = pixels[is_seen].astype(int).T
         np.minimum.at(aligned_m, (row, column), z_color_m[is_seen])
     return np.where(np.isfinite(aligned_m), aligned_m, 0)

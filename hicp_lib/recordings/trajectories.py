@@ -42,22 +42,17 @@ def read_trajectory(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
         return read_poses(path)
     T_base_cam = np.tile(np.eye(4), (len(rows) // 5 if is_log else len(rows), 1, 1))
     try:
-        numbers = np.array(sum(rows, []), float).reshape(len(T_base_cam), -1)
+        numbers = np.array([x for row in rows for x in row], float).reshape(len(T_base_cam), -1)
         T_base_cam[:, : 4 if is_log else 3] = numbers[:, 3 * is_log :].reshape(len(T_base_cam), -1, 4)
     except ValueError:
-        expected = "blocks of 'k k k+1' and a matrix of 4 x 4" if is_log else "12 numbers in every line"
+        expected = "'k k k+1' and a matrix of 4 x 4" if is_log else "12 numbers in every line"
         raise InputError(f"{path}: is cut off or damaged; expected {expected}") from None
-    if is_log and not (numbers[:, :2] == numbers[:1, :1] + np.arange(len(numbers))[:, None]).all():
-        raise InputError(
-            f"{path}: is no log of a camera frame after frame; expected 'k k k+1' above each pose"
-        )
     R, last = T_base_cam[:, :3, :3], T_base_cam[:, 3]
     off = np.abs(R @ R.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2)) + np.abs(last - [0, 0, 0, 1]).max(axis=1)
-    is_rigid = (
-        (off <= _ROTATION_TOLERANCE) & (np.linalg.det(R) > 0) & np.isfinite(T_base_cam).all(axis=(1, 2))
-    )
-    if not is_rigid.all():
-        raise InputError(
-            f"{path}: pose {1 + np.argmin(is_rigid)} is no rotation and translation; export it again"
-        )
+    is_pose = (off <= _ROTATION_TOLERANCE) & (np.linalg.det(R) > 0) & np.isfinite(T_base_cam.sum(axis=(1, 2)))
+    if is_log:
+        is_pose &= (numbers[:, :2] == numbers[0, 0] + np.arange(len(numbers))[:, None]).all(axis=1)
+    if not is_pose.all():
+        wrong = f"pose {1 + np.argmin(is_pose)} is no rotation and translation, or not of the next frame"
+        raise InputError(f"{path}: {wrong}; export it again")
     return np.zeros(0), T_base_cam

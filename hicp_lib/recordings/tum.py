@@ -21,13 +21,11 @@ MAX_DIFFERENCE_S = 0.02  # images and poses further apart in time do not belong 
 _UNIT_TOLERANCE = 0.01  # a quaternion's length may differ from 1 by this much: files are rounded
 _MAX_ABS = 1e20  # more is no time and no place
 _MAX_TIME_S = 1e11  # later than the year 5000: another unit
-_UNITS_S = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _SLOW_S = 5.0  # between two images: as many milliseconds are more usual
 _LIST_COLUMNS = "timestamp filename"
 _POSE_COLUMNS = "timestamp tx ty tz qx qy qz qw"
 # Names of a coordinate: x, tx, p_x, p_RS_R_x [m]; of a quaternion's: qx, q_RS_x []
 _COLUMN = re.compile(r"(?:([ptq])(?:\w*_)?)?([wxyz])")
-_TIME_UNIT = re.compile(r"time(?:stamps?)?[ _\[(]*(ns|us|ms|s)\b")
 
 
 def read_file_list(path: str | Path) -> tuple[np.ndarray, list[str]]:
@@ -41,7 +39,7 @@ def read_file_list(path: str | Path) -> tuple[np.ndarray, list[str]]:
     Returns
     -------
     times_s : array, shape (n,)
-        Increasing: of lines with the same time the first is read (`count_repeated`).
+        Increasing: of lines with the same time the first is read (`remarks`).
     names : list of str
         Relative to the list's folder, and inside it.
 
@@ -79,7 +77,7 @@ def read_poses(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     times_s : array, shape (n,)
-        Increasing: of lines with the same time the first is read (`count_repeated`).
+        Increasing: of lines with the same time the first is read (`remarks`).
     T_base_cam : array, shape (n, 4, 4)
         Camera coordinates to the robot's base frame, metres.
 
@@ -170,31 +168,32 @@ def associate(
     return a[a >= 0], b[a >= 0]
 
 
-def count_repeated(path: str | Path) -> int:
-    """How many lines of a file that can be read have the time of the line before, and are passed over."""
-    lines = (line.partition("#")[0].replace(",", " ").split() for line in _text(path).split("\n"))
-    return int((np.diff([_float(fields[0]) for fields in lines if fields]) == 0).sum())
-
-
 def names_poses(path: str | Path) -> bool:
     """Whether the first line of a file names the columns of poses (as EuRoC's CSV, not one of joints)."""
     first = read_bytes(path, "give a file of camera poses").partition(b"\n")[0]
     return _named_columns(first.decode("latin-1")) is not None
 
 
-def doubt(times_s: np.ndarray) -> str:
-    """Why times are hardly those of images in seconds, if so, else nothing.
+def remarks(path: str | Path, times_s: np.ndarray) -> list[str]:
+    """What is odd about the times of a file that could be read.
 
-    Examples
-    --------
-    >>> doubt(np.arange(4) / 30), doubt(np.arange(4) / 30 * 1000)
-    ('', '0.03 frames per second; times are expected in seconds (these look like milliseconds)')
+    Parameters
+    ----------
+    path : str or Path
+    times_s : array, shape (n,)
+        As read: of lines with the same time only the first counts.
+
+    Returns
+    -------
+    list of str
+        How many lines repeat the time before; whether there are too few a second for times in seconds.
     """
-    step_s = float(np.median(np.diff(times_s))) if len(times_s) > 1 else 0.0
-    if step_s <= _SLOW_S:
-        return ""
-    seconds = f"times are expected in seconds (these look like {_prefix(step_s)}seconds)"
-    return f"{1 / step_s:.2g} frames per second; {seconds}"
+    lines = (line.partition("#")[0].replace(",", " ").split() for line in _text(path).split("\n"))
+    n = int((np.diff([_float(fields[0]) for fields in lines if fields]) == 0).sum())
+    step_s = np.median(np.diff(times_s)) if len(times_s) > 1 else 0.0
+    looks = f"times are expected in seconds (these look like {_prefix(step_s)}seconds)"
+    told = [f"{n} lines repeat the time before and are passed over"] if n else []
+    return [*told, f"{1 / step_s:.2g} frames per second; {looks}"] if step_s > _SLOW_S else told
 
 
 def _prefix(step: float) -> str:
@@ -214,22 +213,25 @@ def _text(path: str | Path) -> str:
 def _rows(path: str | Path, columns: str) -> Iterator[tuple[int, float, list[str]]]:
     """Line number, time and further fields of every line that says something new."""
     width = len(columns.split())
-    order, unit_s, before_s, is_table = list(range(width)), 1.0, -np.inf, False
+    order, before_s, unit_s, is_csv = [*range(width)], -np.inf, 1.0, False
     for number, line in enumerate(_text(path).split("\n"), start=1):
         named = _named_columns(line) if columns == _POSE_COLUMNS and np.isinf(before_s) else None
         if named:
-            is_table, (order, unit_s) = True, named
+            order, is_csv = named, "," in line
             continue
-        content = line.partition("#")[0]
-        fields = (content.replace(",", " ") if is_table else content).split()
+        fields = line.partition("#")[0].replace(",", " " if is_csv else ",").split()
         if not fields:
             continue
-        if len(fields) <= max(order) or (len(fields) > width and not is_table):
+        if len(fields) <= max(order) or (len(fields) > width and not is_csv):
             raise _error(path, number, f"has {len(fields)} fields; expected '{columns}'")
         time_s = _number(path, number, fields[0]) * unit_s
         if abs(time_s) > _MAX_TIME_S:
-            looks = f"looks like {_prefix(_SLOW_S * abs(time_s) / _MAX_TIME_S)}seconds"
-            raise _error(path, number, f"timestamp {fields[0]} {looks}; expected seconds, convert the times")
+            unit = f"{_prefix(_SLOW_S * abs(time_s) / _MAX_TIME_S)}seconds"
+            if not is_csv or unit != "nanoseconds":
+                wrong = f"timestamp {fields[0]} looks like {unit}; expected seconds, convert the times"
+                raise _error(path, number, wrong)
+            unit_s = 1e-9  # as EuRoC writes them
+            time_s *= unit_s
         if time_s < before_s:
             late = f"timestamp {fields[0]} is before the last one; sort the lines by time"
             raise _error(path, number, late)
@@ -240,15 +242,14 @@ def _rows(path: str | Path, columns: str) -> Iterator[tuple[int, float, list[str
         raise InputError(f"{path}: holds no lines; expected one per image or pose")
 
 
-def _named_columns(line: str) -> tuple[list[int], float] | None:
-    """Which columns are those of `_POSE_COLUMNS`, and the unit of time, if the line names them."""
-    names = re.split(r"[,;\s]+", re.sub(r"\[.*?\]", "", line.strip("# \r")))
-    found = [_COLUMN.fullmatch(name) for name in names]
+def _named_columns(line: str) -> list[int] | None:
+    """Which columns are those of `_POSE_COLUMNS`, if the line names them."""
+    names = re.sub(r"[\[(].*?[\])]", "", line.strip("# \r")).split("," if line.count(",") > 6 else None)
+    found = [_COLUMN.fullmatch(name.strip(" ;")) for name in names]
     keys = [(m[1] or "qt"[m[2] != "w"]).replace("p", "t") + m[2] if m else "" for m in found]
     if not all(keys.count(name) == 1 for name in _POSE_COLUMNS.split()[1:]):
         return None
-    unit = _TIME_UNIT.search(line.lower())
-    return [0, *map(keys.index, _POSE_COLUMNS.split()[1:])], _UNITS_S.get(unit[1] if unit else "s", 1.0)
+    return [0, *map(keys.index, _POSE_COLUMNS.split()[1:])]
 
 
 def _float(text: str) -> float:

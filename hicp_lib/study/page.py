@@ -170,6 +170,11 @@ class Study:
         with atomic_path(self.folder / f"{name}.parquet") as temporary:
             pq.write_table(arrow.replace_schema_metadata(metadata), temporary)
 
+    def note(self, sentences: list[str]) -> None:
+        """Show what could not be computed, and why, as a paragraph; nothing where there is nothing to say."""
+        if sentences:
+            display(HTML(f'<p class="hicp-note"><em>{html.escape(" ".join(sentences))}</em></p>'))
+
     def value(self, name: str, value: Any) -> None:
         """Record a number, text or list for the prose of the book; None means "not run".
 

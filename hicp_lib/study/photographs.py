@@ -86,14 +86,13 @@ def who_is_there(truth: Mapping[str, Annotations]) -> pd.DataFrame:
     """
     parts = [people_table(truth).assign(where=RENDERED), photographs("people").assign(where=PHOTOGRAPHED)]
     rows = pd.concat(parts)
-    shares = rows["n_occluded"] / rows["n_labelled"]
-    grouped = rows.assign(occluded=shares, alone=rows["n_others"] == 0).groupby(
-        ["where", "subset"], sort=False
-    )
-    return grouped.agg(
-        people=("annotation_id", "size"), height_px=("height_px", "median"),
-        labelled_of_17=("n_labelled", "median"), occluded_share=("occluded", "mean"), alone_share=("alone", "mean"),
-    ).reset_index()  # fmt: skip
+    rows = rows.assign(occluded=rows["n_occluded"] / rows["n_labelled"], alone=rows["n_others"] == 0)
+    columns = {
+        "people": ("annotation_id", "size"), "height_px": ("height_px", "median"),
+        "labelled_of_17": ("n_labelled", "median"), "occluded_share": ("occluded", "mean"),
+        "alone_share": ("alone", "mean"),
+    }  # fmt: skip
+    return rows.groupby(["where", "subset"], sort=False).agg(**columns).reset_index()
 
 
 def people_table(truth: Mapping[str, Annotations]) -> pd.DataFrame:

@@ -7,7 +7,10 @@ from pathlib import Path
 from hicp_lib.core.cache import key
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import cache_dir, read_json, sha256_file
-from hicp_lib.datasets.subsets import create_hicp
+from hicp_lib.core.keypoints import COCO_17, HANDS
+from hicp_lib.datasets.subsets import create_hicp, notes
+from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN
+from hicp_lib.formats.annotations import read_annotations, source_images
 
 SOURCES = ("rendered", "halpe")
 
@@ -37,6 +40,20 @@ class Source:
     basic: Path
     headless: Path
     summary: dict
+
+    @property
+    def limits(self) -> list[str]:
+        """What these people cannot show, a sentence each."""
+        basic = read_annotations(self.basic / "annotations.json")
+        n_images = len(set(source_images(basic).values()))
+        some = (basic.visibility[~basic.is_crowd] > 0).any(axis=0)
+        said = {
+            "Nobody is in Headless: what is about it is empty.": not self.summary["headless"]["kept"],
+            "Nobody has a labelled hand: what is about hands is empty or a dash.": not some[HANDS].any(),
+            "Nobody has a labelled body: what is about bodies is empty or a dash.": not some[COCO_17].any(),
+            f"Intervals need {MIN_DRAWN} images, calibrations 2, here are {n_images}.": n_images < MIN_DRAWN,
+        }
+        return notes(self.summary) + [sentence for sentence, holds in said.items() if holds]
 
     @property
     def subsets(self) -> dict[str, Path]:
@@ -95,6 +112,8 @@ def open_source(
         raise InputError(f"source={source!r} is unknown; use one of {', '.join(SOURCES)}")
     folder = _crops(annotations, images, min_pixels)
     summary = read_json(folder / "summary.json")
+    if not summary["basic"]["kept"]:
+        raise InputError(f"{annotations}: nobody becomes a crop {summary['basic']}; is min_pixels too large?")
     return Source(source, note, annotations, images, folder / "basic", folder / "headless", summary)
 
 

@@ -185,6 +185,27 @@ def test_areas_that_stand_for_none_are_told(capsys, tmp_path, area, told):
     assert "AP    1.000" in of_box.out and not of_box.err
 
 
+@pytest.mark.parametrize(("of", "who"), [("annotations", "annotations"), ("results", "detections")])
+def test_a_group_that_nobody_has_is_given_no_figures(capsys, tmp_path, of, who):
+    points = [value for i in range(136) for value in (100 + i, 50 + 2 * i, 2)]
+    body = [value if i < 3 * 17 else 0 for i, value in enumerate(points)]
+    person = {"id": 1, "image_id": 1, "category_id": 1, "bbox": [90, 40, 160, 300], "area": 30000}
+    person["keypoints"] = body if of == "annotations" else points
+    result = {"image_id": 1, "category_id": 1, "score": 1, "keypoints": body if of == "results" else points}
+    image = {"id": 1, "file_name": "1.jpg", "width": 400, "height": 400}
+    truth, found = tmp_path / "a.json", tmp_path / "d.json"
+    truth.write_text(json.dumps({"images": [image], "annotations": [person]}))
+    found.write_text(json.dumps([result]))
+    arguments = ["evaluate", "--annotations", str(truth), "--detections", str(found), "--group"]
+    assert cli.run([*arguments, "hand"]) == 0
+    printed = capsys.readouterr().out
+    assert f"the {who} give no hands" in printed and "AP " not in printed
+    assert cli.run([*arguments, "hand", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["metrics"]["AP"]["value"] is None
+    assert cli.run([*arguments, "body"]) == 0
+    assert "AP    1.000" in capsys.readouterr().out
+
+
 def test_evaluation_tells_visible_keypoints_and_each_hand(capsys, tmp_path):
     """The left hand is occluded and not found: half of the hands, and all of what can be seen."""
     flags = np.full(136, 2)

@@ -15,8 +15,9 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import read_image
 from hicp_lib.core.keypoints import BODY, FACE, HANDS, HEAD, INDEX
 from hicp_lib.datasets import subsets as hicp_dataset
-from hicp_lib.datasets.crops import crop_people, headless_cut, inside, n_pixels, whole_pixel_boxes
-from hicp_lib.datasets.subsets import SUBSETS, count_sensitivity, create_hicp, crop_annotations, plan
+from hicp_lib.datasets.crops import crop_people, inside, n_pixels, whole_pixel_boxes
+from hicp_lib.datasets.heads import headless_cut
+from hicp_lib.datasets.subsets import SUBSETS, count_sensitivity, create_hicp, crop_annotations, notes, plan
 from hicp_lib.evaluation.ap.evaluate import evaluate
 from hicp_lib.formats.annotations import Annotations, ImageInfo, read_annotations, write_annotations
 
@@ -109,11 +110,52 @@ def test_an_unlabelled_face_is_assumed_as_long_as_the_skull():
     points[:5] = [100, 40]
     visibility[FACE] = 0
     assert headless_cut(points, visibility, (0, 0, 300, 300)).kept_px == (0, 61, 300, 300)  # chin at 60
-    visibility[INDEX["head_top"]] = 0
-    assert headless_cut(points, visibility, (0, 0, 300, 300)).kept_px == (0, 41, 300, 300)
     visibility[FACE] = 1
     labelled_chin = headless_cut(points, visibility, (0, 0, 300, 300)).kept_px
     assert labelled_chin[1] == np.floor(points[FACE, 1].max() + 0.5) + 1
+
+
+# What a data set labels of head and trunk -> the rule, and where the face ends.
+FEW_LABELS = {
+    ("head_top", "neck"): ("neck", 90),
+    ("head_top", "left_shoulder", "right_shoulder"): ("shoulders", 92.7),
+    ("nose", "left_eye", "right_eye", "neck"): ("neck", 85),
+    ("nose", "left_eye", "right_eye", "right_shoulder"): ("shoulders", 89.5),
+    ("left_ear", "neck", "left_hip"): ("neck", 85),
+    ("face_30", "neck"): ("neck", 85),
+    ("head_top", "left_ear", "neck"): ("head top", 80),
+    ("face_8", "neck"): ("chin labelled", 75),
+    ("nose", "left_hip"): ("head labels only", 40),
+}
+
+
+@pytest.mark.parametrize("names", FEW_LABELS)
+@pytest.mark.parametrize("turned", [0, 1, 2, 3])
+def test_with_few_labels_the_face_ends_on_the_way_to_the_neck(names, turned):
+    points = np.full((136, 2), 200.0)
+    ys = {
+        "head_top": 0,
+        "neck": 100,
+        "left_shoulder": 100,
+        "right_shoulder": 106,
+        "face_8": 75,
+        "left_hip": 190,
+    }
+    for name in names:
+        points[INDEX[name], 1] = ys.get(name, 40)
+    labelled = np.isin(np.arange(136), [INDEX[name] for name in names])
+    rule, end = FEW_LABELS[names]
+    for _ in range(turned):
+        points = np.stack([200 - points[:, 1], points[:, 0]], axis=-1)
+    cut = headless_cut(points, labelled * 2.0, (-300, -300, 300, 300))
+    assert cut.rule == rule
+    edge = {
+        "top": cut.kept_px[1],
+        "bottom": 200 - cut.kept_px[3],
+        "left": cut.kept_px[0],
+        "right": 200 - cut.kept_px[2],
+    }
+    assert -0.5 <= edge[cut.side] - end <= 1.5  # to whole pixels
 
 
 def test_hands_and_the_parts_outside_do_not_move_the_body():
@@ -134,6 +176,28 @@ def test_crops_need_twenty_thousand_pixels():
     table = plan(people([upright()] * 3, [[0, 0, 100, 200], [0, 0, 100, 199], [0, 0, 99.5, 199.5]]))
     assert table["basic"].tolist() == ["kept", "too small", "kept"]  # 99.5 x 199.5 covers 100 x 200 pixels
     assert plan(people([upright()], [[0, 0, 100, 199]]), min_pixels=19_900)["basic"].item() == "kept"
+
+
+@pytest.mark.parametrize("fraction", [0, 0.2, 0.5, 0.7, 1])
+def test_every_keypoint_in_a_box_around_them_is_kept(fraction):
+    points = np.floor(upright()) + fraction
+    for low in (points.min(axis=0), [0.0, 0.0]):  # within the image, and the whole image to its edges
+        shifted = points - points.min(axis=0) + low
+        high = shifted.max(axis=0)
+        size = [640, 480] if low[0] else np.ceil(high).astype(int).tolist()
+        annotations = people([shifted], [[*low, *(high - low)]], size=size)
+        table = plan(annotations, min_pixels=1)
+        crop = crop_annotations(annotations, table, "basic")
+        assert (crop.visibility[0] > 0).all()
+        image = crop.images[11]
+        assert inside(crop.keypoints_px[0], (0, 0, image.width_px, image.height_px)).all()
+
+
+def test_a_crop_grows_by_no_more_than_the_keypoints_need():
+    points = np.array([[50.7, 80.2]] * 136)
+    points[:2] = [[100.6, 60], [140, 60]]  # at the box's right edge; well outside
+    row = plan(people([points], [[20.3, 10.2, 80.4, 100]]), min_pixels=1).iloc[0]
+    assert [row[f"basic_crop_{edge}_px"] for edge in ("left", "top", "right", "bottom")] == [20, 10, 102, 111]
 
 
 def test_headless_needs_its_pixels_only_when_told_so():
@@ -351,7 +415,9 @@ def test_nobody_annotated_gives_empty_datasets(source, tmp_path):
     write_annotations(
         source / "annotations.json", people(np.zeros((0, 136, 2)), np.zeros((0, 4)), [], np.zeros((0, 136)))
     )
-    assert create(source, tmp_path / "hicp") == {"people": 0, "basic": {"kept": 0}, "headless": {"kept": 0}}
+    counts = create(source, tmp_path / "hicp")
+    assert [counts[key] for key in ("people", *SUBSETS)] == [0, {"kept": 0}, {"kept": 0}]
+    assert notes(counts) == []
     assert len(read_annotations(tmp_path / "hicp" / "headless" / "annotations.json")) == 0
 
 

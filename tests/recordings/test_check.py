@@ -38,7 +38,7 @@ def halve_an_image(small):
 DAMAGES = {  # what is done, what the finding says, whether the recording is of no use
     "no poses": (lambda small: (small / "groundtruth.txt").unlink(), "groundtruth.txt: cannot be read", True),
     "no scale": (without_scale, "depth_scale", True),
-    "order": (swap_lines, "is not after the one before", True),
+    "order": (swap_lines, "is before the last one", True),
     "quaternion": (stretch_quaternion, "quaternion of length 1.2", True),
     "size": (halve_an_image, "16 x 12 pixels; camera.json says 32 x 24 (1 of 4 colour", True),
     "truth": (lambda small: (small / "truth.parquet").write_text("junk"), "is not a Parquet table", True),
@@ -63,6 +63,11 @@ DAMAGES = {  # what is done, what the finding says, whether the recording is of 
         "expected metres, not millimetres",
         False,
     ),
+    "a repeated time": (
+        lambda small: edit(small / "groundtruth.txt", lambda text: text + text.splitlines()[-1] + "\n"),
+        "1 lines repeat the time before",
+        False,
+    ),
     "empty depth": (
         lambda small: cv2.imwrite(str(small / "depth/000000.png"), np.zeros((24, 32), np.uint16)),
         "1 of 4 depth images hold no depth",
@@ -82,6 +87,15 @@ def test_each_damage_is_told_in_one_line(small, name):
     findings = check_recording(small)
     assert len(findings) == 1 and findings[0].is_fatal == is_fatal
     assert expected in str(findings[0]) and "\n" not in str(findings[0])
+
+
+def test_times_in_milliseconds_are_told(small):
+    for name in ("rgb.txt", "depth.txt", "groundtruth.txt"):
+        lines = [line.split(" ", 1) for line in (small / name).read_text().splitlines() if line[0] != "#"]
+        (small / name).write_text("".join(f"{1e3 * (float(t) - 100):.3f} {rest}\n" for t, rest in lines))
+    told = [str(finding) for finding in check_recording(small)]
+    assert len(told) == 3 and all("0.01 frames per second" in line for line in told)
+    assert all("these look like milliseconds" in line for line in told)
 
 
 def test_several_damages_are_all_told(small):

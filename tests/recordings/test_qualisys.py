@@ -7,7 +7,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.recordings import c3d
 from hicp_lib.recordings.qualisys import MotionCapture, read_mocap, write_c3d, write_tsv
 
 HEADER = [
@@ -199,52 +198,10 @@ def _c3d(tmp_path, n=9):
     return path, points_m
 
 
-@pytest.mark.parametrize(
-    ("first", "last", "fits"), [(1, 9, True), (3, 11, True), (1, 10, False), (0, 9, False)]
-)
-def test_a_c3d_holds_as_many_frames_as_its_header_says(tmp_path, first, last, fits):
-    head = bytes(6) + np.array([first, last], "<u2").tobytes()
-    if fits:
-        c3d._refuse_cut_off(tmp_path, head, 9)
-    else:
-        with pytest.raises(InputError, match="holds 9 of 10 frames: cut off"):
-            c3d._refuse_cut_off(tmp_path, head, 9)
-
-
-def test_as_many_frames_as_c3d_counts_to_may_be_too_few(tmp_path):
-    c3d._refuse_cut_off(tmp_path, bytes(6) + np.array([1, 65534], "<u2").tobytes(), 65534)
-    with pytest.raises(InputError, match="65535 frames are all C3D counts to"):
-        c3d._refuse_cut_off(tmp_path, bytes(6) + np.array([1, 65535], "<u2").tobytes(), 65535)
-
-
 def test_missing_markers_of_a_c3d_are_marked(tmp_path):
     path, _ = _c3d(tmp_path)
     residuals = ezc3d.c3d(str(path))["data"]["meta_points"]["residuals"][0]
     assert residuals[1, 3] == -1 and (np.delete(residuals.ravel(), 9 + 3) == 0).all()
-
-
-@pytest.mark.parametrize(
-    ("changed", "said"),
-    [
-        ({"names": np.array(["a"])}, "POINT:LABELS"),
-        ({"names": np.array(["a", "a"])}, "POINT:LABELS"),
-        ({"names": np.array(["a", " "])}, "POINT:LABELS"),
-        ({"rate": np.array([])}, "POINT:RATE"),
-        ({"rate": np.array([0.0])}, "POINT:RATE"),
-        ({"rate": np.array([1.001e5])}, "POINT:RATE"),
-        ({"units": np.array([], str)}, "POINT:UNITS"),
-        ({"units": np.array(["inch"])}, "POINT:UNITS is none of mm, cm, m"),
-    ],
-)
-def test_what_a_c3d_lacks_is_told(tmp_path, changed, said):
-    stored = {"points": np.ones((3, 2, 1)), "residuals": np.array([[0.0], [-1e-9]]), "rate": np.array([1e5]),
-              "names": np.array(["a ", "b", "unused"]), "units": np.array(["m"])}  # fmt: skip
-    for unit, scale in (("m", 1.0), ("cm", 0.01), ("mm", 0.001)):
-        points_m, names, rate_hz = c3d._checked(tmp_path, stored | {"units": np.array([unit])})
-        assert names == ("a", "b") and rate_hz == 1e5
-        assert points_m[0, 0].tolist() == [scale] * 3 and np.isnan(points_m[0, 1]).all()
-    with pytest.raises(InputError, match=said):
-        c3d._checked(tmp_path, stored | changed)
 
 
 def test_rates_and_times_have_bounds(tmp_path):

@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.recordings.tum import associate, read_file_list, read_poses, write_file_list, write_poses
+from hicp_lib.recordings.tum import (
+    associate,
+    read_file_list,
+    read_poses,
+    remarks,
+    write_file_list,
+    write_poses,
+)
 
 TIMES = st.lists(st.integers(0, 2**40), min_size=1, max_size=12, unique=True).map(
     lambda ticks: np.sort(np.array(ticks)) / 1e3
@@ -58,8 +65,11 @@ def test_whatever_a_file_holds_it_is_read_or_refused_in_one_line(tmp_path_factor
     ("text", "expected"),
     [
         ("1.0", "line 1: has 1 fields"),
-        ("# times\n1.0 a.png\n1.0 b.png", "line 3: timestamp 1.0 is not after"),
-        ("1.0 a.png\n0.5 b.png", "line 2: timestamp 0.5 is not after"),
+        ("1.0 a.png\n0.5 b.png", "line 2: timestamp 0.5 is before"),
+        ("1.0 a.png\n1.0 b.png\n0.99 c.png", "line 3: timestamp 0.99 is before"),
+        ("1700000000000.0 a.png", "line 1: timestamp 1700000000000.0 looks like milliseconds"),
+        ("1700000000000000 a.png", "looks like microseconds; expected seconds"),
+        ("1700000000000000000 a.png", "looks like nanoseconds; expected seconds"),
         ("one a.png", "line 1: 'one' is not a finite number"),
         ("nan a.png", "not a finite number"),
         ("1.0 ../a.png", "expected a file inside"),
@@ -136,10 +146,10 @@ def test_quaternions_may_be_off_by_a_hundredth(tmp_path, length, fits):
 
 def test_numbers_beyond_any_time_or_place_are_refused(tmp_path):
     path = tmp_path / "rgb.txt"
-    path.write_text("9e14 a.png\n")
-    assert read_file_list(path)[0].tolist() == [9e14]
-    path.write_text("1e15 a.png\n")
-    with pytest.raises(InputError, match="'1e15' is not a finite number"):
+    path.write_text("9e10 a.png\n")
+    assert read_file_list(path)[0].tolist() == [9e10]
+    path.write_text("1e20 a.png\n")
+    with pytest.raises(InputError, match="'1e20' is not a finite number"):
         read_file_list(path)
 
 
@@ -155,3 +165,34 @@ def test_a_file_that_is_no_text_or_not_there_is_told(tmp_path):
         read_file_list(tmp_path / "rgb.txt")
     with pytest.raises(InputError, match="a recording needs it"):
         read_file_list(tmp_path / "depth.txt")
+
+
+def test_of_lines_with_the_same_time_the_first_is_read_and_the_rest_counted(tmp_path):
+    path = tmp_path / "groundtruth.txt"
+    lines = [
+        f"{t} {x} 0 0 0 0 0 1" for t, x in ((1.0, 0), ("1.50", 1), (1.5, 2), (1.5, 3), (2.0, 4), (2.0, 5))
+    ]
+    path.write_text("# timestamp tx ty tz qx qy qz qw\n" + "\n".join(lines))
+    times_s, T = read_poses(path)
+    assert times_s.tolist() == [1, 1.5, 2] and T[:, 0, 3].tolist() == [0, 1, 4]
+    assert remarks(path, times_s) == ["3 lines repeat the time before and are passed over"]
+    path.write_text("\n".join(lines[:2]))
+    assert remarks(path, times_s) == []
+
+
+@pytest.mark.parametrize(
+    ("step", "said"),
+    [
+        (1 / 30, ""),
+        (5.0, ""),
+        (5.1, "0.2 frames per second; times are expected in seconds (these look like milliseconds)"),
+        (1e3 / 30, "0.03 frames per second; times are expected in seconds (these look like milliseconds)"),
+        (1e6 / 30, "3e-05 frames per second; times are expected in seconds (these look like microseconds)"),
+        (1e9 / 30, "3e-08 frames per second; times are expected in seconds (these look like nanoseconds)"),
+    ],
+)
+def test_times_that_are_hardly_seconds_are_told(tmp_path, step, said):
+    path = tmp_path / "rgb.txt"
+    write_file_list(path, 100 + step * np.arange(9), [f"{k}.png" for k in range(9)])
+    assert remarks(path, read_file_list(path)[0]) == [said] * bool(said)
+    assert remarks(path, np.array([step])) == []

@@ -11,7 +11,7 @@ thread in each, so the results do not depend on how many there are.
 
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -114,13 +114,9 @@ def boxes_by_image(annotations: Annotations) -> dict[int, np.ndarray]:
 
 
 def detect_images(
-    name: str,
-    paths: Mapping[Key, str | Path],
-    workers: Workers = None,
-    progress: bool = True,
-    boxes_px: Mapping[Key, np.ndarray] | None = None,
-    **options,
-) -> dict[Key, Timed]:
+    name: str, paths: Mapping[Key, str | Path], workers: Workers = None, progress: bool = True, boxes_px:
+    Mapping[Key, np.ndarray] | None = None, **options,
+) -> dict[Key, Timed]:  # fmt: skip
     """People in every image file.
 
     Parameters
@@ -170,7 +166,7 @@ class _Waiting:
 def detect_each(
     name: str, images: Iterable[tuple[Key, Image]], workers: Workers = None, progress: bool = True,
     boxes_px: Mapping[Key, np.ndarray] | None = None, n_images: int | None = None, **options,
-) -> Iterator[tuple[Key, Timed | InputError]]:  # fmt: skip
+) -> Generator[tuple[Key, Timed | InputError], None, None]:  # fmt: skip
     """People in one image after the other; what was handed on is not held any more.
 
     Parameters

@@ -162,7 +162,7 @@ def precision_recall(matches: Matches, weights: np.ndarray | None = None) -> tup
         NaN when nobody counts.
     """
     weights = np.ones(len(matches.image_ids), dtype=int) if weights is None else weights
-    draws = weights.reshape(-1, weights.shape[-1])
+    draws = weights.reshape(int(np.prod(weights.shape[:-1])), -1)  # of no images, too
     n_people = draws @ matches.n_people
     precision = np.zeros((len(draws), len(OKS_THRESHOLDS), len(RECALLS)))
     recall = np.zeros(precision.shape[:2])

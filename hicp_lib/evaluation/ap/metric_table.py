@@ -204,4 +204,5 @@ def person_oks(
         for keypoints in objects
         for i, fit in best_oks(people, detections, keypoints, SIGMAS[chosen.sigmas][keypoints])
     ]
-    return pd.DataFrame(rows, columns=["image_id", "annotation_id", "oks", "n_labelled"])
+    types = {"image_id": int, "annotation_id": int, "oks": float, "n_labelled": int}
+    return pd.DataFrame(rows, columns=list(types)).astype(types)

@@ -90,10 +90,10 @@ def definitions(annotations: Annotations, group: str) -> list[tuple[str, dict[st
     the visible ones; where some are known to lie outside the picture, with these.
     """
     flags = annotations.visibility
-    occluded, outside = (flags > 0) & (flags < VISIBLE), flags < 0
+    occluded, outside = (flags > 0) & (flags < VISIBLE), flags < 0  # flags of 1 only do not tell
     groups = (group, "each hand") if group == "hand" else (group,)
     ways = [{"labelled": "all"}]
-    ways += [{"labelled": "visible"}] if occluded.any() else []
+    ways += [{"labelled": "visible"}] if occluded.any() and (flags >= VISIBLE).any() else []
     ways += [{"labelled": "all", "outside": "count"}] if outside.any() else []
     return [(of, way) for of in groups for way in ways]
 

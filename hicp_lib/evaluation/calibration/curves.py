@@ -126,6 +126,8 @@ def calibration_study(
 ) -> tuple[pd.DataFrame, pd.DataFrame, dict[tuple[str, str], Calibration]]:
     """Fit a calibration per detector and group on half of the source images, judge it on the other half.
 
+    A detector without scored keypoints in both halves is left out.
+
     Parameters
     ----------
     hits : DataFrame
@@ -148,6 +150,8 @@ def calibration_study(
     errors, curves, calibrations = [], [], {}
     for (detector, group), rows in hits.assign(fit=fits_on).groupby(["detector", "group"], sort=False):
         to_fit, held_out = rows[rows["fit"]], rows[~rows["fit"]]
+        if to_fit.empty or held_out.empty:
+            continue
         calibration = Calibration.fit(to_fit["score"].to_numpy(), to_fit["hit"].to_numpy())
         kinds = {"raw": held_out, "calibrated": held_out.assign(score=calibration(held_out["score"]))}
         counts = (len(held_out), held_out["source_image"].nunique(), held_out["hit"].mean())
@@ -159,7 +163,8 @@ def calibration_study(
     names = ["detector", "group", "n_keypoints", "n_images", "hit_rate"] + [
         f"{kind}{end}" for kind in ("raw", "calibrated", "change") for end in ("", "_low", "_high")
     ]
-    return pd.DataFrame(errors, columns=names), pd.concat(curves, ignore_index=True), calibrations
+    none = pd.DataFrame(columns=["detector", "group", "scores"])
+    return pd.DataFrame(errors, columns=names), pd.concat(curves or [none], ignore_index=True), calibrations
 
 
 def calibration_table(calibrations: Mapping[tuple[str, str], Calibration]) -> pd.DataFrame:

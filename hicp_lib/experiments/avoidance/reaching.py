@@ -182,7 +182,7 @@ def script(name: str, subject: Subject = Subject()) -> Script:
     Examples
     --------
     >>> fingertip_m = Moment("standing, hand", Subject(), NEAR_S).person.keypoints_m[127]
-    >>> bool(np.linalg.norm(in_root(fingertip_m) - HOME_M["left"]) < 0.3)
+    >>> bool(np.linalg.norm(lab.in_root(fingertip_m) - HOME_M["left"]) < 0.3)
     True
     """
     staging, identity = (SCRIPTS | BYSTANDERS)[name], subject.identity

@@ -147,7 +147,7 @@ def import_predictions(
         raise InputError(f"--score-scale is {scale:g}; expected a positive number")
     people = READERS[format](Path(path))
     refuse_fractions(people.path, people.keypoints_px)
-    matched = match_images(people, annotations.images)
+    matched = match_images(people.path, people.sources, people.named_by, annotations.images)
     scale = score_scale(format, people) if scale is None else scale
     rows = np.flatnonzero([matched[s] is not None for s in people.source_of])
     shown = [annotations.images[i] for s in people.source_of if (i := matched[s]) is not None]

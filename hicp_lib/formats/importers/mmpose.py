@@ -48,7 +48,7 @@ def read_mmpose(path: Path) -> People:
     """
     files = json_files(path, (".json",), "the folder MMPoseInferencer wrote with pred_out_dir")
     read = {file: _instances(file) for file in files.values()}
-    sources = [n.removeprefix(_SAVED) if read[file][1] is not None else n for n, file in files.items()]
+    named = (n.removeprefix(_SAVED) if read[file][1] is not None else n for n, file in files.items())
     of_models = {names for _, names in read.values() if names}
     if len(of_models) > 1:
         raise InputError(f"{path}: keypoint_id2name differs from file to file; import each model by itself")
@@ -56,6 +56,8 @@ def read_mmpose(path: Path) -> People:
     joined, source_of = FileRows.joined(
         path, "instances", {file: people for file, (people, _) in read.items()}
     )
+    for key in ("keypoint_scores", "keypoints"):
+        joined.column(key)
     rows = replace(joined, rows=[row | {"keypoints": _flat(joined, i)} for i, row in enumerate(joined.rows)])
     triples = rows.keypoints(layouts)
     conventions = Counter(CONVENTIONS.get(len(row["keypoints"]) // 3, "by their names") for row in rows.rows)
@@ -63,7 +65,7 @@ def read_mmpose(path: Path) -> People:
     counted = scores > _COUNTED_FROM
     means = np.where(counted, scores, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
     return People(
-        path, "stem", sources, source_of, keypoints, scores,
+        path, "stem", list[str | int](named), source_of, keypoints, scores,
         rows.numbers("bbox_score", default=1.0) * means,  # 1 where a bottom-up model gave no box
         conventions, _extras(rows),
     )  # fmt: skip

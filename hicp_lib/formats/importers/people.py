@@ -6,12 +6,12 @@ import os
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import natural_order
+from hicp_lib.formats.importers.matching import NamedBy
 from hicp_lib.formats.json_validation import Rows
 
 
@@ -43,7 +43,7 @@ class People:
     """
 
     path: Path
-    named_by: Literal["stem", "id", "number"]
+    named_by: NamedBy
     sources: list[str | int]
     source_of: np.ndarray
     keypoints_px: np.ndarray

@@ -65,6 +65,7 @@ def random_style(rng: Rng, woman: bool, age: float) -> Style | None:
 
     Examples
     --------
+    >>> import numpy as np
     >>> style = random_style(np.random.default_rng(0), woman=True, age=25)
     >>> 0.1 <= style.top_m < 0.5
     True

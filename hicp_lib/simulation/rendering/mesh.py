@@ -115,7 +115,8 @@ def smoothing(triangles: np.ndarray, n_vertices: int) -> sparse.csr_array:
 
     Returns
     -------
-    sparse array, shape (n_vertices, n_vertices), dtype float32
+    array, shape (n_vertices, n_vertices), dtype float32
+        Sparse.
     """
     pairs = _directed_edges(triangles)
     ends = np.concatenate([pairs, pairs[:, ::-1]]).T

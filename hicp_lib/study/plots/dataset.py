@@ -153,7 +153,8 @@ def labelled_share(subsets: Mapping[str, Annotations], note: str) -> Figure:
         if len(labelled)
     )
     figure, axis = new_figure(1, 1, 9.0, 3.6)
-    wide = table.pivot(index="part", columns="subset", values="share").reindex(list(_PARTS))[list(subsets)]
+    wide = table.pivot(index="part", columns="subset", values="share")
+    wide = wide.reindex(list(_PARTS), columns=list(subsets))
     for k, name in enumerate(subsets):
         x = np.arange(len(wide)) + marks.offset(k, len(subsets), 0.4)
         axis.bar(x, wide[name], 0.38, color=SUBSET_COLOURS.get(name), label=name)

@@ -207,8 +207,9 @@ def examples(folders, truth, found, n_people: int, note: str) -> Figure:
             read_image(Path(folder) / "images" / truth[subset].images[i].file_name),
             {name: found[subset, name].get(i, Detections.none()) for name in detectors},
         )
-        for i in shared[:n_people]
+        for i in (shared or list(truth["basic"].images))[:n_people]
         for subset, folder in folders.items()
+        if i in truth[subset].images
     }
     return detections_grid(pictures, min_score=0.3, note=f"Data: {note}.")
 

@@ -169,7 +169,7 @@ def dots_in_rows(
     """
     for k, (case, pen) in enumerate(pens.items()):
         part = table[table[beside] == case]
-        y = part[down].map(names.index) + offset(k, len(pens), 0.8 / len(pens))
+        y = np.array([names.index(name) for name in part[down]]) + offset(k, len(pens), 0.8 / len(pens))
         dots(axis, part, y, **pen | shared)
 
 

@@ -117,6 +117,7 @@ def picture_grid(
     return Figure(figure, caption, alt)
 
 
+@in_style
 def detections_grid(
     pictures: Mapping[str, tuple[np.ndarray, Mapping[str, Detections]]], min_score: float, note: str = ""
 ) -> Figure:

@@ -1,6 +1,7 @@
 """The command on users' models: what is assumed is printed, mistakes are one line, results are written."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -28,13 +29,18 @@ def mistake(capsys, *arguments):
     return error
 
 
+def cells(table: str) -> list[list[str]]:
+    return [re.split("  +", line) for line in table.splitlines()]
+
+
 @pytest.mark.parametrize("name", ["mmpose", "alphapose"])
 def test_what_is_assumed_is_printed(capsys, model, name):
     assert cli.run(["models", "show", "--detector", name, "--model", model, "-o", "flip_test", "true"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert "input            192 wide, 256 high  (read from the file)" in lines
-    assert any(line.startswith("flip test        yes") for line in lines)
-    assert any(line.startswith("boxes            image") for line in lines)
+    rows = cells(capsys.readouterr().out)
+    assert rows[0] == ["what", "value", "why"]
+    assert ["input", "192 wide, 256 high", "read from the file"] in rows
+    assert any(row[:2] == ["flip test", "yes"] for row in rows)
+    assert any(row[:2] == ["boxes", "image"] for row in rows)
 
 
 def test_detect_with_a_model_of_ones_own(capsys, model, tmp_path):
@@ -88,19 +94,19 @@ def test_a_person_model_is_looked_at_before_an_image_is_shown(capsys, model, tmp
     rows = constant_model(tmp_path / "q.onnx", (1, 3, 64, 64), {"dets": np.zeros((1, 0, 5), np.float32)})
     chosen = ["--person-model", str(rows), "-o", "person_min_score", "0.5", "-o", "person_family", "yolox"]
     assert cli.run([*show, *chosen]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert "person detector  yolox  (given; option person_family)" in lines
-    assert any(line.startswith("person score     >= 0.5  ") for line in lines)
+    rows = cells(capsys.readouterr().out)
+    assert ["person detector", "yolox", "given; option person_family"] in rows
+    assert any(row[:2] == ["person score", ">= 0.5"] for row in rows)
 
 
 def test_the_transform_is_printed_and_may_be_given(capsys, model):
     show = ["models", "show", "--detector", "mmpose", "--model", model]
     for options, expected in (
-        ([], "classic, not UDP  (ASSUMED"),
+        ([], r"classic, not UDP +ASSUMED"),
         (["-o", "udp", "true"], "UDP: sizes less one"),
     ):
         assert cli.run([*show, *options]) == 0
-        assert f"transform        {expected}" in capsys.readouterr().out
+        assert re.search(f"transform +{expected}", capsys.readouterr().out)
 
 
 def test_a_model_named_once_is_taken_from_then_on(capsys, model, tmp_path):

@@ -17,6 +17,7 @@ from hicp_lib.formats.importers.people import People
 from hicp_lib.formats.importers.scores import score_scale
 from tests.formats.importers.native_people import NAMES, annotated, make_person
 
+PATH = Path("predictions.json")
 SIZE_PX = np.array([[640.0, 480.0]])
 
 
@@ -111,14 +112,14 @@ def test_numbers_of_eighteen_digits_name_an_image_and_longer_ones_none():
     numbers = {1: "1" * 18, 2: "2" * 19}
     images = annotated({i: f"frame_{number}_x.png" for i, number in numbers.items()}).images
     sources = (int(numbers[1]),)
-    assert match_images(people(named_by="number", sources=sources), images) == [1]
+    assert match_images(PATH, sources, "number", images) == [1]
     with pytest.raises(InputError, match="none of its 1 images is annotated"):
-        match_images(people(named_by="number", sources=(int(numbers[2]),)), images)
+        match_images(PATH, (int(numbers[2]),), "number", images)
 
 
 def test_a_whole_path_goes_before_a_name_and_a_name_before_a_stem():
     images = annotated({1: "a/x.png", 2: "b/x.png", 3: "y.jpg", 4: "c/z.png"}).images
-    by_id = people(named_by="id", sources=("b/x.png", "d\\y.jpg", "z.jpg", "nowhere.png"))
-    assert match_images(by_id, images) == [2, 3, 4, None]
+    names = ("b/x.png", "d\\y.jpg", "z.jpg", "nowhere.png")
+    assert match_images(PATH, names, "id", images) == [2, 3, 4, None]
     with pytest.raises(InputError, match=r"'x.png' could be a/x.png and b/x.png"):
-        match_images(people(named_by="id", sources=("x.png",)), images)
+        match_images(PATH, ("x.png",), "id", images)

@@ -143,7 +143,7 @@ def test_names_that_say_nothing_are_refused(tmp_path, images):
 def test_another_number_than_that_of_names_is_refused(tmp_path, images):
     saved(tmp_path, make_person(), LAYOUTS["coco17"][::-1])
     (file,) = tmp_path.iterdir()
-    rewrite(file, lambda data: data["instance_info"][0]["keypoint_scores"].pop())
+    rewrite(file, lambda data: data["instance_info"][0]["keypoint_scores"].pop() and None)
     with pytest.raises(InputError, match=r"instances\[0\]: keypoint_scores is a list of 16; expected 17"):
         import_predictions("mmpose", tmp_path, images)
 
@@ -191,7 +191,7 @@ def test_one_scale_for_one_detector(tmp_path, images):
 
 @pytest.mark.parametrize("format", ["openpose", "alphapose", "detectron2"])
 def test_scores_far_above_one_are_not_that_tools(tmp_path, images, format):
-    person = make_person(scores=np.linspace(0.1, 8, 136))
+    person = make_person(scores=np.full(136, 8.0))
     write = {"openpose": write_openpose, "alphapose": write_alphapose}.get(format)
     write(tmp_path / "p", {IMAGE: [person]}) if write else write_detectron2(
         tmp_path / "p", {IMAGE: [person]}, {IMAGE: 785}

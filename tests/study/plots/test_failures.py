@@ -21,7 +21,7 @@ def test_precision_per_class_says_which_classes_are_too_small():
         (name, group, detector, metric, value, value, value, n)
         for name, value, n in (("whole upper body", 0.8, 50), ("only legs", np.nan, 3))
         for group in ("body", "hand")
-        for detector in DETECTORS
+        for detector in DETECTORS[: 1 if group == "hand" else None]  # the other one gives no hands
         for metric in ("AP", "AP50", "AR")
     ]
     columns = ["class", "group", "detector", "metric", "value", "low", "high", "n_people"]
