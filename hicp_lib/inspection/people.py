@@ -85,8 +85,7 @@ def describe_annotations(path: Path) -> Facts:
     }
     if len(people):
         says["area"] = f"{np.median(people.areas_px2 / boxes_px2):.2f} of the box in the median"
-    written = ["hicp export wrote these detections; hicp import --format coco reads them"]
-    written *= any("confidence" in row for row in rows)
+    written = ["hicp export wrote these: import --format coco"] * any("confidence" in row for row in rows)
     hands = (people.visibility[:, HANDS] > 0).any()
     needs = {} if hands else {"hicp evaluate": "(the body only: no hand is labelled)"}
     return Facts(says, [*written, *people.notes.values()], needs)
@@ -96,8 +95,9 @@ def _layout(rows: list[dict], names: tuple[str, ...]) -> str:
     n = {133 if all(key in row for key in PART_KEYS) else len(row.get("keypoints", ())) // 3 for row in rows}
     if not names:
         return f"{', '.join(map(str, sorted(n)))} keypoints by their number: the file has no names"
-    order = layouts_of("", names)[0][len(names)].tolist()
-    orders = {name: indices.tolist() for name, indices in TO_HALPE.items()} | tables()["layouts"]
-    known = next((name for name, indices in orders.items() if indices == order), "its own")
+    indices = layouts_of("", names)[0][len(names)]
+    order = (TO_HALPE[indices] if isinstance(indices, str) else indices).tolist()
+    orders = {name: of.tolist() for name, of in TO_HALPE.items()} | tables()["layouts"]
+    known = next((name for name, of in orders.items() if of == order), "its own")
     known = "wholebody133" if n == {133} and known == "coco17" else known
     return f"{known}, by the {len(names)} names in its category"

@@ -70,11 +70,11 @@ ALL = {"people with labelled": "body 2, face 2, hands 2"}
 set_case("coco17", BODY)
 set_case("halpe26", BODY)
 set_case("halpe136", ALL, body_only=False)
-set_case("crowdpose14", BODY, ["names no nose"])
-set_case("aic14", BODY, ["names no nose"])
-set_case("mpii16", BODY, ["without a counterpart", "taken: upper_neck for neck", "names no nose"])
-set_case("posetrack17", BODY, ["taken: head_bottom for neck", "names no left_eye"])
-set_case("h36m17", BODY, ["without a counterpart", "taken", "names no nose"])
+set_case("crowdpose14", BODY, ["the body has no: nose"])
+set_case("aic14", BODY, ["the body has no: nose"])
+set_case("mpii16", BODY, ["keypoints left out", "taken: upper_neck for neck", "the body has no: nose"])
+set_case("posetrack17", BODY, ["taken: head_bottom for neck", "the body has no: left_eye"])
+set_case("h36m17", BODY, ["keypoints left out", "taken", "the body has no: nose"])
 
 
 @case("COCO annotations of people", {"layout": "its own, by the 17 names", **BODY}, needs=BODY_ONLY)
@@ -160,7 +160,7 @@ def annotations_of_an_animal(folder):
     return dump(path, json.loads(path.read_text().replace('"left_eye"', '"tail"')))
 
 
-@case("COCO annotations of people", needs=BODY_ONLY, notes=["lie outside their images"])
+@case("COCO annotations of people", needs=BODY_ONLY, notes=["outside images"])
 def annotations_of_images_that_were_turned(folder):
     path = annotated(folder, "coco17")
     return dump(path, json.loads(path.read_text().replace('"width": 640', '"width": 360')))

@@ -5,10 +5,12 @@ import json
 import pytest
 
 from hicp_lib.cli.main import run
+from tests.inspection import made_annotations, made_detections, made_pictures, made_recordings
 from tests.inspection.cases import CASES, EXAMPLES
 from tests.inspection.made_detections import FOUND, write_coco
 from tests.inspection.made_pictures import png
 
+MADE = (made_annotations, made_detections, made_recordings, made_pictures)  # which register their cases
 REFUSED = {
     "empty": (b"", "is empty"),
     "blank": (b" \n\n", "is empty"),
