@@ -19,7 +19,7 @@ from hicp_lib.recordings.importing import read_pose_source
 from hicp_lib.recordings.qualisys import read_mocap
 from hicp_lib.recordings.recording import open_recording
 from hicp_lib.recordings.trajectories import read_trajectory
-from hicp_lib.recordings.tum import count_repeated, doubt, read_file_list
+from hicp_lib.recordings.tum import read_file_list, remarks
 
 _CAMERA_FILES = ("intrinsic.json", "camera_intrinsic.json")
 _OPTIONS = {"fps": "--rate", "depth_scale": "--depth-scale"}
@@ -111,7 +111,7 @@ def describe_list(path: Path) -> Facts:
     n_missing = sum(not (path.parent / name).is_file() for name in names)
     says = {"images": f"{len(names)}, of which {n_missing} are not there"}
     says["times"] = about_times(times_s, "seconds, when each image was taken")
-    return Facts(says, _doubts(path, times_s))
+    return Facts(says, remarks(path, times_s))
 
 
 def describe_poses(path: Path, by: str = "") -> Facts:
@@ -125,7 +125,9 @@ def describe_poses(path: Path, by: str = "") -> Facts:
     says["units"] = f"metres; moved by {_metres(np.ptp(place_m, axis=0))}"
     furthest_m = np.linalg.norm(place_m, axis=1).max()
     far = f"up to {furthest_m:.4g} m from its origin, more than a robot reaches; are these millimetres?"
-    return Facts(says, _doubts(path, times_s) + [far] * int(furthest_m > FURTHEST_POSE_M))
+    return Facts(
+        says, (remarks(path, times_s) if len(times_s) else []) + [far] * int(furthest_m > FURTHEST_POSE_M)
+    )
 
 
 def describe_clicks(path: Path) -> Facts:
@@ -141,10 +143,3 @@ def _size(of: Camera) -> str:
 
 def _metres(xyz_m: Iterable[float]) -> str:
     return ", ".join(f"{along:.3f}" for along in xyz_m)
-
-
-def _doubts(path: Path, times_s: np.ndarray) -> list[str]:
-    n = count_repeated(path) if len(times_s) else 0
-    return [
-        *filter(None, [doubt(times_s), f"{n} lines repeat the time before and are passed over" * bool(n)])
-    ]
