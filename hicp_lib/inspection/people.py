@@ -1,5 +1,6 @@
 """What annotations and detections hold."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -91,7 +92,7 @@ def describe_annotations(path: Path) -> Facts:
     return Facts(says, [*written, *people.notes.values()], needs)
 
 
-def _layout(rows: list[dict], names: tuple[str, ...]) -> str:
+def _layout(rows: list[dict], names: Sequence[str]) -> str:
     n = {133 if all(key in row for key in PART_KEYS) else len(row.get("keypoints", ())) // 3 for row in rows}
     if not names:
         return f"{', '.join(map(str, sorted(n)))} keypoints by their number: the file has no names"
