@@ -208,6 +208,8 @@ def content(value: Any) -> Any:
         return [[content(name), content(item)] for name, item in value.items()]
     if isinstance(value, Sequence):
         return [content(item) for item in value]
+    if isinstance(value, set | frozenset):
+        return sorted(map(content, value))
     if is_dataclass(value):
         return [type(value).__name__, {f.name: content(getattr(value, f.name)) for f in fields(value)}]
     if type(value).__name__ == "DataFrame":

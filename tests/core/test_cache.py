@@ -19,6 +19,7 @@ from hicp_lib.core.cache import LIBRARY_DIR, code, imports_of, key
 from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.core.datafiles import DATA_DIR, REFERENCE_DIR
 from hicp_lib.core.errors import InputError
+from hicp_lib.formats.annotations import Annotations
 from hicp_lib.report.notebooks import read_notebooks
 from hicp_lib.report.run import Run
 from hicp_lib.report.runs import run_key
@@ -254,3 +255,9 @@ def test_a_key_is_the_same_in_every_process():
         for seed in ("0", "1", "2")
     }
     assert len(keys) == 1
+
+
+def test_sets_and_annotated_people_have_a_content():
+    assert cache.content({3, 1, 2}) == cache.content({2, 3, 1}) != cache.content({1, 2})
+    nobody = Annotations.concatenate([], {})
+    assert cache.content(nobody) == cache.content(Annotations.concatenate([], {}))
