@@ -3,12 +3,12 @@
 import re
 from dataclasses import replace
 from pathlib import Path
-from pkgutil import resolve_name
 from typing import Any
 
 from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.files import read_json
 from hicp_lib.detectors.runtime.to_file import IMAGE_SUFFIXES
+from hicp_lib.inspection import people, pixels, recorded
 from hicp_lib.inspection.facts import Facts, tables, under_name
 from hicp_lib.recordings.tum import names_poses
 
@@ -17,6 +17,7 @@ _PRINTED = {*b"\t\r\n\f\x1a", *range(32, 256)}  # what texts are made of, in any
 _NUMBER = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?", re.IGNORECASE)
 
 
+_MODULES = {"people": people, "pixels": pixels, "recorded": recorded}
 Kind = dict[str, Any]  # a row of data/kinds.toml, which explains its keys
 
 
@@ -134,7 +135,7 @@ def inspect(path: str | Path) -> Facts:
 
 
 def _describe(kind: Kind, path: Path) -> Facts:
-    describe = resolve_name(f"hicp_lib.inspection.{kind['describe']}")
+    describe = getattr(_MODULES[kind["describe_in"]], kind["describe"])
     suffix, each, given = kind.get("suffix", ""), kind.get("each"), kind.get("given", {})
     if path.is_dir() or not each and suffix in ("", path.suffix.lower()):
         return describe(path, **given)
