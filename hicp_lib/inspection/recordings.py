@@ -40,7 +40,7 @@ def inspect_bag(path: Path) -> Facts:
         }
         poses = bag.topics("TFMessage", "JointState")
         try:
-            color, depth = find_streams(bag, None, None)
+            color, depth = find_streams(bag, (None, None))
         except InputError as error:
             says["topics"] = ", ".join(list(counts)[:8])
             return Facts(path, "bag", says, problem=str(error).removeprefix(f"{path}: "))
