@@ -15,7 +15,7 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
-from hicp_lib.core.files import atomic_path, read_bytes
+from hicp_lib.core.files import atomic_path, natural_order, read_bytes
 
 with needs("analysis"):
     import ezc3d
@@ -43,19 +43,13 @@ except (ImportError, ValueError, OSError):  # no such limit on this system
 import ezc3d, numpy
 file = ezc3d.c3d(sys.argv[1])
 points, analogs = file["data"]["points"], file["data"]["analogs"]
-def of(group, name):
-    group = file["parameters"][group] if group in file["parameters"] else {}
-    return numpy.ravel(group[name]["value"]) if name in group else numpy.array([])
-labels = sorted((key for key in file["parameters"]["POINT"] if key.startswith("LABELS")),
-                key=lambda key: int(key[6:] or 1))
+said = file["parameters"]["POINT"].items()
 numpy.savez(
     sys.argv[2],
     points=points[:3],
     residuals=file["data"]["meta_points"]["residuals"][0],
-    names=numpy.array([str(name) for key in labels for name in of("POINT", key)], dtype=str),
-    units=of("POINT", "UNITS").astype(str),
     n_analog=analogs.size // max(points.shape[2], 1),
-    **{name: of("POINT", name) for name in sys.argv[4].split()},
+    **{"POINT:" + name: numpy.ravel(of["value"]) for name, of in said if "value" in of},
 )
 """
 
@@ -97,9 +91,8 @@ def read_points(path: Path) -> Points:
         raise InputError(f"{path}: is not a C3D file (its second byte is not 80); export it again")
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "points.npz"
-        limits = [str(_MAX_MEMORY_BYTES), " ".join(_PARAMETERS)]
         try:
-            command = [sys.executable, "-P", "-c", _CONVERT, str(path), str(out), *limits]
+            command = [sys.executable, "-P", "-c", _CONVERT, str(path), str(out), str(_MAX_MEMORY_BYTES)]
             subprocess.run(command, capture_output=True, timeout=_TIMEOUT_S, check=True)
         except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
             why = (error.stderr or b"crash").decode(errors="replace").strip().rpartition("\n")[2][:_SHOWN]
@@ -126,14 +119,16 @@ def decoded(raw: bytes) -> str:
 
 def _checked(path: Path, stored: Mapping[str, np.ndarray]) -> Points:
     """Points, names and rate of what `_CONVERT` stored."""
-    points, rate = stored["points"], stored["RATE"]
-    names = [decoded(str(name).encode(errors="surrogateescape")).strip() for name in stored["names"]]
+    points, rate = stored["points"], stored.get("POINT:RATE", np.zeros(0))
+    lists = sorted((key for key in stored if key.startswith("POINT:LABELS")), key=natural_order)
+    labels = [str(name) for key in lists for name in stored[key]]
+    names = [decoded(name.encode(errors="surrogateescape")).strip() for name in labels]
     names = _distinct([*names, *[""] * points.shape[1]][: points.shape[1]])
-    if not stored["names"].size or len(set(names)) != max(len(names), 1):
+    if not labels or len(set(names)) != max(len(names), 1):
         raise InputError(f"{path}: POINT:LABELS does not name the markers; name them in Qualisys")
     if not len(rate) or not 0 < rate[0] <= _MAX_RATE_HZ:
         raise InputError(f"{path}: POINT:RATE is missing or wrong; expected frames per second")
-    found = {_unit_m(str(unit)) for unit in stored["units"] if str(unit).strip()}
+    found = {_unit_m(str(unit)) for unit in stored.get("POINT:UNITS", np.zeros(0)) if str(unit).strip()}
     if len(found) != 1 or None in found:
         raise InputError(f"{path}: POINT:UNITS is none of mm, cm, m, in, ft; export it again")
     points_m = np.moveaxis(points, 0, -1).swapaxes(0, 1) * found.pop()
@@ -160,7 +155,8 @@ def _refuse_contradictions(path: Path, raw: bytes, stored: Mapping[str, np.ndarr
     is_dec = raw[_BLOCK_BYTES * (raw[0] - 1) + 3] == 85  # halves of a float swapped, and four times as large
     floats = words[[7, 6, 11, 10] if is_dec else [6, 7, 10, 11]].view("<f4") / (4 if is_dec else 1)
     n_points, n_analog, first, last, _, _, _, start = words[1:9].tolist()
-    of = {name: float(np.nan_to_num(stored[name][0])) if stored[name].size else 0.0 for name in _PARAMETERS}
+    said = {name: stored.get(f"POINT:{name}", np.zeros(0)) for name in _PARAMETERS}
+    of = {name: float(np.nan_to_num(value[0])) if len(value) else 0.0 for name, value in said.items()}
     pairs = [("RATE", floats[1]), ("DATA_START", start), ("SCALE", floats[0])]
     wrong = [
         f"POINT:{name} ({header:g}, {of[name]:g})" for name, header in pairs

@@ -11,11 +11,12 @@ import cv2
 import numpy as np
 import pandas as pd
 
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import natural_order, read_bytes, read_json, write_bytes
 from hicp_lib.formats.json_validation import is_number, shown
 from hicp_lib.recordings.camera_file import read_distorted_camera
-from hicp_lib.recordings.recording import check_columns
+from hicp_lib.recordings.recording import check_size, read_csv
 from hicp_lib.recordings.rectification import rectify
 from hicp_lib.recordings.trajectories import read_trajectory
 from hicp_lib.recordings.tum import names_poses
@@ -63,13 +64,8 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
         return read_trajectory(path)
     from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub  # not in every installation
 
-    columns = ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)]
-    try:
-        table = pd.read_csv(path)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: is not a CSV table ({str(error).splitlines()[0]})") from None
-    check_columns(path, table, columns)
-    numbers = table[columns].apply(pd.to_numeric, errors="coerce").to_numpy(float)
+    table = read_csv(path, ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)])
+    numbers = table.apply(pd.to_numeric, errors="coerce").to_numpy(float)
     is_bad = ~np.isfinite(numbers).all(axis=1) | (np.diff(numbers[:, 0], prepend=-np.inf) <= 0)
     if is_bad.any() or len(numbers) == 0:
         row = 1 + int(np.argmax([*is_bad, True]))
@@ -137,9 +133,8 @@ def import_open3d(
         notes.append(f"{path}: {lengths}; frames were dropped, or the rate is another")
     refuse_used_folder(out)
     names = [f"rgb/{image.name}" for image in rgb], [f"depth/{image.name}" for image in depth]
-    size = intrinsics.height_px, intrinsics.width_px
     for image, name in zip(rgb + depth, sum(names, []), strict=True):
-        write_bytes(out / name, _rectified(image, size, pixels_px))
+        write_bytes(out / name, _rectified(image, intrinsics, pixels_px))
     write_index(out, intrinsics, units_per_m, times_s, poses, names)
     return len(times_s), notes
 
@@ -172,14 +167,13 @@ def _frame_numbers(paths: list[Path], notes: list[str]) -> np.ndarray:
     return np.array(numbers) - numbers[0]
 
 
-def _rectified(path: Path, size: tuple[int, int], pixels_px: np.ndarray | None) -> bytes:
+def _rectified(path: Path, intrinsics: Camera, pixels_px: np.ndarray | None) -> bytes:
     """An image file's content, without distortion."""
     content = read_bytes(path, "expected an image")
     image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if content else None
     if image is None:
         raise InputError(f"{path}: is not a whole image; expected PNG or JPEG")
-    if image.shape[:2] != size:
-        raise InputError(f"{path}: is {image.shape[:2]} (height, width); the intrinsics are of {size}")
+    check_size(path, image, intrinsics)
     if pixels_px is None:
         return content
     quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
