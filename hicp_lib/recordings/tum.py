@@ -188,8 +188,7 @@ def remarks(path: str | Path, times_s: np.ndarray) -> list[str]:
     list of str
         How many lines repeat the time before; whether there are too few a second for times in seconds.
     """
-    lines = [line for line in _text(path).split("\n") if line.partition("#")[0].strip()]
-    n = sum(not _named_columns(line) for line in lines) - len(times_s)
+    n = sum(bool(re.match(r"\s*[-+.]?\d", line)) for line in _text(path).split("\n")) - len(times_s)
     step_s = np.median(np.diff(times_s)) if len(times_s) > 1 else 0.0
     looks = f"times are expected in seconds (these look like {_prefix(step_s)}seconds)"
     told = [f"{n} lines repeat the time before and are passed over"] if n else []
