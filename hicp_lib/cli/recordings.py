@@ -116,16 +116,10 @@ def _tell(out: Path, n_frames: int, notes: list[str]) -> None:
 
 @record.command("camera")
 @click.argument("out", type=PATH)
-@click.option(
-    "--color", "color_px", nargs=2, type=int, default=(640, 480), show_default=True, help="Width and height."
-)
-@click.option(
-    "--depth", "depth_px", nargs=2, type=int, default=(848, 480), show_default=True, help="Width and height."
-)
+@click.option("--color", "color_px", nargs=2, type=int, default=(640, 480), help="Width, height: 640 480.")
+@click.option("--depth", "depth_px", nargs=2, type=int, default=(848, 480), help="Width, height: 848 480.")
 @click.option("--rate", "rate_hz", default=30, show_default=True, type=int, help="Frames per second.")
-@click.option(
-    "--seconds", "duration_s", type=click.FloatRange(min=0), help="How long; until Ctrl-C if not given."
-)
+@click.option("--seconds", "duration_s", type=click.FloatRange(min=0), help="Until Ctrl-C if not given.")
 @click.option("--joints", type=click.File(), help="Lines of joint angles as they come; - is standard input.")
 @pose_options
 def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> None:

@@ -21,7 +21,7 @@ from hicp_lib.core.extras import needs
 from hicp_lib.core.files import write_bytes
 from hicp_lib.core.images import inside
 from hicp_lib.formats.json_validation import is_number
-from hicp_lib.recordings.recording import Recording, read_rgb
+from hicp_lib.recordings.recording import Recording, read_csv, read_rgb
 
 with needs("report"):
     import plotly.graph_objects as go
@@ -52,7 +52,9 @@ def read_clicks(path: str | Path, recording: Recording, markers: Sequence[str]) 
     InputError
         If it is not such a table; the row is named.
     """
-    table = _read_table(path)
+    table = read_csv(path, COLUMNS)
+    if table.empty:
+        raise InputError(f"{path}: has no rows; expected one per click")
     for row, click in enumerate(table.to_dict("records"), start=2):
         _check_click(f"{path}: row {row}", click, recording, markers)
     twice = table.duplicated(["frame", "marker"])
@@ -128,20 +130,6 @@ def show_frame(recording: Recording, frame: int, clicks: pd.DataFrame | None = N
     title = f"frame {frame}: drag to zoom, double-click to go back"
     width = recording.intrinsics.width_px + _MARGINS_PX
     return figure.update_layout(title=title, dragmode="zoom", width=width, margin={"t": 40, "b": 20})
-
-
-def _read_table(path: str | Path) -> pd.DataFrame:
-    try:
-        table = pd.read_csv(path, skipinitialspace=True)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give the clicked markers") from None
-    except (ValueError, pd.errors.ParserError):
-        raise InputError(f"{path}: is not a table with the columns {','.join(COLUMNS)}") from None
-    missing = [name for name in COLUMNS if name not in table.columns]
-    if missing or table.empty:
-        wrong = f"no column {missing[0]!r}" if missing else "no rows"
-        raise InputError(f"{path}: has {wrong}; expected {','.join(COLUMNS)} and a row per click")
-    return table[COLUMNS]
 
 
 def _check_click(where: str, click: dict, recording: Recording, markers: Sequence[str]) -> None:

@@ -9,6 +9,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.recordings.bag_file import Bag, decode, open_bag, stamp_s
 from hicp_lib.recordings.bag_poses import frame_poses, joint_poses, read_links
 from hicp_lib.recordings.bag_streams import Stream, Topics, find_streams, realsense_links
+from hicp_lib.recordings.recording import check_size
 from hicp_lib.recordings.rectification import align_depth, rectify
 from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, associate
 from hicp_lib.recordings.writer import Poses, RecordingWriter
@@ -124,13 +125,10 @@ def _times(bag: Bag, stream: Stream, notes: list[str]) -> tuple[np.ndarray, np.n
 def _images(bag: Bag, stream: Stream, rows: np.ndarray) -> Iterator[np.ndarray]:
     """Pictures without distortion, of the camera's size."""
     where, wanted = f"{bag.path}: {stream.topic}", set(rows.tolist())
-    expected = stream.camera.height_px, stream.camera.width_px
     for row, (_, _, message) in enumerate(bag.messages(stream.topic)):
         if row in wanted:
             image = decode(where, message)
-            if image.shape[:2] != expected:
-                sizes = f"images are {image.shape[:2]} (height, width), their camera {expected}"
-                raise InputError(f"{where}: {sizes}; record them without binning or cropping")
+            check_size(where, image, stream.camera)
             yield rectify(image, stream.pixels_px)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
-from hicp_lib.core.files import atomic_path, read_bytes
+from hicp_lib.core.files import atomic_path, natural_order, read_bytes
 
 with needs("analysis"):
     import ezc3d
@@ -25,7 +25,7 @@ _UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 _UNITS_M |= {"mill": 1e-3, "cent": 1e-2, "met": 1.0, "inch": 0.0254, "feet": 0.3048, "foot": 0.3048}
 _MAX_RATE_HZ = 1e5
 _SAME_SHARE = 0.005  # of a rate or scale, by which its two statements may differ
-_PARAMETERS, _TRIAL = ("RATE", "SCALE", "FRAMES", "DATA_START"), ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD")
+_PARAMETERS = ("RATE", "SCALE", "FRAMES", "DATA_START")
 _SHOWN = 160  # characters of the reader's own reason
 _BLOCK_BYTES = 512
 MAX_FRAMES = 65535  # that the format's own header counts to
@@ -43,20 +43,13 @@ except (ImportError, ValueError, OSError):  # no such limit on this system
 import ezc3d, numpy
 file = ezc3d.c3d(sys.argv[1])
 points, analogs = file["data"]["points"], file["data"]["analogs"]
-def of(group, name):
-    group = file["parameters"][group] if group in file["parameters"] else {}
-    return numpy.ravel(group[name]["value"]) if name in group else numpy.array([])
-labels = sorted((key for key in file["parameters"]["POINT"] if key.startswith("LABELS")),
-                key=lambda key: int(key[6:] or 1))
+said = file["parameters"]["POINT"].items()
 numpy.savez(
     sys.argv[2],
     points=points[:3],
     residuals=file["data"]["meta_points"]["residuals"][0],
-    names=numpy.array([str(name) for key in labels for name in of("POINT", key)], dtype=str),
-    units=of("POINT", "UNITS").astype(str),
     n_analog=analogs.size // max(points.shape[2], 1),
-    **{name: of("POINT", name) for name in sys.argv[4].split()},
-    **{name: of("TRIAL", name) for name in sys.argv[5].split()},
+    **{"POINT:" + name: numpy.ravel(of["value"]) for name, of in said if "value" in of},
 )
 """
 
@@ -98,16 +91,16 @@ def read_points(path: Path) -> Points:
         raise InputError(f"{path}: is not a C3D file (its second byte is not 80); export it again")
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "points.npz"
-        limits = [str(_MAX_MEMORY_BYTES), " ".join(_PARAMETERS), " ".join(_TRIAL)]
         try:
-            command = [sys.executable, "-P", "-c", _CONVERT, str(path), str(out), *limits]
+            command = [sys.executable, "-P", "-c", _CONVERT, str(path), str(out), str(_MAX_MEMORY_BYTES)]
             subprocess.run(command, capture_output=True, timeout=_TIMEOUT_S, check=True)
         except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
             why = (error.stderr or b"crash").decode(errors="replace").strip().rpartition("\n")[2][:_SHOWN]
             hint = "if it is cut off, export it again, else as TSV"
             raise InputError(f"{path}: ezc3d cannot read it as C3D ({why}); {hint}") from None
         with np.load(out, allow_pickle=False) as stored:
-            return _checked(path, stored, _n_frames(path, raw, stored))
+            _refuse_contradictions(path, raw, stored)
+            return _checked(path, stored)
 
 
 def decoded(raw: bytes) -> str:
@@ -124,20 +117,22 @@ def decoded(raw: bytes) -> str:
         return raw.decode("latin-1")
 
 
-def _checked(path: Path, stored: Mapping[str, np.ndarray], n_frames: int) -> Points:
+def _checked(path: Path, stored: Mapping[str, np.ndarray]) -> Points:
     """Points, names and rate of what `_CONVERT` stored."""
-    points, rate = stored["points"][:, :, :n_frames], stored["RATE"]
-    names = [decoded(str(name).encode(errors="surrogateescape")).strip() for name in stored["names"]]
+    points, rate = stored["points"], stored.get("POINT:RATE", np.zeros(0))
+    lists = sorted((key for key in stored if key.startswith("POINT:LABELS")), key=natural_order)
+    labels = [str(name) for key in lists for name in stored[key]]
+    names = [decoded(name.encode(errors="surrogateescape")).strip() for name in labels]
     names = _distinct([*names, *[""] * points.shape[1]][: points.shape[1]])
-    if not stored["names"].size or len(set(names)) != max(len(names), 1):
+    if not labels or len(set(names)) != max(len(names), 1):
         raise InputError(f"{path}: POINT:LABELS does not name the markers; name them in Qualisys")
     if not len(rate) or not 0 < rate[0] <= _MAX_RATE_HZ:
         raise InputError(f"{path}: POINT:RATE is missing or wrong; expected frames per second")
-    found = {_unit_m(str(unit)) for unit in stored["units"] if str(unit).strip()}
+    found = {_unit_m(str(unit)) for unit in stored.get("POINT:UNITS", np.zeros(0)) if str(unit).strip()}
     if len(found) != 1 or None in found:
         raise InputError(f"{path}: POINT:UNITS is none of mm, cm, m, in, ft; export it again")
     points_m = np.moveaxis(points, 0, -1).swapaxes(0, 1) * found.pop()
-    valid = (stored["residuals"].T[:n_frames] >= 0) & np.isfinite(points_m).all(axis=2)
+    valid = (stored["residuals"].T >= 0) & np.isfinite(points_m).all(axis=2)
     return np.where(valid[..., None], points_m, np.nan), tuple(names), float(rate[0])
 
 
@@ -155,13 +150,13 @@ def _unit_m(text: str) -> float | None:
     return next((m for u, m in _UNITS_M.items() if unit == u or (len(u) > 2 and unit.startswith(u))), None)
 
 
-def _n_frames(path: Path, raw: bytes, stored: Mapping[str, np.ndarray]) -> int:
-    """How many of the frames that ezc3d read are the file's; InputError where it contradicts itself."""
+def _refuse_contradictions(path: Path, raw: bytes, stored: Mapping[str, np.ndarray]) -> None:
     words = np.frombuffer(raw[:24], "<u2")
     is_dec = raw[_BLOCK_BYTES * (raw[0] - 1) + 3] == 85  # halves of a float swapped, and four times as large
     floats = words[[7, 6, 11, 10] if is_dec else [6, 7, 10, 11]].view("<f4") / (4 if is_dec else 1)
     n_points, n_analog, first, last, _, _, _, start = words[1:9].tolist()
-    of = {name: float(np.nan_to_num(stored[name][0])) if stored[name].size else 0.0 for name in _PARAMETERS}
+    said = {name: stored.get(f"POINT:{name}", np.zeros(0)) for name in _PARAMETERS}
+    of = {name: float(np.nan_to_num(value[0])) if len(value) else 0.0 for name, value in said.items()}
     pairs = [("RATE", floats[1]), ("DATA_START", start), ("SCALE", floats[0])]
     wrong = [
         f"POINT:{name} ({header:g}, {of[name]:g})" for name, header in pairs
@@ -176,31 +171,18 @@ def _n_frames(path: Path, raw: bytes, stored: Mapping[str, np.ndarray]) -> int:
     if wrong:
         told = f"header and parameters disagree on {', '.join(wrong)}"
         raise InputError(f"{path}: {told}; export it again, or as TSV")
-    header, frames, actual = last - first + 1, int(of["FRAMES"]), _actual(stored)
-    n_true = actual if actual >= MAX_FRAMES else n
-    fits, actual_fits = (_fits(data_bytes, k * frame_bytes) for k in (n_true, actual))
-    # Counts that do not reach further stay at the highest; TRIAL may be of a file that was cut since.
-    agree = header == n_true or header == MAX_FRAMES <= actual
-    agree &= frames in (0, n, n_true) or (frames in (-1, MAX_FRAMES) and actual >= MAX_FRAMES)
-    agree &= actual in (0, n_true) or (fits and not actual_fits)
-    too_long = data_bytes - n_true * frame_bytes >= 2**16 * frame_bytes or (n_true == MAX_FRAMES and not fits)
-    if n_true > n or not agree or too_long:
-        counts = ((header, "header"), (frames, "POINT:FRAMES"), (actual, "TRIAL"))
-        told = ", ".join(f"{count} ({where})" for count, where in counts if count)
+    header, frames, by_size = last - first + 1, int(of["FRAMES"]), data_bytes // max(frame_bytes, 1)
+    # Counts that do not reach further stay at the highest, or start again: then there is room for more.
+    is_counted = header == n < MAX_FRAMES and frames in (0, n) and by_size - n < MAX_FRAMES
+    if not is_counted:
+        counts = f"{header} (header), {frames} (POINT:FRAMES), {by_size} (size of the file)"
         hint = "it is cut off, or too long for C3D; export it again, or as TSV"
-        raise InputError(f"{path}: holds {n} frames, counts {told}; {hint}")
-    return n_true
+        raise InputError(f"{path}: holds {n} frames, counts {counts}; {hint}")
 
 
 def _fits(file_bytes: int, data_bytes: int) -> bool:
     """Whether data fill a file but for the rest of a block."""
     return 0 <= file_bytes - data_bytes < _BLOCK_BYTES
-
-
-def _actual(stored: Mapping[str, np.ndarray]) -> int:
-    """Frames by the group TRIAL, which counts with 32 bits; 0 if it does not."""
-    first, last = (stored[name].astype(int) % 2**16 @ [1, 2**16][: stored[name].size] for name in _TRIAL)
-    return int(last - first + 1) if stored[_TRIAL[1]].size else 0
 
 
 def write_points(path: str | Path, points_m: np.ndarray, names: tuple[str, ...], rate_hz: float) -> None:

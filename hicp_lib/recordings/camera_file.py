@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +15,26 @@ from hicp_lib.recordings.rectification import undistortion
 MAX_SIDE_PX = 100_000
 _DISTORTION = re.compile(r"(?i)d|.*(dist|coef).*|k[1-6]|p[12]")  # however a tool names the key
 _LAYOUT = "fx, 0, 0, 0, fy, 0, cx, cy, 1"
+
+
+def _is_side(value: object) -> bool:
+    return is_number(value) and value == int(value) and 1 <= value <= MAX_SIDE_PX
+
+
+def _is_scale(value: object) -> bool:
+    return is_number(value) and value >= 1
+
+
+def _is_matrix(value: object) -> bool:
+    return isinstance(value, list) and len(value) == 9 and all(map(is_number, value))
+
+
+_SIDE = f"a whole number from 1 to {MAX_SIDE_PX}, the size of the images in pixels"
+_EXPECTED: tuple[tuple[str, Callable[[object], bool], str], ...] = (
+    ("width", _is_side, _SIDE), ("height", _is_side, _SIDE),
+    ("intrinsic_matrix", _is_matrix, f"nine finite numbers ({_LAYOUT}), column by column"),
+    ("depth_scale", _is_scale, "depth units per metre, at least 1 (1000 for millimetres), or --depth-scale"),
+)  # fmt: skip
 
 
 def read_camera(path: str | Path) -> tuple[Camera, float]:
@@ -82,22 +101,14 @@ def read_distorted_camera(
     if not isinstance(content, dict):
         raise InputError(f"{path}: expected an object with width, height, intrinsic_matrix and depth_scale")
 
-    def read(key: str, is_valid: Callable[[Any], bool], expected: str, hint: str) -> Any:
-        value = content.get(key)
-        if not is_valid(value):
-            raise InputError(f"{path}: {key}: expected {expected}, found {shown(value)}; {hint}")
-        return value
-
-    side = (_is_side, f"a whole number from 1 to {MAX_SIDE_PX}", "give the size of the images in pixels")
-    width, height = (int(read(key, *side)) for key in ("width", "height"))
-    numbers = (_is_matrix, f"nine finite numbers ({_LAYOUT})", "write the matrix column by column")
-    matrix = read("intrinsic_matrix", *numbers)
-    intrinsics = Camera(width, height, *_focal_and_centre(f"{path}: intrinsic_matrix", matrix))
-    units = "the number of depth units per metre, at least 1"
-    if depth_units_per_m is None:
-        hint = "for depth images in millimetres write 1000, or give --depth-scale"
-        depth_units_per_m = read("depth_scale", _is_scale, units, hint)
-    return intrinsics, float(depth_units_per_m), _distortion(path, content, intrinsics)
+    if depth_units_per_m is not None:
+        content = content | {"depth_scale": depth_units_per_m}
+    for key, is_valid, expected in _EXPECTED:
+        if not is_valid(content.get(key)):
+            raise InputError(f"{path}: {key}: expected {expected}; found {shown(content.get(key))}")
+    focal_and_centre = _focal_and_centre(f"{path}: intrinsic_matrix", content["intrinsic_matrix"])
+    intrinsics = Camera(int(content["width"]), int(content["height"]), *focal_and_centre)
+    return intrinsics, float(content["depth_scale"]), _distortion(path, content, intrinsics)
 
 
 def write_camera(path: str | Path, intrinsics: Camera, depth_units_per_m: float) -> None:
@@ -129,18 +140,6 @@ def _distortion(path: str | Path, content: dict, intrinsics: Camera) -> np.ndarr
         expected = "a distortion_model and one list coeffs: k1, k2, p1, p2, k3"
         raise InputError(f"{path}: distortion: expected {expected}, found {shown(numbers)}")
     return undistortion(str(path), intrinsics, model, numbers[0] if numbers else [])
-
-
-def _is_side(value: object) -> bool:
-    return is_number(value) and value == int(value) and 1 <= value <= MAX_SIDE_PX
-
-
-def _is_scale(value: object) -> bool:
-    return is_number(value) and value >= 1
-
-
-def _is_matrix(value: object) -> bool:
-    return isinstance(value, list) and len(value) == 9 and all(map(is_number, value))
 
 
 def _focal_and_centre(where: str, matrix: list) -> tuple[float, float, float, float]:

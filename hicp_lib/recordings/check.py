@@ -77,7 +77,9 @@ def check_recording(folder: str | Path) -> list[Finding]:
     _check_files(findings, folder)
     if not any(finding.is_fatal for finding in findings):
         recording = open_recording(folder)
-        for check in (_check_images, _check_poses, _check_tables, _check_mocap):
+        for read in (read_truth, read_joints):
+            findings.attempt(read, recording)
+        for check in (_check_images, _check_poses, _check_mocap):
             check(findings, recording)
     return list(findings)
 
@@ -149,12 +151,6 @@ def _check_poses(findings: _Findings, recording: Recording) -> None:
     if furthest_m > FURTHEST_POSE_M:
         text = f"the camera is up to {furthest_m:.4g} m from the base; expected metres, not millimetres"
         findings.note(recording.folder / POSES_FILE, text)
-
-
-def _check_tables(findings: _Findings, recording: Recording) -> None:
-    """Truth and joints, where there are any, that are no such tables."""
-    for read in (read_truth, read_joints):
-        findings.attempt(read, recording)
 
 
 def _check_mocap(findings: _Findings, recording: Recording) -> None:

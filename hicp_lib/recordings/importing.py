@@ -11,11 +11,12 @@ import cv2
 import numpy as np
 import pandas as pd
 
+from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_bytes, read_json, write_bytes
+from hicp_lib.core.files import natural_order, read_bytes, read_json, write_bytes
 from hicp_lib.formats.json_validation import is_number, shown
 from hicp_lib.recordings.camera_file import read_distorted_camera
-from hicp_lib.recordings.recording import check_columns
+from hicp_lib.recordings.recording import check_size, read_csv
 from hicp_lib.recordings.rectification import rectify
 from hicp_lib.recordings.trajectories import read_trajectory
 from hicp_lib.recordings.tum import names_poses
@@ -63,13 +64,8 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
         return read_trajectory(path)
     from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub  # not in every installation
 
-    columns = ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)]
-    try:
-        table = pd.read_csv(path)
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: is not a CSV table ({str(error).splitlines()[0]})") from None
-    check_columns(path, table, columns)
-    numbers = table[columns].apply(pd.to_numeric, errors="coerce").to_numpy(float)
+    table = read_csv(path, ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)])
+    numbers = table.apply(pd.to_numeric, errors="coerce").to_numpy(float)
     is_bad = ~np.isfinite(numbers).all(axis=1) | (np.diff(numbers[:, 0], prepend=-np.inf) <= 0)
     if is_bad.any() or len(numbers) == 0:
         row = 1 + int(np.argmax([*is_bad, True]))
@@ -113,8 +109,6 @@ def import_open3d(
         If something is missing or does not match, or `out` holds files.
     """
     source, out = Path(source), Path(out)
-    if rate_hz is not None and not 0 < rate_hz < np.inf:
-        raise InputError(f"rate is {rate_hz!r}; expected frames per second")
     found = [source / name for name in _METADATA if (source / name).is_file()]
     if len(found) > 1:
         raise InputError(f"{source}: holds {' and '.join(_METADATA)}; keep the one of these images")
@@ -129,7 +123,9 @@ def import_open3d(
     if [image.stem for image in rgb] != [image.stem for image in depth]:
         counts = f"color/ holds {len(rgb)} images, depth/ {len(depth)}, not all of the same names"
         raise InputError(f"{source}: {counts}; expected one depth image per colour")
-    rate_hz = _rate_hz(path, said) if rate_hz is None else rate_hz
+    rate_hz = said.get("fps") if rate_hz is None else rate_hz
+    if not (is_number(rate_hz) and 0 < rate_hz < _MAX_RATE_HZ):
+        raise InputError(f"{path}: fps: expected frames per second, found {rate_hz!r}; give --rate")
     times_s = _frame_numbers(rgb, notes) / rate_hz
     lasts_s, said_us = times_s[-1] + 1 / rate_hz, said.get("stream_length_usec")
     if is_number(said_us) and abs(said_us / 1e6 - lasts_s) > max(2 / rate_hz, 0.01 * lasts_s):
@@ -137,9 +133,8 @@ def import_open3d(
         notes.append(f"{path}: {lengths}; frames were dropped, or the rate is another")
     refuse_used_folder(out)
     names = [f"rgb/{image.name}" for image in rgb], [f"depth/{image.name}" for image in depth]
-    size = intrinsics.height_px, intrinsics.width_px
     for image, name in zip(rgb + depth, sum(names, []), strict=True):
-        write_bytes(out / name, _rectified(image, size, pixels_px))
+        write_bytes(out / name, _rectified(image, intrinsics, pixels_px))
     write_index(out, intrinsics, units_per_m, times_s, poses, names)
     return len(times_s), notes
 
@@ -151,11 +146,7 @@ def _images(folder: Path) -> list[Path]:
     paths = [path for path in folder.iterdir() if path.suffix.lower() in _IMAGE_KINDS]
     if not paths:
         raise InputError(f"{folder}: holds no images; expected files such as 00000.png")
-
-    def key(path: Path) -> list[str | int]:
-        return [int(part) if k % 2 else part for k, part in enumerate(re.split("([0-9]+)", path.stem))]
-
-    return sorted(paths, key=key)
+    return sorted(paths, key=lambda path: natural_order(path.stem))
 
 
 def _frame_numbers(paths: list[Path], notes: list[str]) -> np.ndarray:
@@ -176,22 +167,14 @@ def _frame_numbers(paths: list[Path], notes: list[str]) -> np.ndarray:
     return np.array(numbers) - numbers[0]
 
 
-def _rectified(path: Path, size: tuple[int, int], pixels_px: np.ndarray | None) -> bytes:
+def _rectified(path: Path, intrinsics: Camera, pixels_px: np.ndarray | None) -> bytes:
     """An image file's content, without distortion."""
     content = read_bytes(path, "expected an image")
     image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if content else None
     if image is None:
         raise InputError(f"{path}: is not a whole image; expected PNG or JPEG")
-    if image.shape[:2] != size:
-        raise InputError(f"{path}: is {image.shape[:2]} (height, width); the intrinsics are of {size}")
+    check_size(path, image, intrinsics)
     if pixels_px is None:
         return content
     quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
     return cv2.imencode(path.suffix, rectify(image, pixels_px), quality)[1].tobytes()
-
-
-def _rate_hz(path: Path, said: dict) -> float:
-    value = said.get("fps")
-    if not (is_number(value) and 0 < value < _MAX_RATE_HZ):
-        raise InputError(f"{path}: fps: expected frames per second, found {value!r}; give --rate")
-    return float(value)

@@ -8,7 +8,6 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
@@ -18,6 +17,8 @@ from hicp_lib.recordings import c3d
 
 _NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*")
 _MISSING = ("", "NULL", "null", "NaN", "nan", "NAN", "-nan")
+_TIME_CODE = re.compile(r"\d+(:\d+)+([:;.]\d+)*")  # SMPTE, IRIG
+_SAID_ONCE = ("FREQUENCY", "MARKER_NAMES", "NO_OF_FRAMES", "NO_OF_MARKERS")
 _MAX_RATE_HZ = 1e5
 _SHOWN = 40  # characters of a wrong value that a message repeats
 
@@ -47,9 +48,10 @@ class MotionCapture:
 def read_mocap(path: str | Path) -> MotionCapture:
     """Read a Qualisys export: 3D data as ``.tsv``, or ``.c3d``.
 
-    TSV: keys may repeat, and unknown ones are passed over; column titles and the Frame and Time
-    columns are optional. A marker is missing where a coordinate is empty, NULL or NaN, or where
-    all three are exactly zero. Time starts at 0 at frame 1 unless the file has a Time column.
+    TSV: unknown keys are passed over; column titles and the columns Frame, Time and time code (SMPTE)
+    are optional. A marker is missing where a coordinate is empty, NULL or NaN, or where all three are
+    exactly zero. Time starts at 0 at frame 1 unless the file has a Time column, which gives the rate, too,
+    where FREQUENCY is EXT.
 
     Parameters
     ----------
@@ -130,34 +132,51 @@ def _read_tsv(path: Path) -> MotionCapture:
     lines = re.split(r"\r\n|\n|\r", c3d.decoded(raw).rstrip("\r\n \x1a"))
     start = next((k for k, line in enumerate(lines) if _is_data(line)), None)
     if start is None:
-        _refuse_without_data(path, lines)
-    header = _header(lines[:start])
-    names, rate_hz = _names(path, header), _rate_hz(path, header)
-    values = _numbers(path, lines, start)
-    times_s, coordinates_mm = _split_columns(path, values, len(names), rate_hz, start + 1)
-    _check_count(path, header, "NO_OF_FRAMES", len(values), "rows of data")
-    points_m = 1e-3 * coordinates_mm.reshape(len(values), -1, 3)
+        raise InputError(
+            f"{path}: no row of numbers; expected a Qualisys export of 3D data, separated by tabs"
+        )
+    header = _header(path, lines[:start])
+    names, rows = _names(path, header), _rows(path, lines, start)
+    _check_count(path, header, "NO_OF_FRAMES", len(rows), "rows of data")
+    n_leading = len(rows[0]) - 3 * len(names)
+    titles = _titles(f"{path}: row {start}", lines[start - 1], names, len(rows[0]))
+    leading = [[row[k] for row in rows] for k in range(n_leading)]
+    rate_hz = _rate_hz(path, header)
+    columns = {_kind(column, rate_hz): column for column in leading}
+    is_told = n_leading == 0 or len(rows) > 1 or titles is not None
+    as_titled = titles is None or {"Frame", "Time"}.intersection(titles) == {"Frame", "Time"} & columns.keys()
+    if n_leading != len(columns) or "" in columns or not is_told or not as_titled:
+        expected = f"expected 3 for each of {len(names)} markers, after Frame, Time and time code if exported"
+        raise InputError(f"{path}: row {start + 1} has {len(rows[0])} columns; {expected}, as FREQUENCY says")
+    times_s = np.array(columns.get("Time") or columns.get("Frame") or range(1, len(rows) + 1), float)
+    if "Time" not in columns:
+        times_s = (times_s - 1) / rate_hz
+    elif math.isnan(rate_hz) and len(rows) > 1:
+        rate_hz = 1 / float(np.median(np.diff(times_s)))
+    if math.isnan(rate_hz):
+        raise InputError(f"{path}: FREQUENCY is EXT, an external signal's; export it with the column Time")
+    coordinates_mm = [
+        [_number(f"{path}: row {number}, column {k + 1}", row[k]) for k in range(n_leading, len(row))]
+        for number, row in enumerate(rows, start=start + 1)
+    ]
+    points_m = 1e-3 * np.array(coordinates_mm).reshape(len(rows), -1, 3)
     return MotionCapture(times_s, names, _without_missing(points_m), rate_hz)
 
 
 def _is_data(line: str) -> bool:
+    """Whether the first field that is not empty is a number, even a wrong one, or a time code."""
     fields = line.split("\t")
-    return len(fields) >= 3 and all(f.strip() in _MISSING or _NUMBER.fullmatch(f) for f in fields)
+    first = next((field for field in map(str.strip, fields) if field not in _MISSING), "0")
+    return len(fields) >= 3 and bool(re.match(r"[-+]?[.,]?\d[\d.,:;]*(e|$)|[-+]?inf", first, re.IGNORECASE))
 
 
-def _refuse_without_data(path: Path, lines: list[str]) -> NoReturn:
-    for number, line in enumerate(lines, start=1):
-        if "," in line and _is_data(line.replace(",", ".")):
-            raise InputError(f"{path}: row {number}: decimal comma; export with a decimal point")
-    raise InputError(f"{path}: no row of numbers; expected a Qualisys export of 3D data, separated by tabs")
-
-
-def _header(lines: list[str]) -> dict[str, list[str]]:
-    """Values by key, of the first line with that key; all else above the data is passed over."""
+def _header(path: Path, lines: list[str]) -> dict[str, list[str]]:
+    """Values by key; all else above the data is passed over."""
     header: dict[str, list[str]] = {}
     for line in lines:
-        key, *values = (field.strip() for field in line.split("\t"))
-        header.setdefault(key, values)
+        key, *values = (field.strip() for field in line.rstrip().split("\t"))
+        if header.setdefault(key, values) != values and key in _SAID_ONCE:
+            raise InputError(f"{path}: {key} is there twice, and differs; export it again")
     return header
 
 
@@ -167,7 +186,7 @@ def _names(path: Path, header: dict[str, list[str]]) -> tuple[str, ...]:
         raise InputError(f"{path}: holds {'/'.join(included)[:_SHOWN]} or rigid bodies; export 3D data")
     if "MARKER_NAMES" not in header:
         raise InputError(f"{path}: no line MARKER_NAMES above the data; export with the TSV header")
-    values = "\t".join(header["MARKER_NAMES"]).rstrip("\t").split("\t")
+    values = header["MARKER_NAMES"] or [""]
     twice = next((name for k, name in enumerate(values) if name in values[:k]), None)
     if "" in values or twice:
         wrong = f"names {twice[:_SHOWN]!r} twice" if twice else "has an empty name"
@@ -177,7 +196,10 @@ def _names(path: Path, header: dict[str, list[str]]) -> tuple[str, ...]:
 
 
 def _rate_hz(path: Path, header: dict[str, list[str]]) -> float:
+    """NaN where an external signal took the measurements."""
     text = (header.get("FREQUENCY") or ["absent"])[0]
+    if text == "EXT":
+        return math.nan
     if not _NUMBER.fullmatch(text) or not 0 < float(text) <= _MAX_RATE_HZ:
         raise InputError(f"{path}: FREQUENCY is {text[:_SHOWN]!r}; expected measurements per second")
     return float(text)
@@ -190,51 +212,54 @@ def _check_count(path: Path, header: dict[str, list[str]], key: str, found: int,
         raise InputError(f"{path}: {key} is {stated[:_SHOWN]} but there are {found} {what}; export it again")
 
 
-def _numbers(path: Path, lines: list[str], start: int) -> np.ndarray:
-    """The rows of data, NaN where a field is empty."""
+def _rows(path: Path, lines: list[str], start: int) -> list[list[str]]:
+    """The fields of data, without the empty column of exports that end every line with a tab."""
     rows, width = [], lines[start].count("\t") + 1
     for number, line in enumerate(lines[start:], start=start + 1):
-        fields = line.split("\t")
-        if len(fields) != width:
-            text = f"row {number} has {len(fields)} columns, row {start + 1} has {width}"
+        rows.append([field.strip() for field in line.split("\t")])
+        if len(rows[-1]) != width:
+            text = f"row {number} has {len(rows[-1])} columns, row {start + 1} has {width}"
             raise InputError(f"{path}: {text}; export it again")
-        rows.append([_number(f"{path}: row {number}, column", k, f) for k, f in enumerate(fields, start=1)])
-    return np.array(rows)
+    n_empty = next((k for k in range(width) if any(row[-1 - k] not in _MISSING for row in rows)), width)
+    # A marker that was never seen leaves three columns empty.
+    return [row[:-1] for row in rows] if n_empty % 3 == 1 else rows
 
 
-def _number(where: str, column: int, field: str) -> float:
-    text = field.strip()
+def _titles(where: str, line: str, names: tuple[str, ...], width: int) -> list[str] | None:
+    """Titles of the columns before the coordinates, None if the line has none."""
+    titles = [title.strip() for title in line.rstrip().split("\t")]
+    axes = [(name, axis) for name in names for axis in "XYZ"]
+    if titles[0].title() not in ("Frame", "Time", "Smpte") and f"{names[0]} X" not in titles:
+        return None
+    n_leading = max(width - len(axes), 0)
+    if len(titles) != width or not all(
+        title.startswith(name) and title.endswith(axis)
+        for title, (name, axis) in zip(titles[n_leading:], axes, strict=False)
+    ):
+        raise InputError(f"{where}: titles are not those of MARKER_NAMES and of the columns; export it again")
+    return [title.title() for title in titles[:n_leading]]
+
+
+def _kind(column: list[str], rate_hz: float) -> str:
+    """What a column before the coordinates is by what it holds, "" if nothing known."""
+    if any(map(_TIME_CODE.fullmatch, column)):
+        return "code" if all(field in _MISSING or _TIME_CODE.fullmatch(field) for field in column) else ""
+    if not all(map(_NUMBER.fullmatch, column)):
+        return ""
+    values = np.array(column, float)
+    steps = np.diff(values)
+    if all(map(str.isdigit, column)) and (steps == 1).all():
+        return "Frame"
+    is_even = math.isnan(rate_hz) or np.allclose(steps, 1 / rate_hz, rtol=1e-3, atol=2e-5)
+    return "Time" if is_even and (steps > 0).all() and values[0] >= 0 else ""
+
+
+def _number(where: str, text: str) -> float:
     value = math.nan if text in _MISSING else float(text) if _NUMBER.fullmatch(text) else math.inf
     if math.isinf(value):
         hint = "export with a decimal point" if "," in text else "expected a number or nothing"
-        raise InputError(f"{where} {column} is {text[:_SHOWN]!r}; {hint}")
+        raise InputError(f"{where} is {text[:_SHOWN]!r}; {hint}")
     return value
-
-
-def _split_columns(
-    path: Path, values: np.ndarray, n_markers: int, rate_hz: float, row: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) by the columns Frame and Time, if there are such, and the columns of coordinates."""
-    extra = values.shape[1] - 3 * n_markers
-    # Some exports end every line with a tab: one more column, and empty.
-    for leading in (extra, extra - 1) if np.isnan(values[:, -1]).all() else (extra,):
-        times_s = _times_s(values[:, :leading], rate_hz) if 0 <= leading <= 2 else None
-        if times_s is not None:
-            return times_s, values[:, leading : leading + 3 * n_markers]
-    expected = f"expected 3 for each of {n_markers} markers, after Frame and Time if exported"
-    raise InputError(f"{path}: row {row} has {values.shape[1]} columns; {expected}")
-
-
-def _times_s(leading: np.ndarray, rate_hz: float) -> np.ndarray | None:
-    """Times by at most two columns, None if they are not Frame, Time or both: what counts up."""
-    if leading.shape[1] == 0:
-        return np.arange(len(leading)) / rate_hz
-    first, last = leading[:, 0], leading[:, -1]
-    is_frame = first[0] == np.round(first[0]) and (np.diff(first) == 1).all()
-    if leading.shape[1] == 1 and is_frame:
-        return (first - 1) / rate_hz
-    is_time = np.allclose(np.diff(last), 1 / rate_hz, rtol=1e-3, atol=2e-5) and last[0] >= 0
-    return last.copy() if is_time and (is_frame or leading.shape[1] == 1) else None
 
 
 def _without_missing(points_m: np.ndarray) -> np.ndarray:

@@ -64,7 +64,7 @@ def record_camera(
     Raises
     ------
     InputError
-        If there is no camera, or none of these sizes; if it stops; if a line of joints is none.
+        If there is no camera, or none of these sizes; if it stops; afterwards, if a line of joints is none.
     """
     require("bags", "rosbags")
     with needs("camera"):
@@ -74,39 +74,21 @@ def record_camera(
     if bag.exists():
         raise InputError(f"{bag}: is there already; give another folder, or import it with --bag")
     bag.parent.mkdir(parents=True, exist_ok=True)
-    rows: list[tuple[float, list[float]]] = []
-    problems: list[InputError] = []
-    is_over = Event()
-
-    def read() -> None:
-        try:
-            rows.extend(map(read_joints_line, joint_lines or ()))
-        except InputError as error:
-            problems.append(error)
-            is_over.set()
-
-    if joint_lines is not None:
-        Thread(target=read, daemon=True).start()
+    lines: list[tuple[float, str]] = []
+    arrivals = ((time.time(), line) for line in joint_lines or ())
+    Thread(target=lines.extend, args=(arrivals,), daemon=True).start()
+    modes = {"color": (*color_px, rate_hz), "depth": (*depth_px, rate_hz)}
     try:
-        _record(
-            rs,
-            device,
-            bag,
-            {"color": (*color_px, rate_hz), "depth": (*depth_px, rate_hz)},
-            is_over,
-            duration_s,
-        )
+        _record(rs, device, bag, modes, duration_s)
     except RuntimeError as error:
         raise InputError(f"{bag}: RealSense: {one_line(error)}") from None
     try:
-        if problems:
-            raise problems[0]
-        return import_bag(bag, out, poses if joint_lines is None else _joint_poses(rows, mount))
+        return import_bag(bag, out, poses if joint_lines is None else _joint_poses(lines, mount))
     except InputError as error:
         raise InputError(f"{error}; what was recorded is in {bag}") from None
 
 
-def read_joints_line(line: str) -> tuple[float, list[float]]:
+def read_joints_line(line: str, arrival_s: float) -> tuple[float, list[float]]:
     """Time and joint angles of a line of text.
 
     Six numbers, in degrees: torso pitch, roll, yaw, neck pitch, roll, yaw; or, as YARP prints them with their
@@ -115,11 +97,13 @@ def read_joints_line(line: str) -> tuple[float, list[float]]:
     Parameters
     ----------
     line : str
+    arrival_s : float
+        When it came, in seconds since 1970.
 
     Returns
     -------
     time_s : float
-        Now, in seconds since 1970, where the line has none.
+        That of its arrival where the line has none.
     angles_deg : list of float
         Six.
 
@@ -130,7 +114,7 @@ def read_joints_line(line: str) -> tuple[float, list[float]]:
 
     Examples
     --------
-    >>> read_joints_line("7 1700000000.5 (10 0 0 -20 0 5)")
+    >>> read_joints_line("7 1700000000.5 (10 0 0 -20 0 5)", 1700000000.6)
     (1700000000.5, [10.0, 0.0, 0.0, -20.0, 0.0, 5.0])
     """
     try:
@@ -140,22 +124,20 @@ def read_joints_line(line: str) -> tuple[float, list[float]]:
     if len(values) not in (_N_JOINTS, _N_JOINTS + 2) or not np.isfinite(values).all():
         expected = "six angles in degrees, or a count and a time before them"
         raise InputError(f"joints: expected lines of {expected}; found {line.strip()[:60]!r}")
-    return time.time() if len(values) == _N_JOINTS else values[1], values[-_N_JOINTS:]
+    return arrival_s if len(values) == _N_JOINTS else values[1], values[-_N_JOINTS:]
 
 
-def _joint_poses(rows: list[tuple[float, list[float]]], mount: str) -> Poses:
+def _joint_poses(lines: list[tuple[float, str]], mount: str) -> Poses:
     from hicp_lib.robot.kinematics import load_icub  # not in every installation
 
-    if not rows:
+    if not lines:
         raise InputError("joints: no lines arrived; expected six angles in degrees in each")
-    times_s, first = np.unique([time_s for time_s, _ in rows], return_index=True)
-    angles_deg = np.array([angles for _, angles in rows])[first]
-    return times_s, load_icub().T_root_camera(np.radians(angles_deg), mount)
+    stamps_s, angles_deg = zip(*(read_joints_line(line, arrival_s) for arrival_s, line in lines), strict=True)
+    times_s, first = np.unique(stamps_s, return_index=True)
+    return times_s, load_icub().T_root_camera(np.radians(angles_deg)[first], mount)
 
 
-def _record(
-    rs: Any, device: Any, bag: Path, modes: dict[str, Mode], is_over: Event, duration_s: float | None
-) -> None:
+def _record(rs: Any, device: Any, bag: Path, modes: dict[str, Mode], duration_s: float | None) -> None:
     devices = rs.context().query_devices() if device is None else [device]
     if len(devices) == 0:
         raise InputError("no RealSense is connected; see what rs-enumerate-devices lists")
@@ -168,7 +150,7 @@ def _record(
             sensor.open(profile)
             sensor.start(lambda frame: None)
             sensors.append(sensor)
-        is_over.wait(duration_s)
+        Event().wait(duration_s)
     except KeyboardInterrupt:
         pass  # that is how a recording ends
     finally:

@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.camera import Camera
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.extras import needs
 from hicp_lib.core.files import read_bytes, read_json
 from hicp_lib.core.images import read_image
@@ -180,7 +180,7 @@ def read_rgb(recording: Recording, k: int) -> np.ndarray:
         If it cannot be read, or its size is not that of `camera.json`.
     """
     image = read_image(recording.rgb_paths[k])
-    _check_size(recording.rgb_paths[k], image, recording.intrinsics)
+    check_size(recording.rgb_paths[k], image, recording.intrinsics)
     return image
 
 
@@ -282,25 +282,59 @@ def read_simulation(recording: Recording) -> dict | None:
     return read_json(path) if path.is_file() else None
 
 
-def check_columns(path: str | Path, table: pd.DataFrame, columns: Sequence[str]) -> None:
-    """Refuse a table that lacks a column.
+def read_csv(path: str | Path, columns: Sequence[str]) -> pd.DataFrame:
+    """Read columns of a CSV table.
 
     Parameters
     ----------
     path : str or Path
-        Where it was read from.
-    table : pd.DataFrame
     columns : sequence of str
         Those it must have.
+
+    Returns
+    -------
+    pd.DataFrame
+        Of these columns.
 
     Raises
     ------
     InputError
-        If one is missing; the first is named.
+        If it cannot be read, or one is missing; the first is named.
     """
+    try:
+        table = pd.read_csv(path, skipinitialspace=True)
+    except (OSError, ValueError) as error:
+        expected = f"expected a CSV table with {','.join(columns)}"
+        raise InputError(f"{path}: cannot be read ({one_line(error)}); {expected}") from None
+    _check_columns(path, table, columns)
+    return table[list(columns)]
+
+
+def _check_columns(path: str | Path, table: pd.DataFrame, columns: Sequence[str]) -> None:
     missing = [name for name in columns if name not in table.columns]
     if missing:
         raise InputError(f"{path}: has no column {missing[0]!r}; expected {', '.join(columns)}")
+
+
+def check_size(where: str | Path, image: np.ndarray, intrinsics: Camera) -> None:
+    """Refuse an image of another size than its camera's.
+
+    Parameters
+    ----------
+    where : str or Path
+        What was read, for messages.
+    image : array, shape (height, width, ...)
+    intrinsics : Camera
+
+    Raises
+    ------
+    InputError
+        If it is of another size.
+    """
+    height, width = image.shape[:2]
+    if (width, height) != (intrinsics.width_px, intrinsics.height_px):
+        expected = f"{intrinsics.width_px} x {intrinsics.height_px}; do not crop or bin"
+        raise InputError(f"{where}: is {width} x {height} pixels; its camera says {expected}")
 
 
 def _read_depth_m(recording: Recording, path: Path) -> np.ndarray:
@@ -308,17 +342,10 @@ def _read_depth_m(recording: Recording, path: Path) -> np.ndarray:
     units = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
     if units is None or units.dtype != np.uint16 or units.ndim != 2:
         raise InputError(f"{path}: is not a whole 16-bit image of one channel; write depth as 16-bit PNG")
-    _check_size(path, units, recording.intrinsics)
+    check_size(path, units, recording.intrinsics)
     depth_m = units * np.float32(1 / recording.depth_units_per_m)
     depth_m[units == 0] = np.nan
     return depth_m
-
-
-def _check_size(path: Path, image: np.ndarray, intrinsics: Camera) -> None:
-    height, width = image.shape[:2]
-    if (width, height) != (intrinsics.width_px, intrinsics.height_px):
-        expected = f"{intrinsics.width_px} x {intrinsics.height_px}"
-        raise InputError(f"{path}: is {width} x {height} pixels; {CAMERA_FILE} says {expected}")
 
 
 def _read_table(recording: Recording, name: str, columns: tuple[str, ...]) -> pd.DataFrame | None:
@@ -327,10 +354,9 @@ def _read_table(recording: Recording, name: str, columns: tuple[str, ...]) -> pd
         return None
     with needs("analysis"):
         import pyarrow as pa
-        import pyarrow.parquet as pq
     try:
-        table = pq.read_table(path).to_pandas()
+        table = pd.read_parquet(path)
     except (OSError, pa.ArrowException) as error:
-        raise InputError(f"{path}: is not a Parquet table ({str(error).splitlines()[0]})") from None
-    check_columns(path, table, columns)
+        raise InputError(f"{path}: is not a Parquet table ({one_line(error)})") from None
+    _check_columns(path, table, columns)
     return table[table["frame"] < len(recording)].reset_index(drop=True)

@@ -188,8 +188,7 @@ def remarks(path: str | Path, times_s: np.ndarray) -> list[str]:
     list of str
         How many lines repeat the time before; whether there are too few a second for times in seconds.
     """
-    lines = (line.partition("#")[0].replace(",", " ").split() for line in _text(path).split("\n"))
-    n = int((np.diff([_float(fields[0]) for fields in lines if fields]) == 0).sum())
+    n = sum(bool(re.match(r"\s*[-+.]?\d", line)) for line in _text(path).split("\n")) - len(times_s)
     step_s = np.median(np.diff(times_s)) if len(times_s) > 1 else 0.0
     looks = f"times are expected in seconds (these look like {_prefix(step_s)}seconds)"
     told = [f"{n} lines repeat the time before and are passed over"] if n else []
@@ -252,15 +251,11 @@ def _named_columns(line: str) -> list[int] | None:
     return [0, *map(keys.index, _POSE_COLUMNS.split()[1:])]
 
 
-def _float(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return np.nan
-
-
 def _number(path: str | Path, number: int, text: str) -> float:
-    value = _float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
     if not abs(value) < _MAX_ABS:
         raise _error(path, number, f"{text[:40]!r} is not a finite number; expected seconds and metres")
     return value

@@ -65,23 +65,13 @@ class RecordingWriter:
         Parameters
         ----------
         time_s : float
+            After the frame before.
         rgb : array, shape (height, width, 3), dtype uint8
         depth_m : array, shape (height, width)
             Along the camera's axis; what is not finite is stored as no depth.
         T_base_cam : array, shape (4, 4), optional
             Camera coordinates to the robot's base frame; the camera's own when left out.
-
-        Raises
-        ------
-        InputError
-            If the time is not after the frame before, or a size is not that of the intrinsics.
         """
-        if self._times_s and not time_s > self._times_s[-1]:
-            raise InputError(f"{self.folder}: time {time_s} s is not after the frame before; sort frames")
-        expected = (self.intrinsics.height_px, self.intrinsics.width_px)
-        if rgb.shape[:2] != expected or depth_m.shape != expected:
-            found = f"colour {rgb.shape[:2]} and depth {depth_m.shape} (height, width)"
-            raise InputError(f"{self.folder}: {found} must both be {expected}, as the intrinsics say")
         write_frame(self.folder, len(self._times_s), rgb, depth_m, self.depth_units_per_m)
         self._times_s.append(float(time_s))
         self._poses.append(np.eye(4) if T_base_cam is None else np.asarray(T_base_cam, float))

@@ -40,7 +40,11 @@ DAMAGES = {  # what is done, what the finding says, whether the recording is of 
     "no scale": (without_scale, "depth_scale", True),
     "order": (swap_lines, "is before the last one", True),
     "quaternion": (stretch_quaternion, "quaternion of length 1.2", True),
-    "size": (halve_an_image, "16 x 12 pixels; camera.json says 32 x 24 (1 of 4 colour", True),
+    "size": (
+        halve_an_image,
+        "16 x 12 pixels; its camera says 32 x 24; do not crop or bin (1 of 4 colour",
+        True,
+    ),
     "truth": (lambda small: (small / "truth.parquet").write_text("junk"), "is not a Parquet table", True),
     "image gone": (lambda small: (small / "depth/000001.png").unlink(), "1 of 4 listed are not", True),
     "late": (

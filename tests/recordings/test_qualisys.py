@@ -16,6 +16,7 @@ HEADER = [
     "TRAJECTORY_TYPES\tMeasured\tMeasured",
 ]  # fmt: skip
 ROWS = ["-786.729\t-34.016\t1064.381\t1\t2\t3", "0.000\t0.000\t0.000\t4.5\t5.5\t-6.5"]
+AXES = "\t".join(f"{name} {axis}" for name in ("x_HeadL", "x_HeadTop") for axis in "XYZ")
 
 
 def _file(tmp_path, lines, end="\r\n", name="mocap.tsv"):
@@ -89,11 +90,40 @@ def test_a_real_header_with_repeated_and_unknown_keys_and_no_titles(tmp_path):
 )
 @pytest.mark.parametrize("tail", ["", "\t"])
 def test_frame_and_time_columns_titles_and_tabs_at_the_end(tmp_path, end, titles, leading, times_s, tail):
-    axes = "\tx_HeadL X\tx_HeadL Y\tx_HeadL Z\tx_HeadTop X\tx_HeadTop Y\tx_HeadTop Z"
-    lines = HEADER + [t + axes for t in titles] + [a + r for a, r in zip(leading, ROWS, strict=True)]
+    lines = HEADER + [f"{t}\t{AXES}" for t in titles] + [a + r for a, r in zip(leading, ROWS, strict=True)]
     found = read_mocap(_file(tmp_path, [line + tail for line in lines], end))
     assert np.allclose(found.times_s, times_s)
     assert np.allclose(found.points_m[1, 1], [0.0045, 0.0055, -0.0065])
+
+
+@pytest.mark.parametrize("titled", [True, False])
+@pytest.mark.parametrize("code", [None, ["10:47:36:12", "10:47:36:13"], ["", "10:47:36;13.5"]])
+@pytest.mark.parametrize("order", [("Frame", "Time", "SMPTE"), ("SMPTE", "Frame", "Time"), ("SMPTE", "Time")])
+def test_an_external_clock_and_time_codes(tmp_path, titled, code, order):
+    of = {"Frame": ["1", "2"], "Time": ["0.00000", "0.01250"], "SMPTE": code}
+    order = [name for name in order if of[name]]
+    lines = ["\t".join([*(of[name][k] for name in order), ROWS[k]]) for k in (0, 1)]
+    titles = ["\t".join([*order, AXES])] if titled else []
+    found = read_mocap(_file(tmp_path, [*_with("FREQUENCY\tEXT"), *titles, *lines]))
+    assert found.rate_hz == pytest.approx(80) and np.allclose(found.times_s, [0, 0.0125])
+    assert np.allclose(found.points_m[0, 1], [0.001, 0.002, 0.003])
+
+
+@pytest.mark.parametrize("tail", ["", "\t"])
+def test_one_frame_and_a_marker_never_seen_do_not_shift_columns(tmp_path, tail):
+    header = [line.replace("\t2", "\t1") if line.startswith("NO_OF_FRAMES") else line for line in HEADER]
+    found = read_mocap(_file(tmp_path, [*header, "1\t2\t3\t4\t5\t6" + tail]))
+    assert np.allclose(found.points_m[0], [[0.001, 0.002, 0.003], [0.004, 0.005, 0.006]])
+    lines = [*HEADER, f"1\t1\t2\t3\t\t\t{tail}", f"2\t1\t2\t4\t\t\t{tail}"]
+    found = read_mocap(_file(tmp_path, lines))
+    assert np.allclose(found.points_m[1, 0], [0.001, 0.002, 0.004]) and np.isnan(found.points_m[:, 1]).all()
+
+
+def test_names_with_spaces_and_of_another_code_page_and_events(tmp_path):
+    lines = [*_with("MARKER_NAMES\tépaule gauche\tx y\t"), "EVENT\tstart\t17\t0,085", *ROWS]
+    path = tmp_path / "mocap.tsv"
+    path.write_bytes("\r\n".join(lines).encode("latin-1"))
+    assert read_mocap(path).names == ("épaule gauche", "x y")
 
 
 @pytest.mark.parametrize("nothing", ["", "NULL", "NaN", "nan"])
@@ -129,9 +159,21 @@ def _with(line):
         ([*HEADER, ROWS[0], "1\t2\t3,5\t4\t5\t6"], "row 14, column 3 is '3,5'; export with a decimal point"),
         ([*HEADER, ROWS[0], "1\t2\tinf\t4\t5\t6"], "row 14, column 3 is 'inf'"),
         ([*HEADER, ROWS[0], "1\t2\t1e999\t4\t5\t6"], "row 14, column 3 is '1e999'"),
-        ([*HEADER, *(row.replace(".", ",") for row in ROWS)], "row 13: decimal comma"),
+        (
+            [*HEADER, *(row.replace(".", ",") for row in ROWS)],
+            "row 13, column 1 is '-786,729'; export with a decimal point",
+        ),
         (HEADER, "no row of numbers"),
         (_with("DATA_INCLUDED\t6D") + ROWS, "holds 6D"),
+        ([*HEADER, "1,000.5\t2\t3\t4\t5\t6", ROWS[1]], "row 13, column 1 is '1,000.5'"),
+        ([*HEADER, "MARKER_NAMES\ta\tb", *ROWS], "MARKER_NAMES is there twice"),
+        ([*HEADER, "1\t" + ROWS[0], "2\t" + ROWS[1] + "\t1\t2\t3"], "row 14 has 10 columns"),
+        ([*HEADER, "1\t0.0\t00:00:01:00\t1\t" + ROWS[0]], "NO_OF_FRAMES is 2"),
+        ([*HEADER, "Frame\tTime\t" + AXES.replace("L", "R"), *ROWS], "titles are not those"),
+        ([*HEADER, f"Frame\t{AXES}", *ROWS], "titles are not those"),
+        ([*_without("NO_OF_FRAMES"), "1\t" + ROWS[0]], "row 12 has 7 columns"),
+        (_with("FREQUENCY\tEXT") + ROWS, "export it with the column Time"),
+        ([*_with("FREQUENCY\tEXT"), "1\t" + ROWS[0], "2\t" + ROWS[1]], "export it with the column Time"),
         (["NO_OF_BODIES\t1", "BODY_NAMES\trobot", *_without("MARKER_NAMES"), *ROWS], "export 3D data"),
     ],
 )

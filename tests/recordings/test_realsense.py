@@ -131,12 +131,11 @@ def test_a_line_of_joints_that_is_none_is_told_and_the_bag_is_kept(tmp_path, cam
 @pytest.mark.parametrize("line", ["", "1 2 3 4 5", "1 2 3 4 5 nan", "1 2 3 4 5 6 7", "a b c d e f"])
 def test_lines_that_are_none_are_refused(line):
     with pytest.raises(InputError, match="expected lines of six angles"):
-        read_joints_line(line)
+        read_joints_line(line, 0.0)
 
 
-def test_lines_without_a_time_have_that_of_their_arrival(monkeypatch):
-    monkeypatch.setattr(realsense.time, "time", lambda: 12.5)
-    assert read_joints_line("1, 2, 3, 4, 5, 6") == (12.5, [1, 2, 3, 4, 5, 6])
+def test_lines_without_a_time_have_that_of_their_arrival():
+    assert read_joints_line("1, 2, 3, 4, 5, 6", 12.5) == (12.5, [1, 2, 3, 4, 5, 6])
 
 
 def test_sizes_that_a_camera_lacks_and_no_camera_are_told(tmp_path, camera):

@@ -79,7 +79,7 @@ def test_a_missing_file_is_named(small, name):
 def test_images_of_another_size_or_kind_are_refused(small):
     recording = open_recording(small)
     cv2.imwrite(str(recording.rgb_paths[0]), np.zeros((10, 32, 3), np.uint8))
-    with pytest.raises(InputError, match="is 32 x 10 pixels; camera.json says 32 x 24"):
+    with pytest.raises(InputError, match="is 32 x 10 pixels; its camera says 32 x 24"):
         read_rgb(recording, 0)
     cv2.imwrite(str(recording.depth_paths[0]), np.zeros((24, 32), np.uint8))
     with pytest.raises(InputError, match="16-bit"):
@@ -102,12 +102,6 @@ def test_the_writer_refuses_what_would_not_be_a_recording(tmp_path):
     writer = RecordingWriter(tmp_path / "other", SMALL)
     with pytest.raises(InputError, match="no frames"):
         writer.finish()
-    frame = np.zeros((24, 32, 3), np.uint8), np.ones((24, 32)), np.eye(4)
-    writer.add(1.0, *frame)
-    with pytest.raises(InputError, match="not after"):
-        writer.add(1.0, *frame)
-    with pytest.raises(InputError, match="must both"):
-        writer.add(2.0, frame[0], np.ones((24, 30)), np.eye(4))
     assert not (tmp_path / "other" / "rgb.txt").exists()
 
 

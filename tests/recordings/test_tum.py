@@ -177,7 +177,7 @@ def test_of_lines_with_the_same_time_the_first_is_read_and_the_rest_counted(tmp_
     assert times_s.tolist() == [1, 1.5, 2] and T[:, 0, 3].tolist() == [0, 1, 4]
     assert remarks(path, times_s) == ["3 lines repeat the time before and are passed over"]
     path.write_text("\n".join(lines[:2]))
-    assert remarks(path, times_s) == []
+    assert remarks(path, read_poses(path)[0]) == []
 
 
 @pytest.mark.parametrize(
@@ -195,4 +195,5 @@ def test_times_that_are_hardly_seconds_are_told(tmp_path, step, said):
     path = tmp_path / "rgb.txt"
     write_file_list(path, 100 + step * np.arange(9), [f"{k}.png" for k in range(9)])
     assert remarks(path, read_file_list(path)[0]) == [said] * bool(said)
+    write_file_list(path, np.array([step]), ["0.png"])
     assert remarks(path, np.array([step])) == []
