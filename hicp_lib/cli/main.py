@@ -21,7 +21,15 @@ from hicp_lib import __version__
 from hicp_lib.cli.calibration import calibration
 from hicp_lib.cli.looking import draw, inspect_
 from hicp_lib.cli.models import models
-from hicp_lib.cli.options import PATH, detector_options, given, people_option, tell_assumed, worker_options
+from hicp_lib.cli.options import (
+    PATH,
+    detector_options,
+    given,
+    people_option,
+    tell_assumed,
+    text_table,
+    worker_options,
+)
 from hicp_lib.cli.recordings import lift, record
 from hicp_lib.core.errors import InputError
 
@@ -250,27 +258,26 @@ def evaluate(
     found = read_detections(detections, people)
     _tell_notes(annotations, people.notes, area)
     options = {"area": area} | ({"sigmas": sigmas} if sigmas else {})
-    rows = judgement.judge(people, found, [group] if group else GROUPS, seed, **options)
-    judged = dict.fromkeys(row["group"] for row in rows if not _lacking(row))
-    images = judgement.image_table(people, found, judged, **options) if by_image else None
+    judged = judgement.judge(people, found, [group] if group else GROUPS, by_image, seed, **options)
     if out is not None:
-        judgement.write_judgement(out, rows, images)
+        judgement.write_judgement(out, judged)
     if as_json:
-        click.echo(json.dumps(judgement.as_json(rows, images), indent=2))
+        click.echo(json.dumps(judged, indent=2))
         return
     if not any(map(len, found.values())):
         click.echo(f"{detections}: an empty list: nobody was found in any image")
+    rows = (judged, *judged["other_definitions"])
     for row in rows:
         _tell_evaluation(row)
-    for lacking in dict.fromkeys(map(_lacking, rows)):
-        click.echo(lacking, nl=bool(lacking))
-    if images is not None:
-        click.echo(images.to_string(index=False, float_format="%.3f"))
+    click.echo("".join(f"{lacking}\n" for lacking in dict.fromkeys(map(_lacking, rows)) if lacking), nl=False)
+    if images := judged.get("by_image"):
+        cells = [[f"{v:.3f}" if isinstance(v, float) else str(v) for v in image.values()] for image in images]
+        click.echo(text_table([list(images[0]), *cells]))
 
 
 def _lacking(row: dict[str, Any]) -> str:
     """Who gives nobody of a group, in words; empty where there are figures."""
-    if any(metric["value"] is not None for metric in row["metrics"].values()):
+    if row["AP"] is not None:
         return ""
     who = "the detections give" if row["n_people"] else "the annotations give"
     return f"{who} no {'hands' if 'hand' in row['group'] else 'bodies'}"

@@ -37,7 +37,7 @@ def refuse_fractions(path: Path | str, points_px: np.ndarray, what: str = "keypo
         If that is what all coordinates are of half of the people or more, who have three points at least.
     """
     given = np.isfinite(points_px).all(axis=-1) & (points_px != 0).any(axis=-1)
-    small = (np.abs(points_px) <= _FRACTION).all(axis=-1)
+    small = ((points_px <= _FRACTION) & (points_px >= -_FRACTION)).all(axis=-1)
     people = given.sum(axis=-1) >= min(_LEAST_POINTS, points_px.shape[-2])
     fractions = people & (small | ~given).all(axis=-1)
     if fractions.any() and 2 * fractions.sum() >= people.sum():

@@ -2,14 +2,13 @@
 
 Files come in two forms, by their suffix:
 
-- `.json`: the first definition's row, with `metrics`; those of the others as `other_definitions`; and what is
-  known image by image, if that is asked for, as `by_image`.
+- `.json`: what `judge` returns.
 - `.csv`, `.parquet`: a row per definition and metric, with `value`, `low` and `high`; image by image beside
   it in `OUT.by_image.csv` (or `.parquet`).
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,12 +25,11 @@ from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.formats.annotations import Annotations, source_images
 
 Found = Mapping[int, Detections]
-_FIGURE = ("value", "low", "high")
 
 
 def judge(
-    people: Annotations, found: Found, groups: Iterable[str], seed: int = 0, **options: str
-) -> list[dict[str, Any]]:
+    people: Annotations, found: Found, groups: Iterable[str], by_image: bool, seed: int = 0, **options: str
+) -> dict[str, Any]:
     """AP and AR by every definition that `definitions` knows, with intervals over source images.
 
     Parameters
@@ -42,6 +40,8 @@ def judge(
         By image id.
     groups : iterable of str
         Keys of `hicp_lib.evaluation.ap.options.OBJECTS`.
+    by_image : bool
+        Whether image by image, too.
     seed : int, optional
         Of the bootstrap.
     **options : str
@@ -49,20 +49,25 @@ def judge(
 
     Returns
     -------
-    list of dict
-        `Evaluation.row`, with `metrics` (of each its `value`, `low` and `high`) and `seed`, ready for JSON:
-        None where there is no figure, as for a group that annotations or detections have nobody of.
+    dict
+        Ready for JSON. Of the first definition `Evaluation.row`, with `metrics` (of each its `value`, `low` and
+        `high`) and `seed`; those of the others as `other_definitions`; and `by_image`, a list of the rows of
+        `image_table`. None where there is no figure, as for a group that annotations or detections lack.
     """
     clusters, rows = source_images(people), []  # crops of one image are drawn together
-    for group, way in (definition for of in groups for definition in definitions(people, of)):
+    for group, way in (each for of in groups for each in definitions(people, of)):
         evaluation = evaluate(people, found, group, **way, **options)
         row, figures = evaluation.row(), bootstrap_intervals(evaluation, Draws(seed=seed), clusters)
         if any(map(len, found.values())) and not evaluation.n_detections:
             figures = dict.fromkeys(figures, (math.nan,) * 3)
             row |= dict.fromkeys(figures, math.nan)
-        metrics = {name: _finite(zip(_FIGURE, of, strict=True)) for name, of in figures.items()}
+        metrics = {m: _finite(zip(("value", "low", "high"), of, strict=True)) for m, of in figures.items()}
         rows.append(_finite(row.items()) | {"metrics": metrics, "seed": seed})
-    return rows
+    judged = {row["group"]: None for row in rows if row["AP"] is not None}
+    images = {}
+    if by_image and judged:
+        images = {"by_image": image_table(people, found, judged, **options).to_dict("records")}
+    return rows[0] | {"other_definitions": rows[1:]} | images
 
 
 def _finite(row: Iterable[tuple[str, Any]]) -> dict[str, Any]:
@@ -93,44 +98,28 @@ def image_table(people: Annotations, found: Found, groups: Iterable[str], **opti
     return table.sort_values(["group", "oks"], kind="stable", ignore_index=True)
 
 
-def as_json(rows: Sequence[dict[str, Any]], images: pd.DataFrame | None = None) -> dict[str, Any]:
-    """All of it as one object, as the module says.
-
-    Parameters
-    ----------
-    rows : sequence of dict
-        From `judge`.
-    images : DataFrame, optional
-        From `image_table`.
-
-    Returns
-    -------
-    dict
-    """
-    further = {} if images is None else {"by_image": images.to_dict("records")}
-    return rows[0] | {"other_definitions": rows[1:]} | further
-
-
-def write_judgement(path: Path, rows: Sequence[dict[str, Any]], images: pd.DataFrame | None = None) -> None:
+def write_judgement(path: Path, judged: dict[str, Any]) -> None:
     """Write all of it in the format of the file's suffix, as the module says.
 
     Parameters
     ----------
     path : Path
-    rows : sequence of dict
+    judged : dict
         From `judge`.
-    images : DataFrame, optional
-        From `image_table`.
     """
     if path.suffix == ".json":
-        write_json(path, as_json(rows, images), indent=2)
+        write_json(path, judged, indent=2)
         return
     of_all = [
-        {key: value for key, value in row.items() if key not in (*row["metrics"], "metrics")}
+        {
+            key: row[key]
+            for key in row
+            if key not in judged["metrics"] and not isinstance(row[key], dict | list)
+        }
         | {"metric": name, **figure}
-        for row in rows
+        for row in (judged, *judged["other_definitions"])
         for name, figure in row["metrics"].items()
     ]
     write_table(path, pd.DataFrame(of_all))
-    if images is not None:
-        write_table(path.with_suffix(f".by_image{path.suffix}"), images)
+    if "by_image" in judged:
+        write_table(path.with_suffix(f".by_image{path.suffix}"), pd.DataFrame(judged["by_image"]))
