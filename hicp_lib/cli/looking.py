@@ -1,6 +1,8 @@
 """`hicp inspect` and `hicp draw`: what files are, and what detections look like."""
 
 import json
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import click
@@ -20,7 +22,7 @@ def inspect_(path: Path, as_json: bool) -> int:
     from hicp_lib.inspection.inspect import inspect
 
     facts = inspect(path)
-    click.echo(json.dumps(facts.as_dict(), indent=2) if as_json else "\n".join(facts.lines()))
+    click.echo(json.dumps(asdict(facts), indent=2) if as_json else "\n".join(facts.lines()))
     return 2 if facts.problem else 0
 
 
@@ -45,11 +47,10 @@ def draw(
     people = None if annotations is None else read_annotations(annotations)
     found = read_detections(detections, people)
     chosen = pictures(image_paths(detections, images, found, people), found, people)
-    first = chosen[:limit]
+    first, note = chosen[:limit], partial(click.echo, err=True)
     if out.suffix:
-        title = f"{detections.name} over {images.name}"
-        write_page(first, out, title, lambda line: click.echo(line, err=True))
+        write_page(first, out, f"{detections.name} over {images.name}", note)
     else:
-        write_pngs(first, out, min_score)
+        write_pngs(first, out, min_score, note)
     rest = f" of {len(chosen)}, worst first; --limit N for more" if len(chosen) > limit else ""
     click.echo(f"{out}: {len(first)} pictures{rest}")

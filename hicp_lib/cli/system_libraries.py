@@ -16,8 +16,8 @@ LIBRARIES = {
     "libX11.so.6": ("libx11-6", {"open3d"}),
     "libgomp.so.1": ("libgomp1", {"pinocchio"}),
     "libidn2.so.0": ("libidn2-0", {"open3d"}),
-    "libudev.so.1": ("libudev1", {"open3d"}),
-    "libusb-1.0.so.0": ("libusb-1.0-0", {"open3d"}),
+    "libudev.so.1": ("libudev1", {"open3d", "pyrealsense2"}),
+    "libusb-1.0.so.0": ("libusb-1.0-0", {"open3d", "pyrealsense2"}),
 }
 """Each library's package in Debian, and the Python packages that cannot be imported without it."""
 

@@ -294,7 +294,7 @@ def write_annotations(path: str | Path, annotations: Annotations) -> None:
         for extra, i, image, box, area, crowd, count, flat in zip(
             a.extras, a.ids.tolist(), a.image_ids.tolist(), a.boxes_px.tolist(), a.areas_px2.tolist(),
             a.is_crowd.astype(int).tolist(), (a.visibility[:, COCO_17] > 0).sum(axis=1).tolist(),
-            triples.reshape(len(a), -1).tolist(), strict=True,
+            triples.reshape(len(a), 3 * N_KEYPOINTS).tolist(), strict=True,
         )
     ]  # fmt: skip
     category = {**PERSON, "keypoints": list(NAMES)}

@@ -12,24 +12,22 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import pandas as pd
 
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_bytes
 from hicp_lib.core.images import read_image, write_png
-from hicp_lib.core.keypoints import FACE, GROUPS, HANDS, LIMBS, N_KEYPOINTS, NAMES
-from hicp_lib.evaluation.ap.person_oks import person_oks
+from hicp_lib.core.keypoints import FACE, GROUPS, HANDS, LIMBS, NAMES
+from hicp_lib.evaluation.ap.metric_table import person_oks
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.formats.detection_files import read_rows
 from hicp_lib.inspection.skeletons import draw_people
 
-MAX_SIDE_PX = 960
-"""Pictures of a page are not larger than this."""
-
+MAX_SIDE_PX = 960  # pictures of a page are not larger than this
 _TRUTH_COLOUR, _FOUND_COLOUR = "#E69F00", "#56B4E9"  # of Okabe and Ito: told apart by everybody
 _JPEG_QUALITY = 85
+Note = Callable[[str], object]
 
 
 @dataclass(frozen=True)
@@ -41,15 +39,15 @@ class Picture:
     path : Path
     found : Detections
         What the detector gives.
-    truth : Annotations or None
-        The people known to be in it; None where there are no annotations.
+    truth : Detections or None
+        The people known to be in it, labelled keypoints with score 1; None without annotations.
     oks : dict of str to list of float
         By group, of every person who counts.
     """
 
     path: Path
     found: Detections
-    truth: Annotations | None
+    truth: Detections | None
     oks: dict[str, list[float]]
 
     @property
@@ -60,11 +58,9 @@ class Picture:
 
     def line(self) -> str:
         """What there is to say of it."""
-        if self.truth is None:
-            return f"{len(self.found)} found"
-        parts = [f"{len(self.truth)} annotated, {len(self.found)} found"]
-        parts += [f"OKS {group} {min(values):.2f}" for group, values in self.oks.items() if values]
-        return "; ".join(parts)
+        known = "" if self.truth is None else f"{len(self.truth)} annotated, "
+        oks = [f"; OKS {group} {min(values):.2f}" for group, values in self.oks.items() if values]
+        return f"{known}{len(self.found)} found{''.join(oks)}"
 
 
 def pictures(
@@ -85,21 +81,22 @@ def pictures(
     -------
     list of Picture
     """
-    given = np.zeros(N_KEYPOINTS, bool)
-    for people in found.values():
-        given |= np.isfinite(people.keypoints_px).all(axis=-1).any(axis=0)
-    groups = [name for name, keypoints in GROUPS.items() if given[keypoints].any()]  # the detector's own
-    oks = {} if annotations is None else {name: person_oks(annotations, found, name) for name in groups}
+    given = [np.isfinite(people.keypoints_px).all(axis=-1).any(axis=0) for people in found.values()]
+    groups = [name for name, points in GROUPS.items() if any(of[points].any() for of in given)]  # its own
+    tables = {} if annotations is None else {of: person_oks(annotations, found, of) for of in groups}
+    counted = {of: table[table["n_labelled"] > 0].groupby("image_id")["oks"] for of, table in tables.items()}
+    oks = {of: by_image.agg(list).to_dict() for of, by_image in counted.items()}
+    truth = {} if annotations is None else {i: _truth(annotations, i) for i in paths}
     known = [
-        Picture(
-            path,
-            found.get(i, Detections.none()),
-            None if annotations is None else annotations.take(annotations.image_ids == i),
-            {group: _of_image(table, i) for group, table in oks.items()},
-        )
+        Picture(path, found.get(i, Detections.none()), truth.get(i), {of: oks[of].get(i, []) for of in oks})
         for i, path in paths.items()
     ]
     return sorted(known, key=lambda picture: (picture.quality, picture.path.name))
+
+
+def _truth(annotations: Annotations, image_id: int) -> Detections:
+    people = annotations.take(annotations.image_ids == image_id)
+    return Detections(people.keypoints_px, (people.visibility > 0).astype(float), np.ones(len(people)))
 
 
 def image_paths(
@@ -128,29 +125,23 @@ def image_paths(
     """
     if not images.is_dir():
         raise InputError(f"{images}: is not a folder; give the folder that holds the pictures")
-    if annotations is not None:
-        names = {i: image.file_name for i, image in annotations.images.items()}
-    else:
+    known = {} if annotations is None else annotations.images
+    names: dict = {i: image.file_name for i, image in known.items()}
+    if annotations is None:
         beside = detections.with_suffix(".images.json")
         rows = read_json(beside) if beside.is_file() else read_rows(detections)
-        rows = [row for row in rows if isinstance(row, dict) and isinstance(row.get("file_name"), str)]
-        names = {row.get("id", row.get("image_id")): row["file_name"] for row in rows if "frame" not in row}
+        named = [row for row in rows if isinstance(row, dict) and isinstance(row.get("file_name"), str)]
+        names = {row.get("id", row.get("image_id")): row["file_name"] for row in named if "frame" not in row}
         names = names or {int(path.stem): path.name for path in images.iterdir() if path.stem.isdecimal()}
-    for i in found:
-        if i not in names:
-            raise InputError(f"{detections}: nothing says which picture image {i} is; give --annotations")
+    for i in found.keys() - names.keys():
+        raise InputError(f"{detections}: nothing says which picture image {i} is; give --annotations")
     for name in names.values():
         if not (images / name).resolve().is_relative_to(images.resolve()):
             raise InputError(f"{detections}: file name {name!r} leads out of the folder of pictures")
     return {i: images / name for i, name in names.items()}
 
 
-def _of_image(table: pd.DataFrame, image_id: int) -> list[float]:
-    counts = (table["image_id"] == image_id) & (table["n_labelled"] > 0)
-    return table.loc[counts, "oks"].tolist()
-
-
-def write_pngs(chosen: list[Picture], out: Path, min_score: float) -> None:
+def write_pngs(chosen: list[Picture], out: Path, min_score: float, note: Note = print) -> None:
     """Write the pictures with truth and detections drawn, numbered worst first.
 
     Parameters
@@ -160,19 +151,22 @@ def write_pngs(chosen: list[Picture], out: Path, min_score: float) -> None:
         A folder.
     min_score : float
         Detected keypoints below it are left out.
+    note : callable, optional
+        Told of every picture that cannot be shown, one line each.
+
+    Raises
+    ------
+    InputError
+        If none of the pictures can be read.
     """
-    for rank, picture in enumerate(chosen, 1):
-        image = read_image(picture.path)
-        if picture.truth is not None:
-            known = (picture.truth.visibility > 0).astype(float)
-            image = draw_people(image, picture.truth.keypoints_px, known, _TRUTH_COLOUR)
-        image = draw_people(image, picture.found.keypoints_px, picture.found.scores, _FOUND_COLOUR, min_score)
+    for rank, (picture, image) in enumerate(_readable(chosen, note), 1):
+        for people, colour in ((picture.truth, _TRUTH_COLOUR), (picture.found, _FOUND_COLOUR)):
+            if people is not None:
+                image = draw_people(image, people.keypoints_px, people.scores, colour, min_score)
         write_png(out / f"{rank:04}_{picture.path.stem}.png", image)
 
 
-def write_page(
-    chosen: list[Picture], out: Path, title: str, note: Callable[[str], object] = lambda line: None
-) -> None:
+def write_page(chosen: list[Picture], out: Path, title: str, note: Note = print) -> None:
     """Write one HTML file with the pictures in it, and a slider for the least score.
 
     Parameters
@@ -188,12 +182,10 @@ def write_page(
     InputError
         If none of the pictures can be read.
     """
-    shown = [row for picture in chosen for row in _row(picture, note)]
-    if chosen and not shown:
-        raise InputError(f"{chosen[0].path.parent}: none of its {len(chosen)} pictures can be read")
     content = {
         "title": title, "limbs": LIMBS, "names": NAMES, "hands": HANDS.tolist(), "face": FACE.tolist(),
-        "pictures": shown, "has_truth": any(picture.truth is not None for picture in chosen),
+        "pictures": [_row(picture, image) for picture, image in _readable(chosen, note)],
+        "has_truth": any(picture.truth is not None for picture in chosen),
         "colours": {"truth": _TRUTH_COLOUR, "found": _FOUND_COLOUR},
     }  # fmt: skip
     data = json.dumps(content, allow_nan=False).replace("<", "\\u003c")  # ends no script element
@@ -201,32 +193,33 @@ def write_page(
     write_bytes(out, page.replace("GALLERY_DATA", data).encode())
 
 
-def _row(picture: Picture, note: Callable[[str], object]) -> Iterator[dict]:
-    try:
-        image = read_image(picture.path)
-    except InputError as error:
-        note(str(error))
-        return
+def _readable(chosen: list[Picture], note: Note) -> Iterator[tuple[Picture, np.ndarray]]:
+    n_bad = 0
+    for picture in chosen:
+        try:
+            yield picture, read_image(picture.path)
+        except InputError as error:
+            n_bad += 1
+            note(str(error))
+    if chosen and n_bad == len(chosen):
+        raise InputError(f"{chosen[0].path.parent}: none of its {n_bad} pictures can be read")
+
+
+def _row(picture: Picture, image: np.ndarray) -> dict:
     height_px, width_px = image.shape[:2]
     scale = min(1.0, MAX_SIDE_PX / max(height_px, width_px))
     if scale < 1:
         image = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
-    _, jpeg = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), options)
-    truth = picture.truth
-    yield {
+    bgr, quality = cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY]
+    return {
         "name": picture.path.name, "line": picture.line(), "width": width_px, "height": height_px,
-        "jpeg": base64.b64encode(jpeg.tobytes()).decode(),
-        "truth": [] if truth is None else _people(truth.keypoints_px, (truth.visibility > 0).astype(float)),
-        "found": _people(picture.found.keypoints_px, picture.found.scores),
+        "jpeg": base64.b64encode(cv2.imencode(".jpg", bgr, quality)[1].tobytes()).decode(),
+        "truth": _points(picture.truth or Detections.none()), "found": _points(picture.found),
     }  # fmt: skip
 
 
-def _people(keypoints_px: np.ndarray, scores: np.ndarray) -> list[list[list[float]]]:
+def _points(people: Detections) -> list[list[list[float]]]:
     """Of every person, the keypoints that are given: index, u, v, score."""
-    given = np.isfinite(keypoints_px).all(axis=-1) & (scores > 0)
-    rows = zip(keypoints_px.round(1), scores.round(3), given, strict=True)
-    return [
-        [[int(k), *points[k].tolist(), float(sure[k])] for k in np.flatnonzero(which)]
-        for points, sure, which in rows
-    ]
+    given = np.isfinite(people.keypoints_px).all(axis=-1) & (people.scores > 0)
+    rows = zip(people.keypoints_px.round(1).tolist(), people.scores.round(3).tolist(), given, strict=True)
+    return [[[int(k), *uv[k], of[k]] for k in np.flatnonzero(shown)] for uv, of, shown in rows]

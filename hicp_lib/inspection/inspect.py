@@ -1,24 +1,109 @@
-"""What a file or a folder is, by its content: its name is not believed."""
+"""What a file or a folder is, of the kinds in `data/kinds.toml`, by its content: its name is not believed."""
 
-from collections.abc import Callable
+import re
+from dataclasses import replace
 from pathlib import Path
+from pkgutil import resolve_name
+from typing import Any
 
-import cv2
-import numpy as np
-import pandas as pd
-
-from hicp_lib.core import video
 from hicp_lib.core.errors import InputError, one_line
-from hicp_lib.core.files import read_bytes
-from hicp_lib.detectors.onnx.model_file import read_model
-from hicp_lib.inspection.facts import Facts
-from hicp_lib.inspection.folders import inspect_folder
-from hicp_lib.inspection.json_files import inspect_json
-from hicp_lib.inspection.recordings import inspect_bag
-from hicp_lib.inspection.tables import inspect_detections_table, inspect_mocap, inspect_text
+from hicp_lib.core.files import read_json
+from hicp_lib.detectors.runtime.to_file import IMAGE_SUFFIXES
+from hicp_lib.inspection.facts import Facts, tables, under_name
+from hicp_lib.recordings.tum import names_poses
 
-_HEAD_BYTES = 8192
+_HEAD_BYTES, _HEAD_LINES = 8192, 40
 _PRINTED = {*b"\t\r\n\f\x1a", *range(32, 256)}  # what texts are made of, in any code page
+_NUMBER = re.compile(r"[-+]?[\d.]+(e[-+]?\d+)?", re.IGNORECASE)
+
+
+Kind = dict[str, Any]  # a row of data/kinds.toml, which explains its keys
+
+
+def identify(path: Path) -> tuple[Kind, Path]:
+    """The kind of a file or a folder.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Kind
+    path : Path
+        What to describe: of a folder that holds nothing else, its JSON file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is of no kind that is known.
+    """
+    if path.is_dir():
+        return _folder(path)
+    if not path.is_file():
+        raise InputError(f"{path}: is no file and no folder; check the path")
+    with open(path, "rb") as file:
+        head = file.read(_HEAD_BYTES)
+    for kind in tables()["kind"]:
+        if kind["by"] == "bytes" and re.match("|".join(kind["marks"]), head.decode("latin-1"), re.DOTALL):
+            return kind, path
+    if re.match(rb"(\xef\xbb\xbf)?\s*[\[{]", head):
+        return _json(path), path
+    if not head.strip() or set(head) - _PRINTED:
+        wrong = f"is of no kind that is known; it begins with {head[:8]!r}" if head.strip() else "is empty"
+        raise InputError(f"{path}: {wrong}")
+    return _of("text", _marks_of_text(path, head.decode("utf-8-sig", errors="replace")), path), path
+
+
+def _of(by: str, marks: set[str], path: Path) -> Kind:
+    for kind in tables()["kind"]:
+        if kind["by"] == by and marks.issuperset(kind["marks"]):
+            return kind
+    held = ", ".join(sorted(marks)[:6]) or "nothing"
+    raise InputError(f"{path}: {by} of no kind that is known; it has {held}")
+
+
+def _json(path: Path) -> Kind:
+    value = read_json(path)
+    if isinstance(value, dict):
+        return _of("object", set(value), path)
+    rows = value if all(isinstance(row, dict) for row in value) else []
+    marks = set.intersection(*map(set, rows)) if rows else {"no objects"} if value == [] else set()
+    marks |= _marks_of_results(rows) if {"image_id", "keypoints"} <= marks else set()
+    return _of("list", marks, path)
+
+
+def _marks_of_results(rows: list[dict]) -> set[str]:
+    """A name for an id is AlphaPose's way; flags, with -1, -1, 0 for what was not found, are OpenPose's."""
+    flat = [row["keypoints"] for row in rows if isinstance(row["keypoints"], list)]
+    are_flags = all(value in (0, 1) for of in flat for value in of[2::3])
+    are_flags = are_flags and any(of[i : i + 3] == [-1, -1, 0] for of in flat for i in range(0, len(of), 3))
+    return {"flags"} if are_flags else {"box"} if isinstance(rows[0]["image_id"], str) else set()
+
+
+def _marks_of_text(path: Path, head: str) -> set[str]:
+    """Columns of the first line, and what the first rows are made of."""
+    lines = [line.strip() for line in head.splitlines()[:_HEAD_LINES] if line.strip()]
+    rows = [[bool(_NUMBER.fullmatch(word)) for word in line.split()] for line in lines if line[0] != "#"]
+    marks = {name.strip(' "') for name in lines[0].split(",")}
+    marks |= {f"row of {len(row)}" for row in rows[:2] if all(row)} | {
+        line.split("\t")[0].upper() for line in lines
+    }
+    marks |= {"time and name"} if rows[:1] == [[True, False]] else set()
+    return marks | ({"named poses"} if names_poses(path) else set())
+
+
+def _folder(folder: Path) -> tuple[Kind, Path]:
+    names = {path.name for path in folder.iterdir()}
+    images = {"an image" for name in names if name.lower().endswith(IMAGE_SUFFIXES)}
+    files = [folder / n for n in sorted(names) if n.endswith(".json") and not n.endswith(".images.json")]
+    try:
+        return _of("folder", names | images, folder), folder
+    except InputError:
+        kind = _json(files[0]) if files else {}
+        if not kind.get("each") and len(files) != 1:
+            raise
+        return kind, folder if kind.get("each") else files[0]
 
 
 def inspect(path: str | Path) -> Facts:
@@ -38,107 +123,22 @@ def inspect(path: str | Path) -> Facts:
     InputError
         If it cannot be read, or is of no kind that is known.
     """
-    path = Path(path)
-    if path.is_dir():
-        return inspect_folder(path)
-    if not path.is_file():
-        raise InputError(f"{path}: is no file and no folder; check the path")
-    with open(path, "rb") as file:
-        head = file.read(_HEAD_BYTES)
-    if not head:
-        raise InputError(f"{path}: is empty")
-    kind, inspected = next((kind, of) for fits, kind, of in _KINDS if fits(head))
+    kind, path = identify(Path(path))
     try:
-        return inspected(path)
-    except InputError as error:
-        if not kind:
-            raise
-        return Facts(path, kind, problem=str(error).removeprefix(f"{path}: "))
+        facts = _describe(kind, path)
+    except (OSError, ValueError, SyntaxError) as error:  # the libraries' own are among these
+        facts = Facts(problem=one_line(error).removeprefix(f"{path}: "))
+    fixed = {} if facts.problem or facts.kind else kind.get("needs", {})
+    needs = {of: f"{fixed.get(of, '')} {facts.needs.get(of, '')}".strip() for of in {**fixed, **facts.needs}}
+    return replace(facts, path=str(path), kind=facts.kind or kind["name"], needs=needs)
 
 
-def _image(path: Path) -> Facts:
-    content = np.frombuffer(read_bytes(path, "expected an image"), np.uint8)
-    pixels = cv2.imdecode(content, cv2.IMREAD_UNCHANGED | cv2.IMREAD_IGNORE_ORIENTATION)
-    if pixels is None:
-        raise InputError(f"{path}: is cut off, or no image that OpenCV can decode")
-    height_px, width_px = pixels.shape[:2]
-    channels = 1 if pixels.ndim == 2 else pixels.shape[2]
-    says = {"size": f"{width_px} x {height_px} pixels, {channels} channels of {8 * pixels.itemsize} bits"}
-    if pixels.dtype == np.uint16 and channels == 1:
-        known = pixels[pixels > 0]
-        middle = f"median {np.median(known):.0f}" if known.size else "nothing measured"
-        says["depth"] = f"raw units, {100 * known.size / pixels.size:.0f} % measured, {middle}"
-        return Facts(path, "depth image", says, needs={"hicp record import": "its folder, and --depth-scale"})
-    return Facts(path, "image", says, needs={"hicp detect": "--images, the folder it lies in"})
-
-
-def _video(path: Path) -> Facts:
-    frames = video.read_frames(path)
-    first = next(frames, None)
-    if first is None:
-        raise InputError(f"{path}: OpenCV decodes no frame of it")
-    second = next(frames, None)
-    height_px, width_px = first[1].shape[:2]
-    says = {
-        "size": f"{width_px} x {height_px} pixels",
-        "frames": f"{video.count_frames(path)} as the file says",
-    }
-    if second is not None and second[0] > first[0]:
-        says["times"] = f"of the file; {1 / (second[0] - first[0]):.4g} per second at the start"
-    return Facts(path, "video", says, needs={"hicp detect": "--images, this file"})
-
-
-def _parquet(path: Path) -> Facts:
-    try:
-        table = pd.read_parquet(path)
-    except (OSError, ValueError, ImportError) as error:
-        raise InputError(f"{path}: cannot be read as Parquet ({one_line(error)})") from None
-    if {"keypoint", "u_px", "v_px", "image_id"} <= set(table):
-        return inspect_detections_table(path)
-    return Facts(path, "table", {"rows": str(len(table)), "columns": ", ".join(map(str, table))[:400]})
-
-
-def _network(path: Path) -> Facts:
-    model = read_model(path, read_bytes(path, "expected an ONNX file"))
-    said = {name: str(value)[:80] for name, value in list(model.metadata.items())[:5]}
-    says = {"kinds of operators": str(len(model.operators)), **said}
-    return Facts(path, "ONNX network", says, needs={"hicp detect": f"--detector NAME --model {path.name}"})
-
-
-def _text(path: Path) -> Facts:
-    head = read_bytes(path, "expected a text file")[:_HEAD_BYTES].decode("utf-8", errors="replace")
-    return inspect_text(path, head)
-
-
-def _begins(*starts: bytes) -> Callable[[bytes], bool]:
-    return lambda head: head.startswith(starts)
-
-
-def _is_json(head: bytes) -> bool:
-    return head.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] in (b"{", b"[")
-
-
-def _is_video(head: bytes) -> bool:
-    is_avi = head[:4] == b"RIFF" and head[8:11] == b"AVI"
-    return is_avi or head[4:8] == b"ftyp" or head[:4] == b"\x1aE\xdf\xa3"
-
-
-def _is_text(head: bytes) -> bool:
-    return not set(head) - _PRINTED
-
-
-def _is_c3d(head: bytes) -> bool:
-    return head[1:2] == b"\x50" and not _is_text(head[:512])
-
-
-_IMAGES = _begins(b"\x89PNG", b"\xff\xd8\xff", b"BM", b"II*\0", b"MM\0*")
-_KINDS: list[tuple[Callable[[bytes], bool], str, Callable[[Path], Facts]]] = [
-    (_begins(b"#ROSBAG", b"SQLite format 3", b"\x89MCAP"), "bag", inspect_bag),
-    (_is_video, "video", _video),
-    (lambda head: _IMAGES(head) or head[8:12] == b"WEBP", "image", _image),
-    (_begins(b"PAR1"), "Parquet table", _parquet),
-    (_is_c3d, "C3D", lambda path: inspect_mocap(path, "C3D")),
-    (_is_json, "", inspect_json),
-    (_is_text, "", _text),
-    (lambda head: True, "", _network),
-]
+def _describe(kind: Kind, path: Path) -> Facts:
+    describe = resolve_name(f"hicp_lib.inspection.{kind['describe']}")
+    suffix, each, given = kind.get("suffix", ""), kind.get("each"), kind.get("given", {})
+    if path.is_dir() or not each and suffix in ("", path.suffix.lower()):
+        return describe(path, **given)
+    with under_name(path, f"file{suffix or '.json'}") as other:
+        facts = describe(other.parent if each else other, **given)
+    notes = [f"commands take it under a name that ends in {suffix}"] if suffix else []
+    return replace(facts, notes=[*facts.notes, *notes])

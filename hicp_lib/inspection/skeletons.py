@@ -14,13 +14,9 @@ _HAND_LIMB, _FACE_POINT, _HAND_POINT, _BODY_POINT = 0.55, 0.45, 0.6, 1.2
 
 
 def draw_people(
-    image: np.ndarray,
-    keypoints_px: np.ndarray,
-    scores: np.ndarray,
-    colour: str,
-    min_score: float = 0.1,
+    image: np.ndarray, keypoints_px: np.ndarray, scores: np.ndarray, colour: str, min_score: float = 0.1,
     thickness_px: float | None = None,
-) -> np.ndarray:
+) -> np.ndarray:  # fmt: skip
     """Draw skeletons onto a copy of an image.
 
     Parameters

@@ -28,6 +28,8 @@ OPTIONAL = {
     "libtensorflow_framework": "of Open3D's operations for TensorFlow, which the study does not use",
     "libtorch_cpu": "of Open3D's operations for PyTorch, which the study does not use",
     "libc10": "of Open3D's operations for PyTorch, which the study does not use",
+    "libamdhip64": "of librealsense on AMD's GPUs",
+    "libcuda.so": "of librealsense on NVIDIA's GPUs",
     "libGL.so": "of Open3D's window: another name of libGL.so.1",
     "libGLES": "of Open3D's window, for OpenGL ES 1, under two names",
     "libOpenGL": "of Open3D's window: another name for what libGL.so.1 has",
@@ -72,7 +74,7 @@ def wanted() -> Wanted:
     needed, opened, brought = defaultdict(set), defaultdict(set), set()
     for path in (path for folder in site.getsitepackages() for path in Path(folder).rglob("*.so*")):
         brought.add(path.name)
-        if path.is_symlink() or not path.is_file():
+        if path.is_symlink() or not path.is_file() or path.suffix == ".debug":
             continue
         with path.open("rb") as file:
             if file.read(4) == b"\x7fELF":

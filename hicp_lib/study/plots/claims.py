@@ -14,7 +14,6 @@ _LOOKS = zip(VERDICTS, _COLOURS, _HATCHES, strict=True)
 _FILLS = {name: {"color": colour, "hatch": hatch, "edgecolor": "white"} for name, colour, hatch in _LOOKS}
 
 
-@in_style
 def verdicts(table: pd.DataFrame) -> Figure:
     """Claims by section of the paper and verdict; `table` from `verdict_table`.
 
@@ -25,6 +24,11 @@ def verdicts(table: pd.DataFrame) -> Figure:
     """
     if table.empty:
         raise InputError('no claims of this section; expected "all" or a section with claims, such as "IV-A"')
+    return _by_section(table)
+
+
+@in_style
+def _by_section(table: pd.DataFrame) -> Figure:
     sections = list(dict.fromkeys(table["section"]))
     counts = table.groupby(["section", "verdict"], sort=False).size().unstack(fill_value=0)
     counts = counts.reindex(index=sections, columns=VERDICTS, fill_value=0)

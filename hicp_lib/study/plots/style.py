@@ -63,10 +63,12 @@ def in_style(draw: Callable[..., Figure]) -> Callable[..., Figure]:
     @functools.wraps(draw)
     def styled(*args, **kwargs) -> Figure:
         with plt.rc_context(_RC):
-            if any(isinstance(given, pd.DataFrame | list | dict) and not len(given) for given in args):
+            data = [given for given in args if isinstance(given, pd.DataFrame | list | dict)]
+            if not all(map(len, data)):
                 figure = new_figure(1, 1, 6.0, 0.5, subplot_kw={"visible": False})[0]
                 figure.text(0.5, 0.5, _NOTHING, ha="center", va="center")
-                return Figure(figure, _NOTHING, _NOTHING)
+                table = next((given for given in data if isinstance(given, pd.DataFrame)), None)
+                return Figure(figure, _NOTHING, _NOTHING, table)
             return draw(*args, **kwargs)
 
     return styled

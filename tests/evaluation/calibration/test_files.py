@@ -25,7 +25,7 @@ def files(tmp_path):
         points[:5, 2] = [0.9, 0.6, 0.9, 0.9, 0.9]
         points[1, 1] += 0 if i % 4 == 0 else 200
         people.append({"id": i, "image_id": i, "category_id": 1, "iscrowd": 0, "area": 30000.0,
-                       "bbox": [90, 40, 160, 300], "keypoints": truth.ravel().tolist()})  # fmt: skip
+                       "bbox": [30, 30, 160, 300], "keypoints": truth.ravel().tolist()})  # fmt: skip
         found.append({"image_id": i, "category_id": 1, "keypoints": points.ravel().tolist(), "score": 0.5,
                       "box": [1, 2, 3, 4]})  # fmt: skip
     images = [{"id": i, "file_name": f"{i}.jpg", "width": 400, "height": 400} for i in range(1, N + 1)]

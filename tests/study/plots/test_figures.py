@@ -39,9 +39,9 @@ def test_what_is_labelled_is_drawn_hidden_or_not(flag, is_drawn, tmp_path):
     points, flags = np.full((1, 136, 2), 30.0), np.zeros((1, 136))
     flags[0, 5] = flag
     truth = make_annotations(points, [1], visibility=flags)
-    drawn = people.draw_truth(truth, tmp_path, 1, truth.ids == 1, "white")
+    drawn = people.draw_truth(truth, tmp_path, 1, truth.ids == 1, "#FFFFFF")
     assert drawn.any() == is_drawn
-    assert not people.draw_truth(truth, tmp_path, 1, truth.ids == 1, "white", n_keypoints=5).any()
+    assert not people.draw_truth(truth, tmp_path, 1, truth.ids == 1, "#FFFFFF", n_keypoints=5).any()
 
 
 @pytest.mark.parametrize("draw", [evaluation.precision_recall, evaluation.loss_without_head])
