@@ -51,7 +51,7 @@ def judge(
     -------
     dict
         Ready for JSON. Of the first definition `Evaluation.row`, with `metrics` (of each its `value`, `low`
-        and `high`) and `seed`; those of the others as `other_definitions`; and `by_image`, a list of the rows of
+        and `high`) and `seed`; those of the others as `other_definitions`; and `by_image`, a list of rows of
         `image_table`. None where there is no figure, as for a group that annotations or detections lack.
     """
     clusters, rows = source_images(people), []  # crops of one image are drawn together
