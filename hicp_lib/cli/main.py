@@ -21,7 +21,15 @@ from hicp_lib import __version__
 from hicp_lib.cli.calibration import calibration
 from hicp_lib.cli.looking import draw, inspect_
 from hicp_lib.cli.models import models
-from hicp_lib.cli.options import PATH, detector_options, given, people_option, tell_assumed, worker_options
+from hicp_lib.cli.options import (
+    PATH,
+    detector_options,
+    given,
+    people_option,
+    tell_assumed,
+    text_table,
+    worker_options,
+)
 from hicp_lib.cli.recordings import lift, record
 from hicp_lib.core.errors import InputError
 
@@ -223,70 +231,73 @@ def export(detections: Path, kind: str, layout: str, annotations: Path | None, o
 @click.option("--annotations", type=PATH, required=True, help="In COCO's layout.")
 @click.option("--detections", type=PATH, required=True, help="COCO keypoint results.")
 @_keypoint_map_option
-@click.option("--group", default="body", show_default=True, help="body (17 points) or hand (42; and each).")
+@click.option("--group", help="body (17 points) or hand (42; and each); both if not given.")
 @click.option("--sigmas", help="halpe or wholebody; else halpe, of each hand wholebody.")
 @click.option("--area", default="segment", show_default=True, help="Or box, box53 (0.53 x box), source.")
 @click.option("--seed", default=0, show_default=True, type=click.IntRange(min=0), help="Of the bootstrap.")
+@click.option("--by-image", is_flag=True, help="OKS of the people of each image, too; the worst first.")
+@click.option("--out", type=PATH, help="To write: .json, .csv or .parquet.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def evaluate(
-    annotations: Path, detections: Path, keypoint_map, group: str, sigmas: str | None, area: str, seed: int,
-    as_json: bool,
+    annotations: Path, detections: Path, keypoint_map, group: str | None, sigmas: str | None, area: str,
+    seed: int, by_image: bool, out: Path | None, as_json: bool,
 ) -> None:  # fmt: skip
     """Average precision and recall by OKS, with 95 % bootstrap intervals over images.
 
     Over all labelled keypoints, and over the visible ones only; with those outside the picture, by extended
     OKS, where the annotations know of them; of hands, as one object and each by itself.
     """
-    from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals
-    from hicp_lib.evaluation.ap.evaluate import evaluate as evaluate_detections
-    from hicp_lib.evaluation.ap.options import definitions
-    from hicp_lib.evaluation.statistics.resampling import Draws
-    from hicp_lib.formats.annotations import read_annotations, read_detections, source_images
+    from hicp_lib.core.keypoints import GROUPS
+    from hicp_lib.evaluation.ap import judgement
+    from hicp_lib.formats.annotations import read_annotations, read_detections
+    from hicp_lib.formats.detection_files import refuse_other_suffix
 
+    if out is not None:
+        refuse_other_suffix(out)
     people = read_annotations(annotations, keypoint_map)
     found = read_detections(detections, people)
     _tell_notes(annotations, people.notes, area)
-    clusters = source_images(people)  # crops of one image are drawn together
     options = {"area": area} | ({"sigmas": sigmas} if sigmas else {})
-    results = []
-    for of_group, way in definitions(people, group):
-        evaluation = evaluate_detections(people, found, of_group, **way, **options)
-        metrics = bootstrap_intervals(evaluation, Draws(seed=seed), clusters).items()
-        rows = {name: _finite(dict(zip(("value", "low", "high"), of, strict=True))) for name, of in metrics}
-        if any(map(len, found.values())) and not evaluation.n_detections:
-            rows = {name: dict.fromkeys(row) for name, row in rows.items()}
-        results.append(_finite(evaluation.row()) | {"metrics": rows, "seed": seed})
+    judged = judgement.judge(people, found, [group] if group else GROUPS, by_image, seed, **options)
+    if out is not None:
+        judgement.write_judgement(out, judged)
     if as_json:
-        click.echo(json.dumps(results[0] | {"other_definitions": results[1:]}, indent=2))
+        click.echo(json.dumps(judged, indent=2))
         return
     if not any(map(len, found.values())):
         click.echo(f"{detections}: an empty list: nobody was found in any image")
-    for result in results:
-        _tell_evaluation(result)
+    rows = (judged, *judged["other_definitions"])
+    for row in rows:
+        _tell_evaluation(row)
+    click.echo("".join(f"{lacking}\n" for lacking in dict.fromkeys(map(_lacking, rows)) if lacking), nl=False)
+    if images := judged.get("by_image"):
+        cells = [[f"{v:.3f}" if isinstance(v, float) else str(v) for v in image.values()] for image in images]
+        click.echo(text_table([list(images[0]), *cells]))
 
 
-def _tell_evaluation(result: dict[str, Any]) -> None:
+def _lacking(row: dict[str, Any]) -> str:
+    """Who gives nobody of a group, in words; empty where there are figures."""
+    if row["AP"] is not None:
+        return ""
+    who = "the detections give" if row["n_people"] else "the annotations give"
+    return f"{who} no {'hands' if 'hand' in row['group'] else 'bodies'}"
+
+
+def _tell_evaluation(row: dict[str, Any]) -> None:
     from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN
 
-    of = "all labelled" if result["labelled"] == "all" else "visible"
-    of += " and outside" if result["outside"] == "count" else ""
-    where = "{n_people} in {n_images} images; {sigmas} sigmas, {area} area".format(**result)
-    click.echo(f"{result['group']}, {of} keypoints: {where}")
-    if all(row["value"] is None for row in result["metrics"].values()):
-        who = "the detections give" if result["n_people"] else "the annotations give"
-        click.echo(f"{who} no {'hands' if 'hand' in result['group'] else 'bodies'}")
+    if _lacking(row):
         return
-    if all(row["low"] is None for row in result["metrics"].values()):
+    of = "all labelled" if row["labelled"] == "all" else "visible"
+    of += " and outside" if row["outside"] == "count" else ""
+    where = "{n_people} in {n_images} images; {sigmas} sigmas, {area} area".format(**row)
+    click.echo(f"{row['group']}, {of} keypoints: {where}")
+    if all(metric["low"] is None for metric in row["metrics"].values()):
         click.echo(f"no intervals: they ask for {MIN_DRAWN} source images at least")
-    for metric, row in result["metrics"].items():
-        value, *bounds = (math.nan if number is None else number for number in row.values())
-        interval = "" if row["low"] is None else "  [{:.3f}, {:.3f}]".format(*bounds)
-        click.echo(f"{metric:<5} {value:.3f}{interval}")
-
-
-def _finite(row: dict[str, Any]) -> dict[str, Any]:
-    """NaN, where nobody counts, is null in JSON."""
-    return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row.items()}
+    for name, metric in row["metrics"].items():
+        value, *bounds = (math.nan if number is None else number for number in metric.values())
+        interval = "" if metric["low"] is None else "  [{:.3f}, {:.3f}]".format(*bounds)
+        click.echo(f"{name:<5} {value:.3f}{interval}")
 
 
 @hicp.command()

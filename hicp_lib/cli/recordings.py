@@ -140,21 +140,18 @@ def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> Non
 @worker_options("Threads")
 def lift(folder: Path, detector: str, method: str, out: Path, workers: int | str | None, **chosen) -> None:
     """Find people in a recording and where their keypoints are in the robot's base frame."""
-    from hicp_lib.core.extras import require
-    from hicp_lib.core.files import atomic_path
+    from hicp_lib.core.files import write_table
     from hicp_lib.detectors.runtime.results import detections_of
     from hicp_lib.detectors.runtime.run import detect_images
+    from hicp_lib.formats.detection_files import refuse_other_suffix
     from hicp_lib.lifting.table import lift_recording, steps_of
     from hicp_lib.recordings.recording import open_recording
 
-    is_csv = out.suffix == ".csv"
-    if not is_csv:
-        require("analysis", "pyarrow")
+    refuse_other_suffix(out, (".parquet", ".csv"))
     recording = open_recording(folder)
     steps_of(method)  # a wrong name is told before anybody is looked for
     found = detect_images(detector, dict(enumerate(recording.rgb_paths)), workers, **given(**chosen))
     table = lift_recording(recording, list(detections_of(found).values()), method)
-    with atomic_path(out) as temporary:
-        table.to_csv(temporary, index=False) if is_csv else table.to_parquet(temporary, index=False)
+    write_table(out, table)
     n_lifted = table["x_m"].notna().sum()
     click.echo(f"{out}: {n_lifted} of {len(table)} keypoints in {len(recording)} frames lifted")

@@ -1,18 +1,24 @@
 """Files: the cache folder, hashes, writes that are whole or absent, JSON read at the door."""
 
+from __future__ import annotations
+
 import hashlib
 import json
 import os
 import re
 import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import orjson
 import platformdirs
 
 from hicp_lib.core.errors import InputError
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 def cache_dir() -> Path:
@@ -115,6 +121,13 @@ def write_json(path: str | Path, value: Any, *, indent: int | None = None) -> No
     write_bytes(path, (text + "\n").encode())
 
 
+def write_table(path: str | Path, table: DataFrame) -> None:
+    """Write a table as Parquet, or as CSV where the name ends in `.csv`; whole or not at all."""
+    with atomic_path(path) as temporary:
+        write = table.to_csv if temporary.suffix == ".csv" else table.to_parquet
+        write(temporary, index=False)
+
+
 def natural_order(name: str) -> tuple[str, str]:
     """What names are sorted by so that the numbers in them (up to 20 digits) are in their order.
 
@@ -151,6 +164,8 @@ def read_json(path: str | Path) -> Any:
     Returns
     -------
     Any
+        NaN and infinity, which JSON has not, are as Python writes them; whole numbers beyond 64 bits are
+        floats.
 
     Raises
     ------
@@ -158,6 +173,8 @@ def read_json(path: str | Path) -> Any:
         If the file is missing, unreadable or not JSON; the line and column are named.
     """
     content = read_bytes(path, "give the path of a JSON file")
+    with suppress(orjson.JSONDecodeError):  # json knows more than JSON, and says better what is amiss
+        return orjson.loads(content)
     try:
         return json.loads(content)
     except UnicodeDecodeError:

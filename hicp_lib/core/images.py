@@ -6,7 +6,9 @@ whoever reads pictures of others asks for the flag and says so (`rotation_note`)
 TIFF alone is turned as it is read, by OpenCV and by every viewer, and counts as without a flag.
 """
 
-from collections.abc import Iterable
+import re
+from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 
 import cv2
@@ -17,6 +19,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, write_bytes
 
 Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom exclusive
+_EXIF = re.compile(b"Exif|eXIf|EXIF")  # of JPEG, PNG and WebP
 
 
 def read_image(path: str | Path) -> np.ndarray:
@@ -61,7 +64,7 @@ def decode_image(content: bytes | np.ndarray, path: str | Path) -> np.ndarray:
     return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
 
 
-def image_header(path: str | Path) -> tuple[int, int, int]:
+def image_header(path: str | Path | BytesIO) -> tuple[int, int, int]:
     """Width and height of an image as stored, and its rotation flag; its pixels are not decoded.
 
     Returns
@@ -107,11 +110,26 @@ def as_seen(pixels: np.ndarray, flag: int) -> np.ndarray:
     return np.ascontiguousarray(turned[rows, columns])
 
 
-def rotation_note(paths: Iterable[Path]) -> str:
+def note_rotation(content: bytes, name: str, flagged: dict[str, int]) -> None:
+    """Add a picture to those with a rotation flag, if it has one; others are not even opened.
+
+    Parameters
+    ----------
+    content : bytes
+        Of the file.
+    name : str
+    flagged : dict of str to int
+        Flags by name.
+    """
+    if _EXIF.search(content) and (flag := image_header(BytesIO(content))[2]) != 1:
+        flagged[name] = flag
+
+
+def rotation_note(flagged: Mapping[str, int]) -> str:
     """One line that names pictures with a rotation flag; empty where there is none."""
-    flags = [f"{path.name}: {flag}" for path in paths if (flag := image_header(path)[2]) != 1]
     about = "they are taken as stored in the file, not as viewers show them, and keypoints are in that frame"
-    return f"{len(flags)} images have a rotation flag (EXIF; {flags[0]}, ...): {about}" if flags else ""
+    first = [f"{Path(name).name}: {flag}" for name, flag in flagged.items()][:1]
+    return f"{len(flagged)} images have a rotation flag (EXIF; {first[0]}, ...): {about}" if first else ""
 
 
 def write_png(path: str | Path, image: np.ndarray) -> None:

@@ -190,7 +190,8 @@ def read_annotations(path: str | Path, keypoint_map: str | Path | None = None) -
     path = Path(path)
     data = read_json(path)
     if not isinstance(data, dict):
-        raise InputError(f"{path}: is not an object; expected a COCO annotation file")
+        problem = "is not an object; expected images, annotations and categories in COCO's layout"
+        raise InputError(f"{path}: {problem}; bring MPII's and other lists of people into it")
     for key in ("images", "annotations"):
         if key not in data:
             raise InputError(f"{path}: has no {key!r}; expected a COCO annotation file")
@@ -337,13 +338,16 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     _of_people(rows, replace(category, others=set()), {category.id, PERSON_CATEGORY} - category.others)
     image_ids = rows.integers("image_id") if annotations is None else _images_of(rows, annotations.images)
     triples = rows.keypoints()
-    keypoints = np.where((triples == 0).all(axis=-1, keepdims=True), np.nan, triples[..., :2])
+    keypoints = triples[..., :2]  # hundreds of thousands of people are held once
+    keypoints[~triples.any(axis=-1)] = np.nan
     refuse_fractions(rows.path, keypoints)
     found = {} if annotations is None else dict.fromkeys(annotations.images, Detections.none())
     order = np.argsort(image_ids, kind="stable")
     ids, starts = np.unique(image_ids[order], return_index=True)
     for image_id, chosen in zip(ids.tolist(), np.split(order, starts[1:]), strict=False):  # none: one empty
-        found[image_id] = Detections(keypoints[chosen], triples[chosen, :, 2], person_scores[chosen])
+        together = chosen[-1] - chosen[0] == len(chosen) - 1
+        of = slice(chosen[0], chosen[-1] + 1) if together else chosen
+        found[image_id] = Detections(keypoints[of], triples[of, :, 2], person_scores[of])
     return found
 
 

@@ -29,8 +29,14 @@ _PEOPLE_AT_ONCE = 1000  # of a table; a group of rows of Parquet
 _Append = Callable[..., None]
 
 
-def refuse_other_suffix(path: str | Path) -> None:
+def refuse_other_suffix(path: str | Path, suffixes: Sequence[str] = SUFFIXES) -> None:
     """Refuse, before anything is done, a file to write that is in none of the formats.
+
+    Parameters
+    ----------
+    path : str or Path
+    suffixes : sequence of str, optional
+        Of the formats.
 
     Raises
     ------
@@ -38,8 +44,8 @@ def refuse_other_suffix(path: str | Path) -> None:
         For another suffix, or Parquet without its library.
     """
     suffix = Path(path).suffix
-    if suffix not in SUFFIXES:
-        raise InputError(f"{path}: ends in {suffix or 'no suffix'!r}; expected {', '.join(SUFFIXES)}")
+    if suffix not in suffixes:
+        raise InputError(f"{path}: ends in {suffix or 'no suffix'!r}; expected {', '.join(suffixes)}")
     if suffix == ".parquet":
         require("analysis", "pyarrow")
 

@@ -9,6 +9,7 @@ import sys
 from contextlib import nullcontext
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from hicp_lib.cli import main as cli
@@ -204,6 +205,66 @@ def test_a_group_that_nobody_has_is_given_no_figures(capsys, tmp_path, of, who):
     assert json.loads(capsys.readouterr().out)["metrics"]["AP"]["value"] is None
     assert cli.run([*arguments, "body"]) == 0
     assert "AP    1.000" in capsys.readouterr().out
+
+
+@pytest.fixture
+def two_images(tmp_path) -> list[str]:
+    """Somebody found to the pixel, and somebody whose body is missed; their hands are not labelled."""
+    points = np.stack([100 + np.arange(136.0), 50 + 2 * np.arange(136.0), np.full(136, 2.0)], axis=1)
+    points[94:] = 0
+    person = {"category_id": 1, "iscrowd": 0, "bbox": [90, 40, 160, 300], "area": 30000}
+    images = [{"id": i, "file_name": f"{i}.jpg", "width": 400, "height": 400} for i in (1, 2)]
+    people = [person | {"id": i, "image_id": i, "keypoints": points.ravel().tolist()} for i in (1, 2)]
+    found = [points, points + [200, 0, 0]]
+    results = [
+        {"image_id": i, "category_id": 1, "score": 0.9, "keypoints": of.ravel().tolist()}
+        for i, of in enumerate(found, 1)
+    ]
+    truth, detections = tmp_path / "annotations.json", tmp_path / "detections.json"
+    truth.write_text(json.dumps({"images": images, "annotations": people, "categories": [{"id": 1}]}))
+    detections.write_text(json.dumps(results))
+    return ["evaluate", "--annotations", str(truth), "--detections", str(detections)]
+
+
+def test_body_and_hands_are_evaluated_at_once(capsys, two_images):
+    assert cli.run([*two_images, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    groups = [row["group"] for row in (printed, *printed["other_definitions"])]
+    assert groups == ["body", "hand", "each hand"]
+    assert printed["metrics"]["AR"]["value"] == 0.5
+    assert all(row["AP"] is None for row in printed["other_definitions"])
+    assert cli.run(two_images) == 0
+    printed = capsys.readouterr().out
+    assert "AR    0.500" in printed and printed.count("AP ") == 1
+    assert printed.count("the annotations give no hands") == 1
+    assert cli.run([*two_images, "--group", "hand", "--by-image", "--json"]) == 0
+    assert "by_image" not in json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize("suffix", [".json", ".csv", ".parquet"])
+def test_evaluation_is_written_as_its_suffix_says(capsys, tmp_path, two_images, suffix):
+    out = tmp_path / f"ap{suffix}"
+    assert cli.run([*two_images, "--out", str(out), "--by-image", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    least = [(row["image_id"], row["file_name"], round(row["oks_least"], 2)) for row in printed["by_image"]]
+    assert least[1] == (1, "1.jpg", 1.0) and least[0][:2] == (2, "2.jpg") and least[0][2] < 0.1
+    if suffix == ".json":
+        assert json.loads(out.read_text()) == printed
+        return
+    read = pd.read_csv if suffix == ".csv" else pd.read_parquet
+    table, by_image = read(out), read(tmp_path / f"ap.by_image{suffix}")
+    body = table[table["group"] == "body"].set_index("metric")
+    assert body["value"].to_dict() == {name: of["value"] for name, of in printed["metrics"].items()}
+    assert (body["n_people"] == 2).all() and (body["area"] == "segment").all()
+    assert table.loc[table["group"] == "hand", "value"].isna().all()
+    assert by_image["oks"].tolist() == [row["oks"] for row in printed["by_image"]]
+    assert cli.run([*two_images, "--by-image"]) == 0
+    assert "2.jpg" in capsys.readouterr().out.splitlines()[-2]
+
+
+def test_an_evaluation_in_no_known_format_is_refused_first(capsys):
+    asked = ("evaluate", "--annotations", "/no.json", "--detections", "x", "--out", "ap.xlsx")
+    assert "ap.xlsx: ends in '.xlsx'; expected .json, .csv, .parquet" in mistake(capsys, *asked)
 
 
 def test_evaluation_tells_visible_keypoints_and_each_hand(capsys, tmp_path):

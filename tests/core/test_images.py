@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from hicp_lib.core.images import as_seen, image_header, read_image, rotation_note
+from hicp_lib.core.images import as_seen, image_header, note_rotation, read_image, rotation_note
 
 # Where a viewer shows what is stored at the top left and at the top right, by flag.
 CORNERS = {
@@ -52,10 +52,14 @@ def test_tiff_is_turned_as_it_is_read(tmp_path, flag):
 
 def test_the_note_names_who_has_a_flag(tmp_path):
     write_flagged(tmp_path / "a.jpg", 1)
-    assert rotation_note([tmp_path / "a.jpg"]) == ""
     write_flagged(tmp_path / "b.jpg", 6)
     write_flagged(tmp_path / "c.jpg", 0)  # no flag that EXIF knows
-    (tmp_path / "d.jpg").write_bytes(b"no image")
-    assert rotation_note(sorted(tmp_path.iterdir())).startswith(
-        "1 images have a rotation flag (EXIF; b.jpg: 6"
-    )
+    write_flagged(tmp_path / "d.webp", 8, "WEBP")
+    write_flagged(tmp_path / "e.png", 3, "PNG")
+    (tmp_path / "f.jpg").write_bytes(b"no image, Exif or not")
+    flagged = {}
+    for path in sorted(tmp_path.iterdir()):
+        note_rotation(path.read_bytes(), path.name, flagged)
+    assert flagged == {"b.jpg": 6, "d.webp": 8, "e.png": 3}
+    assert rotation_note(flagged).startswith("3 images have a rotation flag (EXIF; b.jpg: 6")
+    assert rotation_note({}) == ""

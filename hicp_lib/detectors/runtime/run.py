@@ -24,7 +24,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.executor import Workers, resolved, run_jobs, threads_beside
 from hicp_lib.core.files import sha256_bytes
-from hicp_lib.core.images import decode_image, image_bytes
+from hicp_lib.core.images import decode_image, image_bytes, note_rotation
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.cached_parts import Runner
 from hicp_lib.detectors.runtime.isolation import IsolationError
@@ -165,7 +165,8 @@ class _Waiting:
 
 def detect_each(
     name: str, images: Iterable[tuple[Key, Image]], workers: Workers = None, progress: bool = True,
-    boxes_px: Mapping[Key, np.ndarray] | None = None, n_images: int | None = None, **options,
+    boxes_px: Mapping[Key, np.ndarray] | None = None, n_images: int | None = None,
+    flagged: dict[str, int] | None = None, **options,
 ) -> Generator[tuple[Key, Timed | InputError], None, None]:  # fmt: skip
     """People in one image after the other; what was handed on is not held any more.
 
@@ -180,6 +181,8 @@ def detect_each(
         These as of `detect_images`.
     n_images : int, optional
         How many there are, if that is known.
+    flagged : dict of str to int, optional
+        Gets the rotation flags of files that have one, by the files' names.
     **options : object
         Of the detector.
 
@@ -210,6 +213,8 @@ def detect_each(
                 waiting[key] = _Waiting(named, folder, error)
                 yield key, None
                 continue
+            if flagged is not None and isinstance(content, bytes):
+                note_rotation(content, named, flagged)
             kept = result_path(folder, sha256, boxes)
             result = read_result(kept)
             waiting[key] = _Waiting(named, kept, kept if result and len(waiting) > _MOST_WAITING else result)

@@ -12,6 +12,7 @@ import numpy as np
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import atomic_path, natural_order
+from hicp_lib.core.images import rotation_note
 from hicp_lib.core.video import SUFFIXES as VIDEO_SUFFIXES
 from hicp_lib.core.video import open_video
 from hicp_lib.detectors.runtime.run import Image, boxes_by_image, detect_each
@@ -126,9 +127,9 @@ def detect_to_file(
         If no image can be read, or one where `strict`; and as of `detect_each`.
     """
     n_people = n_images = n_broken = 0
-    n, known = pictures.n_images, dict[int, Facts]()
+    n, known, flagged = pictures.n_images, dict[int, Facts](), dict[str, int]()
     images = (known.update({i: facts}) or (i, image) for i, facts, image in pictures.images)
-    each = detect_each(name, images, boxes_px=pictures.boxes_px, n_images=n, **options)
+    each = detect_each(name, images, boxes_px=pictures.boxes_px, n_images=n, flagged=flagged, **options)
     with ExitStack() as stack:
         write = stack.enter_context(open_detections(out))
         listed = stack.enter_context(atomic_path(out.with_suffix(".images.json")))
@@ -149,6 +150,8 @@ def detect_to_file(
             n_images, n_people = n_images + 1, n_people + len(found.detections)
         if not n_images:
             raise InputError(f"{pictures.source}: none of its {n or 0} images can be read")
+    if flagged:
+        tell(rotation_note(flagged))
     if n not in (None, n_images + n_broken):
         tell(f"{pictures.source}: says {n} frames, {n_images} could be decoded; it may be cut off")
     return n_people, n_images, n_broken

@@ -90,14 +90,16 @@ def resample(
     places = [np.searchsorted(image_ids, e.matches.image_ids) for e in evaluations]
     rng = np.random.default_rng(draws.seed)
     n_draws = draws.n if n >= MIN_DRAWN else 0
-    weights = [np.bincount(rng.integers(n, size=n), minlength=n)[cluster] for _ in range(n_draws)]
-    pairs = zip(evaluations, places, strict=True)
-    return [_samples(e.matches, [w[place] for w in weights]) for e, place in pairs]
+    drawn = (np.bincount(rng.integers(n, size=n), minlength=n)[cluster] for _ in range(n_draws))
+    # Of n things drawn n times, none comes up more often than a byte holds; images may be many.
+    weights = [of.astype(np.uint8) for of in drawn]
+    return [_samples(e.matches, weights, place) for e, place in zip(evaluations, places, strict=True)]
 
 
-def _samples(matches: cocoeval.Matches, weights: Sequence[np.ndarray]) -> Samples:
+def _samples(matches: cocoeval.Matches, weights: Sequence[np.ndarray], place: np.ndarray) -> Samples:
     block = max(1, _BLOCK // max(1, len(matches.image_rows)))
-    blocks = (np.stack(weights[i : i + block]) for i in range(0, len(weights), block))
+    starts = range(0, len(weights), block)
+    blocks = (np.stack([w[place] for w in weights[i : i + block]]) for i in starts)
     parts = [cocoeval.metrics(*cocoeval.precision_recall(matches, of_block)) for of_block in blocks]
     return {name: np.concatenate([np.zeros(0), *(part[name] for part in parts)]) for name in cocoeval.METRICS}
 

@@ -19,7 +19,7 @@ from hicp_lib.core.cache import code_identity, key
 from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.executor import resolved, run_jobs
-from hicp_lib.core.files import atomic_path, cache_dir
+from hicp_lib.core.files import cache_dir, write_table
 from hicp_lib.core.images import decode_image
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.detectors.registry import make_detector
@@ -181,8 +181,7 @@ def _simulate(out: Path, run: str, job: Job, images: ImageCache) -> None:
         cycles, observations = loop.simulate(job.trial, camera, settings=settings), camera.observations
     frames = pd.DataFrame(list(map(_frame, observations)))
     for name, table in zip(reversed(_TABLES), (frames, cycles), strict=True):
-        with atomic_path(out / run / name) as temporary:
-            table.to_parquet(temporary, index=False)
+        write_table(out / run / name, table)
 
 
 def _frame(seen: Observation) -> dict:

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.camera import project, transform
-from hicp_lib.core.files import atomic_path, read_json, write_json
+from hicp_lib.core.files import read_json, write_json, write_table
 from hicp_lib.core.keypoints import NAMES
 from hicp_lib.experiments.laboratory import COLOUR, colour_and_depth, in_root, robot_camera
 from hicp_lib.experiments.recordings.scenarios import Scenario, scenario
@@ -90,8 +90,8 @@ def finish_recording(out: Path, plan: Scenario, n: int, stamp: dict) -> None:
             if path.stem.isdigit() and int(path.stem) >= n:
                 part_path(out, int(path.stem)).unlink(missing_ok=True)
                 path.unlink()
-    _write_table(out / TRUTH_FILE, _truth(out, times_s, T_base_cam))
-    _write_table(out / JOINTS_FILE, _joints(plan, times_s))
+    write_table(out / TRUTH_FILE, _truth(out, times_s, T_base_cam))
+    write_table(out / JOINTS_FILE, _joints(plan, times_s))
     settings = {"n_frames": n, "rate_hz": plan.rate_hz, "mount": plan.mount}
     settings["depth_camera"] = asdict(plan.depth_camera)
     mocap = out / PARTS_DIR / MOCAP_PART
@@ -116,8 +116,3 @@ def _joints(plan: Scenario, times_s: np.ndarray) -> pd.DataFrame:
     columns = {"frame": np.arange(len(times_s)), "t_s": times_s}
     names = (f"{joint}_rad" for joint in HEAD_JOINTS)
     return pd.DataFrame(columns | dict(zip(names, angles_rad.T, strict=True)))
-
-
-def _write_table(path: Path, table: pd.DataFrame) -> None:
-    with atomic_path(path) as temporary:
-        table.to_parquet(temporary, index=False)

@@ -6,6 +6,7 @@ import weakref
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import ExifTags, Image
 
 from hicp_lib.cli import main as cli
 from hicp_lib.core.errors import InputError
@@ -42,6 +43,15 @@ def test_numbers_in_names_are_in_their_order(folder, tmp_path):
     assert [row["file_name"] for row in rows] == [f"shot_{i}.png" for i in range(12)]
     assert [row["image_id"] for row in rows] == list(range(1, 13))
     assert [row["keypoints"][0] for row in rows] == list(range(12))
+
+
+def test_a_rotation_flag_is_told_kept_results_or_not(folder, tmp_path, capsys):
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = 6
+    Image.new("RGB", (30, 20)).save(folder / "turned.jpg", exif=exif)
+    for _ in range(2):
+        assert detect("--images", folder, "--out", tmp_path / "d.json") == 0
+        assert "1 images have a rotation flag (EXIF; turned.jpg: 6, ...)" in capsys.readouterr().err
 
 
 def test_image_numbers_are_those_of_coco_or_the_order_of_names(tmp_path):

@@ -1,0 +1,125 @@
+"""Detections judged by every group of keypoints and definition: what `hicp evaluate` tells and writes.
+
+Files come in two forms, by their suffix:
+
+- `.json`: what `judge` returns.
+- `.csv`, `.parquet`: a row per definition and metric, with `value`, `low` and `high`; image by image beside
+  it in `OUT.by_image.csv` (or `.parquet`).
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from hicp_lib.core.detections import Detections
+from hicp_lib.core.files import write_json, write_table
+from hicp_lib.evaluation.ap.bootstrap import bootstrap_intervals
+from hicp_lib.evaluation.ap.evaluate import evaluate
+from hicp_lib.evaluation.ap.metric_table import person_oks
+from hicp_lib.evaluation.ap.options import definitions
+from hicp_lib.evaluation.cases import labelled
+from hicp_lib.evaluation.statistics.resampling import Draws
+from hicp_lib.formats.annotations import Annotations, source_images
+
+Found = Mapping[int, Detections]
+
+
+def judge(
+    people: Annotations, found: Found, groups: Iterable[str], by_image: bool, seed: int = 0, **options: str
+) -> dict[str, Any]:
+    """AP and AR by every definition that `definitions` knows, with intervals over source images.
+
+    Parameters
+    ----------
+    people : Annotations
+        The truth.
+    found : mapping of int to Detections
+        By image id.
+    groups : iterable of str
+        Keys of `hicp_lib.evaluation.ap.options.OBJECTS`.
+    by_image : bool
+        Whether image by image, too.
+    seed : int, optional
+        Of the bootstrap.
+    **options : str
+        Fields of `hicp_lib.evaluation.ap.options.Options`.
+
+    Returns
+    -------
+    dict
+        Ready for JSON. Of the first definition `Evaluation.row`, with `metrics` (of each its `value`, `low`
+        and `high`) and `seed`; those of the others as `other_definitions`; and `by_image`, a list of rows of
+        `image_table`. None where there is no figure, as for a group that annotations or detections lack.
+    """
+    clusters, rows = source_images(people), []  # crops of one image are drawn together
+    for group, way in (each for of in groups for each in definitions(people, of)):
+        evaluation = evaluate(people, found, group, **way, **options)
+        row, figures = evaluation.row(), bootstrap_intervals(evaluation, Draws(seed=seed), clusters)
+        if any(map(len, found.values())) and not evaluation.n_detections:
+            figures = dict.fromkeys(figures, (math.nan,) * 3)
+            row |= dict.fromkeys(figures, math.nan)
+        metrics = {m: _finite(zip(("value", "low", "high"), of, strict=True)) for m, of in figures.items()}
+        rows.append(_finite(row.items()) | {"metrics": metrics, "seed": seed})
+    judged = {row["group"]: None for row in rows if row["AP"] is not None}
+    images = {}
+    if by_image and judged:
+        images = {"by_image": image_table(people, found, judged, **options).to_dict("records")}
+    return rows[0] | {"other_definitions": rows[1:]} | images
+
+
+def _finite(row: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """NaN, where nobody counts, is null in JSON."""
+    return {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in row}
+
+
+def image_table(people: Annotations, found: Found, groups: Iterable[str], **options: str) -> pd.DataFrame:
+    """How well people are found, image by image, the worst first.
+
+    Parameters
+    ----------
+    people, found, groups, **options
+        As of `judge`.
+
+    Returns
+    -------
+    DataFrame
+        Columns `group, image_id, file_name, n_people, n_detections, oks, oks_least`: mean and least over the
+        image's people of their best detection's, 0 where there is none. Images with people of the group only.
+    """
+    parts = [labelled(person_oks(people, found, group, **options), group=group) for group in groups]
+    by_image = pd.concat(parts).groupby(["group", "image_id"], sort=False)["oks"]
+    table = by_image.agg(n_people="size", oks="mean", oks_least="min").reset_index()
+    ids = table["image_id"].tolist()
+    table.insert(2, "file_name", [people.images[i].file_name for i in ids])
+    table.insert(4, "n_detections", [len(found.get(i, ())) for i in ids])
+    return table.sort_values(["group", "oks"], kind="stable", ignore_index=True)
+
+
+def write_judgement(path: Path, judged: dict[str, Any]) -> None:
+    """Write all of it in the format of the file's suffix, as the module says.
+
+    Parameters
+    ----------
+    path : Path
+    judged : dict
+        From `judge`.
+    """
+    if path.suffix == ".json":
+        write_json(path, judged, indent=2)
+        return
+    of_all = [
+        {
+            key: row[key]
+            for key in row
+            if key not in judged["metrics"] and not isinstance(row[key], dict | list)
+        }
+        | {"metric": name, **figure}
+        for row in (judged, *judged["other_definitions"])
+        for name, figure in row["metrics"].items()
+    ]
+    write_table(path, pd.DataFrame(of_all))
+    if "by_image" in judged:
+        write_table(path.with_suffix(f".by_image{path.suffix}"), pd.DataFrame(judged["by_image"]))
