@@ -207,7 +207,7 @@ def _last_line(text: str) -> str:
 
 
 def check_opencv() -> Check:
-    """That no other distribution's OpenCV lies in the place of the one without a display: one file for all."""
+    """That no other distribution has laid its OpenCV over the one without a display."""
     others = " ".join(name for name in _OTHER_OPENCVS if _installed(name) != "none")
     version = _installed(_OPENCV)
     uninstall = f"pip uninstall -y {others}; " if others else ""

@@ -16,23 +16,9 @@ from hicp_lib.core.datafiles import DATA_DIR
 N_KEYPOINTS = 136
 _TABLES = json.loads((DATA_DIR / "keypoints.json").read_text())
 
-COCO_NAMES = (
-    "nose left_eye right_eye left_ear right_ear left_shoulder right_shoulder left_elbow right_elbow "
-    "left_wrist right_wrist left_hip right_hip left_knee right_knee left_ankle right_ankle"
-).split()
-_HALPE_BODY_NAMES = (
-    "head_top neck mid_hip left_big_toe right_big_toe left_small_toe right_small_toe left_heel right_heel"
-).split()
-HAND_NAMES = ["hand_root"] + [
-    f"{finger}_{joint}" for finger in ("thumb", "index", "middle", "ring", "little") for joint in (1, 2, 3, 4)
-]
-NAMES: tuple[str, ...] = (
-    *COCO_NAMES,
-    *_HALPE_BODY_NAMES,
-    *(f"face_{i}" for i in range(68)),
-    *(f"left_{name}" for name in HAND_NAMES),
-    *(f"right_{name}" for name in HAND_NAMES),
-)
+NAMES: tuple[str, ...] = tuple(_TABLES["names"])
+COCO_NAMES = list(NAMES[:17])
+HAND_NAMES = [name.removeprefix("left_") for name in NAMES[94:115]]
 INDEX: dict[str, int] = {name: i for i, name in enumerate(NAMES)}
 
 COCO_17 = np.arange(0, 17)
@@ -47,12 +33,8 @@ HEAD = np.concatenate([np.arange(0, 5), [17], FACE])
 # The groups results are reported for: the body as all detectors share it, and both hands.
 GROUPS: dict[str, np.ndarray] = {"body": COCO_17, "hand": HANDS}
 
-HAND_LIMBS: list[tuple[int, int]] = [
-    (0 if joint == 1 else 4 * f + joint - 1, 4 * f + joint) for f in range(5) for joint in (1, 2, 3, 4)
-]
-LIMBS: list[tuple[int, int]] = [
-    *map(tuple, _TABLES["body_limbs"]), *((w + a, w + b) for w in (94, 115) for a, b in HAND_LIMBS)
-]  # fmt: skip
+LIMBS: list[tuple[int, int]] = [(a, b) for a, b in _TABLES["limbs"]]
+HAND_LIMBS = [(a - 94, b - 94) for a, b in LIMBS if a in LEFT_HAND]
 
 # Per-keypoint constants sigma of OKS (k = 2 sigma). "halpe": the Halpe tool box; "wholebody":
 # COCO-WholeBody's, with Halpe's own value for the three points that set lacks (17-19).
@@ -100,18 +82,7 @@ def to_halpe(values: np.ndarray, convention: str, axis: int, fill: float = np.na
     return np.moveaxis(result, -1, axis)
 
 
-def _halpe_mirror() -> np.ndarray:
-    swap = {"left": "right", "right": "left"}
-    parts = [name.partition("_") for name in NAMES]
-    indices = [INDEX[swap.get(side, side) + bar + rest] for side, bar, rest in parts]
-    # Within the 300-W face, points first...last mirror onto total - i (contour, brows, nose, eyes, lips).
-    for first, last, total in _TABLES["face_mirror"]:
-        for i in range(first, last + 1):
-            indices[FACE[i]] = int(FACE[total - i])
-    return np.array(indices)
-
-
-_HALPE_MIRROR = _halpe_mirror()
+_HALPE_MIRROR = np.array(_TABLES["in_a_mirror"])
 
 
 def mirror(convention: str) -> np.ndarray:

@@ -11,10 +11,15 @@ the parabola through the logarithms of its neighbours, exact for the Gaussians t
 cheaper. And two people are merged when a limb joins them and they have no part in common.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import read_json
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,13 @@ class PartModel:
     fields: np.ndarray
     completing: frozenset[int] = frozenset()
     uncounted: frozenset[int] = frozenset()
+
+    @classmethod
+    def of(cls, convention: str) -> PartModel:
+        """That of one of OpenPose's networks, by the name of its keypoints (`data/keypoints.json`)."""
+        row = read_json(DATA_DIR / "keypoints.json")["openpose_parts"][convention]
+        given = map(np.array, (row["pairs"], row["fields"]))
+        return cls(convention, row["n_parts"], *given, *map(frozenset, (row["completing"], row["uncounted"])))
 
 
 @dataclass(frozen=True)

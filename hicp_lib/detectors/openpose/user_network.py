@@ -21,22 +21,7 @@ from hicp_lib.detectors.openpose.net_input import feed, fit
 from hicp_lib.detectors.openpose.paf import PafOptions, PartModel, assemble
 from hicp_lib.detectors.openpose.released import assemble_released
 
-_BODY_25_LIMBS = {
-    (1, 8): (0, 1), (1, 2): (14, 15), (1, 5): (22, 23), (2, 3): (16, 17), (3, 4): (18, 19),
-    (5, 6): (24, 25), (6, 7): (26, 27), (8, 9): (6, 7), (9, 10): (2, 3), (10, 11): (4, 5),
-    (8, 12): (8, 9), (12, 13): (10, 11), (13, 14): (12, 13), (1, 0): (30, 31), (0, 15): (32, 33),
-    (15, 17): (36, 37), (0, 16): (34, 35), (16, 18): (38, 39), (2, 17): (20, 21), (5, 18): (28, 29),
-    (14, 19): (40, 41), (19, 20): (42, 43), (14, 21): (44, 45), (11, 22): (46, 47), (22, 23): (48, 49),
-    (11, 24): (50, 51),
-}  # fmt: skip
-BODY_25 = PartModel(
-    convention="openpose_body25",
-    n_parts=25,
-    pairs=np.array(list(_BODY_25_LIMBS)),
-    fields=np.array(list(_BODY_25_LIMBS.values())),
-    completing=frozenset({18, 19}),
-    uncounted=frozenset(range(19, 25)),
-)
+BODY_25 = PartModel.of("openpose_body25")
 # By the number of heat maps, background included, and of fields.
 _PART_MODELS = {(19, 38): COCO_18, (26, 52): BODY_25}
 
