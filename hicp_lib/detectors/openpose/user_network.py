@@ -47,14 +47,9 @@ class OpenPose:
     name = "openpose"
 
     def __init__(
-        self,
-        model: str | Path,
-        hand_model: str | Path | None = None,
-        net_height_px: int = 368,
-        as_released: bool = True,
-        provider: str = "cpu",
-        threads: int = 1,
-    ) -> None:
+        self, model: str | Path, hand_model: str | Path | None = None, net_height_px: int = 368,
+        as_released: bool = True, provider: str = "cpu", threads: int = 1,
+    ) -> None:  # fmt: skip
         check_height(net_height_px)
         self._model = open_model(model, provider, threads)
         height, width = self._model.image_size_px
