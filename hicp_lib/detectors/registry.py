@@ -182,9 +182,7 @@ def _make_combined(name: str, options: dict) -> Detector:
     for_hands = _HANDS_WITHIN.get(hands, {}) | {
         key.removeprefix("hands_"): value for key, value in options.items() if key.startswith("hands_")
     }
-    for_body = {
-        key: value for key, value in options.items() if key not in own and not key.startswith("hands_")
-    }
+    for_body = {key: options[key] for key in options if key not in own and not key.startswith("hands_")}
     return combined_class(make_detector(body, **for_body), make_detector(hands, **for_hands), **own)
 
 

@@ -53,8 +53,9 @@ class PartModel:
     def of(cls, convention: str) -> PartModel:
         """That of one of OpenPose's networks, by the name of its keypoints (`data/keypoints.json`)."""
         row = read_json(DATA_DIR / "keypoints.json")["openpose_parts"][convention]
-        given = map(np.array, (row["pairs"], row["fields"]))
-        return cls(convention, row["n_parts"], *given, *map(frozenset, (row["completing"], row["uncounted"])))
+        pairs, fields = np.array(row["pairs"]), np.array(row["fields"])
+        completing, uncounted = frozenset(row["completing"]), frozenset(row["uncounted"])
+        return cls(convention, row["n_parts"], pairs, fields, completing, uncounted)
 
 
 @dataclass(frozen=True)
