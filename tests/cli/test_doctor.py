@@ -37,6 +37,21 @@ def test_a_package_that_differs_from_the_lock_is_named(tmp_path):
     assert doctor.check_locked_versions(tmp_path / "none.lock").status == doctor.FAIL
 
 
+def test_another_opencv_is_named_with_a_remedy(tmp_path, monkeypatch):
+    assert doctor.check_opencv().finding.startswith("opencv-python-headless ")
+    monkeypatch.setattr("sys.path", [str(tmp_path)])
+    reinstall = "pip install --force-reinstall --no-deps opencv-python-headless"
+    assert (doctor.check_opencv().status, doctor.check_opencv().remedy) == (doctor.FAIL, reinstall)
+    for name in ("opencv-python-headless", "opencv-contrib-python"):
+        info = tmp_path / f"{name.replace('-', '_')}-5.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 5.0\n")
+    check = doctor.check_opencv()
+    assert check.status == doctor.FAIL
+    assert check.finding == "opencv-contrib-python in the place of opencv-python-headless"
+    assert check.remedy == f"pip uninstall -y opencv-contrib-python; {reinstall}"
+
+
 def trial(code: str, limit_s: float = 60.0) -> doctor.Check:
     return doctor.check_probe("renderer", (sys.executable, "-c", code), limit_s)
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import onnxruntime
 import pytest
+from bake.messages import message_class
 from export_openpose import MESSAGES, to_onnx
-
-from hicp_lib.detectors.onnx.protobuf import message_class
 
 DESCRIPTION = """
 name: "toy"

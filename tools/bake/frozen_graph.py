@@ -17,8 +17,8 @@ import onnx
 from google.protobuf.message import DecodeError, Message
 from onnx import helper, numpy_helper
 
+from bake.messages import Messages, message_class
 from hicp_lib.core.errors import InputError
-from hicp_lib.detectors.onnx.protobuf import Messages, message_class
 
 _MESSAGES: Messages = {
     "Graph": {"node": (1, "[Node]")},

@@ -1,10 +1,10 @@
 """The program of MediaPipe's own process: one task, then an answer to every image.
 
 It is run by its path and imports nothing of this package, so that it starts in any environment, and soon.
-Messages go through standard input and output: the lengths of head and body, a head in JSON, a body of plain
-bytes. The first one's head tells the task's options and its body is the bundle; every other one tells the
-`shape` of the RGB image that lies in memory both sides see, a file whose descriptor is the argument: through
-a pipe a call would take a tenth longer. Answers are arrays of float64 (`shape`) or an `error` in one line.
+Messages go through a socket whose descriptor is the last argument: a head in JSON, a body of plain bytes. The
+first one's head tells the task's options and its body is the bundle; every other one tells the `shape` of the
+RGB image that lies in memory both sides see, a file whose descriptor is the argument before: through a pipe a
+call would take a tenth longer. Answers are arrays of float64 (`shape`) or an `error` in one line.
 """
 
 import itertools
@@ -12,66 +12,55 @@ import json
 import mmap
 import os
 import signal
-import struct
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from multiprocessing.connection import Connection
 from types import ModuleType
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
 N_POSE, N_HAND = 33, 21
-_LENGTHS = struct.Struct("<QQ")
 _SIDES = {"Left": 0.0, "Right": 1.0}
 _VISION = "mediapipe.tasks.python.vision"
 
 
-def send(file: IO[bytes], head: dict, body: bytes = b"") -> None:
+def send(pipe: Connection, head: dict, body: bytes = b"") -> None:
     """Write one message.
 
     Parameters
     ----------
-    file : file
+    pipe : Connection
     head : dict
         JSON-able.
     body : bytes
 
     Examples
     --------
-    >>> from io import BytesIO
-    >>> pipe = BytesIO()
-    >>> send(pipe, {"shape": [1, 2]}, b"ab")
-    >>> _ = pipe.seek(0)
-    >>> receive(pipe)
+    >>> from multiprocessing import Pipe
+    >>> one, other = Pipe()
+    >>> send(one, {"shape": [1, 2]}, b"ab")
+    >>> receive(other)
     ({'shape': [1, 2]}, b'ab')
     """
-    text = json.dumps(head).encode()
-    file.write(_LENGTHS.pack(len(text), len(body)) + text)
-    file.write(body)
-    file.flush()
+    pipe.send_bytes(json.dumps(head).encode())
+    pipe.send_bytes(body)
 
 
-def receive(file: IO[bytes]) -> tuple[dict, bytes]:
+def receive(pipe: Connection) -> tuple[dict, bytes]:
     """Read one message.
 
     Raises
     ------
-    EOFError
+    EOFError or OSError
         If the other side is gone.
     """
-    lengths = file.read(_LENGTHS.size)
-    if len(lengths) < _LENGTHS.size:
-        raise EOFError
-    n_head, n_body = _LENGTHS.unpack(lengths)
-    head, body = file.read(n_head), file.read(n_body)
-    if len(head) < n_head or len(body) < n_body:
-        raise EOFError
-    return json.loads(head), body
+    return json.loads(pipe.recv_bytes()), pipe.recv_bytes()
 
 
-def _serve(questions: IO[bytes], answers: IO[bytes], folder: str, shared: int) -> None:
-    head, bundle = receive(questions)
+def _serve(pipe: Connection, folder: str, shared: int) -> None:
+    head, bundle = receive(pipe)
     # Whatever hangs in the library is ended by the system, also when nobody waits for it any more.
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGALRM])
@@ -80,10 +69,10 @@ def _serve(questions: IO[bytes], answers: IO[bytes], folder: str, shared: int) -
     _leave_out(folder, "mediapipe", "mediapipe.tasks.python", _VISION)
     detect = detection(bundle, **head)
     signal.setitimer(signal.ITIMER_REAL, 0)
-    send(answers, {})
+    send(pipe, {})
     pixels: bytes | mmap.mmap = b""
     while True:
-        shape = receive(questions)[0]["shape"]
+        shape = receive(pipe)[0]["shape"]
         signal.setitimer(signal.ITIMER_REAL, limit_s)
         try:
             if np.prod(shape) > len(pixels):
@@ -93,7 +82,7 @@ def _serve(questions: IO[bytes], answers: IO[bytes], folder: str, shared: int) -
         except (ValueError, RuntimeError) as error:
             head, body = {"error": _one_line(error)}, b""
         signal.setitimer(signal.ITIMER_REAL, 0)
-        send(answers, head, body)
+        send(pipe, head, body)
 
 
 def detection(
@@ -178,15 +167,15 @@ def _one_line(error: BaseException) -> str:
 
 
 def _main() -> None:
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what the library prints is no answer
-    sys.path.append(sys.argv[1])  # where MediaPipe is
+    folder, shared, socket = sys.argv[1], *map(int, sys.argv[2:])
+    pipe = Connection(socket)
+    sys.path.append(folder)  # where MediaPipe is
     try:
-        _serve(sys.stdin.buffer, answers, sys.argv[1], int(sys.argv[2]))
+        _serve(pipe, folder, shared)
     except EOFError:
         pass
     except Exception as error:  # a broken library may raise anything
-        send(answers, {"error": _one_line(error)})
+        send(pipe, {"error": _one_line(error)})
     # Without closing the task: that would send usage metrics, and takes its time.
     os._exit(0)
 

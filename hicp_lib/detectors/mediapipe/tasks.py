@@ -19,7 +19,6 @@ What MediaPipe gives and what is made of it:
   The answer then depends on the images before.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -54,12 +53,9 @@ class MediaPipePose:
     name = "mediapipe-pose"
 
     def __init__(
-        self,
-        num_poses: int = 1,
-        min_score: float = 0.5,
-        model: str | Path | None = None,
+        self, num_poses: int = 1, min_score: float = 0.5, model: str | Path | None = None,
         tracking_hz: float = 0,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._process, identity = _process(self.name, "pose", num_poses, min_score, model, tracking_hz)
         self.settings = {"num_poses": num_poses, "min_score": min_score, **identity}
         self.start = self._process.start
@@ -95,12 +91,9 @@ class MediaPipeHands:
     name = "mediapipe-hands"
 
     def __init__(
-        self,
-        num_hands: int = 2,
-        min_score: float = 0.5,
-        model: str | Path | None = None,
+        self, num_hands: int = 2, min_score: float = 0.5, model: str | Path | None = None,
         tracking_hz: float = 0,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._process, identity = _process(self.name, "hand", num_hands, min_score, model, tracking_hz)
         self.settings = {"num_hands": num_hands, "min_score": min_score, **identity}
         self.start = self._process.start
@@ -128,37 +121,23 @@ class MediaPipe:
         Most people to return per image (and half the number of hands).
     min_score : float
         Threshold of both detectors.
-    side_by_side : bool
-        Look for both at the same time, in two threads: an answer comes sooner where a processor is free,
-        which is what a robot waits for.
     tracking_hz : float, optional
         As of its parts.
     """
 
     name = "mediapipe"
 
-    def __init__(
-        self, num_people: int = 1, min_score: float = 0.5, side_by_side: bool = False, tracking_hz: float = 0
-    ) -> None:
-        self._thread = ThreadPoolExecutor(1) if side_by_side else None
+    def __init__(self, num_people: int = 1, min_score: float = 0.5, tracking_hz: float = 0) -> None:
         self.parts: dict[str, MediaPipePose | MediaPipeHands] = {
             "pose": MediaPipePose(num_people, min_score, tracking_hz=tracking_hz),
             "hands": MediaPipeHands(2 * num_people, min_score, tracking_hz=tracking_hz),
         }
         self.settings = {name: part.settings for name, part in self.parts.items()}
 
-    def start(self) -> None:
-        """Start both if they work side by side: the times of two starts at once do not add up."""
-        for part in self.parts.values() if self._thread else ():
-            part.start()
-
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
         pose, hands = self.parts.values()
-        if self._thread is None:
-            return attach_hands(pose.detect(image), hands.detect(image))
-        found = self._thread.submit(hands.detect, image)
-        return attach_hands(pose.detect(image), found.result())
+        return attach_hands(pose.detect(image), hands.detect(image))
 
 
 def attach_hands(bodies: Detections, found: Detections) -> Detections:

@@ -2,36 +2,15 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 from google.protobuf.message import DecodeError, Message
+from onnx import GraphProto, ModelProto, TensorProto
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import json_or_text
-from hicp_lib.detectors.onnx.protobuf import Messages, message_class
 
-# Of ONNX's own `onnx.proto`, what is asked of a model before it runs.
-_MESSAGES: Messages = {
-    "Model": {
-        "graph": (7, "Graph"), "metadata": (14, "[Entry]"), "training": (20, "[Training]"),
-        "functions": (25, "[Function]"),
-    },
-    "Training": {"initialization": (1, "Graph"), "algorithm": (2, "Graph")},
-    "Function": {"node": (7, "[Node]"), "attribute": (11, "[Attribute]")},
-    "Graph": {"node": (1, "[Node]"), "initializer": (5, "[Tensor]"), "sparse": (15, "[Sparse]")},
-    "Node": {"input": (1, "[string]"), "op_type": (4, "string"), "attribute": (5, "[Attribute]")},
-    "Attribute": {
-        "t": (5, "Tensor"), "g": (6, "Graph"), "tensors": (10, "[Tensor]"), "graphs": (11, "[Graph]"),
-        "sparse": (22, "Sparse"), "sparses": (23, "[Sparse]"),
-    },
-    "Sparse": {"values": (1, "Tensor"), "indices": (2, "Tensor")},
-    "Tensor": {
-        "dims": (1, "[int64]"), "name": (8, "string"), "external": (13, "[Entry]"), "location": (14, "int32"),
-    },
-    "Entry": {"key": (1, "string"), "value": (2, "string")},
-}  # fmt: skip
 # Under this name exporters keep what a network expects, as a JSON object.
 _CONTRACT = "cigpose_meta"
 
@@ -70,33 +49,30 @@ def read_model(path: Path, content: bytes) -> ModelFile:
         If it is no ONNX file, keeps weights in a second one, or its contract is no JSON object.
     """
     try:
-        model = _model_class().FromString(content)
+        model = ModelProto.FromString(content)
     except DecodeError:
         raise InputError(
             f"{path}: is not an ONNX file or is cut off ({len(content)} bytes); get it again, or export it"
         ) from None
     # A second file would be read from wherever the program was started, and its content is in no hash.
-    outside = next((tensor for tensor in _tensors(model) if tensor.location or tensor.external), None)
+    outside = next(
+        (tensor for tensor in _tensors(model) if tensor.data_location or tensor.external_data), None
+    )
     if outside is not None:
-        file = next((entry.value for entry in outside.external if entry.key == "location"), "?")
+        file = next((entry.value for entry in outside.external_data if entry.key == "location"), "?")
         raise InputError(
             f"{path}: keeps weights outside the file ({outside.name or 'a constant'} in {file!r}), which are "
             "not read; export it in one file: torch.onnx.export(..., external_data=False), or load it with "
             "onnx.load and save it with onnx.save"
         )
     operators = frozenset(node.op_type for node in model.graph.node)
-    written = {entry.key: entry.value for entry in model.metadata}
+    written = {entry.key: entry.value for entry in model.metadata_props}
     return ModelFile(operators, _first_convolution(model.graph), _metadata(path, written))
 
 
-@cache
-def _model_class() -> type[Message]:
-    return message_class(_MESSAGES, "Model")
-
-
-def _tensors(message: Message) -> Iterator[Message]:
+def _tensors(message: Message) -> Iterator[TensorProto]:
     """Every tensor in a message: of graphs, of nodes' attributes, of the graphs within them."""
-    if message.DESCRIPTOR.name == "Tensor":
+    if isinstance(message, TensorProto):
         yield message
         return
     for field, value in message.ListFields():
@@ -105,7 +81,7 @@ def _tensors(message: Message) -> Iterator[Message]:
                 yield from _tensors(part)
 
 
-def _first_convolution(graph: Message) -> tuple[int, ...]:
+def _first_convolution(graph: GraphProto) -> tuple[int, ...]:
     dims = {tensor.name: tuple(tensor.dims) for tensor in graph.initializer}
     weights = [node.input[1] for node in graph.node if node.op_type == "Conv" and len(node.input) > 1]
     return next((dims[name] for name in weights if len(dims.get(name, ())) > 1), ())

@@ -15,15 +15,11 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.onnx.decode import given
 from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import letterbox
-from hicp_lib.detectors.onnx.person_boxes import unsuppressed
+from hicp_lib.detectors.onnx.person_boxes import DEFAULT_SIDE_PX, FILL, N_BOX, unsuppressed
 from hicp_lib.detectors.onnx.pose_net import CONVENTIONS, convention_of
 from hicp_lib.detectors.onnx.session import open_model
 
-_FILL = (114, 114, 114)
-_DEFAULT_SIDE_PX = 640
-# x, y, size and score
-_N_BOX = 5
-_N_COLUMNS = {_N_BOX + 3 * n_keypoints for n_keypoints in CONVENTIONS}
+_N_COLUMNS = {N_BOX + 3 * n_keypoints for n_keypoints in CONVENTIONS}
 
 
 class OneStage:
@@ -45,13 +41,9 @@ class OneStage:
     name = "one-stage"
 
     def __init__(
-        self,
-        model: str | Path,
-        min_score: float = 0.1,
-        max_overlap: float = 0.65,
-        provider: str = "cpu",
+        self, model: str | Path, min_score: float = 0.1, max_overlap: float = 0.65, provider: str = "cpu",
         threads: int = 1,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._model = open_model(model, provider, threads)
         self._min_score, self._max_overlap = min_score, max_overlap
         height, width = self._model.image_size_px
@@ -59,7 +51,7 @@ class OneStage:
             case [int(open_height), int(open_width)]:
                 self._size_px = width or open_width, height or open_height
             case _:
-                self._size_px = width or _DEFAULT_SIDE_PX, height or _DEFAULT_SIDE_PX
+                self._size_px = width or DEFAULT_SIDE_PX, height or DEFAULT_SIDE_PX
         outputs = self._model.response_to_zeros(*self._size_px[::-1])
         self._is_rtmo = len(outputs) > 1
         self._convention = convention_of(self._model, self._read(outputs)[1].shape[1], outputs)
@@ -67,7 +59,7 @@ class OneStage:
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
-        fitted = letterbox(image, self._size_px, _FILL, is_centred=not self._is_rtmo)
+        fitted = letterbox(image, self._size_px, FILL, is_centred=not self._is_rtmo)
         feed = cv2.dnn.blobFromImage(fitted.pixels, 1 if self._is_rtmo else 1 / 255, swapRB=self._is_rtmo)
         boxes, keypoints = self._read(self._model.run(feed))
         keep = np.flatnonzero(boxes[:, 4] >= self._min_score)
@@ -101,8 +93,8 @@ class OneStage:
                 rows = outputs[0][0].T.astype(float)
                 half = rows[:, 2:4] / 2
                 corners = np.concatenate([rows[:, :2] - half, rows[:, :2] + half, rows[:, 4:5]], axis=1)
-                return corners, rows[:, _N_BOX:].reshape(len(rows), -1, 3)
+                return corners, rows[:, N_BOX:].reshape(len(rows), -1, 3)
             case [(1, _, n_columns)] if n_columns - 1 in _N_COLUMNS:
                 rows = outputs[0][0].astype(float)
-                return rows[:, :_N_BOX], rows[:, _N_BOX + 1 :].reshape(len(rows), -1, 3)
+                return rows[:, :N_BOX], rows[:, N_BOX + 1 :].reshape(len(rows), -1, 3)
         raise self._model.refusal("expected RTMO's or YOLO-pose's outputs, of one class", outputs)

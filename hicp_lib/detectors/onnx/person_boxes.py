@@ -17,17 +17,17 @@ from hicp_lib.detectors.onnx.facts import Fact
 from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, blob, letterbox
 from hicp_lib.detectors.onnx.session import open_model
 
-_FILL = (114, 114, 114)
+FILL = (114, 114, 114)
 _NORMALISATIONS = {"yolox": ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), "rtmdet": IMAGENET_BGR}
 _STRIDES = (8, 16, 32)
 _PERSON = 0
 # YOLOX begins by folding 2 x 2 pixels into channels.
 _FOLDED_CHANNELS = 12
-_DEFAULT_SIDE_PX = 640
+DEFAULT_SIDE_PX = 640
 # exp() of more is no size of a box
 _MAX_LOG_SIZE = 20
 # x, y, size and score
-_N_BOX = 5
+N_BOX = 5
 
 
 class PersonBoxes:
@@ -49,14 +49,9 @@ class PersonBoxes:
     """
 
     def __init__(
-        self,
-        model: str | Path,
-        provider: str = "cpu",
-        threads: int = 1,
-        family: str | None = None,
-        min_score: float = 0.3,
-        max_overlap: float = 0.45,
-    ) -> None:
+        self, model: str | Path, provider: str = "cpu", threads: int = 1, family: str | None = None,
+        min_score: float = 0.3, max_overlap: float = 0.45,
+    ) -> None:  # fmt: skip
         self._model = open_model(model, provider, threads)
         folds = self._model.told.first_convolution[1:2] == (_FOLDED_CHANNELS,)
         self._is_told = family is None
@@ -64,19 +59,19 @@ class PersonBoxes:
         refuse_unknown("person_family", self._family, _NORMALISATIONS)
         self._min_score, self._max_overlap = min_score, max_overlap
         height, width = self._model.image_size_px
-        self._size_px = width or _DEFAULT_SIDE_PX, height or _DEFAULT_SIDE_PX
+        self._size_px = width or DEFAULT_SIDE_PX, height or DEFAULT_SIDE_PX
         self._cells = _cells(self._size_px)
         rows = self._rows(self._model.response_to_zeros(*self._size_px[::-1]))
-        self._is_decoded = rows.shape[1] > _N_BOX and _is_decoded(rows, self._cells)
+        self._is_decoded = rows.shape[1] > N_BOX and _is_decoded(rows, self._cells)
         own = {"family": self._family, "min_score": min_score, "max_overlap": max_overlap}
         self.settings = own | {"decoded": self._is_decoded} | self._model.settings
 
     def find(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """People in an RGB image (height, width, 3): boxes (n, 4: x, y, width, height) and scores (n,)."""
-        fitted = letterbox(image, self._size_px, _FILL)
+        fitted = letterbox(image, self._size_px, FILL)
         outputs = self._model.run(blob([fitted.pixels], *_NORMALISATIONS[self._family], is_bgr=True))
         rows = self._rows(outputs)
-        suppressed = rows.shape[1] == _N_BOX
+        suppressed = rows.shape[1] == N_BOX
         corners, scores, labels = _listed(rows, outputs) if suppressed else self._from_grid(rows)
         keep = (scores >= self._min_score) & np.isfinite(corners).all(axis=1)
         keep &= (corners[:, 2:] > corners[:, :2]).all(axis=1)
@@ -106,7 +101,7 @@ class PersonBoxes:
         tables = [output for output in outputs if output.ndim == 3]
         rows = tables[0][0] if len(tables) == 1 and len(tables[0]) == 1 else np.empty((0, 0))
         n_columns = rows.shape[1]
-        if n_columns < _N_BOX or n_columns > _N_BOX and len(rows) != len(self._cells):
+        if n_columns < N_BOX or n_columns > N_BOX and len(rows) != len(self._cells):
             size = "{} x {}".format(*self._size_px)
             raise self._model.refusal(
                 f"expected (1, n, 5) boxes with scores, or (1, {len(self._cells)}, 5 + classes) of YOLOX's "
@@ -121,8 +116,8 @@ class PersonBoxes:
             stride = self._cells[:, 2:]
             centre = (centre + self._cells[:, :2]) * stride
             size = np.exp(np.minimum(size, _MAX_LOG_SIZE)) * stride
-        labels = rows[:, _N_BOX:].argmax(axis=1)
-        scores = rows[:, 4].astype(float) * rows[:, _N_BOX:].max(axis=1)
+        labels = rows[:, N_BOX:].argmax(axis=1)
+        scores = rows[:, 4].astype(float) * rows[:, N_BOX:].max(axis=1)
         scores = np.where(np.isfinite(scores), scores, 0.0)
         return np.concatenate([centre - size / 2, centre + size / 2], axis=1), scores, labels
 

@@ -18,20 +18,7 @@ from hicp_lib.detectors.onnx.session import open_committed
 from hicp_lib.detectors.openpose.paf import PafOptions, PartModel, assemble
 
 STRIDE = 8
-
-_COCO_18_LIMBS = {
-    (1, 2): (12, 13), (1, 5): (20, 21), (2, 3): (14, 15), (3, 4): (16, 17), (5, 6): (22, 23),
-    (6, 7): (24, 25), (1, 8): (0, 1), (8, 9): (2, 3), (9, 10): (4, 5), (1, 11): (6, 7),
-    (11, 12): (8, 9), (12, 13): (10, 11), (1, 0): (28, 29), (0, 14): (30, 31), (14, 16): (34, 35),
-    (0, 15): (32, 33), (15, 17): (36, 37), (2, 16): (18, 19), (5, 17): (26, 27),
-}  # fmt: skip
-COCO_18 = PartModel(
-    convention="openpose_coco18",
-    n_parts=18,
-    pairs=np.array(list(_COCO_18_LIMBS)),
-    fields=np.array(list(_COCO_18_LIMBS.values())),
-    completing=frozenset({17, 18}),
-)
+COCO_18 = PartModel.of("openpose_coco18")
 
 
 def check_height(net_height_px: int) -> None:

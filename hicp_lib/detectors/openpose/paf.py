@@ -11,10 +11,15 @@ the parabola through the logarithms of its neighbours, exact for the Gaussians t
 cheaper. And two people are merged when a limb joins them and they have no part in common.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import read_json
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,14 @@ class PartModel:
     fields: np.ndarray
     completing: frozenset[int] = frozenset()
     uncounted: frozenset[int] = frozenset()
+
+    @classmethod
+    def of(cls, convention: str) -> PartModel:
+        """That of one of OpenPose's networks, by the name of its keypoints (`data/keypoints.json`)."""
+        row = read_json(DATA_DIR / "keypoints.json")["openpose_parts"][convention]
+        pairs, fields = np.array(row["pairs"]), np.array(row["fields"])
+        completing, uncounted = frozenset(row["completing"]), frozenset(row["uncounted"])
+        return cls(convention, row["n_parts"], pairs, fields, completing, uncounted)
 
 
 @dataclass(frozen=True)
@@ -145,13 +158,9 @@ def _vertex(before: np.ndarray, middle: np.ndarray, after: np.ndarray) -> np.nda
 
 
 def limb_scores(
-    limb_field: np.ndarray,
-    starts: np.ndarray,
-    ends: np.ndarray,
-    stride: int,
-    options: PafOptions,
+    limb_field: np.ndarray, starts: np.ndarray, ends: np.ndarray, stride: int, options: PafOptions,
     sample: Sampler | None = None,
-) -> np.ndarray:
+) -> np.ndarray:  # fmt: skip
     """How well an affinity field supports a limb between every start and every end.
 
     The field is sampled along the straight line, 5 to 25 times by its length, and projected on
@@ -256,13 +265,9 @@ def assemble(
 
 
 def find_limbs(
-    peaks: list[np.ndarray],
-    fields: np.ndarray,
-    model: PartModel,
-    stride: int,
-    options: PafOptions,
+    peaks: list[np.ndarray], fields: np.ndarray, model: PartModel, stride: int, options: PafOptions,
     sample: Sampler | None = None,
-) -> list[list[Limb]]:
+) -> list[list[Limb]]:  # fmt: skip
     """Limbs of each pair.
 
     Parameters

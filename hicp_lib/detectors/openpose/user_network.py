@@ -18,25 +18,10 @@ from hicp_lib.detectors.onnx.session import OnnxModel, open_model
 from hicp_lib.detectors.openpose.hands import OpenPoseHands
 from hicp_lib.detectors.openpose.mobilenet import COCO_18, STRIDE, as_detections, check_height
 from hicp_lib.detectors.openpose.net_input import feed, fit
-from hicp_lib.detectors.openpose.paf import PafOptions, PartModel, assemble
+from hicp_lib.detectors.openpose.paf import PafOptions, PartModel
 from hicp_lib.detectors.openpose.released import assemble_released
 
-_BODY_25_LIMBS = {
-    (1, 8): (0, 1), (1, 2): (14, 15), (1, 5): (22, 23), (2, 3): (16, 17), (3, 4): (18, 19),
-    (5, 6): (24, 25), (6, 7): (26, 27), (8, 9): (6, 7), (9, 10): (2, 3), (10, 11): (4, 5),
-    (8, 12): (8, 9), (12, 13): (10, 11), (13, 14): (12, 13), (1, 0): (30, 31), (0, 15): (32, 33),
-    (15, 17): (36, 37), (0, 16): (34, 35), (16, 18): (38, 39), (2, 17): (20, 21), (5, 18): (28, 29),
-    (14, 19): (40, 41), (19, 20): (42, 43), (14, 21): (44, 45), (11, 22): (46, 47), (22, 23): (48, 49),
-    (11, 24): (50, 51),
-}  # fmt: skip
-BODY_25 = PartModel(
-    convention="openpose_body25",
-    n_parts=25,
-    pairs=np.array(list(_BODY_25_LIMBS)),
-    fields=np.array(list(_BODY_25_LIMBS.values())),
-    completing=frozenset({18, 19}),
-    uncounted=frozenset(range(19, 25)),
-)
+BODY_25 = PartModel.of("openpose_body25")
 # By the number of heat maps, background included, and of fields.
 _PART_MODELS = {(19, 38): COCO_18, (26, 52): BODY_25}
 
@@ -52,8 +37,6 @@ class OpenPose:
         ONNX conversion of the hand network; without it no hands are given.
     net_height_px : int
         Height of the input, a multiple of 16, where the file leaves it open.
-    as_released : bool
-        Read the maps as OpenPose's program does; else the cheaper way of `hicp_lib.detectors.openpose.paf`.
     provider : str
     threads : int
         See `hicp_lib.detectors.onnx.session.open_model`.
@@ -62,14 +45,9 @@ class OpenPose:
     name = "openpose"
 
     def __init__(
-        self,
-        model: str | Path,
-        hand_model: str | Path | None = None,
-        net_height_px: int = 368,
-        as_released: bool = True,
-        provider: str = "cpu",
-        threads: int = 1,
-    ) -> None:
+        self, model: str | Path, hand_model: str | Path | None = None, net_height_px: int = 368,
+        provider: str = "cpu", threads: int = 1,
+    ) -> None:  # fmt: skip
         check_height(net_height_px)
         self._model = open_model(model, provider, threads)
         height, width = self._model.image_size_px
@@ -78,23 +56,18 @@ class OpenPose:
         answer = self._model.response_to_zeros(*shown_px)
         self._convention = _split(self._model, answer, shown_px)[2].convention
         self._hands = OpenPoseHands(hand_model, provider, threads) if hand_model is not None else None
-        self._as_released = as_released
         self._options = PafOptions()
         hands = self._hands.settings if self._hands else None
         self.settings: dict[str, Any] = {"model": self._model.settings, "hand_model": hands}
-        self.settings |= {"size_px": self._size_px, "as_released": as_released}
-        self.settings |= {"opencv": cv2.__version__, **asdict(self._options)}
+        self.settings |= {"size_px": self._size_px, "opencv": cv2.__version__, **asdict(self._options)}
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
         net_input = fit(image, *self._size_px)
         maps = self._model.run(feed(net_input.pixels))
         heat_maps, fields, parts_model = _split(self._model, maps, net_input.pixels.shape[:2])
-        given = heat_maps, fields, parts_model, STRIDE, self._options
-        if self._as_released:
-            parts, scores = assemble_released(*given, offset_px=0.5 * net_input.scale.min())
-        else:
-            parts, scores = assemble(*given)
+        offset_px = 0.5 * net_input.scale.min()
+        parts, scores = assemble_released(heat_maps, fields, parts_model, STRIDE, self._options, offset_px)
         people = as_detections(parts, scores, net_input, parts_model.convention)
         return self._hands.complete(image, people) if self._hands else people
 
@@ -109,14 +82,11 @@ class OpenPose:
                  "proportion, to a multiple of 16, at most 16 / 9 of it"),
             Fact("pixels", "BGR / 256 - 0.5, aspect kept, padded right and below", "as OpenPose"),
             Fact("keypoints", self._convention, "told by the number of maps"),
-            Fact("decoding", "as OpenPose's program" if self._as_released else "in the small maps",
-                 "option as_released"),
+            Fact("decoding", "maps enlarged, centroids of peaks", "as OpenPose's program"),
             Fact("hands", hands, "square around wrist + 0.33 (wrist - elbow), side 1.5 x the greater of "
                  "forearm and 0.9 x upper arm"),
             Fact("keypoint score", "value of the map's peak, cut off at 1", "as OpenPose"),
-            Fact("person score", "sum of part and limb scores / " + (
-                 "number of all parts and limbs" if self._as_released else "number of those found"),
-                 "as OpenPose" if self._as_released else "option as_released"),
+            Fact("person score", "sum of part and limb scores / number of all there could be", "as OpenPose"),
         ]  # fmt: skip
 
 

@@ -9,6 +9,7 @@ it stays so.
 from __future__ import annotations
 
 import mmap
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -17,6 +18,7 @@ import tempfile
 import threading
 import weakref
 from contextlib import suppress
+from multiprocessing.connection import Connection
 from typing import IO
 
 import numpy as np
@@ -128,18 +130,19 @@ class _Child:
         self._stderr = tempfile.TemporaryFile()
         self._shared = _unnamed_file()
         self._pixels: bytes | mmap.mmap = b""
+        self._pipe, theirs = multiprocessing.Pipe()
+        inherited = self._shared.fileno(), theirs.fileno()
         self._process = subprocess.Popen(
-            [sys.executable, "-P", *program, str(self._shared.fileno())],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
+            [sys.executable, "-P", *program, *map(str, inherited)],
+            stdin=subprocess.DEVNULL,
+            stdout=self._stderr,  # what the library prints is no answer
             stderr=self._stderr,
             env=child_environment(),
-            pass_fds=[self._shared.fileno()],
+            pass_fds=inherited,
             start_new_session=True,  # an interrupt from the keyboard is for the caller
         )
-        assert self._process.stdin and self._process.stdout
-        self._questions, self._answers = self._process.stdin, self._process.stdout
-        files = self._questions, self._answers, self._stderr, self._shared
+        theirs.close()
+        files = self._pipe, self._stderr, self._shared
         self.close = weakref.finalize(self, _close, self._process, files, self.owner)
 
     def show(self, image: np.ndarray) -> None:
@@ -151,8 +154,8 @@ class _Child:
 
     def ask(self, head: dict, body: bytes = b"") -> tuple[dict, bytes]:
         """Send a message and wait for the answer; EOFError or OSError if the program has ended."""
-        send(self._questions, head, body)
-        return receive(self._answers)
+        send(self._pipe, head, body)
+        return receive(self._pipe)
 
     def end(self) -> str:
         """How it ended, in words; it is about to, since it does not speak any more."""
@@ -177,7 +180,7 @@ def _unnamed_file() -> IO[bytes]:
     return tempfile.TemporaryFile(buffering=0)
 
 
-def _close(process: subprocess.Popen, files: tuple[IO[bytes], ...], owner: int) -> None:
+def _close(process: subprocess.Popen, files: tuple[Connection | IO[bytes], ...], owner: int) -> None:
     for file in files:
         with suppress(OSError):  # what was not sent any more
             file.close()

@@ -1,9 +1,9 @@
 """Weights their authors publish for download: fetched one by one, by name, and never by default.
 
-`data/published_weights.json` names each download with its licence and, where known, its size and
-SHA-256. Where the hash is not known, the first fetch records it in the cache, in
-`published_weights.lock.json` (a committed one in `data/` comes first); a download that differs later is
-refused. Of an archive one member is read, in memory; nothing is unpacked and nothing fetched is executed.
+`data/published_weights.json` names each download with its licence and, where known, its size and SHA-256.
+Where the hash is not known, the first fetch records it in the cache, in `published_weights.lock.json`; a
+download that differs later is refused. Of an archive one member is read, in memory; nothing is unpacked and
+nothing fetched is executed.
 """
 
 import stat
@@ -78,7 +78,7 @@ def published_dir() -> Path:
 
 
 def lock_path() -> Path:
-    """The user's file of the hashes recorded on first use."""
+    """The file of the hashes recorded on first use."""
     return cache_dir() / "published_weights.lock.json"
 
 
@@ -184,45 +184,26 @@ def _verified(model: Published, source: Path) -> str:
 
 
 def _read_member(archive: Path, member: str) -> bytes:
-    """Content of the one regular file called `member` in a zip archive, whatever folder it lies in."""
-    broken = (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError, ValueError)
+    """Content of the one regular file called `member` in a zip archive, whatever folder it lies in.
+
+    Names in there are never those of files here: whether they lead out of a folder does not matter.
+    """
+    problem = f"is not a sound zip archive with {member}"
     try:
         with zipfile.ZipFile(archive) as file:
-            entry, problem = _find_member(file.infolist(), member)
-            if entry is not None:
-                return file.read(entry)
-    except broken:
-        problem = f"is not a sound zip archive with {member}"
+            named = [entry for entry in file.infolist() if PurePosixPath(entry.filename).name == member]
+            found = [one for one in named if not (one.is_dir() or stat.S_ISLNK(one.external_attr >> 16))]
+            if len(found) == 1 and found[0].file_size <= MAX_BYTES:
+                return file.read(found[0])
+            problem = f"expected one file {member} of up to {MAX_BYTES} bytes in it"
+    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError, ValueError):
+        pass
     raise InputError(f"{archive.name}: {problem}; it was not used, get it again or ask its authors")
 
 
-def _find_member(entries: list[zipfile.ZipInfo], member: str) -> tuple[zipfile.ZipInfo | None, str]:
-    """The entry that is `member`, or None and what is wrong with the archive."""
-    if any(_leads_out(entry.filename) for entry in entries):
-        return None, "holds names that lead out of a folder"
-    found = [entry for entry in entries if PurePosixPath(entry.filename).name == member]
-    if len(found) != 1 or found[0].is_dir() or stat.S_ISLNK(found[0].external_attr >> 16):
-        return None, f"expected one file {member} in it"
-    if found[0].compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        return None, f"{member} is compressed in an unusual way"
-    if found[0].file_size > MAX_BYTES:
-        return None, f"{member} is larger than {MAX_BYTES} bytes"
-    return found[0], ""
-
-
-def _leads_out(name: str) -> bool:
-    return name.startswith("/") or bool(set(name) & set("\\:")) or ".." in PurePosixPath(name).parts
-
-
 def _records() -> dict[str, dict[str, str]]:
-    """The user's records, and in their place those that came with the library."""
-    return _read_records(lock_path()) | _read_records(REGISTRY_PATH.with_suffix(".lock.json"))
-
-
-def _read_records(path: Path) -> dict[str, dict[str, str]]:
-    if not path.exists():
-        return {}
-    records = read_json(path)
+    path = lock_path()
+    records = read_json(path) if path.exists() else {}
     keys = {"url", "sha256", "file_sha256"}
     if not isinstance(records, dict) or any(
         not isinstance(record, dict) or record.keys() != keys for record in records.values()
@@ -236,7 +217,6 @@ def _record(model: Published, sha256: str, file_sha256: str) -> None:
     records = _records()
     record = {"url": model.url, "sha256": sha256, "file_sha256": file_sha256}
     if model.name not in records:
-        own = _read_records(lock_path()) | {model.name: record}
-        write_json(lock_path(), dict(sorted(own.items())), indent=1)
+        write_json(lock_path(), dict(sorted((records | {model.name: record}).items())), indent=1)
     elif records[model.name]["file_sha256"] != file_sha256:
         raise InputError(f"{lock_path()}: {model.name} is recorded with another hash; restore that file")

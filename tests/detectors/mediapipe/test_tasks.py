@@ -128,14 +128,6 @@ def test_a_photograph(weights, photograph):
     assert left_shoulder[0] - right_shoulder[0] == pytest.approx(360, abs=50)
 
 
-def test_side_by_side_finds_the_same(weights, photograph):
-    plain, both = make_detector("mediapipe"), make_detector("mediapipe", side_by_side=True)
-    one, two = plain.detect(photograph), both.detect(photograph)
-    assert len(one) == len(two) > 0
-    assert np.array_equal(one.keypoints_px, two.keypoints_px, equal_nan=True)
-    assert plain.settings == both.settings
-
-
 def test_on_a_video_the_person_is_looked_for_where_they_were(weights, photograph):
     still, video = make_detector("mediapipe"), make_detector("mediapipe", tracking_hz=10.0)
     one, two = still.detect(photograph), video.detect(photograph)

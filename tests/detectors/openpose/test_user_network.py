@@ -36,11 +36,10 @@ def body_model(path, part_model=COCO_18, person=STANDING):
     )
 
 
-@pytest.mark.parametrize("as_released", [True, False])
 @pytest.mark.parametrize(("part_model", "person"), [(COCO_18, STANDING), (BODY_25, STANDING_25)])
-def test_a_drawn_person_is_found_where_it_stands(tmp_path, part_model, person, as_released):
+def test_a_drawn_person_is_found_where_it_stands(tmp_path, part_model, person):
     model = body_model(tmp_path / "m.onnx", part_model, person)
-    found = OpenPose(model, as_released=as_released).detect(IMAGE)
+    found = OpenPose(model).detect(IMAGE)
     assert len(found) == 1
     truth = person * 183 / 367
     points = found.keypoints_px[0, TO_HALPE[part_model.convention]]

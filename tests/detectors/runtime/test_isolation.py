@@ -37,8 +37,8 @@ def program(tmp_path):
     def make(lines: str, is_ready: bool = True) -> IsolatedProcess:
         path = tmp_path / "program.py"
         head = "import os, signal, sys, time\nfrom hicp_lib.detectors.mediapipe.child import receive, send\n"
-        head += "files = sys.stdin.buffer, sys.stdout.buffer\n"
-        head += "receive(files[0]); send(files[1], {}); receive(files[0])\n" if is_ready else ""
+        head += "from multiprocessing.connection import Connection\npipe = Connection(int(sys.argv[-1]))\n"
+        head += "receive(pipe); send(pipe, {}); receive(pipe)\n" if is_ready else ""
         path.write_text(head + textwrap.dedent(lines))
         return IsolatedProcess([str(path)], {}, b"", "a.task", "give another file")
 
@@ -89,7 +89,7 @@ def test_one_that_cannot_start_says_why(program):
     assert "code 3" in told(program("sys.exit(3)", is_ready=False))
     line = told(program("import nothing_of_that_name", is_ready=False))
     assert line.endswith("No module named 'nothing_of_that_name'); give another file")
-    refuses = program("receive(files[0]); send(files[1], {'error': 'no such model'})", is_ready=False)
+    refuses = program("receive(pipe); send(pipe, {'error': 'no such model'})", is_ready=False)
     assert told(refuses) == told(refuses) == "a.task: no such model; give another file"
 
 

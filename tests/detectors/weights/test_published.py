@@ -184,14 +184,9 @@ def test_one_flipped_bit_in_an_archive_of_unknown_hash_fails_its_checksum(server
     refused("net", "not a sound zip archive")
 
 
-def test_nothing_is_written_beside_the_registry_and_what_is_recorded_there_comes_first(server, tmp_path):
+def test_nothing_is_written_beside_the_registry(server, tmp_path):
     published.fetch_published("net")
     assert [path.name for path in (tmp_path / "data").iterdir()] == ["published.json"]
-    shipped = json.loads(published.lock_path().read_text())
-    shipped["net"]["sha256"] = "0" * 64
-    (tmp_path / "data" / "published.lock.json").write_text(json.dumps(shipped))
-    published.published()["net"].path.unlink()
-    refused("net", r"SHA-256 is .* has changed")
 
 
 def test_a_file_without_a_record_is_fetched_anew(server):
@@ -229,12 +224,7 @@ def link(name: str) -> zipfile.ZipInfo:
 @pytest.mark.parametrize(
     ("members", "match"),
     [
-        ([("../end2end.onnx", CONTENT)], "lead out"),
-        ([("a/../../end2end.onnx", CONTENT)], "lead out"),
-        ([("/tmp/end2end.onnx", CONTENT)], "lead out"),
-        ([("..\\end2end.onnx", CONTENT)], "lead out"),
-        ([("c:/end2end.onnx", CONTENT)], "lead out"),
-        ([("end2end.onnx", CONTENT), ("../../x", b"")], "lead out"),
+        ([("..\\end2end.onnx", CONTENT)], "expected one file"),
         ([(link("end2end.onnx"), b"/etc/passwd")], "expected one file"),
         ([("end2end.onnx/", b"")], "expected one file"),
         ([("a/end2end.onnx", CONTENT), ("b/end2end.onnx", CONTENT)], "expected one file"),
@@ -246,11 +236,22 @@ def test_hostile_archives_are_refused(server, members, match):
     refused("net", match)
 
 
+@pytest.mark.parametrize("name", ["../end2end.onnx", "a/../../end2end.onnx", "/tmp/end2end.onnx"])
+def test_a_name_that_leads_out_of_a_folder_is_never_a_files(server, tmp_path, name):
+    server.files["/a/net.zip"] = zipped((name, CONTENT), ("../../x", b""))
+    before = {path for path in tmp_path.parent.rglob("*") if path.is_file()}
+    path = published.fetch_published("net").path
+    assert path.read_bytes() == CONTENT
+    assert {path for path in tmp_path.parent.rglob("*") if path.is_file()} - before == {
+        path, published.lock_path()
+    }  # fmt: skip
+
+
 def test_an_archive_that_swells_is_refused_before_it_is_read(server, monkeypatch):
     monkeypatch.setattr(published, "MAX_BYTES", 100_000)
     server.files["/a/net.zip"] = zipped(("end2end.onnx", bytes(100_001)))
     assert len(server.files["/a/net.zip"]) < 1000
-    refused("net", "larger than 100000 bytes")
+    refused("net", "of up to 100000 bytes")
 
 
 def test_an_archive_that_lies_about_its_size_is_refused(server):
@@ -330,8 +331,8 @@ def test_the_command_lists_them_and_fetches_only_what_is_named(server, capsys, m
     assert f"hicp detect --detector mmpose --model {path}" in lines[0]
     assert "as it is" in lines[1]
     assert cli.run(["models", "list"]) == 0
-    block = capsys.readouterr().out.partition("published, fetched by name:\n")[2].splitlines()
-    assert [line.split()[:2] for line in block] == [["net", "present"], ["plain", "present"]]
+    rows = [line.split()[:2] for line in capsys.readouterr().out.splitlines()]
+    assert [row for row in rows if row[0] in ("net", "plain")] == [["net", "present"], ["plain", "present"]]
 
 
 def test_the_committed_registry_is_whole():
