@@ -115,9 +115,12 @@ def code_identity(*names: str) -> dict[str, Any]:
 
 
 def code(
-    names: Iterable[str], *, without: Sequence[str] = (), library: Path | None = None,
+    names: Iterable[str],
+    *,
+    without: Sequence[str] = (),
+    library: Path | None = None,
     data: Path | None = None,
-) -> Code:  # fmt: skip
+) -> Code:
     """The import closure of modules of the library, with the data and the libraries it uses.
 
     Parameters

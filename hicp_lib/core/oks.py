@@ -38,9 +38,13 @@ def oks_terms(offsets_px: np.ndarray, areas_px2: np.ndarray, sigmas: np.ndarray)
 
 
 def oks(
-    truth_px: np.ndarray, labelled: np.ndarray, boxes_px: np.ndarray, areas_px2: np.ndarray,
-    found_px: np.ndarray, sigmas: np.ndarray,
-) -> np.ndarray:  # fmt: skip
+    truth_px: np.ndarray,
+    labelled: np.ndarray,
+    boxes_px: np.ndarray,
+    areas_px2: np.ndarray,
+    found_px: np.ndarray,
+    sigmas: np.ndarray,
+) -> np.ndarray:
     """OKS of annotated people and detections, broadcast: `x[:, None]` against `y[None]` gives all pairs.
 
     A person without a labelled keypoint gets, as in COCO's tool, the mean over all keypoints with

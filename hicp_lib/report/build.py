@@ -23,9 +23,13 @@ from hicp_lib.report.runs import run_all
 
 
 def make_report(
-    profile: str, pairs: list[tuple[str, str]], log: Callable[[str], None], sources: Path, root: Path,
+    profile: str,
+    pairs: list[tuple[str, str]],
+    log: Callable[[str], None],
+    sources: Path,
+    root: Path,
     only: str | None = None,
-) -> Path | None:  # fmt: skip
+) -> Path | None:
     """Run the notebooks of a study under a profile of its `notebooks/profiles.toml`, and build the book.
 
     Parameters

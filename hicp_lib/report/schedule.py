@@ -18,9 +18,11 @@ def needed(after: Mapping[str, Sequence[str]], name: str) -> set[str]:
 
 
 def run_when_ready(
-    after: Mapping[str, Sequence[str]], job: Callable[[str, list[Future]], object], pool: Executor,
+    after: Mapping[str, Sequence[str]],
+    job: Callable[[str, list[Future]], object],
+    pool: Executor,
     n_parallel: int,
-) -> dict[str, Future]:  # fmt: skip
+) -> dict[str, Future]:
     """Run every job once those before it have ended, well or not; its ended future by its name.
 
     Of those that are ready, the one at the head of the longest chain of others goes first: started late, it

@@ -57,9 +57,15 @@ class Combined:
     """
 
     def __init__(
-        self, body: Detector, hands: Detector, looks: str = "wrists+image+along", arbitrate: bool = True,
-        agreement: bool = True, min_side_px: int = 320, side_by_side: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        body: Detector,
+        hands: Detector,
+        looks: str = "wrists+image+along",
+        arbitrate: bool = True,
+        agreement: bool = True,
+        min_side_px: int = 320,
+        side_by_side: bool = False,
+    ) -> None:
         self._thread = ThreadPoolExecutor(1) if side_by_side else None
         self._looks = looks.split("+")
         if not set(self._looks) <= set(LOOKS):

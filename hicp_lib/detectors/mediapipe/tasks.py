@@ -53,9 +53,12 @@ class MediaPipePose:
     name = "mediapipe-pose"
 
     def __init__(
-        self, num_poses: int = 1, min_score: float = 0.5, model: str | Path | None = None,
+        self,
+        num_poses: int = 1,
+        min_score: float = 0.5,
+        model: str | Path | None = None,
         tracking_hz: float = 0,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._process, identity = _process(self.name, "pose", num_poses, min_score, model, tracking_hz)
         self.settings = {"num_poses": num_poses, "min_score": min_score, **identity}
         self.start = self._process.start
@@ -91,9 +94,12 @@ class MediaPipeHands:
     name = "mediapipe-hands"
 
     def __init__(
-        self, num_hands: int = 2, min_score: float = 0.5, model: str | Path | None = None,
+        self,
+        num_hands: int = 2,
+        min_score: float = 0.5,
+        model: str | Path | None = None,
         tracking_hz: float = 0,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._process, identity = _process(self.name, "hand", num_hands, min_score, model, tracking_hz)
         self.settings = {"num_hands": num_hands, "min_score": min_score, **identity}
         self.start = self._process.start

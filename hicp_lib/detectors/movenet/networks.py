@@ -43,10 +43,15 @@ class MoveNetThunder:
     name = "movenet-thunder"
 
     def __init__(
-        self, boxes: str | None = None, person_model: str | Path | None = None,
-        person_min_score: float | None = None, person_max_overlap: float | None = None, padding: float = 1.0,
-        provider: str = "cpu", threads: int = 1,
-    ) -> None:  # fmt: skip
+        self,
+        boxes: str | None = None,
+        person_model: str | Path | None = None,
+        person_min_score: float | None = None,
+        person_max_overlap: float | None = None,
+        padding: float = 1.0,
+        provider: str = "cpu",
+        threads: int = 1,
+    ) -> None:
         self._model = open_committed(f"{self.name}.onnx", provider, threads)
         self._side_px = self._model.side_px
         thresholds = {"min_score": person_min_score, "max_overlap": person_max_overlap}

@@ -55,11 +55,19 @@ class AlphaPose:
     name = "alphapose"
 
     def __init__(
-        self, model: str | Path, person_model: str | Path | None = None, boxes: str | None = None,
-        person_family: str | None = None, person_min_score: float | None = None,
-        person_max_overlap: float | None = None, decoding: str | None = None, flip_test: bool = False,
-        input_size_px: list | None = None, provider: str = "cpu", threads: int = 1,
-    ) -> None:  # fmt: skip
+        self,
+        model: str | Path,
+        person_model: str | Path | None = None,
+        boxes: str | None = None,
+        person_family: str | None = None,
+        person_min_score: float | None = None,
+        person_max_overlap: float | None = None,
+        decoding: str | None = None,
+        flip_test: bool = False,
+        input_size_px: list | None = None,
+        provider: str = "cpu",
+        threads: int = 1,
+    ) -> None:
         opened = open_model(model, provider, threads)
         self._net = PoseNet(opened, _MEAN, _STD, flip_test, input_size_px)
         if self._net.is_simcc:

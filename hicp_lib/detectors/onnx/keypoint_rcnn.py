@@ -53,9 +53,13 @@ class KeypointRcnn:
     name = "detectron2"
 
     def __init__(
-        self, model: str | Path, family: str | None = None, min_score: float = 0.05, provider: str = "cpu",
+        self,
+        model: str | Path,
+        family: str | None = None,
+        min_score: float = 0.05,
+        provider: str = "cpu",
         threads: int = 1,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._model = open_model(model, provider, threads)
         shape = self._model.inputs[0].shape
         if shape[:-3] not in ((), (1,), (None,)) or shape[-3:-2] not in ((3,), (None,)):

@@ -59,12 +59,22 @@ class MMPose:
     name = "mmpose"
 
     def __init__(
-        self, model: str | Path, person_model: str | Path | None = None, boxes: str | None = None,
-        person_family: str | None = None, person_min_score: float | None = None,
-        person_max_overlap: float | None = None, dark: bool = True, udp: bool | None = None,
-        flip_test: bool = False, score_scale: float | None = None, hand: str = "right",
-        input_size_px: list | None = None, provider: str = "cpu", threads: int = 1,
-    ) -> None:  # fmt: skip
+        self,
+        model: str | Path,
+        person_model: str | Path | None = None,
+        boxes: str | None = None,
+        person_family: str | None = None,
+        person_min_score: float | None = None,
+        person_max_overlap: float | None = None,
+        dark: bool = True,
+        udp: bool | None = None,
+        flip_test: bool = False,
+        score_scale: float | None = None,
+        hand: str = "right",
+        input_size_px: list | None = None,
+        provider: str = "cpu",
+        threads: int = 1,
+    ) -> None:
         opened, self._dark = open_model(model, provider, threads), dark
         self._net = PoseNet(opened, *IMAGENET_RGB, flip_test, input_size_px)
         self._udp, self._udp_from = _told_udp(opened, self._net.is_simcc, udp)

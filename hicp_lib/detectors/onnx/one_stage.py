@@ -41,9 +41,13 @@ class OneStage:
     name = "one-stage"
 
     def __init__(
-        self, model: str | Path, min_score: float = 0.1, max_overlap: float = 0.65, provider: str = "cpu",
+        self,
+        model: str | Path,
+        min_score: float = 0.1,
+        max_overlap: float = 0.65,
+        provider: str = "cpu",
         threads: int = 1,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._model = open_model(model, provider, threads)
         self._min_score, self._max_overlap = min_score, max_overlap
         height, width = self._model.image_size_px

@@ -49,9 +49,14 @@ class PersonBoxes:
     """
 
     def __init__(
-        self, model: str | Path, provider: str = "cpu", threads: int = 1, family: str | None = None,
-        min_score: float = 0.3, max_overlap: float = 0.45,
-    ) -> None:  # fmt: skip
+        self,
+        model: str | Path,
+        provider: str = "cpu",
+        threads: int = 1,
+        family: str | None = None,
+        min_score: float = 0.3,
+        max_overlap: float = 0.45,
+    ) -> None:
         self._model = open_model(model, provider, threads)
         folds = self._model.told.first_convolution[1:2] == (_FOLDED_CHANNELS,)
         self._is_told = family is None

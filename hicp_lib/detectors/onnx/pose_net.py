@@ -62,9 +62,13 @@ class PoseNet:
     """
 
     def __init__(
-        self, model: OnnxModel, mean: Colour, std: Colour, flip_test: bool,
+        self,
+        model: OnnxModel,
+        mean: Colour,
+        std: Colour,
+        flip_test: bool,
         input_size_px: list[int] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.model, self._mean, self._std, self._flip_test = model, mean, std, flip_test
         self.batch = model.inputs[0].shape[0] if model.inputs[0].shape else None
         self.input_size_px, self._size_from = _input_size(model, input_size_px)

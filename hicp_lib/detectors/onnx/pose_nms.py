@@ -19,9 +19,12 @@ _COINCIDENT_PX, _MERGED_PX, _AGREEING_PX = 7.0, 15.0, 1.0
 
 
 def oks_nms(
-    positions_px: np.ndarray, person_scores: np.ndarray, areas_px2: np.ndarray, sigmas: np.ndarray,
+    positions_px: np.ndarray,
+    person_scores: np.ndarray,
+    areas_px2: np.ndarray,
+    sigmas: np.ndarray,
     max_oks: float = 0.9,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """Rows to keep, by falling score: each pose whose OKS with every better one is at most `max_oks`.
 
     Parameters

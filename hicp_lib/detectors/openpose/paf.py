@@ -158,9 +158,13 @@ def _vertex(before: np.ndarray, middle: np.ndarray, after: np.ndarray) -> np.nda
 
 
 def limb_scores(
-    limb_field: np.ndarray, starts: np.ndarray, ends: np.ndarray, stride: int, options: PafOptions,
+    limb_field: np.ndarray,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    stride: int,
+    options: PafOptions,
     sample: Sampler | None = None,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """How well an affinity field supports a limb between every start and every end.
 
     The field is sampled along the straight line, 5 to 25 times by its length, and projected on
@@ -265,9 +269,13 @@ def assemble(
 
 
 def find_limbs(
-    peaks: list[np.ndarray], fields: np.ndarray, model: PartModel, stride: int, options: PafOptions,
+    peaks: list[np.ndarray],
+    fields: np.ndarray,
+    model: PartModel,
+    stride: int,
+    options: PafOptions,
     sample: Sampler | None = None,
-) -> list[list[Limb]]:  # fmt: skip
+) -> list[list[Limb]]:
     """Limbs of each pair.
 
     Parameters

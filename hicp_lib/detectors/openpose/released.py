@@ -37,9 +37,13 @@ _REACH_PX = 3
 
 
 def assemble_released(
-    heat_maps: np.ndarray, fields: np.ndarray, model: PartModel, stride: int, options: PafOptions,
+    heat_maps: np.ndarray,
+    fields: np.ndarray,
+    model: PartModel,
+    stride: int,
+    options: PafOptions,
     offset_px: float = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+) -> tuple[np.ndarray, np.ndarray]:
     """People in the maps of one image, as `hicp_lib.detectors.openpose.paf.assemble` gives them.
 
     Parameters

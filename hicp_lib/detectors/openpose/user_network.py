@@ -45,9 +45,13 @@ class OpenPose:
     name = "openpose"
 
     def __init__(
-        self, model: str | Path, hand_model: str | Path | None = None, net_height_px: int = 368,
-        provider: str = "cpu", threads: int = 1,
-    ) -> None:  # fmt: skip
+        self,
+        model: str | Path,
+        hand_model: str | Path | None = None,
+        net_height_px: int = 368,
+        provider: str = "cpu",
+        threads: int = 1,
+    ) -> None:
         check_height(net_height_px)
         self._model = open_model(model, provider, threads)
         height, width = self._model.image_size_px
