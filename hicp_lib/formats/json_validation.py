@@ -285,8 +285,9 @@ def is_number(value: object) -> TypeGuard[float]:
     >>> [is_number(value) for value in (3, 0.5, True, float("nan"), "3")]
     [True, True, False, False, False]
     """
-    is_real = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    return is_real and bool(abs(value) <= sys.float_info.max)
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    return bool(abs(value) <= sys.float_info.max)
 
 
 def shown(value: Any) -> str:
