@@ -287,7 +287,8 @@ def is_number(value: object) -> TypeGuard[float]:
     """
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return False
-    return bool(abs(value) <= sys.float_info.max)
+    number: Any = value  # types of NumPy do not say that they have a size
+    return bool(abs(number) <= sys.float_info.max)
 
 
 def shown(value: Any) -> str:
