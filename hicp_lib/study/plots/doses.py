@@ -108,7 +108,8 @@ def _dose_panels(table: pd.DataFrame, by: str, styles: dict, labels: dict, ylabe
             part, colour = part.sort_values("level"), detector_colour(detector)
             pen = {"color": colour, "ls": styles[value], "label": f"{detector}{labels[value]}"}
             axis.plot(part["level"], part["value"], marker=detector_marker(detector), ms=4, **pen)
-            axis.fill_between(part["level"], part["low"], part["high"], color=colour, alpha=0.13, lw=0)
+            bounds = part[["low", "high"]].astype(float)  # objects where there is no interval at all
+        axis.fill_between(part["level"], bounds["low"], bounds["high"], color=colour, alpha=0.13, lw=0)
         axis.set(xlabel=_LABELS.get(dose, dose), ylim=(-0.02, 1.02))
     for axis in axes.flat[len(doses) :]:
         axis.set_axis_off()
