@@ -109,6 +109,8 @@ def import_open3d(
         If something is missing or does not match, or `out` holds files.
     """
     source, out = Path(source), Path(out)
+    if rate_hz is not None and not 0 < rate_hz < np.inf:
+        raise InputError(f"rate is {rate_hz!r}; expected frames per second")
     found = [source / name for name in _METADATA if (source / name).is_file()]
     if len(found) > 1:
         raise InputError(f"{source}: holds {' and '.join(_METADATA)}; keep the one of these images")

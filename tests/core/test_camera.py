@@ -90,7 +90,7 @@ def valid() -> dict:
         ("intrinsic_matrix", [615, 0, 0, 2, 613, 0, 318, 241, 1], "skew"),
         ("intrinsic_matrix", [-615, 0, 0, 0, 613, 0, 318, 241, 1], "positive focal lengths"),
         ("intrinsic_matrix", [float("nan"), 0, 0, 0, 613, 0, 318, 241, 1], "finite"),
-        ("depth_scale", 0.001, "write 1000"),
+        ("depth_scale", 0.001, "1000 for millimetres"),
         ("depth_scale", None, "depth_scale"),
     ],
 )

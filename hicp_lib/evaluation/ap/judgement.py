@@ -80,8 +80,11 @@ def image_table(people: Annotations, found: Found, groups: Iterable[str], **opti
 
     Parameters
     ----------
-    people, found, groups, **options
-        As of `judge`.
+    people : Annotations
+    found : mapping of int to Detections
+    groups : iterable of str
+    **options : str
+        All as of `judge`.
 
     Returns
     -------
