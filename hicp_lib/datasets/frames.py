@@ -14,8 +14,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.images import image_header
 from hicp_lib.datasets.crops import image_sizes
 from hicp_lib.formats.annotations import Annotations
-
-_SLACK_PX = 1.0  # by which rounding may put a label outside its image
+from hicp_lib.formats.units import beyond
 
 
 def in_frame(
@@ -74,8 +73,7 @@ def outside_image(annotations: Annotations) -> dict[str, int]:
         `people` who have any.
     """
     sizes, points = image_sizes(annotations), annotations.keypoints_px
-    past = ((points < -_SLACK_PX) | (points > sizes[:, None] + _SLACK_PX)).any(axis=-1)
-    keypoints = past & (annotations.visibility > 0)
+    keypoints = beyond(points, 0, sizes[:, None]) & (annotations.visibility > 0)
     start, sides = annotations.boxes_px[:, :2], annotations.boxes_px[:, 2:]
     inside = np.clip(start + sides, 0, sizes) - np.clip(start, 0, sizes)
     boxes = inside.prod(axis=1) < 0.5 * sides.prod(axis=1)

@@ -160,6 +160,19 @@ _NOBODY = {
 }
 
 
+def rows_by_image(image_ids: np.ndarray) -> dict[int, np.ndarray]:
+    """The rows of each image, in the order they have; images by their ids.
+
+    Examples
+    --------
+    >>> {i: rows.tolist() for i, rows in rows_by_image(np.array([7, 3, 7])).items()}
+    {3: [1], 7: [0, 2]}
+    """
+    order = np.argsort(image_ids, kind="stable")
+    ids, starts = np.unique(image_ids[order], return_index=True)
+    return dict(zip(ids.tolist(), np.split(order, starts[1:]), strict=False))  # of no ids: one empty part
+
+
 def source_images(annotations: Annotations) -> dict[int, int]:
     """Image id -> the image it was cropped from (itself where the annotations do not say)."""
     source = {i: i for i in annotations.images}
@@ -342,9 +355,7 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     keypoints[~triples.any(axis=-1)] = np.nan
     refuse_fractions(rows.path, keypoints)
     found = {} if annotations is None else dict.fromkeys(annotations.images, Detections.none())
-    order = np.argsort(image_ids, kind="stable")
-    ids, starts = np.unique(image_ids[order], return_index=True)
-    for image_id, chosen in zip(ids.tolist(), np.split(order, starts[1:]), strict=False):  # none: one empty
+    for image_id, chosen in rows_by_image(image_ids).items():
         together = chosen[-1] - chosen[0] == len(chosen) - 1
         of = slice(chosen[0], chosen[-1] + 1) if together else chosen
         found[image_id] = Detections(keypoints[of], triples[of, :, 2], person_scores[of])

@@ -23,6 +23,7 @@ from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.extras import require
 from hicp_lib.core.files import atomic_path, read_json
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
+from hicp_lib.formats.layouts import PERSON_CATEGORY
 
 SUFFIXES = (".json", ".csv", ".parquet")
 _PEOPLE_AT_ONCE = 1000  # of a table; a group of rows of Parquet
@@ -142,7 +143,14 @@ def result_rows(
         raise ValueError(f"image {image_id}: a score is not a finite number")
     flat = triples.reshape(len(found), 3 * points.shape[1])
     for of, score, extra in zip(flat, found.person_scores.tolist(), extras or [{}] * len(found), strict=True):
-        yield {**extra, "image_id": image_id, **facts, "category_id": 1, "keypoints": of, "score": score}
+        yield {
+            **extra,
+            "image_id": image_id,
+            **facts,
+            "category_id": PERSON_CATEGORY,
+            "keypoints": of,
+            "score": score,
+        }
 
 
 @contextmanager

@@ -1,9 +1,9 @@
 """Whether the coordinates of a file can be pixels of its images, and its boxes x, y, width, height."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX
@@ -75,9 +75,9 @@ def corners_note(
         ten end far beyond their people.
     """
     first, last = boxes_px[:, :2], boxes_px[:, 2:]
-    leave = (keypoints_px < first[:, None] - _SLACK_PX) | (keypoints_px > last[:, None] + _SLACK_PX)
+    leave = beyond(keypoints_px, first[:, None], last[:, None])
     ordered = np.all((last > first) & (last <= sizes_px + _SLACK_PX), axis=-1)
-    fits = ordered & ~leave.any(axis=(1, 2))
+    fits = ordered & ~leave.any(axis=1)
     labelled = np.isfinite(keypoints_px[..., 0]).sum(axis=-1) >= _LEAST_POINTS
     far = labelled & (first > _MUCH * last).any(axis=-1)
     n_far, n_beyond = far.sum(), (far & (first + last > sizes_px + _SLACK_PX).any(axis=-1)).sum()
@@ -89,8 +89,28 @@ def corners_note(
     return "the boxes would fit as x1, y1, x2, y2, too; they are read as x, y, width, height"
 
 
-def _n_beyond(points_px: np.ndarray, low_px: Any, high_px: Any) -> int:
-    return int(((points_px < low_px - _SLACK_PX) | (points_px > high_px + _SLACK_PX)).any(axis=-1).sum())
+def beyond(points_px: np.ndarray, low_px: ArrayLike, high_px: ArrayLike) -> np.ndarray:
+    """Which points leave a range by more than rounding: a pixel.
+
+    Parameters
+    ----------
+    points_px : array, shape (..., 2)
+        NaN leaves none.
+    low_px, high_px : float or array, shape (..., 2)
+        Least and most of both coordinates.
+
+    Returns
+    -------
+    array of bool, shape (...)
+
+    Examples
+    --------
+    >>> beyond(np.array([[-2.0, 5.0], [-1.0, 11.0], [np.nan, 5.0]]), 0, 10)
+    array([ True, False, False])
+    """
+    low_px, high_px = np.asarray(low_px) - _SLACK_PX, np.asarray(high_px) + _SLACK_PX
+    u, v = np.moveaxis((points_px < low_px) | (points_px > high_px), -1, 0)
+    return u | v
 
 
 def doubts(boxes_px: np.ndarray, keypoints_px: np.ndarray, sizes_px: np.ndarray) -> str:
@@ -103,8 +123,9 @@ def doubts(boxes_px: np.ndarray, keypoints_px: np.ndarray, sizes_px: np.ndarray)
     """
     (first, room), sizes = np.split(boxes_px[:, None], 2, axis=-1), sizes_px[:, None]
     last, few = first + room, _FEW * np.isfinite(keypoints_px[..., 0]).sum()
-    n_points, n_ends = (_n_beyond(of, 0, sizes) for of in (keypoints_px, np.hstack([first, last])))
-    n_astray = _n_beyond(keypoints_px, first - _MUCH * room, last + _MUCH * room)
+    ends = np.hstack([first, last])
+    n_points, n_ends = (int(beyond(of, 0, sizes).sum()) for of in (keypoints_px, ends))
+    n_astray = int(beyond(keypoints_px, first - _MUCH * room, last + _MUCH * room).sum())
     turned = "; are the images turned by an orientation flag?" if n_points > few else ""
     rises_px = keypoints_px[:, _HIPS, 1] - keypoints_px[:, _SHOULDERS, 1]
     fallen = (rises_px < 0).sum() > (rises_px >= 0).sum()

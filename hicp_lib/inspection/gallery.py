@@ -20,7 +20,7 @@ from hicp_lib.core.files import read_json, write_bytes
 from hicp_lib.core.images import read_image, write_png
 from hicp_lib.core.keypoints import FACE, GROUPS, HANDS, LIMBS, NAMES
 from hicp_lib.evaluation.ap.metric_table import person_oks
-from hicp_lib.formats.annotations import Annotations
+from hicp_lib.formats.annotations import Annotations, rows_by_image
 from hicp_lib.formats.detection_files import read_rows
 from hicp_lib.inspection.skeletons import draw_people
 
@@ -86,7 +86,7 @@ def pictures(
     tables = {} if annotations is None else {of: person_oks(annotations, found, of) for of in groups}
     counted = {of: table[table["n_labelled"] > 0].groupby("image_id")["oks"] for of, table in tables.items()}
     oks = {of: by_image.agg(list).to_dict() for of, by_image in counted.items()}
-    truth = {} if annotations is None else {i: _truth(annotations, i) for i in paths}
+    truth = {} if annotations is None else _truth(annotations)
     known = [
         Picture(path, found.get(i, Detections.none()), truth.get(i), {of: oks[of].get(i, []) for of in oks})
         for i, path in paths.items()
@@ -94,9 +94,11 @@ def pictures(
     return sorted(known, key=lambda picture: (picture.quality, picture.path.name))
 
 
-def _truth(annotations: Annotations, image_id: int) -> Detections:
-    people = annotations.take(annotations.image_ids == image_id)
-    return Detections(people.keypoints_px, (people.visibility > 0).astype(float), np.ones(len(people)))
+def _truth(people: Annotations) -> dict[int, Detections]:
+    """Who is known to be in each image, labelled keypoints with score 1."""
+    labelled, rows = (people.visibility > 0).astype(float), rows_by_image(people.image_ids)
+    known = {i: Detections(people.keypoints_px[of], labelled[of], np.ones(len(of))) for i, of in rows.items()}
+    return {i: known.get(i, Detections.none()) for i in people.images}
 
 
 def image_paths(

@@ -15,13 +15,12 @@ from hicp_lib.recordings.bag_file import open_bag
 from hicp_lib.recordings.bag_streams import find_streams
 from hicp_lib.recordings.camera_file import read_distorted_camera
 from hicp_lib.recordings.check import FURTHEST_POSE_M, check_recording
-from hicp_lib.recordings.importing import read_pose_source
+from hicp_lib.recordings.importing import METADATA, read_pose_source
 from hicp_lib.recordings.qualisys import read_mocap
 from hicp_lib.recordings.recording import open_recording
 from hicp_lib.recordings.trajectories import read_trajectory
 from hicp_lib.recordings.tum import read_file_list, remarks
 
-_CAMERA_FILES = ("intrinsic.json", "camera_intrinsic.json")
 _OPTIONS = {"fps": "--rate", "depth_scale": "--depth-scale"}
 
 
@@ -62,9 +61,9 @@ def describe_recording(folder: Path) -> Facts:
 def describe_open3d(folder: Path) -> Facts:
     """Say what a folder with `color/` and `depth/` holds."""
     n_color, n_depth = (len(list((folder / name).iterdir())) for name in ("color", "depth"))
-    path = next((path for path in map(folder.joinpath, _CAMERA_FILES) if path.is_file()), None)
+    path = next((path for path in map(folder.joinpath, METADATA) if path.is_file()), None)
     if path is None or n_color != n_depth:
-        raise InputError(f"{n_color} and {n_depth} images; expected as many, and one of {_CAMERA_FILES}")
+        raise InputError(f"{n_color} and {n_depth} images; expected as many, and one of {METADATA}")
     content, facts = read_json(path), describe_camera(path)
     times = f"{content.get('fps', 'not known how many')} per second, as {path.name} says"
     missing = "".join(f" {option}" for key, option in _OPTIONS.items() if key not in content)

@@ -22,7 +22,7 @@ from hicp_lib.recordings.trajectories import read_trajectory
 from hicp_lib.recordings.tum import names_poses
 from hicp_lib.recordings.writer import JPEG_QUALITY, Poses, refuse_used_folder, write_index
 
-_METADATA = ("intrinsic.json", "camera_intrinsic.json")
+METADATA = ("intrinsic.json", "camera_intrinsic.json")
 _IMAGE_KINDS = (".png", ".jpg", ".jpeg")
 _MAX_RATE_HZ = 10_000
 
@@ -111,10 +111,10 @@ def import_open3d(
     source, out = Path(source), Path(out)
     if rate_hz is not None and not 0 < rate_hz < np.inf:
         raise InputError(f"rate is {rate_hz!r}; expected frames per second")
-    found = [source / name for name in _METADATA if (source / name).is_file()]
+    found = [source / name for name in METADATA if (source / name).is_file()]
     if len(found) > 1:
-        raise InputError(f"{source}: holds {' and '.join(_METADATA)}; keep the one of these images")
-    path = (found or [source / _METADATA[0]])[0]
+        raise InputError(f"{source}: holds {' and '.join(METADATA)}; keep the one of these images")
+    path = (found or [source / METADATA[0]])[0]
     intrinsics, units_per_m, pixels_px = read_distorted_camera(path, depth_units_per_m)
     notes = [] if pixels_px is None else [f"{path}: distortion undone"]
     said = read_json(path)

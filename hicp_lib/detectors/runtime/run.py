@@ -39,7 +39,7 @@ from hicp_lib.detectors.runtime.results import (
     result_path,
     write_result,
 )
-from hicp_lib.formats.annotations import Annotations, read_annotations
+from hicp_lib.formats.annotations import Annotations, read_annotations, rows_by_image
 
 Image = str | Path | np.ndarray  # a file, or RGB, shape (height, width, 3), uint8
 _MOST_WAITING = 4096  # results in memory that wait for that of an image before theirs
@@ -107,10 +107,8 @@ def detect_annotated(
 def boxes_by_image(annotations: Annotations) -> dict[int, np.ndarray]:
     """The annotated people's boxes, arrays (n, 4: x, y, width, height), by image id."""
     people = annotations.take(~annotations.is_crowd)
-    order = np.argsort(people.image_ids, kind="stable")
-    ids, starts = np.unique(people.image_ids[order], return_index=True)
-    found = dict(zip(ids.tolist(), np.split(people.boxes_px[order], starts[1:]), strict=False))
-    return {image_id: found.get(image_id, np.zeros((0, 4))) for image_id in annotations.images}
+    rows, nobody = rows_by_image(people.image_ids), np.zeros(0, int)
+    return {image_id: people.boxes_px[rows.get(image_id, nobody)] for image_id in annotations.images}
 
 
 def detect_images(
