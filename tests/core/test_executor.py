@@ -105,6 +105,8 @@ def test_processes_end_with_who_started_them(tmp_path, how):
         stderr=subprocess.PIPE,
         start_new_session=True,
         text=True,
+        # Of tests that run in a shell's background, children would not be interrupted at all.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     while not all((tmp_path / name).exists() and (tmp_path / name).read_text() for name in "ab"):
         assert started.poll() is None, started.communicate()
