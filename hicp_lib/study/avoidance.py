@@ -17,6 +17,8 @@ from hicp_lib.robot.loop import AVOIDING
 
 MARKS_M = (0.05, 0.10)
 """Clearances that are asked for."""
+UNTIL = {"in the first reach": "reach_m", "until they leave": "min_distance_m"}
+"""Until when a least distance is: the column of `metrics` that has it."""
 FIELD_M = 0.25
 """The person is near the robot's skin when nearer than this: about where its receptive fields begin."""
 REACH_M = 0.4  # keypoints this near the post can threaten the hand
@@ -82,6 +84,22 @@ def over_people(table: pd.DataFrame, by: Sequence[str], of: str = "min_distance_
             row |= {name: kept.mean(), f"{name}_low": low, f"{name}_high": high}
         rows.append(row | {"n_people": people.nunique()})
     return pd.DataFrame(rows)
+
+
+def clearance(table: pd.DataFrame) -> pd.DataFrame:
+    """`over_people` for each of `UNTIL`, of all conditions: a column `until`, and its own.
+
+    Parameters
+    ----------
+    table : pd.DataFrame
+        As from `metrics`.
+
+    Returns
+    -------
+    pd.DataFrame
+    """
+    parts = {until: over_people(table, ["detector", "gains"], of) for until, of in UNTIL.items()}
+    return pd.concat(parts, names=["until"]).reset_index(level=0)
 
 
 def _wilson(k: int, n: int) -> tuple[float, float]:

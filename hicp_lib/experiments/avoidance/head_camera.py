@@ -13,7 +13,7 @@ import numpy as np
 from hicp_lib.core.camera import transform
 from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.keypoints import N_KEYPOINTS
-from hicp_lib.experiments.avoidance.closed_loop import MOUNT, Latency, start_posture
+from hicp_lib.experiments.avoidance.closed_loop import MOUNT, start_posture
 from hicp_lib.experiments.avoidance.reaching import LOOKED_AT_S, Moment
 from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
 from hicp_lib.experiments.laboratory import COLOUR, colour_and_depth, robot_camera
@@ -63,8 +63,6 @@ class HeadCamera:
     ----------
     detector : Detector
         Looks at the images.
-    latency : Latency
-        From image to keypoints in the loop.
     lifting : str
         One of `hicp_lib.lifting.robust.METHODS`.
     images : mapping
@@ -74,7 +72,6 @@ class HeadCamera:
     """
 
     detector: Detector
-    latency: Latency
     lifting: str = "robust"
     images: ImageCache = field(default_factory=dict)
     observations: list[Observation] = field(default_factory=list)

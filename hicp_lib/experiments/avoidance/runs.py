@@ -30,7 +30,7 @@ from hicp_lib.experiments.avoidance.error_model import in_sight
 from hicp_lib.experiments.avoidance.head_camera import HeadCamera, ImageCache, Observation
 from hicp_lib.experiments.avoidance.reaching import Moment
 from hicp_lib.experiments.laboratory import COLOUR, in_root
-from hicp_lib.robot.controller import PUBLISHED, Settings
+from hicp_lib.robot.controller import PUBLISHED
 
 NO_AVOIDANCE, TRUE_KEYPOINTS = "no avoidance", "ground truth"
 IDEAL = (NO_AVOIDANCE, TRUE_KEYPOINTS)
@@ -165,21 +165,13 @@ def moment_at(run: Run, time_s: float) -> Moment:
     return Moment(run.job.trial.script, run.job.trial.subject, float(time_s), hand_m)
 
 
-def settings_of(gains: str) -> Settings:
-    """The controller's settings by `Job.gains`."""
-    return PUBLISHED if gains == "published" else Settings()
-
-
 def _simulate(out: Path, run: str, job: Job, images: ImageCache) -> None:
     """Simulate a run and write its tables; it counts as finished when the first of them is there."""
-    observations: list[Observation] = []
-    avoids, settings = job.detector != NO_AVOIDANCE, settings_of(job.gains)
-    if job.detector in IDEAL:
-        cycles = loop.simulate(job.trial, loop.TrueKeypoints(job.latency), avoids, settings)
-    else:
-        camera = HeadCamera(_detector(job), job.latency, job.lifting, images)
-        cycles, observations = loop.simulate(job.trial, camera, settings=settings), camera.observations
-    frames = pd.DataFrame(list(map(_frame, observations)))
+    camera = None if job.detector in IDEAL else HeadCamera(_detector(job), job.lifting, images)
+    perceive, avoids = camera.perceive if camera else loop.true_keypoints, job.detector != NO_AVOIDANCE
+    settings = PUBLISHED if job.gains == "published" else None
+    cycles = loop.simulate(job.trial, perceive, job.latency, avoids, settings)
+    frames = pd.DataFrame([_frame(seen) for seen in camera.observations] if camera else [])
     for name, table in zip(reversed(_TABLES), (frames, cycles), strict=True):
         write_table(out / run / name, table)
 

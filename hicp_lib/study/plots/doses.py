@@ -10,7 +10,7 @@ from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
 from hicp_lib.study.plots.people import picture_grid
-from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.style import Figure, in_lines, in_style, new_figure, series_text, texts
 
 _LABELS = {
     "distance": "distance [m]",
@@ -44,12 +44,9 @@ def dose_pictures(annotations: Annotations, folder: Path, person: int = 0) -> Fi
         if extra["source_image_id"] == person:
             image = read_image(Path(folder) / "images" / annotations.images[image_id].file_name)
             rows.setdefault(extra["dose"], []).append((extra["level"], image))
-    figure = picture_grid(
-        [[image for _, image in pictures] for pictures in rows.values()],
-        row_titles=list(rows), cell_in=1.5,
-        caption="The pictures of one person, rendered: one thing varied in each row, the rest the same.",
-        alt=f"Rows of pictures of one person: {in_words(list(rows))}.",
-    )  # fmt: skip
+    drawn = [[image for _, image in pictures] for pictures in rows.values()]
+    said = texts("dose_pictures", doses=list(rows))
+    figure = picture_grid(drawn, *said, row_titles=list(rows), cell_in=1.5)
     columns = max(len(pictures) for pictures in rows.values())
     for i, (dose, pictures) in enumerate(rows.items()):
         for j, (level, _) in enumerate(pictures):
@@ -76,10 +73,9 @@ def dose_curves(table: pd.DataFrame, group: str) -> Figure:
             axis.set_xscale("log")
             axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
-    caption = "AP (solid) and visible keypoints hit (dotted), with 95 % intervals over rendered people."
     lows = rows[rows["measure"] == "AP"].groupby(["detector", "dose"], sort=False)["value"].min()
     said = series_text(lows, "{0} {2:.2f} for {1}")
-    return Figure(figure, caption, f"Curves per dose. Lowest average precision: {said}.", table)
+    return Figure(figure, *texts("dose_curves", said=said), table)
 
 
 @in_style
@@ -90,10 +86,9 @@ def observed_curves(table: pd.DataFrame, note: str) -> Figure:
     labels = {subset: f", {subset}" for subset in subsets}
     figure, axes = _dose_panels(table, "subset", styles, labels, "share of hits")
     marks.legend_below(figure, axes[0, 0], ncols=3)
-    caption = f"Share of body keypoints hit by fifths of each dose; 95 % intervals over images: {note}."
     spread = table.groupby(["detector", "dose"], sort=False)["value"].agg(np.ptp)
     said = series_text(spread, "{0} {2:.2f} for {1}")
-    return Figure(figure, caption, f"Curves per dose. Range of the hit rate: {said}.", table)
+    return Figure(figure, *texts("observed_curves", note=note, said=said), table)
 
 
 def _dose_panels(table: pd.DataFrame, by: str, styles: dict, labels: dict, ylabel: str):
@@ -109,7 +104,7 @@ def _dose_panels(table: pd.DataFrame, by: str, styles: dict, labels: dict, ylabe
             pen = {"color": colour, "ls": styles[value], "label": f"{detector}{labels[value]}"}
             axis.plot(part["level"], part["value"], marker=detector_marker(detector), ms=4, **pen)
             bounds = part[["low", "high"]].astype(float)  # objects where there is no interval at all
-        axis.fill_between(part["level"], bounds["low"], bounds["high"], color=colour, alpha=0.13, lw=0)
+            axis.fill_between(part["level"], bounds["low"], bounds["high"], color=colour, alpha=0.13, lw=0)
         axis.set(xlabel=_LABELS.get(dose, dose), ylim=(-0.02, 1.02))
     for axis in axes.flat[len(doses) :]:
         axis.set_axis_off()
@@ -132,10 +127,6 @@ def flicker_rates(table: pd.DataFrame, note: str) -> Figure:
         axis.set(xlabel=measure, xlim=(0, None), ylim=(-0.5, len(detectors) - 0.5))
     axes[0].set(yticks=range(len(detectors)), yticklabels=list(map(in_lines, detectors)))
     lag_ms = 1000 * cases["filtered", "latency [s]"]["value"]
-    caption = (
-        "Keypoints that come and go between consecutive frames, and how far they jump, as detected "
-        f"(filled) and through a causal filter (open), with 95 % bootstrap intervals over seconds: {note}. "
-        f"Delay of the filter: {series_text(lag_ms, '{} {:.0f} ms')}."
-    )
+    lags = series_text(lag_ms, "{} {:.0f} ms")
     said = series_text(cases["as detected", "flicker rate"]["value"], "{} {:.3f}")
-    return Figure(figure, caption, f"Dots with whiskers. Flicker rate as detected: {said}.", table)
+    return Figure(figure, *texts("flicker_rates", note=note, lags=lags, said=said), table)

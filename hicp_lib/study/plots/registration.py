@@ -6,7 +6,7 @@ from matplotlib.patheffects import withStroke
 
 from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.style import Figure, in_style, new_figure, series_text
+from hicp_lib.study.plots.style import Figure, in_style, new_figure, series_text, texts
 
 # Solutions in the order they are given; not detectors' colours.
 _STYLES = (("#D5272D", "x"), ("#FF69B4", "3"), ("#F0A202", "+"), ("#19B5FE", "1"), ("#2ECC40", "2"))
@@ -48,9 +48,8 @@ def registration(
         if known
         else "the median error of a marker under the fit of the others"
     )
-    caption = f"Markers clicked (circles), where each solution puts them (crosses), and {what}: {note}."
     said = series_text(1000 * table.set_index("method")[column].dropna(), "{} {:.0f} mm")
-    return Figure(figure, caption, f"Images with markers, and bars: {said}.", table)
+    return Figure(figure, *texts("registration", what=what, note=note, said=said), table)
 
 
 def _draw_markers(axis, recording: Recording, frame: int, clicks, pixels: pd.DataFrame, methods) -> None:

@@ -2,6 +2,7 @@
 
 import functools
 import re
+import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -10,24 +11,10 @@ import matplotlib.figure
 import matplotlib.pyplot as plt
 import pandas as pd
 
-_RC: dict[Any, Any] = {
-    "figure.dpi": 110,
-    "savefig.dpi": 160,
-    "figure.constrained_layout.use": True,
-    "font.size": 10,
-    "axes.titlesize": 11,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#E3E3E3",
-    "grid.linewidth": 0.8,
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "hicp",
-    "svg.fonttype": "none",
-}
+from hicp_lib.core.datafiles import DATA_DIR
+
+_STYLE = DATA_DIR / "report.mplstyle"
+_TEXTS = tomllib.loads((DATA_DIR / "captions.toml").read_text("utf-8"))
 
 
 @dataclass(frozen=True)
@@ -62,7 +49,7 @@ def in_style(draw: Callable[..., Figure]) -> Callable[..., Figure]:
 
     @functools.wraps(draw)
     def styled(*args, **kwargs) -> Figure:
-        with plt.rc_context(_RC):
+        with plt.style.context(_STYLE):
             data = [given for given in args if isinstance(given, pd.DataFrame | list | dict)]
             if not all(map(len, data)):
                 figure = new_figure(1, 1, 6.0, 0.5, subplot_kw={"visible": False})[0]
@@ -91,6 +78,25 @@ def new_figure(n_rows: int = 1, n_columns: int = 1, width_in: float = 8.0, heigh
     figure, axes = plt.subplots(n_rows, n_columns, figsize=(width_in, height_in), **kwargs)
     plt.close(figure)
     return figure, axes
+
+
+def texts(name: str, **values: Any) -> tuple[str, str]:
+    """Caption and alternative text of a figure: those of `data/captions.toml`, filled in.
+
+    Parameters
+    ----------
+    name : str
+        Of the function that draws the figure.
+    **values : any
+        What stands in the texts, by name; a list is enumerated.
+
+    Returns
+    -------
+    tuple of str
+    """
+    said = {key: in_words(value) if isinstance(value, list) else value for key, value in values.items()}
+    caption, alt = (_TEXTS[name][kind].format(**said) for kind in ("caption", "alt"))
+    return caption, alt
 
 
 def in_words(items: Iterable[str]) -> str:

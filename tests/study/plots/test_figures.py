@@ -115,7 +115,7 @@ def test_grids_have_a_picture_per_detector_and_room_for_missing_ones():
         1,
         0,
     ]
-    sparse = people.picture_grid([[image, None]], caption="c", alt="a")
+    sparse = people.picture_grid([[image, None]], "c", "a")
     assert [len(axis.images) for axis in sparse.figure.axes] == [1, 0]
 
 
