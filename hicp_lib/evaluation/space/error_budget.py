@@ -24,7 +24,7 @@ from hicp_lib.evaluation.cases import labelled
 from hicp_lib.evaluation.space import error_sources as s
 from hicp_lib.evaluation.space.mocap_error import JOINTS
 from hicp_lib.evaluation.space.stability import MIN_SCORE, counted, position_array
-from hicp_lib.evaluation.statistics.design import smallest_difference
+from hicp_lib.evaluation.statistics.proportions import smallest_difference
 from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, with_interval
 from hicp_lib.lifting.robust import METHODS
 from hicp_lib.lifting.table import lift_found

@@ -80,7 +80,7 @@ def new_figure(n_rows: int = 1, n_columns: int = 1, width_in: float = 8.0, heigh
     return figure, axes
 
 
-def texts(name: str, **values: Any) -> tuple[str, str]:
+def texts(name: str, /, **values: Any) -> tuple[str, str]:
     """Caption and alternative text of a figure: those of `data/captions.toml`, filled in.
 
     Parameters
