@@ -28,7 +28,7 @@ from hicp_lib.core.executor import run_jobs
 from hicp_lib.core.files import cache_dir
 from hicp_lib.core.images import write_png
 from hicp_lib.datasets.crops import inside, whole_pixel_boxes
-from hicp_lib.experiments.laboratory import PHOTOGRAPHIC, facing_robot, furnished
+from hicp_lib.experiments.laboratory import MOVEMENTS, PHOTOGRAPHIC, facing_robot, furnished
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.simulation.appearance import materials as m
 from hicp_lib.simulation.appearance.people import appearance_of, dress
@@ -42,14 +42,7 @@ from hicp_lib.simulation.rendering.render import Frame, World, render
 from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
-LEVELS: dict[str, tuple[float, ...]] = {
-    "distance": (0.5, 0.75, 1.0, 1.5, 2.5, 3.5),
-    "light": (1.0, 0.3, 0.1, 0.03, 0.01),
-    "hidden": (0.0, 0.2, 0.4, 0.6, 0.8),
-    "resolution": (640, 320, 160, 80, 48),
-    "upper part": (1.0, 0.8, 0.6, 0.4, 0.2),
-    "lower part": (1.0, 0.8, 0.6, 0.4, 0.2),
-}
+LEVELS: dict[str, list[float]] = MOVEMENTS["doses"]
 DISTANCE_M, EYE_M = 2.5, 1.3
 _UNCHANGED = {"distance": DISTANCE_M, "light": 1.0, "hidden": 0.0, "resolution": 640}  # at these levels
 _KEY_LENGTH = 16  # of a data set's folder

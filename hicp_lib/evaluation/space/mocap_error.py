@@ -17,8 +17,8 @@ import pandas as pd
 from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.evaluation.space.stability import POSITION, THRESHOLDS_M
-from hicp_lib.evaluation.statistics.proportions import smallest_difference
 from hicp_lib.evaluation.statistics import resampling as boot
+from hicp_lib.evaluation.statistics.proportions import smallest_difference
 from hicp_lib.evaluation.statistics.resampling import Draws, weighted_median, with_interval
 from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.qualisys import MotionCapture

@@ -43,9 +43,7 @@ CONTACT_M, BYSTAND_M = 0.01, 0.36
 REACTION_S = 0.2
 """How old what the person acts on is: eyes to arm (150 to 200 ms to a target that jumps)."""
 
-_SITTING_DEG = {"hip_flexion": 86.0, "knee_flexion": 86.0, "hip_abduction": 12.0}
-_HANGING_DEG = {"left_shoulder_abduction": 6.0, "right_shoulder_abduction": 6.0, "left_elbow_flexion": 12.0}
-_HAND_DEG = {"forearm_supination": -15.0, "wrist_flexion": 0.0, "wrist_deviation": 0.0}
+_DEG = lab.MOVEMENTS["reaching_deg"]
 _LEANS_DEG = np.arange(0.0, 100.1, 5.0)  # how far the trunk bends in all; the neck no further
 _FINE_DEG = np.arange(0.0, 100.1, 0.25)
 _LEAN_SHARES = {lab.PELVIS_LEAN: 0.35, "spine_flexion": 0.65, "neck_flexion": -0.45}  # the eyes look ahead
@@ -272,11 +270,11 @@ def _robot_at_post() -> tuple[np.ndarray, np.ndarray]:
 
 def _rest(rng, shape: str, staging: Staging) -> Posture:
     """Upright; arms hang, or lie in the lap."""
-    joints = radians(_HANGING_DEG)
+    joints = radians(_DEG["hanging"])
     if staging.sits:
-        joints |= radians(_SITTING_DEG, "left_") | radians(_SITTING_DEG, "right_")
+        joints |= radians(_DEG["sitting"], "left_") | radians(_DEG["sitting"], "right_")
     for side in ("left", "right"):
-        joints |= sample_hand(rng, "open", f"{side}_") | radians(_HAND_DEG, f"{side}_")
+        joints |= sample_hand(rng, "open", f"{side}_") | radians(_DEG["hand"], f"{side}_")
         if staging.sits:
             wrist_m = _REST_M * [1, 1 if side == "left" else -1, 1]
             joints = reach(load_body(), shape, joints, side, wrist_m, _ELBOW_AT_REST) or joints

@@ -10,19 +10,8 @@ from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
 from hicp_lib.study.plots.people import picture_grid
-from hicp_lib.study.plots.style import Figure, in_lines, in_style, new_figure, series_text, texts
+from hicp_lib.study.plots.style import TEXTS, Figure, in_lines, in_style, new_figure, series_text, texts
 
-_LABELS = {
-    "distance": "distance [m]",
-    "light": "share of the light",
-    "hidden": "share of the height hidden, from below",
-    "resolution": "height of the picture [px]",
-    "upper part": "share of the height seen, from above",
-    "lower part": "share of the height seen, from below",
-    "picture": "size of the picture [px, square root of its area]",
-    "distance to the border": "distance to the border [of the shorter side]",
-    "brightness": "mean brightness [of 255]",
-}
 _UNITS = {"distance": " m", "resolution": " px"}
 _LOGARITHMIC = ("light", "resolution", "distance")
 _SUBSET_STYLES = {"basic": "-", "headless": "--", "close": ":"}
@@ -105,7 +94,7 @@ def _dose_panels(table: pd.DataFrame, by: str, styles: dict, labels: dict, ylabe
             axis.plot(part["level"], part["value"], marker=detector_marker(detector), ms=4, **pen)
             bounds = part[["low", "high"]].astype(float)  # objects where there is no interval at all
             axis.fill_between(part["level"], bounds["low"], bounds["high"], color=colour, alpha=0.13, lw=0)
-        axis.set(xlabel=_LABELS.get(dose, dose), ylim=(-0.02, 1.02))
+        axis.set(xlabel=TEXTS["doses"].get(dose, dose), ylim=(-0.02, 1.02))
     for axis in axes.flat[len(doses) :]:
         axis.set_axis_off()
     for axis in axes[:, 0]:

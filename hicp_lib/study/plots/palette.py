@@ -9,7 +9,7 @@ PERFECT = "perfect detector"  # what finds the true keypoints, where they are kn
 # Each detector's colour and marker, the same on every page. Those of the default study stay apart for readers
 # who are blind to red or green, too; the others do so by their markers.
 DETECTOR_STYLES: dict[str, tuple[str, str]] = {
-    name: tuple(style) for name, style in read_json(DATA_DIR / "detector_styles.json").items()
+    name: (colour, marker) for name, (colour, marker) in read_json(DATA_DIR / "detector_styles.json").items()
 } | {PERFECT: (TRUTH_COLOUR, "x")}
 OTHER_COLOUR, _OTHER_MARKER = "#595959", "."
 

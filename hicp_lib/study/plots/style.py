@@ -14,7 +14,8 @@ import pandas as pd
 from hicp_lib.core.datafiles import DATA_DIR
 
 _STYLE = DATA_DIR / "report.mplstyle"
-_TEXTS = tomllib.loads((DATA_DIR / "captions.toml").read_text("utf-8"))
+TEXTS = tomllib.loads((DATA_DIR / "captions.toml").read_text("utf-8"))
+"""Captions and alternative texts of figures by name (`texts`), and labels of axes."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def texts(name: str, /, **values: Any) -> tuple[str, str]:
     tuple of str
     """
     said = {key: in_words(value) if isinstance(value, list) else value for key, value in values.items()}
-    caption, alt = (_TEXTS[name][kind].format(**said) for kind in ("caption", "alt"))
+    caption, alt = (TEXTS[name][kind].format(**said) for kind in ("caption", "alt"))
     return caption, alt
 
 
