@@ -13,7 +13,7 @@ from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS
 from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import PERFECT, TRUTH_COLOUR, detector_colour
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text, texts
+from hicp_lib.study.plots.style import TEXTS, Figure, in_style, in_words, new_figure, series_text, texts
 
 _OUT_OF_RANGE_M = 0.15  # beyond the reference's range by more is not drawn
 _BOX_CM = (1, 3, 10, 30, 100)  # ticks of a logarithmic axis
@@ -201,11 +201,7 @@ def registration(
     column, label = _ADDED if known else _LEAVE_ONE_OUT
     _draw_bars(axes[-1], 1000 * table.set_index("method")[column], label)
     marks.legend_below(figure, axes[0])
-    what = (
-        "how far it puts the person's markers from where they truly are, median over markers, frames, people"
-        if known
-        else "the median error of a marker under the fit of the others"
-    )
+    what = TEXTS["registration"]["known" if known else "unknown"]
     said = series_text(1000 * table.set_index("method")[column].dropna(), "{} {:.0f} mm")
     return Figure(figure, *texts("registration", what=what, note=note, said=said), table)
 

@@ -10,14 +10,9 @@ import pandas as pd
 
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.style import Figure, in_style, series_text, texts
+from hicp_lib.study.plots.style import TEXTS, Figure, in_style, series_text, texts
 from hicp_lib.study.table_format import intervals_over
 
-_REFERENCES = {
-    "median": "its median position",
-    "truth": "its true position",
-    "markers": "the mean of its two markers",
-}
 _METHOD_LINES = {"robust": "-", "paper": ":"}
 # Darker is closer.
 _FADES = (1.0, 0.62, 0.34)
@@ -94,7 +89,7 @@ def _told(table: pd.DataFrame, marked_m: Sequence[float]) -> dict[str, Any]:
     rows = table[table["threshold_m"] == nearest_m]
     means = rows.groupby(["detector", "view", "method"], sort=False)["value"].mean()
     return {
-        "reference": _REFERENCES[table["reference"].iloc[0]],
+        "reference": TEXTS["references"][table["reference"].iloc[0]],
         "distances": [f"{100 * distance_m:g}" for distance_m in marked_m],
         "nearest_cm": 100 * nearest_m,
         "said": series_text(means, "{} {} {} {:.0%}"),
