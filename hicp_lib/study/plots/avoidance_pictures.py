@@ -16,8 +16,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.experiments.avoidance.closed_loop import start_posture
+from hicp_lib.experiments.avoidance.head_camera import CAMERA, onlooker_view, robot_surfaces
 from hicp_lib.experiments.avoidance.reaching import LEAVES_S, NEAR_S
-from hicp_lib.experiments.avoidance.robot_surfaces import CAMERA, onlooker_view, robot_surfaces
 from hicp_lib.experiments.avoidance.runs import Run, image, moment_at
 from hicp_lib.experiments.laboratory import T_WORLD_ROOT
 from hicp_lib.inspection.skeletons import draw_people

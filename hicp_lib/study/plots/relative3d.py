@@ -113,7 +113,7 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
     Parameters
     ----------
     table : pd.DataFrame
-        As from `hicp_lib.evaluation.space.spread.spread_and_bias`, with truth.
+        As from `hicp_lib.evaluation.space.sightings.spread_and_bias`, with truth.
     method : str
         The lifting that is drawn.
     note : str

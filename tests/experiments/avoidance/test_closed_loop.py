@@ -13,6 +13,7 @@ from hicp_lib.experiments.avoidance.closed_loop import (
     simulate,
     true_keypoints,
 )
+from hicp_lib.experiments.avoidance.head_camera import robot_surfaces
 from hicp_lib.experiments.avoidance.reaching import (
     BYSTAND_M,
     BYSTANDERS,
@@ -24,7 +25,6 @@ from hicp_lib.experiments.avoidance.reaching import (
     Moment,
     script,
 )
-from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
 from hicp_lib.experiments.avoidance.skin_distance import FAR_M, robot_spheres, skin_distance_m
 from hicp_lib.experiments.laboratory import in_root
 from hicp_lib.robot.home import HOME_M, home_posture
