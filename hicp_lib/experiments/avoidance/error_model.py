@@ -21,7 +21,6 @@ from hicp_lib.experiments.laboratory import COLOUR, in_root
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.loop import Perception
 from hicp_lib.robot.posture import Posture
-from hicp_lib.robot.skin import read_skin
 
 GROUPS = {
     "head": np.setdiff1d(HEAD, FACE), "face": FACE, "trunk": np.array([5, 6, 11, 12, 18, 19]),
@@ -48,7 +47,7 @@ def in_sight(moment: Moment, posture: Posture) -> np.ndarray:
     array of bool, shape (n_groups,)
     """
     icub, person = load_icub(), moment.person
-    places, radii = robot_spheres(icub, read_skin(), posture)
+    places, _ = robot_spheres(posture)
     points = [in_root(person.keypoints_m), in_root(person.vertices_m), places]
     T_camera_root = np.linalg.inv(icub.T_root_camera(posture.angles("head"), MOUNT))
     x, y, depth_m = transform(T_camera_root, np.concatenate(points)).T

@@ -20,7 +20,6 @@ from hicp_lib.experiments.avoidance.skin_distance import robot_spheres, skin_dis
 from hicp_lib.experiments.minimum_jerk import Posture, between, minimum_jerk
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
-from hicp_lib.robot.skin import read_skin
 from hicp_lib.simulation.appearance.people import Appearance, appearance_of, dress
 from hicp_lib.simulation.body.hands import sample_hand
 from hicp_lib.simulation.body.identities import Subject
@@ -264,8 +263,7 @@ def _distance_m(shape: str, posture: Posture) -> float:
 
 @memoised()
 def _robot_at_post() -> tuple[np.ndarray, np.ndarray]:
-    icub = load_icub()
-    return robot_spheres(icub, read_skin(), home_posture(icub))
+    return robot_spheres(home_posture(load_icub()))
 
 
 def _rest(rng, shape: str, staging: Staging) -> Posture:

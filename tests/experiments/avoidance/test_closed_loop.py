@@ -38,8 +38,7 @@ HOME = np.array(HOME_M["left"])
 
 @pytest.fixture(scope="module")
 def spheres():
-    icub = load_icub()
-    return robot_spheres(icub, read_skin(), home_posture(icub))
+    return robot_spheres(home_posture(load_icub()))
 
 
 def distance_m(spheres, name: str, time_s: float, hand_m=HOME) -> float:
