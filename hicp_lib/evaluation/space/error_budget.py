@@ -39,9 +39,8 @@ TOTALS = {
 }
 """Sources that come together: all, those of the paper's comparison, and those the robot lives with."""
 _ALONE, _WITHOUT = "{}, alone", "without {}"
-_ALL_BUT = {source: {*s.SOURCES} - {source} for source in s.SOURCES}
 STATES: dict[str, set[str]] = TOTALS | {_ALONE.format(source): {source} for source in s.SOURCES}
-STATES |= {_WITHOUT.format(source): others for source, others in _ALL_BUT.items()}
+STATES |= {_WITHOUT.format(source): {*s.SOURCES} - {source} for source in s.SOURCES}
 """What is switched on, by the column that has the error then."""
 
 _FINGERS = tuple(NAMES[k] for hand in (LEFT_HAND, RIGHT_HAND) for k in hand[1:])

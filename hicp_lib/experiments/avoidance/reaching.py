@@ -81,15 +81,10 @@ class Staging:
     by: str
 
 
-BYSTANDERS = {
-    "sitting, gesture": Staging(True, (0.26, 1.02), "gesture"),
-    "standing, passing": Staging(False, (0.26, 1.5), "passing"),
-}
-SCRIPTS = {
-    "sitting, hand": Staging(True, (0.26, 1.02), "hand"),
-    "standing, hand": Staging(False, (0.26, 0.92), "hand"),
-    "sitting, head": Staging(True, (-0.14, 1.0), "head"),
-}
+BYSTANDERS, SCRIPTS = (
+    {name: Staging(sits, (x_m, y_m), by) for name, (sits, x_m, y_m, by) in lab.MOVEMENTS[kind].items()}
+    for kind in ("bystanders", "scripts")
+)
 
 
 @dataclass(frozen=True, eq=False)
