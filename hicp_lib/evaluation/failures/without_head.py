@@ -24,7 +24,8 @@ def with_and_without_head(errors: pd.DataFrame) -> pd.DataFrame:
     """
     body = errors[errors["group"] == "body"]
     basic, headless = (body[body["subset"] == subset] for subset in ("basic", "headless"))
-    return basic.merge(headless, on=["detector", "annotation_id", "keypoint"], suffixes=("", "_headless"))
+    same = ["detector", "keypoint", "annotation_id", "source_image"]
+    return basic.merge(headless, on=same, suffixes=("", "_headless"))
 
 
 def change_per_keypoint(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
