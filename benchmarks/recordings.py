@@ -20,8 +20,9 @@ import numpy as np
 from timing import Comparison, run
 
 from hicp_lib.core.executor import Processes
+from hicp_lib.experiments.recordings.frames import camera_at, record_frame
 from hicp_lib.experiments.recordings.scenarios import SCENARIOS, Scenario
-from hicp_lib.experiments.recordings.simulate import camera_at, record_frame, record_one, simulate_recording
+from hicp_lib.experiments.recordings.simulate import record_one, simulate_recording
 from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.rendering.render import render
 

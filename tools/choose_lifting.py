@@ -26,8 +26,8 @@ from hicp_lib.core.keypoints import INDEX, LEFT_HAND, N_KEYPOINTS
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.evaluation.space.lifting_ablation import GROUPS, MIN_SCORE
 from hicp_lib.experiments.laboratory import COLOUR
+from hicp_lib.experiments.recordings.frames import camera_poses, record_frame
 from hicp_lib.experiments.recordings.scenarios import scenario
-from hicp_lib.experiments.recordings.simulate import camera_poses, record_frame
 from hicp_lib.lifting import body_measures, depth_candidates, hand_shapes, limb_lengths, robust
 from hicp_lib.simulation.body.identities import Subject, split_members
 

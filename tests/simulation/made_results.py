@@ -12,8 +12,8 @@ from hicp_lib.experiments.avoidance.closed_loop import Trial, simulate, start_po
 from hicp_lib.experiments.avoidance.head_camera import photograph
 from hicp_lib.experiments.avoidance.reaching import SCRIPTS, Moment
 from hicp_lib.experiments.doses import doses
+from hicp_lib.experiments.recordings.frames import record_frame
 from hicp_lib.experiments.recordings.scenarios import scenario
-from hicp_lib.experiments.recordings.simulate import record_frame
 from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.world.scenes import render_scene
 from hicp_lib.simulation.world.staging import random_stage

@@ -9,7 +9,7 @@ kept = watch_caches()
 import numpy as np  # noqa: E402
 
 from hicp_lib.experiments.laboratory import COLOUR  # noqa: E402
-from hicp_lib.experiments.recordings.simulate import record_frame  # noqa: E402
+from hicp_lib.experiments.recordings.frames import record_frame  # noqa: E402
 from hicp_lib.lifting.paper import lift  # noqa: E402
 from hicp_lib.lifting.robust import lift_robust  # noqa: E402
 from hicp_lib.simulation.body.identities import Subject  # noqa: E402

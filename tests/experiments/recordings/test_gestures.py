@@ -9,9 +9,9 @@ from hicp_lib.core.camera import project, transform
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.experiments.laboratory import posed
 from hicp_lib.experiments.minimum_jerk import between
+from hicp_lib.experiments.recordings.frames import camera_at
 from hicp_lib.experiments.recordings.gestures import DISTANCE_M, TABLE_M, Gestures
 from hicp_lib.experiments.recordings.scenarios import scenario
-from hicp_lib.experiments.recordings.simulate import camera_at
 from hicp_lib.simulation.appearance.people import appearance_of
 from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.body.joints import pose_from_joints, within_limits
