@@ -91,12 +91,11 @@ def paired_differences(
         for a, b in combinations(dict.fromkeys(part[over]), 2):
             less = (values[a] - values[b]).dropna().rename("less").reset_index()
             whose = less.get("subject")
-            interval = mean_with_interval(less["less"], less["source_image"], draws, whose)
-            value, low, high = interval
+            value, low, high = mean_with_interval(less["less"], less["source_image"], draws, whose)
             counts: list[float] = [len(less)]
             if whose is not None:
                 counts += [whose.nunique(), smallest_difference(less.groupby(whose)["less"].mean())]
-            table.append((*group, a, b, f"{a} less {b}", *interval, *counts))
+            table.append((*group, a, b, f"{a} less {b}", value, low, high, *counts))
             table.append((*group, b, a, f"{b} less {a}", 0 - value, 0 - high, 0 - low, *counts))
     names = ["n_images", "n_people", "detectable"][: 2 * len(units) - 1]
     return pd.DataFrame(table, columns=[*by, over, "other", "pair", "value", "low", "high", *names])
