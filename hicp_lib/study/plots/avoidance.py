@@ -85,10 +85,7 @@ def sweep_curves(sweeps: Mapping[str, pd.DataFrame], note: str) -> Figure:
     axes[0, 0].set(ylabel="least distance (cm)", ylim=(0, None))
     marks.legend_below(figure, axes, ncols=2)
     lines = table.assign(cm=100 * table["value"]).groupby(["swept", *case], sort=False)["cm"]
-    ends = [
-        f"{detector}, {gains}, from {cm.iloc[0]:.1f} to {cm.iloc[-1]:.1f} cm over {column}"
-        for (column, detector, gains), cm in lines
-    ]
+    ends = lines.agg(["first", "last"]).reset_index()
     return Figure(figure, *texts("sweep_curves", note=note, ends=ends), table)
 
 

@@ -7,7 +7,7 @@ from hicp_lib.evaluation.ap.loss_shares import SHARES
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.evaluation import WIDTH_IN
 from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.style import Figure, in_style, series_text, texts
+from hicp_lib.study.plots.style import Figure, in_style, texts
 
 
 @in_style
@@ -15,8 +15,7 @@ def box_sources(table: pd.DataFrame, data_note: str) -> Figure:
     """Average precision by where the box comes from; `table` as from `metric_table`, of `box_variants`."""
     rows = table[table["metric"] == "AP"]
     figure = _bars_by_case(rows, "subset", "detector", "AP")
-    said = series_text(rows.set_index(["detector", "subset"])["value"], "{0} {2:.2f} on {1}")
-    return Figure(figure, *texts("box_sources", note=data_note, said=said), rows)
+    return Figure(figure, *texts("box_sources", note=data_note, said=rows), rows)
 
 
 @in_style
@@ -27,8 +26,7 @@ def loss_shares(table: pd.DataFrame, data_note: str) -> Figure:
     rows = table.assign(case=cases).iloc[np.argsort(table["share"].map(SHARES.index), kind="stable")]
     figure = _bars_by_case(rows, "share", "case", "loss of AP")
     last = table[table["subset"] == table["subset"].iloc[-1]]
-    said = series_text(last.set_index(["share", "detector", "subset"])["value"], "{0} of {1} {3:.2f} on {2}")
-    return Figure(figure, *texts("loss_shares", note=data_note, said=said), table)
+    return Figure(figure, *texts("loss_shares", note=data_note, said=last), table)
 
 
 def _bars_by_case(rows: pd.DataFrame, across: str, down: str, x_label: str):

@@ -38,6 +38,5 @@ def _by_section(table: pd.DataFrame) -> Figure:
     axis.invert_yaxis()
     axis.set(xlabel="claims", ylabel="section of the paper", xticks=range(int(counts.sum(axis=1).max()) + 1))
     figure.legend(loc="outside upper center", ncols=3)
-    said = [f"{counts[verdict].sum()} {verdict}" for verdict in VERDICTS]
     numbers = counts.reset_index().melt("section", var_name="verdict", value_name="claims")
-    return Figure(figure, *texts("verdicts", counts=said), numbers)
+    return Figure(figure, *texts("verdicts", counts=counts.sum()), numbers)

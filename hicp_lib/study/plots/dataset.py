@@ -18,7 +18,7 @@ from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import BODY_COLOUR, HEAD_COLOUR, SUBSET_COLOURS
 from hicp_lib.study.plots.people import draw_truth, picture_grid
-from hicp_lib.study.plots.style import Figure, in_style, new_figure, series_text, texts
+from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
 
 _TRUTH_COLOUR = "#F0E442"
 _EDGES = ("left", "top", "right", "bottom")
@@ -147,8 +147,7 @@ def labelled_share(subsets: Mapping[str, Annotations], note: str) -> Figure:
     axis.set(ylabel="share of people", ylim=(0, 1))
     axis.grid(axis="x", visible=False)
     axis.legend(loc="upper right", ncols=2, bbox_to_anchor=(1, 1.16))
-    said = series_text(wide.mean(), "{} {:.0%}")
-    return Figure(figure, *texts("labelled_share", note=note, said=said), table)
+    return Figure(figure, *texts("labelled_share", note=note, said=wide.mean()), table)
 
 
 @in_style
@@ -202,8 +201,7 @@ def layouts() -> Figure:
     _draw_layout(axes.flat[-1], points_m, LEFT_HAND, "a left hand, the same\nof all that give it")
     marks.legend_below(figure, axes.flat[3], ncols=2)
     table = pd.DataFrame(rows, columns=["layout", "points", "drawn"])
-    said = series_text(table.set_index("layout")["points"], "{} {}")
-    return Figure(figure, *texts("layouts", said=said), table)
+    return Figure(figure, *texts("layouts", said=table), table)
 
 
 def _draw_layout(axis, points_m: np.ndarray, given: np.ndarray, title: str) -> None:

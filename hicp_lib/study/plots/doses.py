@@ -10,7 +10,7 @@ from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
 from hicp_lib.study.plots.people import picture_grid
-from hicp_lib.study.plots.style import TEXTS, Figure, in_lines, in_style, new_figure, series_text, texts
+from hicp_lib.study.plots.style import TEXTS, Figure, in_lines, in_style, new_figure, texts
 
 _UNITS = {"distance": " m", "resolution": " px"}
 _LOGARITHMIC = ("light", "resolution", "distance")
@@ -63,8 +63,7 @@ def dose_curves(table: pd.DataFrame, group: str) -> Figure:
             axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
     lows = rows[rows["measure"] == "AP"].groupby(["detector", "dose"], sort=False)["value"].min()
-    said = series_text(lows, "{0} {2:.2f} for {1}")
-    return Figure(figure, *texts("dose_curves", said=said), table)
+    return Figure(figure, *texts("dose_curves", said=lows), table)
 
 
 @in_style
@@ -76,8 +75,7 @@ def observed_curves(table: pd.DataFrame, note: str) -> Figure:
     figure, axes = _dose_panels(table, "subset", styles, labels, "share of hits")
     marks.legend_below(figure, axes[0, 0], ncols=3)
     spread = table.groupby(["detector", "dose"], sort=False)["value"].agg(np.ptp)
-    said = series_text(spread, "{0} {2:.2f} for {1}")
-    return Figure(figure, *texts("observed_curves", note=note, said=said), table)
+    return Figure(figure, *texts("observed_curves", note=note, said=spread), table)
 
 
 def _dose_panels(table: pd.DataFrame, by: str, styles: dict, labels: dict, ylabel: str):
@@ -116,6 +114,5 @@ def flicker_rates(table: pd.DataFrame, note: str) -> Figure:
         axis.set(xlabel=measure, xlim=(0, None), ylim=(-0.5, len(detectors) - 0.5))
     axes[0].set(yticks=range(len(detectors)), yticklabels=list(map(in_lines, detectors)))
     lag_ms = 1000 * cases["filtered", "latency [s]"]["value"]
-    lags = series_text(lag_ms, "{} {:.0f} ms")
-    said = series_text(cases["as detected", "flicker rate"]["value"], "{} {:.3f}")
-    return Figure(figure, *texts("flicker_rates", note=note, lags=lags, said=said), table)
+    rates = cases["as detected", "flicker rate"]["value"]
+    return Figure(figure, *texts("flicker_rates", note=note, lags=lag_ms, said=rates), table)

@@ -12,7 +12,7 @@ from hicp_lib.study.photographs import PHOTOGRAPHED, RENDERED
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import THRESHOLD_MARKERS, detector_colour
 from hicp_lib.study.plots.people import detections_grid
-from hicp_lib.study.plots.style import Figure, in_style, new_figure, series_text, texts
+from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
 
 GROUP_TITLES = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
 WIDTH_IN = 5.5  # what can be read on a telephone, and fills a page
@@ -52,9 +52,7 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
     marks.legend_below(figure, axes[0, 0], ncols=_legend_columns(detectors))
     rows = table[(table["metric"] == "AP") & table["value"].notna()]
     best = rows.loc[rows.groupby(["subset", "group"], sort=False)["value"].idxmax()]
-    values = best.set_index(["detector", "subset", "group"])["value"]
-    said = series_text(values, "{0} with {3:.2f} on {1} {2}")
-    return Figure(figure, *texts("precision_recall", note=data_note, said=said), table)
+    return Figure(figure, *texts("precision_recall", note=data_note, said=best), table)
 
 
 def _panels(table: pd.DataFrame, height_in: float, x_label: str, y_label: str):
@@ -101,8 +99,7 @@ def loss_without_head(table: pd.DataFrame, data_note: str) -> Figure:
     figure = _with_and_without(rows, {"AP": "average precision (.5:.95)"}, "metric")
     drops = rows.pivot_table(index=["detector", "group"], columns="subset", values="value", sort=False)
     change = drops.get("headless", np.nan) - drops.get("basic", np.nan)
-    said = series_text(change.dropna(), "{} {} {:+.2f}")
-    return Figure(figure, *texts("loss_without_head", note=data_note, said=said), rows)
+    return Figure(figure, *texts("loss_without_head", note=data_note, said=change.dropna()), rows)
 
 
 @in_style
@@ -115,9 +112,8 @@ def found_and_placed(table: pd.DataFrame, data_note: str) -> Figure:
     rows = table[table["what"].isin(labels)]
     figure = _with_and_without(rows, labels, "what")
     shares = rows[(rows["what"] == FOUND) & (rows["group"] == rows["group"].iloc[0])]
-    said = series_text(shares.set_index(["detector", "subset"])["value"], "{0} {2:.2f} on {1}")
     group = _short_title(rows["group"].iloc[0])
-    return Figure(figure, *texts("found_and_placed", note=data_note, group=group, said=said), table)
+    return Figure(figure, *texts("found_and_placed", note=data_note, group=group, said=shares), table)
 
 
 def _with_and_without(rows: pd.DataFrame, labels: dict[str, str], across: str):
@@ -208,8 +204,7 @@ def time_per_image(table: pd.DataFrame, machine_note: str) -> Figure:
     marks.draw_boxes(axis, samples, map(detector_colour, detectors))
     axis.set(yticks=range(1, len(detectors) + 1), yticklabels=detectors)
     axis.set(xlabel="time per image [ms]", xlim=(0, None))
-    pairs = zip(detectors, samples, strict=True)
-    medians = [f"{name} {np.median(times):.0f} ms" for name, times in pairs if len(times)]
+    medians = pd.Series([times.median() for times in samples], detectors).dropna()
     return Figure(figure, *texts("time_per_image", note=machine_note, medians=medians), table)
 
 
@@ -226,5 +221,4 @@ def precisions(table: pd.DataFrame, note: str) -> Figure:
     marks.name_rows(axes[0, 0], names)
     marks.legend_below(figure, axes[0, 0], ncols=2)
     best = table.loc[table.groupby(["where", "subset"], sort=False)["value"].idxmax()]
-    said = series_text(best.set_index(["detector", "where", "subset"])["value"], "{0} {3:.2f} ({1}, {2})")
-    return Figure(figure, *texts("precisions", note=note, said=said), table)
+    return Figure(figure, *texts("precisions", note=note, said=best), table)

@@ -16,7 +16,7 @@ from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.evaluation import GROUP_TITLES
 from hicp_lib.study.plots.palette import detector_colour
 from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
-from hicp_lib.study.plots.style import Figure, in_lines, in_style, new_figure, series_text, texts
+from hicp_lib.study.plots.style import Figure, in_lines, in_style, new_figure, texts
 
 _TRUTH_COLOUR = "#39D353"
 _ONE_CROP = ["subset", "image_id", "annotation_id"]
@@ -76,8 +76,7 @@ def class_precision(table: pd.DataFrame, note: str) -> Figure:
     marks.legend_below(figure, axes, ncols=2)
     best = rows.query("group == 'body' and metric == 'AP'").dropna(subset="value")
     best = best.sort_values("value", ascending=False).groupby("class").head(1)
-    said = series_text(best.set_index(["detector", "class"])["value"], "{0} {2:.2f} for {1}")
-    return Figure(figure, *texts("class_precision", note=note, said=said), rows)
+    return Figure(figure, *texts("class_precision", note=note, said=best), rows)
 
 
 def _say_too_few(axis, names: list[str], few: set[str]) -> None:
@@ -120,8 +119,8 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
     marks.name_rows(axes[0], order)
     marks.legend_below(figure, axes)
     worst = table[(table["kind"] == "miss") & table["share"].notna()]
-    said = series_text(worst.set_index(["detector", by])["share"], "{0} {2:.2f} on {1}")
-    return Figure(figure, *texts("error_kinds", note=note, by=by, said=said), table)
+    misses = worst.set_index(["detector", by])["share"]
+    return Figure(figure, *texts("error_kinds", note=note, by=by, said=misses), table)
 
 
 @in_style
@@ -135,8 +134,8 @@ def head_change(table: pd.DataFrame, note: str) -> Figure:
     marks.name_rows(axis, [name.replace("_", " ") for name in names])
     axis.set(xlabel="change of the share of keypoints hit, without the head")
     marks.legend_below(figure, axis, ncols=2)
-    said = series_text(table.groupby("detector", sort=False)["change"].mean(), "{} {:+.2f}")
-    return Figure(figure, *texts("head_change", note=note, said=said), table)
+    changes = table.groupby("detector", sort=False)["change"].mean()
+    return Figure(figure, *texts("head_change", note=note, said=changes), table)
 
 
 @in_style
@@ -152,8 +151,8 @@ def hallucinated_heads(table: pd.DataFrame, note: str) -> Figure:
     axes[0].set(ylabel="below the cut [of the picture]")
     figure.colorbar(dots, ax=axes, label="score", shrink=0.8)
     marks.legend_below(figure, axes)
-    said = series_text((table["below"] < 0).groupby(table["detector"], sort=False).mean())
-    return Figure(figure, *texts("hallucinated_heads", note=note, said=said), table)
+    shares = (table["below"] < 0).groupby(table["detector"], sort=False).mean()
+    return Figure(figure, *texts("hallucinated_heads", note=note, said=shares), table)
 
 
 @in_style
@@ -171,8 +170,7 @@ def false_presence(table: pd.DataFrame, note: str) -> Figure:
     marks.name_rows(axes[0, 0], names)
     marks.legend_below(figure, axes, ncols=2)
     heads = rows[(rows["part"] == "head") & (rows["subset"] == "headless")]
-    said = series_text(heads.set_index(["detector", "decision"])["value"], "{0} {2:.2f} ({1})")
-    return Figure(figure, *texts("false_presence", note=note, said=said), table)
+    return Figure(figure, *texts("false_presence", note=note, said=heads), table)
 
 
 @in_style
@@ -191,8 +189,7 @@ def scores_by_state(table: pd.DataFrame, note: str) -> Figure:
     axes[0].set(ylabel="share of hits")
     marks.legend_below(figure, axes)
     top = table[table["state"] == "outside"].groupby("detector", sort=False).tail(1)
-    said = series_text(top.set_index(["detector", "score"])["value"], "{0} {2:.2f} at {1:.2f}")
-    return Figure(figure, *texts("scores_by_state", note=note, said=said), table)
+    return Figure(figure, *texts("scores_by_state", note=note, said=top), table)
 
 
 def gallery(

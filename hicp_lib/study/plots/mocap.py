@@ -13,7 +13,7 @@ from hicp_lib.evaluation.space.mocap_error import TABLE_JOINTS
 from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import PERFECT, TRUTH_COLOUR, detector_colour
-from hicp_lib.study.plots.style import TEXTS, Figure, in_style, in_words, new_figure, series_text, texts
+from hicp_lib.study.plots.style import TEXTS, Figure, in_style, in_words, new_figure, texts
 
 _OUT_OF_RANGE_M = 0.15  # beyond the reference's range by more is not drawn
 _BOX_CM = (1, 3, 10, 30, 100)  # ticks of a logarithmic axis
@@ -67,7 +67,7 @@ def error_distributions(errors: pd.DataFrame, paper: pd.DataFrame, min_score: fl
         axis.label_outer()
     medians_cm = 100 * at_arms[at_arms["is_found"]].groupby(_LINE[:2], sort=False)["error_m"].median()
     told = {"min_score": min_score, "note": note, "floor": _floor(errors)}
-    said = texts("error_distributions", **told, said=series_text(medians_cm, "{}, {} lifting, {:.1f} cm"))
+    said = texts("error_distributions", **told, said=medians_cm)
     return Figure(figure, *said, errors.loc[is_found, [*_LINE, "frame", "score", "error_m"]])
 
 
@@ -115,7 +115,7 @@ def trajectories(
     counts = found[found["error_m"].notna()].groupby("detector", sort=False).size()
     told = {"min_score": min_score, "beyond_cm": 100 * _OUT_OF_RANGE_M, "floor": _floor(errors), "note": note}
     told |= {"name": keypoint.replace("_", " "), "methods": list(errors["method"].unique())}
-    said = texts("trajectories", **told, said=series_text(counts, "{} in {} frames"))
+    said = texts("trajectories", **told, said=counts)
     columns = ["detector", "frame", *_AXES, *(f"reference_{c}" for c in _AXES), "score", "error_m"]
     return Figure(figure, *said, errors[columns])
 
@@ -161,8 +161,7 @@ def error_budget(table: pd.DataFrame, paper: pd.DataFrame, note: str) -> Figure:
     beside = theirs if AGAINST_MOCAP in rows else ""
     first = table[table["kind"] == "alone"].sort_values("value_m", ascending=False)
     first = first.drop_duplicates(["part", "method"]).set_index(["part", "method", "source"])["value_m"]
-    said = series_text(100 * first, "{}s, {} lifting: {} with {:.1f} cm")
-    told = {"n_people": table["n_people"].max(), "beside": beside, "note": note, "said": said}
+    told = {"n_people": table["n_people"].max(), "beside": beside, "note": note, "said": 100 * first}
     return Figure(figure, *texts("error_budget", **told), table)
 
 
@@ -202,7 +201,7 @@ def registration(
     _draw_bars(axes[-1], 1000 * table.set_index("method")[column], label)
     marks.legend_below(figure, axes[0])
     what = TEXTS["registration"]["known" if known else "unknown"]
-    said = series_text(1000 * table.set_index("method")[column].dropna(), "{} {:.0f} mm")
+    said = 1000 * table.set_index("method")[column].dropna()
     return Figure(figure, *texts("registration", what=what, note=note, said=said), table)
 
 

@@ -14,7 +14,7 @@ from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
 from hicp_lib.study.plots.people import detections_grid
-from hicp_lib.study.plots.style import Figure, in_style, new_figure, series_text, texts
+from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
 from hicp_lib.study.table_format import intervals_over
 
 _AXES = ("x_m", "y_m", "z_m")
@@ -95,8 +95,8 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
             axis.yaxis.set_inverted(up == "x_m")  # forward is up
     marks.legend_below(figure, axes)
     counts = medians.groupby(["detector", "view"], sort=False).size()
-    dashed, said = "; dashed: the true skeleton" * bool(truth), series_text(counts, "{0} {2} ({1})")
-    told = texts("median_skeletons", fewest=fewest, dashed=dashed, note=note, said=said)
+    dashed = "; dashed: the true skeleton" * bool(truth)
+    told = texts("median_skeletons", fewest=fewest, dashed=dashed, note=note, said=counts)
     return Figure(figure, *told, medians)
 
 
@@ -139,8 +139,7 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
     marks.legend_below(figure, axes[0, 0], ncols=5)
     worse = table.assign(mostly=np.where(table["bias_m"] > table["spread_m"], "bias", "spread"))
     counts = worse.groupby(["detector", "mostly"], sort=False).size()
-    said = series_text(counts, "{0} {2} with more {1}")
-    told = texts("spread_against_bias", intervals=intervals_over(table), note=note, said=said)
+    told = texts("spread_against_bias", intervals=intervals_over(table), note=note, said=counts)
     return Figure(figure, *told, table)
 
 

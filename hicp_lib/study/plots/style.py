@@ -89,15 +89,21 @@ def texts(name: str, /, **values: Any) -> tuple[str, str]:
     name : str
         Of the function that draws the figure.
     **values : any
-        What stands in the texts, by name; a list is enumerated.
+        What stands in the texts, by name. A list is enumerated, as are rows of a table and values of a series,
+        each put into the pattern that has the value's name (`series_text`).
 
     Returns
     -------
     tuple of str
     """
-    said = {key: in_words(value) if isinstance(value, list) else value for key, value in values.items()}
-    caption, alt = (TEXTS[name][kind].format(**said) for kind in ("caption", "alt"))
-    return caption, alt
+    patterns, said = TEXTS[name], {}
+    for key, value in values.items():
+        if isinstance(value, pd.DataFrame):
+            value = [patterns[key].format(**row) for row in value.to_dict("records")]
+        elif isinstance(value, pd.Series):
+            value = series_text(value, patterns[key])
+        said[key] = in_words(value) if isinstance(value, list) else value
+    return patterns["caption"].format(**said), patterns["alt"].format(**said)
 
 
 def in_words(items: Iterable[str]) -> str:

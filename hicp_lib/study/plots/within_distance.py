@@ -10,7 +10,7 @@ import pandas as pd
 
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.style import TEXTS, Figure, in_style, series_text, texts
+from hicp_lib.study.plots.style import TEXTS, Figure, in_style, texts
 from hicp_lib.study.table_format import intervals_over
 
 _METHOD_LINES = {"robust": "-", "paper": ":"}
@@ -92,5 +92,5 @@ def _told(table: pd.DataFrame, marked_m: Sequence[float]) -> dict[str, Any]:
         "reference": TEXTS["references"][table["reference"].iloc[0]],
         "distances": [f"{100 * distance_m:g}" for distance_m in marked_m],
         "nearest_cm": 100 * nearest_m,
-        "said": series_text(means, "{} {} {} {:.0%}"),
+        "said": means,
     }
