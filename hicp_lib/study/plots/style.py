@@ -89,7 +89,7 @@ def texts(name: str, /, **values: Any) -> tuple[str, str]:
     name : str
         Of the function that draws the figure.
     **values : any
-        What stands in the texts, by name. A list is enumerated, as are rows of a table and values of a series,
+        What stands in the texts, by name. A list is enumerated, as are rows of a table and values of series,
         each put into the pattern that has the value's name (`series_text`).
 
     Returns
