@@ -248,7 +248,7 @@ def _row(
     hand_m = icub.chains["left"].T_root_link("hand", q)[:3, 3]
     row = {
         "t_s": now_s,
-        "distance_m": skin_distance_m(robot_spheres(posture), person.skin_m(now_s)),
+        "distance_m": skin_distance_m(robot_spheres(icub, posture), person.skin_m(now_s)),
         "activation": float(threat.activations.max()),
         "activations": threat.activations.round(3).tolist(),
         "status": command.status,

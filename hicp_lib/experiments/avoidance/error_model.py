@@ -47,7 +47,7 @@ def in_sight(moment: Moment, posture: Posture) -> np.ndarray:
     array of bool, shape (n_groups,)
     """
     icub, person = load_icub(), moment.person
-    places, _ = robot_spheres(posture)
+    places, _ = robot_spheres(icub, posture)
     points = [in_root(person.keypoints_m), in_root(person.vertices_m), places]
     T_camera_root = np.linalg.inv(icub.T_root_camera(posture.angles("head"), MOUNT))
     x, y, depth_m = transform(T_camera_root, np.concatenate(points)).T

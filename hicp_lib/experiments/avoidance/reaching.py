@@ -258,7 +258,8 @@ def _distance_m(shape: str, posture: Posture) -> float:
 
 @memoised()
 def _robot_at_post() -> tuple[np.ndarray, np.ndarray]:
-    return robot_spheres(home_posture(load_icub()))
+    icub = load_icub()
+    return robot_spheres(icub, home_posture(icub))
 
 
 def _rest(rng, shape: str, staging: Staging) -> Posture:

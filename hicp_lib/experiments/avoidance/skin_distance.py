@@ -7,7 +7,7 @@ clothes and hair. The robot's fingers are left out.
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hicp_lib.robot.kinematics import load_icub
+from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.segments import body_segments
 from hicp_lib.robot.skin import read_skin
@@ -18,11 +18,12 @@ _STEP_M = 0.01
 _SOME = 32  # of so many vertices one is looked at first
 
 
-def robot_spheres(posture: Posture) -> tuple[np.ndarray, np.ndarray]:
+def robot_spheres(icub: ICub, posture: Posture) -> tuple[np.ndarray, np.ndarray]:
     """The robot as spheres: taxels are points; upper arms, forearms and hands are rows a centimetre apart.
 
     Parameters
     ----------
+    icub : ICub
     posture : Posture
 
     Returns
@@ -31,7 +32,6 @@ def robot_spheres(posture: Posture) -> tuple[np.ndarray, np.ndarray]:
         In the root frame.
     radii_m : array, shape (n,)
     """
-    icub = load_icub()
     taxels, _ = read_skin().in_root(icub, posture)
     places, radii = [taxels], [np.zeros(len(taxels))]
     for segment in body_segments(icub, posture):

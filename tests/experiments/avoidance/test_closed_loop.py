@@ -38,7 +38,8 @@ HOME = np.array(HOME_M["left"])
 
 @pytest.fixture(scope="module")
 def spheres():
-    return robot_spheres(home_posture(load_icub()))
+    icub = load_icub()
+    return robot_spheres(icub, home_posture(icub))
 
 
 def distance_m(spheres, name: str, time_s: float, hand_m=HOME) -> float:
