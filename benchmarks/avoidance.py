@@ -20,7 +20,7 @@ from timing import Comparison, run
 from hicp_lib.core.camera import Camera, transform
 from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.registry import make_detector
-from hicp_lib.lifting.robust import METHODS, lift_in_steps
+from hicp_lib.lifting.robust import METHODS, lift_robust
 from hicp_lib.robot.controller import Controller
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
@@ -84,8 +84,8 @@ def run_cycles(detector, frames: list, n_cycles: int, method: str = "robust") ->
     for k in range(n_cycles):
         image, depth, intrinsics, true = frames[k // 4 % len(frames)]
         found = clock.measure("detector", detector.detect, image) if detector else true
-        arguments = found.keypoints_px, depth, intrinsics, [METHODS[method]]
-        (lifted,) = clock.measure("lifting", lift_in_steps, *arguments)
+        arguments = found.keypoints_px, depth, intrinsics, METHODS[method]
+        lifted = clock.measure("lifting", lift_robust, *arguments)
         T = clock.measure("camera pose", icub.T_root_camera, posture.angles("head"))
         points = transform(T, lifted.points_m)
         seen = Perception(k * PERIOD_S, points, found.scores)

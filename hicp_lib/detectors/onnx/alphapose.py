@@ -11,7 +11,7 @@ from hicp_lib.detectors.onnx import pose_nms
 from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.box_source import BoxSource
 from hicp_lib.detectors.onnx.decode import decode_combined, decode_integral, decode_quarter
-from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.facts import Fact, facts
 from hicp_lib.detectors.onnx.pose_net import Decoder, PoseNet
 from hicp_lib.detectors.onnx.session import OnnxModel, open_model
 
@@ -98,16 +98,9 @@ class AlphaPose:
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""
         told = "told by the network's answer to the mean colour" if self._is_told else "given"
-        return [
-            *self._net.describe(),
-            Fact("pixels", "RGB / 255 - (0.406, 0.457, 0.480)", "as AlphaPose trains"),
-            Fact("decoding", self.decoding, f"{told}; option decoding"),
-            Fact("transform", "classic", "as AlphaPose"),
-            Fact("keypoint score", _SCORES[self.decoding] + ", cut off at 1", "as AlphaPose"),
-            Fact("person score", f"mean + {_GREATEST_WEIGHT} x greatest keypoint score + box score",
-                 "as AlphaPose; pose-NMS"),
-            *self._boxes.describe(),
-        ]  # fmt: skip
+        score = {"score": _SCORES[self.decoding], "greatest_weight": _GREATEST_WEIGHT}
+        own = facts("alphapose", told=told, **score, **self.settings)
+        return [*self._net.describe(), *own, *self._boxes.describe()]
 
 
 def _told_decoding(maps: np.ndarray, n_integral: int) -> str:
