@@ -47,9 +47,9 @@ CONSTANTS = {
     **{
         f"{part} {key}": (limb_lengths, part, number)
         for part in ("_BODY", "_HAND")
-        for number, key in enumerate(("share", "more_m"))
+        for number, key in enumerate(("share", "more_m", "most_short"))
     },
-    **{name: (limb_lengths, name, None) for name in ("_MOST_SHORT", "_MOST_LONG")},
+    "_MOST_LONG": (limb_lengths, "_MOST_LONG", None),
     **{
         name: (hand_shapes, name, None)
         for name in (

@@ -9,14 +9,15 @@ from hicp_lib.core.keypoints import LEFT_HAND
 from hicp_lib.lifting.body_measures import LEVELS, BodyMeasures, found_parents
 
 # A limb longer or shorter than people's by a share of its length and some more costs 1, and so on with the
-# square up to a most. Limbs seen too short are often the detector's fault.
-_MOST_SHORT, _MOST_LONG = 4.0, 40.0
-_BODY, _HAND = np.array([0.02, 0.005]), np.array([0.03, 0.006])
+# square up to a most. Limbs of the body seen too short are often the detector's fault; hands are rigid.
+_MOST_LONG = 40.0
+_ALIKE = 20  # limbs whose reach falls into the same so many steps are worked out together
+_BODY, _HAND = np.array([0.02, 0.005, 4.0]), np.array([0.03, 0.006, 20.0])  # share, more_m, most_short
 
 
 @dataclass(frozen=True)
 class Limbs:
-    """The limbs that are equally far from the root.
+    """Some limbs that are equally far from the root.
 
     Attributes
     ----------
@@ -24,11 +25,14 @@ class Limbs:
         Rows of the keypoints at their ends, `begin` nearer to the root.
     costs : array, shape (n, g, g)
         What their lengths cost, by the depth of the beginning and then of the end.
+    reach : int
+        Steps of depth after which all of them are too long by the most that costs.
     """
 
     begin: np.ndarray
     end: np.ndarray
     costs: np.ndarray
+    reach: int
 
 
 def limbs_outwards(
@@ -39,7 +43,7 @@ def limbs_outwards(
     Parameters
     ----------
     grid_m : array, shape (g,)
-        Depths.
+        Depths, evenly spaced.
     rays : array, shape (m, 3)
         Lines of sight, z = 1.
     found : array of int, shape (m,)
@@ -51,13 +55,17 @@ def limbs_outwards(
     list of Limbs
         From the root outwards.
     """
-    above, rays, grid_m = found_parents(found), rays.astype(np.float32), grid_m.astype(np.float32)
-    limbs = []
-    for level in np.unique(LEVELS[found[above >= 0]]):
-        end = np.flatnonzero((above >= 0) & (LEVELS[found] == level))
-        pairs = np.stack([above[end], end])
-        costs = _length_costs(grid_m, rays[pairs], _limits(found[pairs], measures))
-        limbs.append(Limbs(*pairs, costs))
+    above, step_m, limbs = found_parents(found), grid_m[1] - grid_m[0], []
+    end = np.flatnonzero(above >= 0)
+    pairs = np.stack([above[end], end])
+    limits = _limits(found[pairs], measures)
+    farthest_m = limits[1] + np.sqrt(_MOST_LONG) * limits[2]
+    reach = np.minimum((farthest_m.ravel() / step_m).astype(int) + 1, len(grid_m) - 1)
+    alike = 100 * LEVELS[found[end]] + reach // _ALIKE
+    for kind in np.unique(alike):
+        some = alike == kind
+        costs = _length_costs(grid_m, rays[pairs[:, some]], limits[:, some])
+        limbs.append(Limbs(*pairs[:, some], costs, int(reach[some].max())))
     return limbs
 
 
@@ -87,7 +95,7 @@ def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> tuple[np.nd
     >>> costs = np.array([[0.0, 1.0, 5.0], [4.0, 0.0, 4.0]])
     >>> choose_along_limbs(costs, [])[0]
     array([0, 1])
-    >>> one_depth_only = Limbs(np.array([0]), np.array([1]), 9 - 9 * np.eye(3)[None])
+    >>> one_depth_only = Limbs(np.array([0]), np.array([1]), 9 - 9 * np.eye(3)[None], 1)
     >>> choose_along_limbs(costs, [one_depth_only])[0]
     array([1, 1])
     """
@@ -97,8 +105,12 @@ def choose_along_limbs(costs: np.ndarray, limbs: Sequence[Limbs]) -> tuple[np.nd
         np.add.at(costs, some.begin, told[-1])
     chosen = costs.argmin(axis=1)  # which counts for those that hang on none
     for some, told_of in zip(limbs, told[::-1], strict=True):
-        of_begin = some.costs[np.arange(len(some.end)), chosen[some.begin]]
-        chosen[some.end] = (of_begin + costs[some.end]).argmin(axis=1)
+        ends, begin = costs[some.end], chosen[some.begin]
+        total = some.costs[np.arange(len(begin)), begin] + ends
+        # Of depths that are equally good, rather one that a limb all but reaches.
+        total[abs(np.arange(costs.shape[1]) - begin[:, None]) > some.reach] = np.inf
+        is_near = total.min(axis=1) <= ends.min(axis=1) + _MOST_LONG
+        chosen[some.end] = np.where(is_near, total.argmin(axis=1), ends.argmin(axis=1))
         rest = costs[some.begin] - told_of
         costs[some.end] += (some.costs + rest[..., None]).min(axis=1)
     return chosen, costs
@@ -125,10 +137,11 @@ def out_of_reach(chosen: np.ndarray, limbs: Sequence[Limbs]) -> np.ndarray:
 
 
 def _limits(pairs: np.ndarray, measures: BodyMeasures) -> np.ndarray:
-    """Of n limbs, (3, n, 1, 1): least and most length, and what more or less than that costs 1."""
+    """Of n limbs, (4, n, 1, 1): least and most length, what more or less than that costs 1, and how many
+    times that counts when it is too short (its root)."""
     most_m = measures.farthest_m[*pairs]
-    share, more_m = np.where(pairs[1] >= LEFT_HAND[0], _HAND[:, None], _BODY[:, None])
-    limits = measures.closest_m[*pairs], most_m, share * most_m + more_m
+    share, more_m, most_short = np.where(pairs[1] >= LEFT_HAND[0], _HAND[:, None], _BODY[:, None])
+    limits = measures.closest_m[*pairs], most_m, share * most_m + more_m, np.sqrt(most_short)
     return np.array(limits, np.float32)[..., None, None]
 
 
@@ -137,15 +150,15 @@ def _length_costs(grid_m: np.ndarray, rays: np.ndarray, limits: np.ndarray) -> n
 
     `rays` (2, n, 3) are the lines of sight, `limits` as of `_limits`.
     """
-    begin, end = rays
+    grid_m, (begin, end) = grid_m.astype(np.float32), rays.astype(np.float32)
     aa, bb, ab = ((a * b).sum(axis=1)[:, None, None] for a, b in ((begin, begin), (end, end), (begin, end)))
-    begin_m, (least_m, most_m, sigma_m) = grid_m[:, None], limits
+    begin_m, (least_m, most_m, sigma_m, most_short) = grid_m[:, None], limits
     values = bb * grid_m - 2 * ab * begin_m  # from here on in place, as memory is what takes the time
     values *= grid_m
     values += aa * begin_m**2
     length_m = np.sqrt(np.maximum(values, 0, out=values), out=values)
     values -= np.clip(length_m, least_m, most_m)
     values /= sigma_m
-    np.clip(values, -np.float32(np.sqrt(_MOST_SHORT)), np.float32(np.sqrt(_MOST_LONG)), out=values)
+    np.clip(values, -most_short, np.float32(np.sqrt(_MOST_LONG)), out=values)
     values *= values
     return values

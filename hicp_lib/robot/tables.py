@@ -80,6 +80,9 @@ class Tables:
         Name of the camera holder -> pose of the colour camera in the head-centre frame.
     parts : dict of str to tuple of str
         Part of the skin -> (chain, link) whose frame it is described in.
+    capsules : tuple of tuple
+        Part of the body, chain and link where it begins and where it ends ("tips" are a hand's), radius in
+        metres; fingers with the thumb.
     """
 
     T_root_base: np.ndarray
@@ -89,6 +92,7 @@ class Tables:
     cables: tuple[Cable, ...]
     T_head_camera: dict[str, np.ndarray]
     parts: dict[str, tuple[str, str]]
+    capsules: tuple[tuple[str, str, str, float], ...]
 
 
 @memoised(4)
@@ -168,6 +172,9 @@ def _tables(data: dict[str, Any]) -> Tables:
             name: _transform(holder["T_head_camera_m"]) for name, holder in data["camera_mounts"].items()
         },
         parts={name: (part["chain"], part["link"]) for name, part in data["parts"].items()},
+        capsules=tuple(
+            (part, begin, end, float(radius_m)) for part, begin, end, radius_m in data["capsules"]
+        ),
     )
 
 

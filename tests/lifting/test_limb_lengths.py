@@ -13,14 +13,14 @@ STEP_M = 0.002
 
 
 @pytest.mark.parametrize(
-    ("begin", "end", "share", "more_m"),
+    ("begin", "end", "share", "more_m", "most_short"),
     [
-        ("left_elbow", "left_wrist", 0.02, 0.005),
-        ("left_index_2", "left_index_3", 0.03, 0.006),
-        ("left_wrist", "left_hand_root", 0.03, 0.006),  # a limb is of what it ends in
+        ("left_elbow", "left_wrist", 0.02, 0.005, 4.0),
+        ("left_index_2", "left_index_3", 0.03, 0.006, 20.0),
+        ("left_wrist", "left_hand_root", 0.03, 0.006, 20.0),  # a limb is of what it ends in
     ],
 )
-def test_lengths_cost_the_square_beyond_what_people_have(begin, end, share, more_m):
+def test_lengths_cost_the_square_beyond_what_people_have(begin, end, share, more_m, most_short):
     found, measures = np.array([INDEX[begin], INDEX[end]]), load_measures()
     grid_m, rays = np.arange(1.0, 2.2, STEP_M), np.tile([0.0, 0.0, 1.0], (2, 1))  # one behind the other
     (limbs,) = limbs_outwards(grid_m, rays, found, measures)
@@ -29,10 +29,11 @@ def test_lengths_cost_the_square_beyond_what_people_have(begin, end, share, more
     sigma_m = share * most_m + more_m
     middle = len(grid_m) // 2
     length_m = abs(grid_m - grid_m[middle])
-    short = np.minimum((np.maximum(least_m - length_m, 0) / sigma_m) ** 2, 4.0)
+    short = np.minimum((np.maximum(least_m - length_m, 0) / sigma_m) ** 2, most_short)
     long = np.minimum((np.maximum(length_m - most_m, 0) / sigma_m) ** 2, 40.0)
     np.testing.assert_allclose(limbs.costs[0, middle], short + long, rtol=5e-3, atol=5e-3)
     np.testing.assert_allclose(limbs.costs[0], limbs.costs[0].T, rtol=5e-3, atol=5e-3)
+    assert limbs.reach * STEP_M == pytest.approx(most_m + np.sqrt(40) * sigma_m, abs=STEP_M)
 
 
 @pytest.mark.parametrize(("near_cost", "chosen"), [(39.9, 5), (40.1, 0)])
@@ -40,7 +41,9 @@ def test_an_end_out_of_reach_costs_forty(near_cost, chosen):
     costs = np.full((2, 8), 1000.0)
     costs[0, 5] = 0.0
     costs[1, [0, 5]] = 0.0, near_cost
-    limb = Limbs(np.array([0]), np.array([1]), np.minimum(100.0 * abs(np.arange(8) - np.c_[:8]), 40.0)[None])
+    limb = Limbs(
+        np.array([0]), np.array([1]), np.minimum(100.0 * abs(np.arange(8) - np.c_[:8]), 40.0)[None], 1
+    )
     found = choose_along_limbs(costs, [limb])[0]
     assert found.tolist() == [5, chosen]
     assert out_of_reach(found, [limb]).tolist() == [False, chosen == 0]
@@ -53,7 +56,7 @@ def test_costs_go_by_the_depth_of_the_beginning_and_then_of_the_end():
     for end in (3, 4, 5):
         of_depths = np.full((1, 8, 8), 9.0)
         of_depths[0, 4, end] = 0.0
-        limb = Limbs(np.array([0]), np.array([1]), of_depths)
+        limb = Limbs(np.array([0]), np.array([1]), of_depths, 7)
         assert choose_along_limbs(costs, [limb])[0].tolist() == [4, end]
 
 
@@ -67,11 +70,20 @@ def test_a_limb_may_reach_from_one_end_of_the_grid_to_the_other():
 def test_a_chain_is_chosen_outwards():
     """A chain of three; each end lies one step nearer than its beginning."""
     one_nearer = np.where(np.arange(9) == np.c_[:9] - 1, 0.0, 30.0)[None]
-    limbs = [Limbs(np.array([k]), np.array([k + 1]), one_nearer) for k in range(2)]
+    limbs = [Limbs(np.array([k]), np.array([k + 1]), one_nearer, 8) for k in range(2)]
     costs = np.zeros((3, 9))
     costs[0] = 100.0
     costs[0, 8] = 0.0
     assert choose_along_limbs(costs, limbs)[0].tolist() == [8, 7, 6]
+
+
+def test_an_end_out_of_reach_is_rather_at_the_edge_of_it():
+    costs = np.zeros((2, 9))
+    costs[0] = 1000.0
+    costs[0, 5] = 0.0
+    too_long = np.full((1, 9, 9), 40.0)
+    limb = Limbs(np.array([0]), np.array([1]), too_long, 3)
+    assert choose_along_limbs(costs, [limb])[0].tolist() == [5, 2]
 
 
 def test_other_depths_cost_what_the_best_choice_with_them_does():
@@ -79,7 +91,7 @@ def test_other_depths_cost_what_the_best_choice_with_them_does():
     rng, g = np.random.default_rng(0), 6
     costs = rng.uniform(0, 50, (5, g))
     limbs = [
-        Limbs(np.array(begin), np.array(end), rng.uniform(0, 45, (2, g, g)))
+        Limbs(np.array(begin), np.array(end), rng.uniform(0, 40, (2, g, g)), g)
         for begin, end in (([0, 0], [1, 3]), ([1, 3], [2, 4]))
     ]
     least = np.full((5, g), np.inf)

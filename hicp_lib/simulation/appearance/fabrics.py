@@ -1,12 +1,13 @@
 """Fabrics: patterns that follow the cloth, weave, folds and seams."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.simulation.appearance.materials import Rng, any_colour, hsv, linear
+from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.rendering import textures
 from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
 
@@ -113,20 +114,14 @@ def random_fabric(rng: Rng, plain: float) -> Fabric:
     )
 
 
-# How often a pattern is worn, between what its period lies (m), which it is and of what numbers.
-_PATTERNS: dict[str, tuple[float, tuple[float, float], textures.Pattern, Sequence[float]]] = {
-    "stripes": (0.3, (0.02, 0.12), textures.stripes, (0.2, 0.35, 0.5)),
-    "uprights": (0.12, (0.01, 0.05), textures.stripes, (0.12, 0.3)),
-    "checks": (0.28, (0.03, 0.16), textures.checks, range(3)),
-    "dots": (0.12, (0.015, 0.06), textures.dots, (0.16,)),
-    "blobs": (0.18, (0.2, 0.6), textures.blobs, range(6)),
-}
+# How often a pattern is worn, between what its period lies (m), which texture it is and of what numbers.
+_PATTERNS = PEOPLE["patterns"]
 
 
 def _random_pattern(rng: Rng) -> Weights:
     kind = str(rng.choice(list(_PATTERNS), p=[often for often, *_ in _PATTERNS.values()]))
-    _, period, pattern, numbers = _PATTERNS[kind]
-    number, period_m = rng.choice(numbers), rng.uniform(*period)
+    _, period, texture, numbers = _PATTERNS[kind]
+    number, period_m, pattern = rng.choice(numbers), rng.uniform(*period), getattr(textures, texture)
 
     def weights(uv: np.ndarray, footprint: np.ndarray) -> np.ndarray:
         turned = uv[::-1] if kind == "uprights" else uv
