@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.files import read_json
 
-_TEXTS = read_json(DATA_DIR / "model_facts.json")
-KNOWN_NETWORKS = ", ".join(_TEXTS["networks"])
+TEXTS = read_json(DATA_DIR / "model_facts.json")
+KNOWN_NETWORKS = ", ".join(TEXTS["networks"])
 """The networks that the detectors take, in one line."""
 
 
@@ -40,4 +40,4 @@ def facts(name: str, **values: Any) -> list[Fact]:
     >>> facts("nanodet", min_score=0.3, max_overlap=0.6)[1]
     Fact(what='person score', value='>= 0.3', why='overlaps above 0.6 are suppressed')
     """
-    return [Fact(*(text.format(**values) for text in row)) for row in _TEXTS["facts"][name]]
+    return [Fact(*(text.format(**values) for text in row)) for row in TEXTS["facts"][name]]
