@@ -49,16 +49,13 @@ def from_motor_order(torso_deg: ArrayLike, limb_deg: ArrayLike, joints: tuple[st
         shapes = f"joint angles of shapes {torso.shape} and {limb.shape}"
         raise InputError(f"{shapes}: {expected}; give as many rows of both")
     angles = np.concatenate([torso[..., ::-1], limb[..., :n_limb]], axis=-1)
-    _check(angles.reshape(-1, len(joints)), joints)
-    return np.deg2rad(angles)
-
-
-def _check(angles_deg: np.ndarray, joints: tuple[str, ...]) -> None:
-    limits = np.rad2deg([read_tables().limits_rad["table"][joint] for joint in joints])
-    possible = (angles_deg >= limits[:, 0] - TOLERANCE_DEG) & (angles_deg <= limits[:, 1] + TOLERANCE_DEG)
+    limits_deg = np.rad2deg([read_tables().limits_rad["table"][joint] for joint in joints])
+    low_deg, high_deg = (limits_deg + (-TOLERANCE_DEG, TOLERANCE_DEG)).T
+    possible = (angles >= low_deg) & (angles <= high_deg)
     if not possible.all():
-        row, column = np.argwhere(~possible)[0]
-        low, high = limits[column]
-        wrong = f"{angles_deg[row, column]:g} degrees, expected {low:g} to {high:g}"
+        row, column = np.argwhere(~possible.reshape(-1, len(joints)))[0]
+        low, high = limits_deg[column]
+        wrong = f"{angles.reshape(-1, len(joints))[row, column]:g} degrees, expected {low:g} to {high:g}"
         hint = "give degrees, the torso as yaw, roll, pitch"
         raise InputError(f"joint angles: row {row}, {joints[column]}: {wrong}; {hint}")
+    return np.deg2rad(angles)

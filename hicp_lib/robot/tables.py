@@ -22,43 +22,13 @@ Read = TypeVar("Read")
 _MAX_SKEW = 1e-4  # by which a rotation may differ from the nearest one: numbers are rounded
 
 
-@dataclass(frozen=True)
-class Row:
-    """One row of a Denavit-Hartenberg table.
+Row = tuple[str | None, str, float, float, float, float]
+"""One row of a Denavit-Hartenberg table: joint (without one it is held at zero), the frame after the row,
+a and d (metres), alpha and offset (radians)."""
 
-    Attributes
-    ----------
-    joint : str or None
-        Without one it is held at zero.
-    link : str
-        The frame after the row.
-    a_m, d_m : float
-    alpha_rad, offset_rad : float
-    """
-
-    joint: str | None
-    link: str
-    a_m: float
-    d_m: float
-    alpha_rad: float
-    offset_rad: float
-
-
-@dataclass(frozen=True)
-class Cable:
-    """A bound on a sum of joint angles, from the cables inside the shoulder.
-
-    Attributes
-    ----------
-    joints : dict of str to float
-        Joint -> factor.
-    lower_rad, upper_rad : float
-        Infinite where open.
-    """
-
-    joints: dict[str, float]
-    lower_rad: float
-    upper_rad: float
+Cable = tuple[dict[str, float], tuple[float, float]]
+"""A bound on a sum of joint angles, from the cables inside the shoulder: joint -> factor; lowest and highest
+sum in radians, infinite where open."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +150,7 @@ def _tables(data: dict[str, Any]) -> Tables:
 
 def _rows(rows: list[list[Any]]) -> tuple[Row, ...]:
     return tuple(
-        Row(joint, link, float(a), float(d), np.deg2rad(float(alpha)), np.deg2rad(float(offset)))
+        (joint, link, float(a), float(d), np.deg2rad(float(alpha)), np.deg2rad(float(offset)))
         for joint, link, a, d, alpha, offset in rows
     )
 
@@ -196,8 +166,8 @@ def _limits(limits_deg: dict[str, list[float]]) -> dict[str, tuple[float, float]
 
 def _cable(cable: dict[str, Any]) -> Cable:
     given = zip(cable["limits_deg"], (-np.inf, np.inf), strict=True)
-    lower_rad, upper_rad = (float(np.deg2rad(none if limit is None else limit)) for limit, none in given)
-    return Cable({joint: float(factor) for joint, factor in cable["joints"].items()}, lower_rad, upper_rad)
+    low_rad, high_rad = (float(np.deg2rad(none if limit is None else limit)) for limit, none in given)
+    return {joint: float(factor) for joint, factor in cable["joints"].items()}, (low_rad, high_rad)
 
 
 def _transform(rows: list[list[float]]) -> np.ndarray:

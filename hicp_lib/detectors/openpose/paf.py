@@ -84,12 +84,12 @@ class PafOptions:
 
 
 @dataclass
-class _Person:
-    """Peaks of one person by part, and the sum of the limb scores."""
+class Person:
+    """Peaks of one person by part, the sum of the scores that count (here of limbs) and their number."""
 
     peaks: dict[int, int] = field(default_factory=dict)
-    limb_score: float = 0.0
-    n_limbs: int = 0
+    score: float = 0.0
+    n_scores: int = 0
 
 
 # Peaks at its start and end, by their row, and how well the field supports it.
@@ -260,7 +260,7 @@ def assemble(
         (sum of part and limb scores) / (parts + limbs).
     """
     peaks = find_peaks(heat_maps, stride, options.min_peak)
-    people: list[_Person] = []
+    people: list[Person] = []
     for index, limbs in enumerate(find_limbs(peaks, fields, model, stride, options)):
         a, b = model.pairs[index].tolist()
         for start, end, score in limbs:
@@ -302,7 +302,7 @@ def part_rows(person: dict[int, int], peaks: list[np.ndarray]) -> np.ndarray:
 
 
 def _join(
-    people: list[_Person], a: tuple[int, int], b: tuple[int, int], score: float, completing: bool
+    people: list[Person], a: tuple[int, int], b: tuple[int, int], score: float, completing: bool
 ) -> None:
     """Add the limb between peak `a` and peak `b` (part, index) to the people found so far."""
     with_a = next((person for person in people if person.peaks.get(a[0]) == a[1]), None)
@@ -311,31 +311,31 @@ def _join(
     if person is None:
         if completing:
             return
-        person = _Person()
+        person = Person()
         people.append(person)
     elif with_b is not None and with_b is not person:
         if person.peaks.keys() & with_b.peaks.keys():
             return
         person.peaks.update(with_b.peaks)
-        person.limb_score += with_b.limb_score
-        person.n_limbs += with_b.n_limbs
+        person.score += with_b.score
+        person.n_scores += with_b.n_scores
         people[:] = [other for other in people if other is not with_b]
     for part, peak in (a, b):
         if person.peaks.setdefault(part, peak) != peak:
             return
-    person.limb_score += score
-    person.n_limbs += 1
+    person.score += score
+    person.n_scores += 1
 
 
 def _keep(
-    people: list[_Person], peaks: list[np.ndarray], model: PartModel, options: PafOptions
+    people: list[Person], peaks: list[np.ndarray], model: PartModel, options: PafOptions
 ) -> tuple[np.ndarray, np.ndarray]:
     parts, scores = [], []
     for person in people:
         rows = part_rows(person.peaks, peaks)
-        total = rows[:, 2].sum() + person.limb_score
+        total = rows[:, 2].sum() + person.score
         n_counted = len(person.peaks.keys() - model.uncounted)
         if n_counted >= options.min_parts and total / len(person.peaks) >= options.min_score:
             parts.append(rows)
-            scores.append(total / (len(person.peaks) + person.n_limbs))
+            scores.append(total / (len(person.peaks) + person.n_scores))
     return np.array(parts).reshape(-1, model.n_parts, 3), np.array(scores)
