@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+import cv2
 import numpy as np
 
 from hicp_lib.core.datafiles import DATA_DIR
@@ -137,16 +138,13 @@ def find_peaks(heat_maps: np.ndarray, stride: int, min_peak: float) -> list[np.n
     return [peaks[order[part[order] == index]][:MAX_PEAKS] for index in range(len(heat_maps))]
 
 
+_BEFORE = np.array([[1, 1, 1], [1, 0, 0], [0, 0, 0]], np.uint8)  # a cell's neighbours, row by row
+
+
 def _is_maximum(maps: np.ndarray) -> np.ndarray:
     """Cells above their eight neighbours; of a plateau of equals, one remains."""
-    height, width = maps.shape[1:]
-    padded = np.pad(maps, ((0, 0), (1, 1), (1, 1)), constant_values=-np.inf)
-    result = np.ones(maps.shape, dtype=bool)
-    for dy, dx in np.ndindex(3, 3):
-        neighbour = padded[:, dy : dy + height, dx : dx + width]
-        if (dy, dx) != (1, 1):
-            result &= (maps > neighbour) if (dy, dx) < (1, 1) else (maps >= neighbour)
-    return result
+    before, after = (np.stack([cv2.dilate(one, of) for one in maps]) for of in (_BEFORE, _BEFORE[::-1, ::-1]))
+    return (maps > before) & (maps >= after)
 
 
 def _vertex(before: np.ndarray, middle: np.ndarray, after: np.ndarray) -> np.ndarray:
