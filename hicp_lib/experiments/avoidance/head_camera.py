@@ -16,7 +16,7 @@ from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.experiments.avoidance.closed_loop import MOUNT, start_posture
 from hicp_lib.experiments.avoidance.reaching import LOOKED_AT_S, Moment
 from hicp_lib.experiments.laboratory import COLOUR, T_WORLD_ROOT, colour_and_depth, robot_camera
-from hicp_lib.lifting.robust import METHODS, lift_in_steps
+from hicp_lib.lifting.robust import METHODS, lift_robust
 from hicp_lib.robot.kinematics import ICub, load_icub
 from hicp_lib.robot.loop import Perception
 from hicp_lib.robot.posture import Posture
@@ -160,7 +160,7 @@ def lifted(
     Perception
     """
     icub = load_icub()
-    (in_camera,) = lift_in_steps(found.keypoints_px, depth_m, COLOUR, [METHODS[method]])
+    in_camera = lift_robust(found.keypoints_px, depth_m, COLOUR, METHODS[method])
     T_root_camera = icub.T_root_camera(posture.angles("head"), MOUNT)
     points_m = filter_self(icub, posture, transform(T_root_camera, in_camera.points_m))
     return Perception(time_s, points_m, found.scores)
