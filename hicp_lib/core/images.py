@@ -8,16 +8,34 @@ TIFF alone is turned as it is read, by OpenCV and by every viewer, and counts as
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 
 import cv2
 import numpy as np
-from PIL import ExifTags, Image
+from PIL import BmpImagePlugin, ExifTags, GifImagePlugin, Image, Jpeg2KImagePlugin, JpegImagePlugin
+from PIL import PngImagePlugin, PpmImagePlugin, TiffImagePlugin, WebPImagePlugin
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, write_bytes
+from hicp_lib.core.limited import LIMITS_VARIABLE, raised
 
+MAX_PIXELS = 100e6
+"""Of an image; more would be a gigabyte before anything looks at them."""
+_MAX_SCANS = 15  # of so large a JPEG: each costs as much as decoding it anew, and those that are written have ten
+# Who reads the size, by how a file begins. Pillow's own `open` would warn of large pictures on its own account.
+_READERS = {
+    b"\x89PNG": PngImagePlugin.PngImageFile,
+    b"\xff\xd8": JpegImagePlugin.JpegImageFile,
+    b"RIFF": WebPImagePlugin.WebPImageFile,
+    b"II": TiffImagePlugin.TiffImageFile,
+    b"MM": TiffImagePlugin.TiffImageFile,
+    b"BM": BmpImagePlugin.BmpImageFile,
+    b"GIF8": GifImagePlugin.GifImageFile,
+    b"\0\0\0\x0c": Jpeg2KImagePlugin.Jpeg2KImageFile,
+    b"P": PpmImagePlugin.PpmImageFile,
+}
 Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom exclusive
 _EXIF = re.compile(b"Exif|eXIf|EXIF")  # of JPEG, PNG and WebP
 
@@ -38,7 +56,7 @@ def read_image(path: str | Path) -> np.ndarray:
     Raises
     ------
     InputError
-        If the file is missing or not an image OpenCV can decode.
+        If the file is missing, not an image OpenCV can decode or has too many pixels.
     """
     return decode_image(image_bytes(path), path)
 
@@ -56,12 +74,66 @@ def image_bytes(path: str | Path) -> bytes:
 
 def decode_image(content: bytes | np.ndarray, path: str | Path) -> np.ndarray:
     """An image out of a file's content, as `read_image` does; `path` is for the error's message."""
-    coded = np.frombuffer(content, dtype=np.uint8)
-    flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-    bgr = cv2.imdecode(coded, flags) if coded.size else None
-    if bgr is None:
+    return decode(content, path, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
+
+
+def decode(content: bytes | np.ndarray, path: str | Path, flags: int) -> np.ndarray:
+    """Pixels out of a file's content, which is looked at before memory is taken for them.
+
+    Parameters
+    ----------
+    content : bytes or array of uint8
+    path : str or Path
+        For messages.
+    flags : int
+        OpenCV's.
+
+    Returns
+    -------
+    array
+        As the flags say.
+
+    Raises
+    ------
+    InputError
+        If it is no image that can be decoded, or has more than `MAX_PIXELS`.
+    """
+    content = bytes(content)
+    width_px, height_px, _ = image_header(BytesIO(content))
+    refuse_too_large(path, width_px, height_px)
+    n_scans, pixels = content.count(b"\xff\xda"), None
+    if n_scans * width_px * height_px > _MAX_SCANS * raised(MAX_PIXELS):
+        raise InputError(f"{path}: is a JPEG of {n_scans} scans; save it anew")
+    if width_px:
+        with suppress(cv2.error):
+            pixels = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
+    if pixels is None:
         raise InputError(f"{path}: is not an image (PNG, JPEG, ...) or is cut off; replace the file")
-    return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+    return pixels
+
+
+def refuse_too_large(path: str | Path, width_px: int, height_px: int) -> None:
+    """Tell an image, or a frame of a video, of more pixels than are decoded.
+
+    Raises
+    ------
+    InputError
+        With the variable of the environment that raises the limit.
+
+    Examples
+    --------
+    >>> refuse_too_large("a.png", 30_000, 30_000)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    hicp_lib.core.errors.InputError: a.png: 30000 x 30000 pixels are more than 100 million; make it smaller, ...
+    """
+    most = raised(MAX_PIXELS)
+    if width_px * height_px > most:
+        times = -(-width_px * height_px // MAX_PIXELS)
+        raise InputError(
+            f"{path}: {width_px} x {height_px} pixels are more than {most / 1e6:g} million; make it smaller, or "
+            f"set {LIMITS_VARIABLE}={times:.0f} in the environment"
+        )
 
 
 def image_header(path: str | Path | BytesIO) -> tuple[int, int, int]:
@@ -75,7 +147,11 @@ def image_header(path: str | Path | BytesIO) -> tuple[int, int, int]:
         2 to 8 for pictures that viewers turn (see `as_seen`), 1 for all others.
     """
     try:
-        with Image.open(path) as image:
+        with path if isinstance(path, BytesIO) else open(path, "rb") as file:
+            start = file.read(12)
+            file.seek(0)
+            reader = next(of for begins, of in _READERS.items() if start.startswith(begins))
+            image = reader(file)
             exif = Image.Exif()
             # A TIFF has nothing there, as it should; `getexif` would decode a PNG to its end.
             exif.load(image.info.get("exif", b""))
