@@ -139,22 +139,13 @@ def connected(address: str) -> Iterator[Client]:
 
 
 async def _greet(address: str, soon_s: float) -> None:
-    """Raise unless a scheduler says in time that it is one: Dask's client waits for minutes for other servers."""
+    """Raise unless a scheduler says in time that it is one: Dask's client waits for minutes for others."""
     from distributed import Security
-    from distributed.core import connect
+    from distributed.core import rpc
 
-    async def ask() -> dict:
-        comm = await connect(address, soon_s, **Security().get_connection_args("client"))
-        try:
-            await comm.write({"op": "identity", "reply": True})
-            return await comm.read()
-        finally:
-            comm.abort()
-
-    try:
-        who = await asyncio.wait_for(ask(), soon_s)
-    except TimeoutError:
-        raise TimeoutError(f"no answer within {soon_s:g} s") from None
+    security = Security().get_connection_args("client")
+    async with asyncio.timeout(soon_s), rpc(address, connection_args=security) as server:
+        who = await server.identity()
     if who["type"] != "Scheduler":
         raise ValueError(f"it is a {who['type']}")
 

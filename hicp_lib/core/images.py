@@ -14,8 +14,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from PIL import BmpImagePlugin, ExifTags, GifImagePlugin, Image, Jpeg2KImagePlugin, JpegImagePlugin
-from PIL import PngImagePlugin, PpmImagePlugin, TiffImagePlugin, WebPImagePlugin
+from PIL import ExifTags, Image
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, write_bytes
@@ -23,19 +22,10 @@ from hicp_lib.core.limited import LIMITS_VARIABLE, raised
 
 MAX_PIXELS = 100e6
 """Of an image; more would be a gigabyte before anything looks at them."""
-_MAX_SCANS = 15  # of so large a JPEG: each costs as much as decoding it anew, and those that are written have ten
-# Who reads the size, by how a file begins. Pillow's own `open` would warn of large pictures on its own account.
-_READERS = {
-    b"\x89PNG": PngImagePlugin.PngImageFile,
-    b"\xff\xd8": JpegImagePlugin.JpegImageFile,
-    b"RIFF": WebPImagePlugin.WebPImageFile,
-    b"II": TiffImagePlugin.TiffImageFile,
-    b"MM": TiffImagePlugin.TiffImageFile,
-    b"BM": BmpImagePlugin.BmpImageFile,
-    b"GIF8": GifImagePlugin.GifImageFile,
-    b"\0\0\0\x0c": Jpeg2KImagePlugin.Jpeg2KImageFile,
-    b"P": PpmImagePlugin.PpmImageFile,
-}
+# Of so large a JPEG: each costs as much as decoding it anew, and those that are written have ten.
+_MAX_SCANS = 15
+_FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "JPEG2000", "PPM")  # as Pillow calls them
+Image.init()
 Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom exclusive
 _EXIF = re.compile(b"Exif|eXIf|EXIF")  # of JPEG, PNG and WebP
 
@@ -58,18 +48,7 @@ def read_image(path: str | Path) -> np.ndarray:
     InputError
         If the file is missing, not an image OpenCV can decode or has too many pixels.
     """
-    return decode_image(image_bytes(path), path)
-
-
-def image_bytes(path: str | Path) -> bytes:
-    """Content of an image file, as it lies there.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read.
-    """
-    return read_bytes(path, "expected an image file")
+    return decode_image(read_bytes(path, "expected an image file"), path)
 
 
 def decode_image(content: bytes | np.ndarray, path: str | Path) -> np.ndarray:
@@ -125,14 +104,14 @@ def refuse_too_large(path: str | Path, width_px: int, height_px: int) -> None:
     >>> refuse_too_large("a.png", 30_000, 30_000)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
-    hicp_lib.core.errors.InputError: a.png: 30000 x 30000 pixels are more than 100 million; make it smaller, ...
+    hicp_lib.core.errors.InputError: a.png: 30000 x 30000 pixels are more than 100 million; make ...
     """
     most = raised(MAX_PIXELS)
     if width_px * height_px > most:
         times = -(-width_px * height_px // MAX_PIXELS)
         raise InputError(
-            f"{path}: {width_px} x {height_px} pixels are more than {most / 1e6:g} million; make it smaller, or "
-            f"set {LIMITS_VARIABLE}={times:.0f} in the environment"
+            f"{path}: {width_px} x {height_px} pixels are more than {most / 1e6:g} million; make it smaller, "
+            f"or set {LIMITS_VARIABLE}={times:.0f} in the environment"
         )
 
 
@@ -148,10 +127,10 @@ def image_header(path: str | Path | BytesIO) -> tuple[int, int, int]:
     """
     try:
         with path if isinstance(path, BytesIO) else open(path, "rb") as file:
-            start = file.read(12)
+            start, readers = file.read(16), (Image.OPEN[kind] for kind in _FORMATS)
             file.seek(0)
-            reader = next(of for begins, of in _READERS.items() if start.startswith(begins))
-            image = reader(file)
+            # Pillow's own `open` would warn of large pictures, on its own account.
+            image = next(read for read, accepts in readers if accepts and accepts(start))(file, "")
             exif = Image.Exif()
             # A TIFF has nothing there, as it should; `getexif` would decode a PNG to its end.
             exif.load(image.info.get("exif", b""))

@@ -88,9 +88,9 @@ COMBINED = "combined:"
 # Within a combination the body vouches for the hands: the hand model may be less sure, and others' hands
 # in a square must not use up the number.
 _HANDS_WITHIN: dict[str, dict[str, Any]] = {"mediapipe-hands": {"num_hands": 4, "min_score": 0.2}}
-# What numbers may be, by how their option's name ends; all others are counts, pixels or factors.
-_BOUNDS = {"score": (0, 1), "overlap": (0, 1), "hz": (0, 1e4), "threads": (1, 256)}
-_ANY_BOUNDS = 0.01, 1e4
+# What numbers may be, by how their option's name ends; all others count something.
+_BOUNDS = {"score": (0, 1), "overlap": (0, 1), "hz": (0, 1e4), "threads": (1, 256), "padding": (0.1, 10)}
+_BOUNDS |= {"scale": (0.001, 1000), "": (1, 10_000)}
 # Their counts are those of the committed and fetched files' convolutions and fully connected layers.
 DETECTORS: dict[str, Entry] = {
     name: Entry(name, row.pop("label"), tuple(row.pop("groups")), _MODULE_OF[row["class_name"]],
@@ -206,8 +206,10 @@ def _check_options(name: str, detector_class: type, options: dict) -> None:
         if not isinstance(value, kind) or (isinstance(value, bool) and not takes_bool):
             wanted = getattr(kinds[option], "__name__", None) or str(kinds[option])
             raise InputError(f"detector {name!r}: option {option!r} is {value!r}; expected {wanted}")
-        least, most = next((of for end, of in _BOUNDS.items() if option.endswith(end)), _ANY_BOUNDS)
-        numbers = [one for one in (value if isinstance(value, list) else [value]) if type(one) in (int, float)]
+        least, most = next(of for end, of in _BOUNDS.items() if option.endswith(end))
+        numbers = [
+            one for one in (value if isinstance(value, list) else [value]) if type(one) in (int, float)
+        ]
         if not all(least <= number <= most for number in numbers):  # NaN is neither
             wanted = f"from {least:g} to {most:g}"
             raise InputError(f"detector {name!r}: option {option!r} is {value!r}; expected {wanted}")

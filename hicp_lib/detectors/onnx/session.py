@@ -5,13 +5,12 @@ Runtime allows its sessions to be run from several threads at a time.
 """
 
 import math
-import re
 import threading
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -24,11 +23,6 @@ from hicp_lib.detectors.onnx.model_file import ModelFile, read_model
 from hicp_lib.detectors.onnx.starting import DTYPES, VERSION, available_providers, start, try_out
 from hicp_lib.detectors.weights.default import find, load
 from hicp_lib.detectors.weights.published import check_use
-
-if TYPE_CHECKING:
-    import onnxruntime
-
-_NUMBERS = re.compile(r"tensor\((float|float16|double|u?int\d+|bool)\)")
 
 
 @dataclass(frozen=True)
@@ -68,16 +62,17 @@ class OnnxModel:
     def __init__(self, path: Path, content: bytes, provider: str, threads: int, is_ours: bool) -> None:
         self.told: ModelFile = read_model(path, content)
         if not is_ours:
-            try_out(path, content)
+            try_out(path)
         self.path, self.sha256, self.provider = path, sha256_bytes(content), provider
         self._session = start(path, content, provider, threads)
         self._responses: dict[tuple[int, ...], list[np.ndarray]] = {}
         self.inputs = [_port(node) for node in self._session.get_inputs()]
         self.outputs = [_port(node) for node in self._session.get_outputs()]
-        if len(self.inputs) != 1 or self.inputs[0].dtype not in DTYPES:
-            raise self.refusal("expected a network with one input, an image in floating point")
-        if not all(_NUMBERS.fullmatch(port.dtype) for port in self.outputs):
-            raise self.refusal("expected outputs of numbers")
+        are_numbers = all(
+            port.dtype.startswith("tensor(") and "str" not in port.dtype for port in self.outputs
+        )
+        if len(self.inputs) != 1 or self.inputs[0].dtype not in DTYPES or not are_numbers:
+            raise self.refusal("expected one input, an image in floating point, and outputs of numbers")
 
     @property
     def settings(self) -> dict:
@@ -153,10 +148,7 @@ class OnnxModel:
             ) from None
         for port, output in zip(self.outputs, outputs, strict=True):
             if output.dtype.kind == "f" and output.size and np.isnan(output.min()):
-                raise InputError(
-                    f"{self.path}: its output {port.name} has values that are no numbers (NaN), for an input of "
-                    f"shape {pixels.shape}; export it again, in 32 bits if it has 16"
-                )
+                raise InputError(f"{self.path}: its output {port.name} is NaN in places; export in 32 bits")
         return [np.asarray(output) for output in outputs]
 
     def run_named(self, pixels: np.ndarray) -> dict[str, np.ndarray]:
@@ -176,7 +168,7 @@ class OnnxModel:
             sizes = one_image if len(shape) == len(one_image) else [1] * len(shape)
             sizes = [size or given for size, given in zip(shape, sizes, strict=True)]
             if math.prod(sizes) > raised(MAX_PIXELS):
-                raise self.refusal(f"its input would be {_text(sizes)}; expected up to {MAX_PIXELS:.0e} values")
+                raise self.refusal(f"its input would be {_text(sizes)}, more than {MAX_PIXELS:.0e} values")
             self._responses[size_px] = self.run(np.zeros(sizes, np.float32))
         return self._responses[size_px]
 
@@ -201,43 +193,21 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
     ------
     InputError
         If the file is absent, not a network ONNX Runtime can run or, if it was fetched by name, not the one
-        that was recorded then, or the provider is not to be had.
+        that was recorded then, takes too much time or memory, or the provider is not to be had.
     """
     path = Path(path)
     content = read_bytes(path, "give the path of an ONNX file")
     check_use(path, content)
-    return open_content(content, path, provider, threads)
+    return _opened(content, path, provider, threads, is_ours=False)
 
 
-def open_content(
-    content: bytes, path: Path, provider: str = "cpu", threads: int = 1, is_ours: bool = False
-) -> OnnxModel:
-    """As `open_model`, from the bytes of an ONNX model.
-
-    Parameters
-    ----------
-    content : bytes
-    path : Path
-        The file they were made from.
-    provider : str
-    threads : int
-    is_ours : bool, optional
-        Whether the network comes with the library; others are tried before, in a process of their own.
-
-    Examples
-    --------
-    >>> open_content(b"no network", Path("a.onnx"), "abacus")  # doctest: +ELLIPSIS
-    Traceback (most recent call last):
-    ...
-    hicp_lib.core.errors.InputError: a.onnx: execution provider 'abacus' is not available here; expected ...
-    """
+def _opened(content: bytes, path: Path, provider: str, threads: int, is_ours: bool) -> OnnxModel:
+    """A model of this content; networks that do not come with the library are tried before."""
     if provider not in available_providers():
         raise InputError(
             f"{path}: execution provider {provider!r} is not available here; expected one of: "
             f"{', '.join(available_providers())} (others need another build of onnxruntime)"
         )
-    if threads < 1:
-        raise InputError(f"{path}: threads {threads}: expected 1 or more")
     key = (sha256_bytes(content), str(path), provider, threads)
     with _lock:
         model = _open.get(key)
@@ -261,13 +231,13 @@ def open_committed(name: str, provider: str = "cpu", threads: int = 1) -> OnnxMo
     >>> open_committed("movenet-lightning.onnx").inputs[0].shape
     (1, 3, 192, 192)
     """
-    return open_content(load(name), find(name).path, provider, threads, is_ours=True)
+    return _opened(load(name), find(name).path, provider, threads, is_ours=True)
 
 
 def _text(shape: Sequence[int | None]) -> str:
     return f"({', '.join('?' if size is None else str(size) for size in shape)})"
 
 
-def _port(node: "onnxruntime.NodeArg") -> Port:
+def _port(node: Any) -> Port:
     shape = tuple(size if isinstance(size, int) and size > 0 else None for size in node.shape or ())
     return Port(node.name, shape, node.type)

@@ -35,7 +35,7 @@ _NOWHERE = {
 _FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1"}  # NumPy's, which have nothing to do there
 # A call takes milliseconds, and a start seconds on a busy machine.
 LIMIT_S = 120.0
-# Of memory for its data, with the stacks of threads for all cores; and for each byte of an image, which it copies.
+# Of memory for its data, with stacks of a thread per core; and for each byte of an image, which it copies.
 _MOST_BYTES, _MOST_BYTES_PER_BYTE = 700 * 2**20 + 2**24 * (os.cpu_count() or 1), 3
 
 

@@ -3,7 +3,7 @@
 import time
 from functools import partial
 from http.client import HTTPException
-from multiprocessing import TimeoutError as MultiprocessingTimeout
+from multiprocessing import ProcessError
 from multiprocessing.pool import ThreadPool
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -49,8 +49,6 @@ def download(url: str, target: Path, max_bytes: int) -> str | None:
                     return f"too slow: {file.tell()} bytes in {time.monotonic() - begin_s:.0f} s"
             if file.tell() != announced:
                 return f"ended after {file.tell()} bytes, {announced} were announced"
-    except (OSError, HTTPException, ValueError) as error:
+    except (OSError, HTTPException, ValueError, ProcessError) as error:  # the last: within TIMEOUT_S
         return one_line(error).strip("<>")
-    except MultiprocessingTimeout:
-        return f"no answer within {TIMEOUT_S:g} s"
     return None

@@ -9,7 +9,7 @@ import pytest
 from onnx import TensorProto, helper
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.detectors.onnx import model_file, starting
+from hicp_lib.detectors.onnx import model_file
 from hicp_lib.detectors.onnx.one_stage import OneStage
 from hicp_lib.detectors.onnx.session import open_model
 from hicp_lib.detectors.registry import make_detector
@@ -37,7 +37,10 @@ def loop(path, body, n_inputs: list[str], constants: dict, port) -> None:
         [node("Identity", ["go"], ["go_on"]), body], "body",
         *([helper.make_tensor_value_info(*one) for one in side] for side in (ports, gone)),
     )  # fmt: skip
-    nodes = [node("ReduceMean", ["image"], ["mean"], keepdims=0), node("Reshape", ["mean", "shape"], ["start"])]
+    nodes = [
+        node("ReduceMean", ["image"], ["mean"], keepdims=0),
+        node("Reshape", ["mean", "shape"], ["start"]),
+    ]
     nodes.append(node("Loop", [*n_inputs, "yes", "start"], ["y"], body=graph))
     constants |= {"yes": np.array(True), "shape": np.array([1] * len(port), np.int64)}
     save(path, nodes, IMAGE, ANY, constants)
@@ -61,8 +64,8 @@ BOMBS = {
         [node("ReduceMean", ["image"], ["m"], keepdims=0), node("Expand", ["m", "size"], ["sum"])],
         {"size": np.array([50_000, 50_000])},
     ),
-    "Tile": ([node("Tile", ["image", "times"], ["sum"])], {"times": np.array([100, 1, 100, 100])}),
-    "Pad": ([node("Pad", ["image", "pads"], ["sum"])], {"pads": np.array([0, 0, 0, 0, 0, 0, 50_000, 50_000])}),
+    "Tile": ([node("Tile", ["image", "times"], ["sum"])], {"times": np.array([400, 1, 10, 10])}),
+    "Pad": ([node("Pad", ["image", "pads"], ["sum"])], {"pads": np.array([0] * 6 + [50_000] * 2)}),
     "Resize": (
         [node("Resize", ["image", "", "scales"], ["sum"])], {"scales": np.array([1, 1, 1e4, 1e4], np.float32)}
     ),
@@ -74,8 +77,10 @@ BOMBS = {
 def test_a_network_that_asks_for_all_memory_is_refused(tmp_path, kind):
     nodes, constants = BOMBS[kind]
     path = save(tmp_path / "m.onnx", [*nodes, node("Identity", ["sum"], ["y"])], IMAGE, ANY, constants)
-    if kind in ("ConstantOfShape", "Range", "MatMul"):
-        path = save(tmp_path / "m.onnx", [*nodes, node("Add", ["image", "sum"], ["y"])], IMAGE, ANY, constants)
+    if kind in ("ConstantOfShape", "Range", "MatMul"):  # numbers, not images
+        path = save(
+            tmp_path / "m.onnx", [*nodes, node("Add", ["image", "sum"], ["y"])], IMAGE, ANY, constants
+        )
     refused(path, "GB of memory; if the file is sound, HICP_LIMITS=")
 
 
@@ -107,7 +112,7 @@ def test_outputs_that_are_no_numbers_are_refused(tmp_path):
     save(path, [node("Cast", ["image"], ["y"], to=TensorProto.STRING)], IMAGE, text, {})
     refused(path, "outputs of numbers")
     save(path, [node("Mul", ["image", "nan"], ["y"])], IMAGE, ANY, {"nan": np.float32(np.nan)})
-    refused(path, "output y has values that are no numbers", lambda path: open_model(path).response_to_zeros())
+    refused(path, "output y is NaN in places", lambda path: open_model(path).response_to_zeros())
 
 
 def test_infinity_is_a_number(tmp_path):
@@ -132,14 +137,6 @@ def test_what_else_is_wrong_with_a_graph_is_told_as_before(tmp_path, monkeypatch
     refused(path, "has 5 nodes; expected a network of up to 4")
 
 
-def test_a_file_that_changes_on_the_way_is_not_what_was_tried(tmp_path):
-    path = colour_maps_model(tmp_path / "m.onnx", (16, 16), 3)
-    content = path.read_bytes()
-    starting.try_out(path, content)
-    path.write_bytes(content + b" ")
-    refused(path, "was changed while it was read", lambda path: starting.try_out(path, content))
-
-
-def test_a_network_of_ours_is_not_tried(monkeypatch, image_of_nobody=np.zeros((64, 48, 3), np.uint8)):
+def test_a_network_of_ours_is_not_tried(monkeypatch):
     monkeypatch.setattr("hicp_lib.detectors.onnx.session.try_out", None)
-    assert len(make_detector("movenet-multipose").detect(image_of_nobody)) == 0
+    assert len(make_detector("movenet-multipose").detect(np.zeros((64, 48, 3), np.uint8))) == 0

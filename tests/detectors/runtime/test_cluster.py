@@ -301,7 +301,7 @@ def test_a_server_that_is_no_scheduler_is_left_in_time(registered, monkeypatch, 
     with socketserver.ThreadingTCPServer(("127.0.0.1", 0), handler) as server:
         server.daemon_threads = True
         threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}).start()
-        address, begin = "tcp://127.0.0.1:{}".format(server.server_address[1]), time.monotonic()
+        address, begin = f"tcp://127.0.0.1:{server.server_address[1]}", time.monotonic()
         try:
             assert refusal(address, registered).startswith(f"{address}: no Dask scheduler answers (")
         finally:
