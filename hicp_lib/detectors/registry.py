@@ -207,10 +207,8 @@ def _check_options(name: str, detector_class: type, options: dict) -> None:
             wanted = getattr(kinds[option], "__name__", None) or str(kinds[option])
             raise InputError(f"detector {name!r}: option {option!r} is {value!r}; expected {wanted}")
         least, most = next(of for end, of in _BOUNDS.items() if option.endswith(end))
-        numbers = [
-            one for one in (value if isinstance(value, list) else [value]) if type(one) in (int, float)
-        ]
-        if not all(least <= number <= most for number in numbers):  # NaN is neither
+        numbers = value if isinstance(value, list) else [value]
+        if not all(least <= one <= most for one in numbers if type(one) in (int, float)):  # NaN is neither
             wanted = f"from {least:g} to {most:g}"
             raise InputError(f"detector {name!r}: option {option!r} is {value!r}; expected {wanted}")
 

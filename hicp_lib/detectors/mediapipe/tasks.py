@@ -38,7 +38,6 @@ class _Task:
     """One of MediaPipe's tasks, in a process of its own."""
 
     name: str
-    settings: dict
 
     def _prepare(
         self, task: str, n: int, min_score: float, model: str | Path | None, tracking_hz: float
