@@ -83,9 +83,8 @@ def decode(content: bytes | np.ndarray, path: str | Path, flags: int) -> np.ndar
     n_scans, pixels = content.count(b"\xff\xda"), None
     if n_scans * width_px * height_px > _MAX_SCANS * raised(MAX_PIXELS):
         raise InputError(f"{path}: is a JPEG of {n_scans} scans; save it anew")
-    if width_px:
-        with suppress(cv2.error):
-            pixels = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
+    with suppress(cv2.error):
+        pixels = cv2.imdecode(np.frombuffer(content, np.uint8), flags) if width_px else None
     if pixels is None:
         raise InputError(f"{path}: is not an image (PNG, JPEG, ...) or is cut off; replace the file")
     return pixels

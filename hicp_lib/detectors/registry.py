@@ -209,8 +209,9 @@ def _check_options(name: str, detector_class: type, options: dict) -> None:
         least, most = next(of for end, of in _BOUNDS.items() if option.endswith(end))
         numbers = value if isinstance(value, list) else [value]
         if not all(least <= one <= most for one in numbers if type(one) in (int, float)):  # NaN is neither
-            wanted = f"from {least:g} to {most:g}"
-            raise InputError(f"detector {name!r}: option {option!r} is {value!r}; expected {wanted}")
+            raise InputError(
+                f"detector {name!r}: option {option!r} is {value!r}; expected {least:g} to {most:g}"
+            )
 
 
 def describe(detector: Detector) -> list[tuple[str, str, str]]:

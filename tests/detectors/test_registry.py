@@ -69,7 +69,7 @@ def test_an_option_of_another_kind_is_refused(option, value):
 )
 def test_numbers_that_make_no_sense_are_refused_before_anything_starts(name, options, monkeypatch):
     monkeypatch.setattr(subprocess, "Popen", None)
-    with pytest.raises(InputError, match=r"option '\w+' is .*; expected from [\d.]+ to \d+") as error:
+    with pytest.raises(InputError, match=r"option '\w+' is .*; expected [\d.]+ to \d+") as error:
         make_detector(name, **options)
     assert "\n" not in str(error.value)
 

@@ -68,9 +68,7 @@ class OnnxModel:
         self._responses: dict[tuple[int, ...], list[np.ndarray]] = {}
         self.inputs = [_port(node) for node in self._session.get_inputs()]
         self.outputs = [_port(node) for node in self._session.get_outputs()]
-        are_numbers = all(
-            port.dtype.startswith("tensor(") and "str" not in port.dtype for port in self.outputs
-        )
+        are_numbers = all(of.dtype.startswith("tensor(") and "str" not in of.dtype for of in self.outputs)
         if len(self.inputs) != 1 or self.inputs[0].dtype not in DTYPES or not are_numbers:
             raise self.refusal("expected one input, an image in floating point, and outputs of numbers")
 

@@ -19,8 +19,6 @@ with with_variables(ORT_DISABLE_TELEMETRY="1"):
 
 VERSION = onnxruntime.__version__
 DTYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
-_FATAL_ONLY = 4
-_OPEN_SIDE_PX = 256  # of an image on trial, where the file leaves it open
 
 
 def available_providers() -> dict[str, str]:
@@ -48,7 +46,7 @@ def start(path: Path, content: bytes, provider: str, threads: int) -> onnxruntim
     """
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
-    options.log_severity_level = _FATAL_ONLY
+    options.log_severity_level = 4  # fatal ones only
     # Threads that wait by spinning would take the cores from the other images.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     full_name = available_providers()[provider]
@@ -90,7 +88,7 @@ def _open_and_run(path: str) -> None:
 
 
 def _sizes(shape: list[int | str | None]) -> list[int]:
-    """Sizes of an input: what is open is one image."""
-    one_image = [1, 3, _OPEN_SIDE_PX, _OPEN_SIDE_PX][-len(shape) :]
+    """Sizes of an input: what is open is one image of 256 pixels a side."""
+    one_image = [1, 3, 256, 256][-len(shape) :]
     sizes = (size if isinstance(size, int) else 0 for size in shape)
     return [size if size > 0 else one for size, one in zip(sizes, one_image, strict=True)]
