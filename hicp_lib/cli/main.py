@@ -23,6 +23,7 @@ from hicp_lib.cli.looking import draw, inspect_
 from hicp_lib.cli.models import models
 from hicp_lib.cli.options import (
     PATH,
+    FiniteRange,
     detector_options,
     given,
     people_option,
@@ -196,7 +197,7 @@ def detect(
 @click.option("--annotations", type=PATH, required=True, help="Annotations of the images the tool saw.")
 @_keypoint_map_option
 @click.option("--out", type=PATH, required=True, help="COCO keypoint results to write.")
-@click.option("--score-scale", type=float, help="Divides keypoint scores; the format's own if not given.")
+@click.option("--score-scale", type=FiniteRange(0, min_open=True), help="Divides scores; else the format's.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def import_(
     kind: str, predictions: Path, annotations: Path, keypoint_map, out: Path, score_scale, as_json: bool
