@@ -25,7 +25,6 @@ MAX_PIXELS = 100e6
 # Of so large a JPEG: each costs as much as decoding it anew, and those that are written have ten.
 _MAX_SCANS = 15
 _FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "JPEG2000", "PPM")  # as Pillow calls them
-Image.init()
 Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom exclusive
 _EXIF = re.compile(b"Exif|eXIf|EXIF")  # of JPEG, PNG and WebP
 
@@ -126,6 +125,7 @@ def image_header(path: str | Path | BytesIO) -> tuple[int, int, int]:
     """
     try:
         with path if isinstance(path, BytesIO) else open(path, "rb") as file:
+            Image.init()
             start, readers = file.read(16), (Image.OPEN[kind] for kind in _FORMATS)
             file.seek(0)
             # Pillow's own `open` would warn of large pictures, on its own account.
