@@ -10,6 +10,7 @@ import math
 import os
 import shlex
 import sys
+import warnings
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -42,7 +43,10 @@ _keypoint_map_option = click.option(
 
 def main() -> NoReturn:
     """Run the command line and exit."""
-    os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # an image cut off is told in one line, by us
+    # What is damaged is told in one line, by us: what libraries written in C say of it goes nowhere.
+    sys.stderr = os.fdopen(os.dup(2), "w", 1, sys.stderr.encoding, "backslashreplace")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    warnings.filterwarnings("ignore", module="PIL")
     sys.exit(run(sys.argv[1:]))
 
 

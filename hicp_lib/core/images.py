@@ -22,7 +22,6 @@ from hicp_lib.core.limited import LIMITS_VARIABLE, raised
 
 MAX_PIXELS = 100e6
 """Of an image; more would be a gigabyte before anything looks at them."""
-# Of so large a JPEG: each costs as much as decoding it anew, and those that are written have ten.
 _MAX_SCANS = 15
 _FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "JPEG2000", "PPM")  # as Pillow calls them
 Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom exclusive
@@ -78,10 +77,9 @@ def decode(content: bytes | np.ndarray, path: str | Path, flags: int) -> np.ndar
     """
     content = bytes(content)
     width_px, height_px, _ = image_header(BytesIO(content))
-    refuse_too_large(path, width_px, height_px)
-    n_scans, pixels = content.count(b"\xff\xda"), None
-    if n_scans * width_px * height_px > _MAX_SCANS * raised(MAX_PIXELS):
-        raise InputError(f"{path}: is a JPEG of {n_scans} scans; save it anew")
+    # Each scan of a JPEG costs as much as decoding it anew; those that are written have ten.
+    refuse_too_large(path, width_px, height_px * max(1, content.count(b"\xff\xda") // _MAX_SCANS))
+    pixels = None
     with suppress(cv2.error):
         pixels = cv2.imdecode(np.frombuffer(content, np.uint8), flags) if width_px else None
     if pixels is None:

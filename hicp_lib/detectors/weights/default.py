@@ -129,9 +129,7 @@ def load(name: str) -> bytes:
         If the file is absent, or is not the one the registry names.
     """
     weight = find(name)
-    if not weight.path.exists():
-        raise InputError(f"{weight.path}: weight file is absent; get it with: {weight.remedy}")
-    content = read_bytes(weight.path, f"make it readable, or replace it with: {weight.remedy}")
+    content = read_bytes(weight.path, f"get it with: {weight.remedy}")
     if sha256_bytes(content) != weight.sha256:
         raise InputError(
             f"{weight.path}: the file is damaged and was not used (expected SHA-256 {weight.sha256}); "
