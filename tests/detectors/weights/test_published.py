@@ -208,7 +208,7 @@ def test_an_unexpected_size_is_refused(server):
 @pytest.mark.parametrize("announce", [1, 1000, None])
 def test_a_download_that_breaks_off_leaves_nothing_and_is_fetched_again(server, announce):
     server.announce = announce
-    refused("plain", r"could not be downloaded \((ended after \\d+ bytes, \\d+ were|size announced)")
+    refused("plain", r"could not be downloaded \((ended after \d+ bytes, \d+ were|size announced)")
     server.announce = 0
     assert published.fetch_published("plain").path.read_bytes() == CONTENT
 
