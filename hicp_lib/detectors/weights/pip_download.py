@@ -4,6 +4,9 @@ import os
 import subprocess
 import sys
 
+# pip gives up a server that says nothing, but not one that says a byte now and then.
+TIMEOUT_S = 3600.0
+
 
 def run_pip(*arguments: str) -> str | None:
     """Run a command of pip's on wheels that a file of requirements names with their hashes.
@@ -26,8 +29,15 @@ def run_pip(*arguments: str) -> str | None:
     environment = os.environ | {"PIP_DISABLE_PIP_VERSION_CHECK": "1", "PIP_USER": "0"}
     try:
         run = subprocess.run(
-            command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True
+            command,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT_S,
         )
+    except subprocess.TimeoutExpired:
+        return f"it was not done within {TIMEOUT_S:g} s"
     except OSError as error:
         return f"Python could not be started: {error.strerror}"
     return None if run.returncode == 0 else reason(run.stderr) or f"pip ended with code {run.returncode}"
