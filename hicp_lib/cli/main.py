@@ -9,6 +9,7 @@ import json
 import math
 import os
 import shlex
+import signal
 import sys
 from dataclasses import asdict
 from functools import partial
@@ -33,6 +34,7 @@ from hicp_lib.cli.options import (
 from hicp_lib.cli.recordings import lift, record
 from hicp_lib.core.errors import InputError
 
+_STOPPED = "stopped; run the same command again to go on"
 _keypoint_map_option = click.option(
     "--keypoint-map", type=PATH, metavar="FILE.json",
     help="What keypoint names of the annotations mean: their names to ours, or null to leave one out.",
@@ -42,7 +44,14 @@ _keypoint_map_option = click.option(
 def main() -> NoReturn:
     """Run the command line and exit."""
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # an image cut off is told in one line, by us
+    signal.signal(signal.SIGTERM, _terminate)
     sys.exit(run(sys.argv[1:]))
+
+
+def _terminate(number: int, _: object) -> NoReturn:
+    """Leave as at an error: what runs is ended, and nothing is left half-written."""
+    signal.signal(number, signal.SIG_IGN)
+    sys.exit(128 + number)
 
 
 def run(arguments: list[str]) -> int:
@@ -56,7 +65,7 @@ def run(arguments: list[str]) -> int:
     Returns
     -------
     int
-        0 done, 1 a notebook or the book failed, 2 bad input or usage, 130 stopped.
+        0 done, 1 a notebook or the book failed, 2 bad input or usage, 130 stopped, 143 terminated.
 
     Examples
     --------
@@ -73,7 +82,9 @@ def run(arguments: list[str]) -> int:
         where = context.command_path if context else "hicp"
         return _fail(f"{' '.join(error.format_message().split())} See: {where} --help", 2)
     except (click.Abort, KeyboardInterrupt):
-        return _fail("stopped; run the same command again to go on", 130)
+        return _fail(_STOPPED, 130)
+    except SystemExit as terminated:
+        return _fail(_STOPPED, int(terminated.code or 0))
     except InputError as error:
         return _fail(error, 2)
     except OSError as error:

@@ -5,7 +5,6 @@ the address of a Dask scheduler, or nothing, which is what `HICP_DASK` names, el
 number nor the place is in any result.
 """
 
-import multiprocessing
 import os
 import re
 import signal
@@ -13,7 +12,6 @@ import threading
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
 from functools import partial
 from operator import length_hint
 from pathlib import Path
@@ -22,7 +20,8 @@ from typing import Any, TypeVar
 import cv2
 import numpy as np
 
-from hicp_lib.core.environment import usable_cores, with_variables
+from hicp_lib.core.children import SafeSpawn, end_with, safe_start
+from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
 
@@ -31,9 +30,6 @@ Key = TypeVar("Key", bound=Hashable)
 Workers = int | str | None
 # Checked here, since Dask starts threads, and for an empty address a cluster, before it looks.
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+:\d{1,5}")
-_ONE_THREAD = dict.fromkeys(
-    ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
-)
 
 
 def resolved(workers: Workers) -> int | str:
@@ -192,14 +188,10 @@ class Processes(ProcessPoolExecutor):
     """
 
     def __init__(self, n: int) -> None:
-        context = multiprocessing.get_context("spawn")
+        context = SafeSpawn()
         self._theirs, self._ours = context.Pipe(duplex=False)
-        super().__init__(n, context, _begin, (self._theirs,))
-
-    def submit(self, *arguments: Any, **named: Any) -> Any:
-        """As any executor's; it may start a process."""
-        with with_variables(**_ONE_THREAD):
-            return super().submit(*arguments, **named)
+        with safe_start():
+            super().__init__(n, context, _begin, (self._theirs,))
 
     def __exit__(self, kind: object, *_: object) -> None:
         if kind is not None:
@@ -213,13 +205,7 @@ def _begin(pipe: Any) -> None:
     """What a process does first."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the caller's, who ends this one
     cv2.setNumThreads(1)
-    threading.Thread(target=_end_with, args=(pipe,), daemon=True).start()
-
-
-def _end_with(pipe: Any) -> None:
-    with suppress(EOFError, OSError):
-        pipe.recv_bytes()  # nothing is ever written: this ends when the other end closes
-    os._exit(1)
+    end_with(pipe.fileno())
 
 
 class _OneThread:

@@ -13,13 +13,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from hicp_lib.core.errors import InputError
-from hicp_lib.detectors.registry import COMBINED
+from hicp_lib.core.errors import InputError, refuse_unknown
+from hicp_lib.detectors.registry import COMBINED, DETECTORS
 from hicp_lib.detectors.weights.default import registry
 from hicp_lib.report.book import build_book
-from hicp_lib.report.notebooks import parse_overrides, read_notebooks, read_profile
+from hicp_lib.report.notebooks import Notebook, parse_overrides, read_notebooks, read_profile
 from hicp_lib.report.run import Folders, Run
 from hicp_lib.report.runs import run_all
+
+_DETECTORS = ("names", "two names", "a name")  # how the words about a parameter begin that names detectors
+_COMBINATION = f"{COMBINED}BODY+HANDS"
 
 
 def make_report(
@@ -87,8 +90,17 @@ def _plan(profile: str, pairs: list[tuple[str, str]], folder: Path, only: str | 
     for notebook in notebooks:
         name = notebook.name
         parameters = notebook.defaults | chosen.parameters.get(name, {}) | overrides[name]
+        _refuse_unknown_detectors(notebook, parameters)
         runs.append(Run(notebook, parameters, chosen.after.get(name, [])))
     return runs
+
+
+def _refuse_unknown_detectors(notebook: Notebook, parameters: dict[str, Any]) -> None:
+    for name, value in parameters.items():
+        if notebook.allowed.get(name, "").startswith(_DETECTORS):
+            for one in [value] if isinstance(value, str) else value:
+                named = one if not one.startswith(COMBINED) else _COMBINATION
+                refuse_unknown(f"-p {name}: detector", named, [*DETECTORS, _COMBINATION])
 
 
 def _without_absent(

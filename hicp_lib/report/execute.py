@@ -47,7 +47,8 @@ def main(job_path: str) -> int:
             execution_timeout=CELL_TIMEOUT_S,
             kernel_manager_class=IpcKernelManager,
             # What C++ libraries write to the terminal goes to the log; Python's own warnings stay visible.
-            extra_arguments=["--IPKernelApp.capture_fd_output=False"],
+            # Nothing beside a notebook is imported: its key would not know of it.
+            extra_arguments=["--IPKernelApp.capture_fd_output=False", "--IPKernelApp.ignore_cwd=True"],
         )
     except PapermillExecutionError:
         return 1

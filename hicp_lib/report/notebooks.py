@@ -2,8 +2,10 @@
 
 import ast
 import json
+import os
+import re
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
@@ -12,9 +14,15 @@ import nbformat
 
 from hicp_lib.core.cache import digest, imports_of
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_bytes
+from hicp_lib.core.files import json_or_text, read_bytes
 
 PARAMETERS_TAG = "parameters"
+_COMMENTED = re.compile(r"((?:^#.*\n)+)(\w+)", re.MULTILINE)
+_NUMBER = r"(\d+(?:\.\d+)?)"
+_FROM = re.compile(rf"{_NUMBER} or more|from {_NUMBER} |{_NUMBER} to|above {_NUMBER}")
+_UP_TO = re.compile(rf"\d to (?:below )?{_NUMBER}")
+_NONE_WILL_DO = "some or none"  # in the words about a list that may be empty
+_MOST, _SHOWN = 2.0**63, 80  # numbers, characters of a refused value
 
 
 @dataclass(frozen=True)
@@ -31,12 +39,15 @@ class Notebook:
         Hash of its cells' kinds, tags and text; outputs and other metadata do not count.
     imports : frozenset of str
         Names of the modules it imports.
+    allowed : dict of str to str
+        By a parameter's name, what the comment above it says in brackets: its unit and range.
     """
 
     path: Path
     defaults: dict[str, Any]
     source_sha256: str
     imports: frozenset[str]
+    allowed: dict[str, str] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -89,9 +100,20 @@ def read_notebook(path: Path) -> Notebook:
     tagged = [cell.source for cell in cells if PARAMETERS_TAG in cell.metadata.get("tags", [])]
     if len(tagged) != 1:
         raise InputError(f"{path}: has {len(tagged)} cells tagged `{PARAMETERS_TAG}`; expected exactly one")
-    source = [[cell.cell_type, cell.metadata.get("tags", []), cell.source] for cell in cells]
     code = [cell.source for cell in cells if cell.cell_type == "code"]
-    return Notebook(path, _assignments(tagged[0], path), digest(source), _imports(path, code))
+    declared = _assignments(tagged[0], path), source_sha256(cells), _imports(path, code)
+    return Notebook(path, *declared, _allowed(tagged[0]))
+
+
+def source_sha256(cells: list[Any]) -> str:
+    """Hash of what is run of a notebook, or was run of an executed one."""
+    return digest(
+        [
+            [cell.cell_type, cell.metadata.get("tags", []), cell.source]
+            for cell in cells
+            if "injected-parameters" not in cell.metadata.get("tags", [])  # papermill's own
+        ]
+    )
 
 
 def _imports(path: Path, cells: list[str]) -> frozenset[str]:
@@ -117,6 +139,11 @@ def _assignments(source: str, path: Path) -> dict[str, Any]:
             f"{path}: its parameters cell is not `name = value` lines with literal values; rewrite it so"
         ) from None
     return values
+
+
+def _allowed(source: str) -> dict[str, str]:
+    above = {name: text.replace("\n# ", " ") for text, name in _COMMENTED.findall(source)}
+    return {name: found[1] for name, text in above.items() if (found := re.search(r"\[(.+)\]", text))}
 
 
 def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
@@ -178,7 +205,7 @@ def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> 
     Raises
     ------
     InputError
-        Naming the unknown parameter and the known ones, or the type that was expected.
+        Naming the unknown parameter and the known ones, or the type and range that were expected.
 
     Examples
     --------
@@ -195,25 +222,53 @@ def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> 
             known = ", ".join(notebook.defaults) or "none"
             raise InputError(f"{origin}: {notebook.name} has no parameter '{name}'; known are {known}")
         default = notebook.defaults[name]
-        expected, several = type(default), isinstance(value, list) and is_path(name, default)
-        if not all(_fits(one, expected) for one in (value if several else [value])):
+        several = isinstance(value, list) and is_path(name, default)
+        allowed = notebook.allowed.get(name, "")
+        if (
+            several
+            and not value
+            or not all(_fits(v, default, allowed) for v in (value if several else [value]))
+        ):
             raise InputError(
-                f"{origin}: {notebook.name}: '{name}' is {json.dumps(value, default=str)}; "
-                f"expected {_article(expected)} such as {default!r}"
+                f"{origin}: {notebook.name}: '{name}' is {json.dumps(value, default=str)[:_SHOWN]}; "
+                f"expected {_article(type(default))} such as {default!r}{allowed and f' [{allowed}]'}"
             )
     return given
 
 
-def _fits(value: Any, expected: type) -> bool:
-    if expected is type(None):
-        return True
-    if expected is float:
-        return isinstance(value, (int, float)) and not isinstance(value, bool)
-    return type(value) is expected
+def _fits(value: Any, default: Any, allowed: str) -> bool:
+    """Whether a value is of the kind of the default, and all numbers in it in the range that is allowed."""
+    if isinstance(default, bool | None):
+        return default is None or isinstance(value, bool)
+    if isinstance(default, int | float):
+        is_number = type(value) is int or isinstance(default, float) and type(value) is float
+        return is_number and abs(value) < _MOST and _is_in_range(value, allowed)
+    if type(value) is not type(default):
+        return False
+    if isinstance(default, str):
+        choices = re.findall('"(.+?)"', allowed)
+        is_one = value in choices if default in choices and len(choices) > 1 else value or not default
+        return bool(is_one) and value.isprintable()
+    if isinstance(default, dict):
+        return all(_fits(one, known, allowed) for one in value.values() for known in [*default.values()][:1])
+    if any(value.count(one) > 1 for one in value) or allowed.startswith("two ") and len(value) != 2:
+        return False
+    can_be_empty = not default or _NONE_WILL_DO in allowed
+    return all(_fits(one, default[0], allowed) for one in value) if value else can_be_empty
+
+
+def _is_in_range(value: float, allowed: str) -> bool:
+    """Whether a number is in the range that words such as "1 or more" or "0 to below 1" say."""
+    low, high = _FROM.search(allowed), _UP_TO.search(allowed)
+    least = float(low[low.lastindex or 0]) if low else 0.0 if "standard deviation" in allowed else -_MOST
+    most = float(high[1]) if high else _MOST
+    is_low_enough = value < most if high and "below" in high[0] else value <= most
+    return is_low_enough and (value > least if low and low[0].startswith("above") else value >= least)
 
 
 def _article(kind: type) -> str:
-    names = {int: "an integer", float: "a number", bool: "true or false", str: "text", list: "a list"}
+    names = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
+    names[list] = "a list of one or more different values"
     return names.get(kind, f"a {kind.__name__}")
 
 
@@ -269,13 +324,10 @@ def parse_overrides(pairs: list[tuple[str, str]], notebooks: list[Notebook]) -> 
 
 def _parse(name: str, text: str, default: Any) -> Any:
     """`text` as a value of the type of `default`; unchanged text when it is not one."""
-    try:
-        value = json.loads(text)
-    except json.JSONDecodeError:
-        value = text
+    value = json_or_text(text)
     if text and is_path(name, default):
         several = isinstance(value, list)
-        paths = [str(Path(str(one)).resolve()) for one in (value if several else [text])]
+        paths = [os.path.abspath(str(one)) for one in (value if several else [text])]
         return paths if several else paths[0]
     if isinstance(default, list) and not text.startswith("["):
         first = default[0] if default else ""

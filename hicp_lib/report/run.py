@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import IO, Any, cast
 
 from hicp_lib.core.checkout import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
+from hicp_lib.core.children import child_environment
 from hicp_lib.core.files import write_json
 from hicp_lib.report.notebooks import Notebook
 
@@ -131,7 +131,7 @@ def _environment(staging: Path, folders: Folders, private: str) -> dict[str, str
     """A kernel's environment: nothing of the user's own set-up may move a number or a pixel."""
     import matplotlib
 
-    return os.environ | {
+    return child_environment() | {
         RESULTS_VARIABLE: str(staging / "results"),
         EARLIER_RESULTS_VARIABLE: str(folders.results.resolve()),
         PROFILE_VARIABLE: folders.profile,

@@ -144,7 +144,7 @@ def test_a_library_edited_during_the_run_is_not_stamped(tmp_path, monkeypatch, l
         return pretend_to_execute(*arguments)
 
     monkeypatch.setattr(Children, "execute", edit)
-    with pytest.raises(RunError, match="hicp_lib was changed while it ran"):
+    with pytest.raises(RunError, match="library changed while it ran; run the report again"):
         run_all([run], folders, print)
     assert not folders.results.exists()
 
