@@ -84,26 +84,17 @@ class Check:
 
 def run_checks() -> list[Check]:
     """Every check; none of them raises, and none contacts a network."""
-    checks: dict[str, Callable[[], Check | list[Check]]] = {
-        "Python": check_python,
-        "system libraries": check_system_libraries,
-        _LOCKED: lambda: check_locked_versions(provenance.LOCK_PATH),
-        "OpenCV": check_opencv,
-        "weights": check_weights,
-        "trials": check_probes,
-        "cache": lambda: check_folder("cache", cache_dir(), "set HICP_CACHE to a folder you may write to"),
-        "results": lambda: check_folder(
-            "results", working_folder() / "results", "give yourself the right to write there"
-        ),
-    }
-    return [check for name, run in checks.items() for check in _run(name, run)]
+    checks = [check_python, check_system_libraries, check_locked_versions, check_opencv, check_weights]
+    checks += [check_probes, check_folders]
+    return [line for check in checks for line in _lines(check)]
 
 
-def _run(name: str, run: Callable[[], Check | list[Check]]) -> list[Check]:
+def _lines(check: Callable[[], Check | list[Check]]) -> list[Check]:
     """What a check found; that it could not look is a finding, too."""
     try:
-        found = run()
+        found = check()
     except Exception as error:  # a broken installation may raise anything
+        name = check.__name__.removeprefix("check_").replace("_", " ")
         return [Check(name, FAIL, one_line(error), _remedy(one_line(error)))]
     return found if isinstance(found, list) else [found]
 
@@ -123,7 +114,7 @@ def check_system_libraries() -> Check:
     return Check.of("system libraries", not missing, finding, f"sudo apt-get install {' '.join(missing)}")
 
 
-def check_locked_versions(lock_path: Path) -> Check:
+def check_locked_versions(lock_path: Path = provenance.LOCK_PATH) -> Check:
     """That what is installed is what the lock says."""
     if provenance.CHECKOUT is None:
         return Check(_LOCKED, OK, "none: hicp was installed without a checkout")
@@ -241,6 +232,13 @@ def check_weights() -> Check:
         return Check("weights", FAIL, str(error), "git restore data/detectors.json")
     wrong = ", ".join(f"{name} {state}" for name, state in found.items() if state != "present")
     return Check.of("weights", not wrong, wrong or f"{len(found)} present and sound", "hicp models fetch")
+
+
+def check_folders() -> list[Check]:
+    """The folders that are written to."""
+    cache = check_folder("cache", cache_dir(), "set HICP_CACHE to a folder you may write to")
+    results = working_folder() / "results"
+    return cache + check_folder("results", results, "give yourself the right to write there")
 
 
 def check_folder(name: str, folder: Path, remedy: str) -> list[Check]:

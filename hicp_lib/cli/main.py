@@ -34,7 +34,6 @@ from hicp_lib.cli.options import (
 from hicp_lib.cli.recordings import lift, record
 from hicp_lib.core.errors import InputError
 
-_STOPPED = "stopped; run the same command again to go on"
 _keypoint_map_option = click.option(
     "--keypoint-map", type=PATH, metavar="FILE.json",
     help="What keypoint names of the annotations mean: their names to ours, or null to leave one out.",
@@ -44,14 +43,8 @@ _keypoint_map_option = click.option(
 def main() -> NoReturn:
     """Run the command line and exit."""
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # an image cut off is told in one line, by us
-    signal.signal(signal.SIGTERM, _terminate)
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))  # tidied up as at an error
     sys.exit(run(sys.argv[1:]))
-
-
-def _terminate(number: int, _: object) -> NoReturn:
-    """Leave as at an error: what runs is ended, and nothing is left half-written."""
-    signal.signal(number, signal.SIG_IGN)
-    sys.exit(128 + number)
 
 
 def run(arguments: list[str]) -> int:
@@ -81,10 +74,8 @@ def run(arguments: list[str]) -> int:
         context = getattr(error, "ctx", None)
         where = context.command_path if context else "hicp"
         return _fail(f"{' '.join(error.format_message().split())} See: {where} --help", 2)
-    except (click.Abort, KeyboardInterrupt):
-        return _fail(_STOPPED, 130)
-    except SystemExit as terminated:
-        return _fail(_STOPPED, int(terminated.code or 0))
+    except (click.Abort, KeyboardInterrupt, SystemExit) as error:
+        return _fail("stopped; run the same command again to go on", getattr(error, "code", 130))
     except InputError as error:
         return _fail(error, 2)
     except OSError as error:

@@ -281,7 +281,7 @@ def files_below(folder: Path, above: frozenset[Path] = frozenset()) -> Iterator[
     here = folder.resolve()
     if here in above:
         raise InputError(f"{folder}: leads to a folder that it lies in; remove the link")
-    for path in folder.iterdir():
+    for path in folder.iterdir() if folder.is_dir() else ():
         if path.is_dir():
             yield from files_below(path, above | {here})
         elif path.is_file():

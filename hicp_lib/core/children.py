@@ -1,7 +1,7 @@
 """Processes that this one starts: none imports from the working folder, none outlives this one.
 
-A data folder may hold a `numpy.py`. Python puts the working folder on the path of `-m` and `-c` programs, before
-its own library; Jupyter puts it on that of notebooks, and multiprocessing hands it on from there.
+A data folder may hold a `numpy.py`. Python puts the working folder on the path of `-m` and `-c`, before its
+own library; Jupyter puts it on that of notebooks, and multiprocessing hands it on from there.
 """
 
 import os
@@ -9,15 +9,11 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
-from typing import Any
 
 from hicp_lib.core.environment import with_variables
 
-_ONE_THREAD = dict.fromkeys(
-    ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
-)
+_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 _SAFE_PATH = {"PYTHONSAFEPATH": "1"}
 _LIBRARY_ROOT = Path(__file__).resolve().parents[2]
 
@@ -33,42 +29,26 @@ def child_environment(**variables: str) -> dict[str, str]:
     return os.environ | _SAFE_PATH | variables
 
 
-class _Process(SpawnProcess):
-    @staticmethod
-    def _Popen(process_obj: Any) -> Any:  # noqa: N802, multiprocessing's name
-        here = Path.cwd()
-        is_told = here == _LIBRARY_ROOT  # a checkout that is not installed
-        told = [entry for entry in sys.path if is_told or Path(entry).resolve() != here]
-        with safe_start():
-            before, sys.path = sys.path, told
-            try:
-                return SpawnProcess._Popen(process_obj)  # type: ignore[attr-defined]
-            finally:
-                sys.path = before
-
-
-class SafeSpawn(SpawnContext):
-    """Starts processes of multiprocessing as fresh interpreters, with one thread each in linear algebra."""
-
-    Process = _Process  # type: ignore[assignment]
-
-
 @contextmanager
 def safe_start() -> Iterator[None]:
-    """A block in which multiprocessing may start processes of its own, as it does with the first lock."""
-    with with_variables(**_ONE_THREAD, **_SAFE_PATH):
-        yield
+    """A block in which multiprocessing starts processes, with one thread each in linear algebra."""
+    here = Path.cwd()
+    is_library = here == _LIBRARY_ROOT  # a checkout that is not installed
+    with with_variables(**_SAFE_PATH, **dict.fromkeys(_THREADS, "1")):  # one thread at a time
+        before = sys.path
+        sys.path = [entry for entry in before if is_library or Path(entry).resolve() != here]
+        try:
+            yield
+        finally:
+            sys.path = before
 
 
 @contextmanager
 def lifeline() -> Iterator[int]:
     """A standard input for a program that calls `end_with(0)`: it ends with the block, at the latest."""
     theirs, ours = os.pipe()
-    try:
+    with open(theirs, "rb"), open(ours, "wb"):
         yield theirs
-    finally:
-        os.close(ours)
-        os.close(theirs)
 
 
 def end_with(descriptor: int) -> None:
@@ -82,17 +62,12 @@ def end_with(descriptor: int) -> None:
     descriptor : int
         Of the pipe's end that is read.
     """
+    own = os.dup(descriptor)
+    threading.Thread(target=lambda: os._exit(1 + len(os.read(own, 1))), daemon=True).start()
     with suppress(ImportError, OSError, AttributeError):
         import fcntl
 
         # Opened anew: flags and owner are of what was opened, which all who inherited it share.
-        own = os.open(f"/proc/self/fd/{descriptor}", os.O_RDONLY | os.O_NONBLOCK)
-        fcntl.fcntl(own, fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(own, fcntl.F_SETFL, os.O_NONBLOCK | os.O_ASYNC)
-    threading.Thread(target=_wait_and_end, args=(os.dup(descriptor),), daemon=True).start()
-
-
-def _wait_and_end(descriptor: int) -> None:
-    with suppress(OSError):
-        os.read(descriptor, 1)
-    os._exit(1)
+        anew = os.open(f"/proc/self/fd/{own}", os.O_RDONLY | os.O_NONBLOCK)
+        fcntl.fcntl(anew, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(anew, fcntl.F_SETFL, os.O_NONBLOCK | os.O_ASYNC)

@@ -2,10 +2,10 @@
 
 import re
 
-_MARKUP = re.compile(r"[^\w .,%/()–—-]|(?<![^\W_])_|_(?![^\W_])|^-")
+_MARKUP = re.compile(r"[^\w .,;%/()=–—-]|(?<! )=|(?<![^\W_])_|_(?![^\W_])|^-")
 
 
-def plain(text: object) -> str:
+def escaped(text: object) -> str:
     """Text that is shown as it is, in Markdown (also in its tables, links and raw HTML) and in HTML.
 
     What means something there becomes a numeric character reference, in which both see nothing but the
@@ -19,7 +19,7 @@ def plain(text: object) -> str:
 
     Examples
     --------
-    >>> plain("<svg onload=a()>\\n| b_c"), plain(0.5)
+    >>> escaped("<svg onload=a()>\\n| b_c"), escaped(0.5)
     ('&#60;svg onload&#61;a()&#62; &#124; b_c', '0.5')
     """
     line = "".join(c if c.isprintable() else "\ufffd" for c in " ".join(str(text).split()))

@@ -5,6 +5,7 @@ the address of a Dask scheduler, or nothing, which is what `HICP_DASK` names, el
 number nor the place is in any result.
 """
 
+import multiprocessing
 import os
 import re
 import signal
@@ -12,6 +13,7 @@ import threading
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from functools import partial
 from operator import length_hint
 from pathlib import Path
@@ -20,7 +22,7 @@ from typing import Any, TypeVar
 import cv2
 import numpy as np
 
-from hicp_lib.core.children import SafeSpawn, end_with, safe_start
+from hicp_lib.core.children import end_with, safe_start
 from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
@@ -108,7 +110,7 @@ def run_jobs(
         return
     n = min(workers, length_hint(jobs, workers))
     todo = jobs if folder is None else ((key, job and partial(job, folder)) for key, job in jobs)
-    with single_threaded_opencv:
+    with single_threaded_opencv():
         if n < 2:
             yield from ((key, job and job()) for key, job in todo)
             return
@@ -188,10 +190,15 @@ class Processes(ProcessPoolExecutor):
     """
 
     def __init__(self, n: int) -> None:
-        context = SafeSpawn()
+        context = multiprocessing.get_context("spawn")
         self._theirs, self._ours = context.Pipe(duplex=False)
         with safe_start():
             super().__init__(n, context, _begin, (self._theirs,))
+
+    def submit(self, *arguments: Any, **named: Any) -> Any:
+        """As any executor's; it may start a process."""
+        with safe_start():
+            return super().submit(*arguments, **named)
 
     def __exit__(self, kind: object, *_: object) -> None:
         if kind is not None:
@@ -208,27 +215,20 @@ def _begin(pipe: Any) -> None:
     end_with(pipe.fileno())
 
 
-class _OneThread:
-    """Holds OpenCV to one thread: the jobs are what is spread.
+_opencv_lock, _n_threads_before = threading.Lock(), list[int]()
 
-    The number is the whole process's: the first of several who want it sets it, the last one restores it.
+
+@contextmanager
+def single_threaded_opencv() -> Iterator[None]:
+    """Hold OpenCV to one thread for a block: the jobs are what is spread.
+
+    The number is the whole process's: of several who want it, the last to leave restores what the first met.
     """
-
-    def __init__(self) -> None:
-        self._lock, self._depth, self._before = threading.Lock(), 0, 0
-
-    def __enter__(self) -> None:
-        with self._lock:
-            if self._depth == 0:
-                self._before = cv2.getNumThreads()
-                cv2.setNumThreads(1)
-            self._depth += 1
-
-    def __exit__(self, *_) -> None:
-        with self._lock:
-            self._depth -= 1
-            if self._depth == 0:
-                cv2.setNumThreads(self._before)
-
-
-single_threaded_opencv = _OneThread()
+    with _opencv_lock:
+        _n_threads_before.append(cv2.getNumThreads())
+        cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        with _opencv_lock:
+            cv2.setNumThreads(_n_threads_before.pop())

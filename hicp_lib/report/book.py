@@ -16,7 +16,7 @@ import nbformat
 from hicp_lib.core.cache import files_below
 from hicp_lib.core.children import child_environment, lifeline
 from hicp_lib.core.datafiles import REFERENCE_DIR
-from hicp_lib.core.escape import plain
+from hicp_lib.core.escape import escaped
 from hicp_lib.core.files import sha256_file, write_json
 from hicp_lib.report.checks import book_problems
 from hicp_lib.report.prose import Results, render_page
@@ -26,10 +26,8 @@ from hicp_lib.report.sphinx_extension import PLOTLY_PATH, SCRIPTS_DIR
 from hicp_lib.study import provenance
 
 BUILD_LIMIT_S = 900
-_SPHINX = """from hicp_lib.core.children import end_with
-end_with(0)
-from jupyter_book.cli.main import main
-main()"""
+_SPHINX = "from hicp_lib.core.children import end_with; end_with(0); "
+_SPHINX += "from jupyter_book.cli.main import main; main()"
 # Links lead to files of the checkout. In the book, `book/` is the top and `notebooks/` lies in it.
 _LINK_TO_PAGE, _LINK_TO_NOTEBOOK = ("](../book/", "](../"), ("](../notebooks/", "](notebooks/")
 # MathJax in one file with its fonts inside: browsers refuse font files to pages that are read from disk.
@@ -110,8 +108,7 @@ def _key(folders: Folders, left_out: Mapping[str, str]) -> str:
 
 
 def _hashes(folder: Path) -> dict[str, str]:
-    files = files_below(folder) if folder.is_dir() else ()
-    return {path.relative_to(folder).as_posix(): sha256_file(path) for path in files}
+    return {path.relative_to(folder).as_posix(): sha256_file(path) for path in files_below(folder)}
 
 
 def _assemble(source: Path, folders: Folders, left_out: Mapping[str, str]) -> None:
@@ -138,7 +135,7 @@ def _write_stub(original: Path, stub: Path, reason: str) -> None:
     """A page with a notebook's title that says why it was not run."""
     whole = nbformat.read(original, as_version=4)
     title = whole.cells[0].source.splitlines()[0]
-    text = nbformat.v4.new_markdown_cell(f"{title}\n\nNot run: {plain(reason)}.", id="not-run")
+    text = nbformat.v4.new_markdown_cell(f"{title}\n\nNot run: {escaped(reason)}.", id="not-run")
     nbformat.write(nbformat.v4.new_notebook(cells=[text], metadata=whole.metadata), stub)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import nbformat
 
 from hicp_lib.core.cache import digest, imports_of
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import json_or_text, read_bytes
 
 PARAMETERS_TAG = "parameters"
@@ -107,13 +107,8 @@ def read_notebook(path: Path) -> Notebook:
 
 def source_sha256(cells: list[Any]) -> str:
     """Hash of what is run of a notebook, or was run of an executed one."""
-    return digest(
-        [
-            [cell.cell_type, cell.metadata.get("tags", []), cell.source]
-            for cell in cells
-            if "injected-parameters" not in cell.metadata.get("tags", [])  # papermill's own
-        ]
-    )
+    rows = [[cell.cell_type, cell.metadata.get("tags", []), cell.source] for cell in cells]
+    return digest([row for row in rows if "injected-parameters" not in row[1]])  # papermill's own
 
 
 def _imports(path: Path, cells: list[str]) -> frozenset[str]:
@@ -174,12 +169,10 @@ def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: not TOML ({error}); correct the file") from None
     after = content.pop("after", {})
-    if name not in content:
-        raise InputError(f"{path}: has no profile '{name}'; choose one of {', '.join(sorted(content))}")
+    refuse_unknown(f"{path}: profile", name, sorted(content))
     known = {notebook.name: notebook for notebook in notebooks}
     for notebook in [*content[name], *after, *(item for items in after.values() for item in items)]:
-        if notebook not in known:
-            raise InputError(f"{path}: names notebook '{notebook}'; known are {', '.join(known)}")
+        refuse_unknown(f"{path}: notebook", notebook, known)
     try:
         TopologicalSorter(after).prepare()
     except CycleError as error:
@@ -218,9 +211,7 @@ def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> 
     hicp_lib.core.errors.InputError: -p seed: 05_tiny: 'seed' is "one"; expected an integer such as 0
     """
     for name, value in given.items():
-        if name not in notebook.defaults:
-            known = ", ".join(notebook.defaults) or "none"
-            raise InputError(f"{origin}: {notebook.name} has no parameter '{name}'; known are {known}")
+        refuse_unknown(f"{origin}: {notebook.name}: parameter", name, notebook.defaults)
         default = notebook.defaults[name]
         several = isinstance(value, list) and is_path(name, default)
         allowed = notebook.allowed.get(name, "")
@@ -268,8 +259,7 @@ def _is_in_range(value: float, allowed: str) -> bool:
 
 def _article(kind: type) -> str:
     names = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
-    names[list] = "a list of one or more different values"
-    return names.get(kind, f"a {kind.__name__}")
+    return (names | {list: "a list of different values"}).get(kind, f"a {kind.__name__}")
 
 
 def is_path(name: str, default: Any) -> bool:
@@ -311,12 +301,10 @@ def parse_overrides(pairs: list[tuple[str, str]], notebooks: list[Notebook]) -> 
     {'05_tiny': {'seed': 3, 'detectors': ['openpose', 'mmpose']}}
     """
     overrides: dict[str, dict[str, Any]] = {notebook.name: {} for notebook in notebooks}
+    known = sorted({name for notebook in notebooks for name in notebook.defaults})
     for name, text in pairs:
-        users = [notebook for notebook in notebooks if name in notebook.defaults]
-        if not users:
-            known = ", ".join(sorted({key for notebook in notebooks for key in notebook.defaults})) or "none"
-            raise InputError(f"-p {name}: no notebook has such a parameter; known are {known}")
-        for notebook in users:
+        refuse_unknown("-p: parameter", name, known)
+        for notebook in (notebook for notebook in notebooks if name in notebook.defaults):
             value = _parse(name, text, notebook.defaults[name])
             overrides[notebook.name] |= check_parameters(notebook, {name: value}, f"-p {name}")
     return overrides

@@ -11,8 +11,8 @@ In a page of `book/`, between double braces:
     data("paper.json")                                a JSON file of `data/`, for loops over its rows
     repetition()                                      this run beside the profile's reference run
 
-A name that no result file has stops the build. Texts of results are shown as they are, whatever is in them;
-those of `data` are the study's own Markdown.
+A name that no result file has stops the build. Texts are shown as they are, whatever is in them; what is
+Markdown, as texts of `data` may be, says so: `data("paper.json").why | safe`.
 """
 
 import json
@@ -26,7 +26,7 @@ from markupsafe import Markup
 
 from hicp_lib.core.datafiles import DATA_DIR, REFERENCE_DIR
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.escape import plain
+from hicp_lib.core.escape import escaped
 from hicp_lib.core.files import read_json
 from hicp_lib.report import repetition
 
@@ -103,8 +103,8 @@ class Results:
         texts = self._entry(notebook, "captions.json", name)
         source = f"results/{self.profile}/{notebook}/{texts['file']}"
         return Markup(
-            f'<figure class="hicp"><img src="{source}" alt="{plain(texts["alt"])}">'
-            f"<figcaption>{plain(texts['caption'])} "
+            f'<figure class="hicp"><img src="{source}" alt="{escaped(texts["alt"])}">'
+            f"<figcaption>{escaped(texts['caption'])} "
             f'<a href="notebooks/{notebook}.html#{name}">How it was made</a></figcaption></figure>'
         )
 
@@ -163,7 +163,7 @@ def markdown_table(table: pd.DataFrame, digits: int = 2) -> Markup:
     def cell(value: Any) -> str:
         if value is None or value is pd.NA or value != value:
             return "–"
-        return f"{value:.{digits}f}" if isinstance(value, float) else plain(value)
+        return f"{value:.{digits}f}" if isinstance(value, float) else escaped(value)
 
     rows = [list(table.columns), *table.itertuples(index=False)]
     lines = ["| " + " | ".join(cell(value) for value in row) + " |" for row in rows]
@@ -195,7 +195,7 @@ def render_page(source: Path, results: Results, profile: str) -> str:
     )
     offered = ("value", "raw", "table", "figure", "stamp", "repetition")
     names = {name: getattr(results, name) for name in offered}
-    names |= {"data": lambda name: _trusted(json.loads((DATA_DIR / name).read_text()))}
+    names |= {"data": lambda name: json.loads((DATA_DIR / name).read_text())}
     names |= {"profile": profile, "notebooks": results.notebooks()}
     try:
         return environment.from_string(source.read_text()).render(names)
@@ -206,13 +206,4 @@ def render_page(source: Path, results: Results, profile: str) -> str:
 
 def _shown(value: Any) -> Any:
     """What a page shows of a value: Markdown as it is, any other text without markup."""
-    return plain(value) if isinstance(value, str) and not isinstance(value, Markup) else value
-
-
-def _trusted(value: Any) -> Any:
-    """JSON of the study's own, whose texts are Markdown."""
-    if isinstance(value, dict):
-        return {_trusted(name): _trusted(item) for name, item in value.items()}
-    if isinstance(value, list):
-        return [_trusted(item) for item in value]
-    return Markup(value) if isinstance(value, str) else value
+    return escaped(value) if isinstance(value, str) and not isinstance(value, Markup) else value

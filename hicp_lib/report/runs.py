@@ -30,6 +30,8 @@ from hicp_lib.report.run import WALL_LIMIT_S, Children, Folders, Run, RunError
 from hicp_lib.report.schedule import needed, run_when_ready
 from hicp_lib.study import provenance
 
+Earlier = Callable[[], list[str]]
+"""Digests of the runs before one, as they are when it is called."""
 MEMORY_PER_RUN_BYTES = 2 * 10**9
 """What one notebook may need with its workers; the study's largest takes 0.7 GB without them."""
 
@@ -72,8 +74,7 @@ def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None], only:
         def job(name: str, before: list[Future]) -> None:
             if any(future.exception() for future in before):
                 raise _SkippedError
-            earlier = partial(_made, after[name], folders)
-            _bring_up_to_date(named[name], earlier, folders, children, log)
+            _bring_up_to_date(named[name], partial(_made, after[name], folders), folders, children, log)
 
         done = run_when_ready(after, job, pool, n_workers)
     for error in (done[name].exception() for name in after):
@@ -97,7 +98,7 @@ def _made(names: list[str], folders: Folders) -> list[str]:
 
 
 def _bring_up_to_date(
-    run: Run, earlier: Callable[[], list[str]], folders: Folders, children: Children, log: Callable
+    run: Run, earlier: Earlier, folders: Folders, children: Children, log: Callable
 ) -> None:
     """Run the notebook unless it is fresh."""
     name, key = run.notebook.name, run_key(run, earlier())
@@ -191,9 +192,7 @@ def outputs(name: str, folders: Folders) -> dict[str, str]:
     return {path.relative_to(folders.root).as_posix(): sha256_file(path) for path in paths if path.is_file()}
 
 
-def _run_notebook(
-    run: Run, key: dict[str, Any], earlier: Callable[[], list[str]], folders: Folders, children: Children
-) -> None:
+def _run_notebook(run: Run, key: dict, earlier: Earlier, folders: Folders, children: Children) -> None:
     """Run a notebook and put its outcome, stamped with its key, in place of the last one.
 
     Raises RunError if a cell failed, wrote to stderr or took too long, the results are not those of this run,
@@ -255,12 +254,9 @@ def _check(run: Run, status: int | None, copy: Path, staging: Path) -> None:
         raise RunError("its results state other parameters than it ran with; pass all to `Study`")
 
 
-def _refuse_changed(run: Run, key: dict[str, Any], copy: Path, earlier: Callable[[], list[str]]) -> None:
-    """Raise RunError if what was run, or what there is now, is not what the key says."""
-    try:
-        now = run_key(replace(run, notebook=read_notebook(run.notebook.path)), earlier())
-    except InputError as error:
-        raise RunError(f"changed while it ran: {error}") from None
+def _refuse_changed(run: Run, key: dict[str, Any], copy: Path, earlier: Earlier) -> None:
+    """Raise RunError if what was run, or what there is now, is not what the key says; InputError if gone."""
+    now = run_key(replace(run, notebook=read_notebook(run.notebook.path)), earlier())
     if source_sha256(nbformat.read(copy, as_version=4).cells) != key["notebook"]:
         now["notebook"] = "another was run"
     if changed := [part for part in key if now[part] != key[part]]:

@@ -17,18 +17,18 @@ from typing import Any
 
 from hicp_lib.core.cache import LIBRARY_DIR, digest, files_below, files_sha256
 from hicp_lib.core.checkout import CHECKOUT
+from hicp_lib.core.children import child_environment
 from hicp_lib.core.datafiles import DATA_DIR, REFERENCE_DIR
 from hicp_lib.core.environment import usable_cores
-from hicp_lib.core.escape import plain
+from hicp_lib.core.escape import escaped
 from hicp_lib.core.files import read_json, sha256_file
 from hicp_lib.detectors.weights.user import user_weights_sha256
 
 LOCK_PATH = (CHECKOUT or LIBRARY_DIR) / "environment.lock"
 
-_SHOWN_VERSIONS = (
-    "numpy", "pandas", "opencv-python-headless", "onnxruntime", "mediapipe", "open3d-cpu", "open3d",
-    "matplotlib",
-)  # fmt: skip
+_SHOWN_VERSIONS = "numpy pandas opencv-python-headless onnxruntime mediapipe open3d-cpu open3d matplotlib"
+# No program of a checkout's configuration is run.
+_GIT = ("git", "--no-optional-locks", "-c", "core.fsmonitor=false", "-c", "core.hooksPath=/dev/null")
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
@@ -71,13 +71,9 @@ def git(*arguments: str) -> str | None:
     """What git says in the library's checkout; None without git or a checkout, or where it refuses."""
     if CHECKOUT is None:
         return None
-    # Of this checkout, not of one around it or one that variables name; no program of its configuration runs.
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
-    environment |= {"GIT_CEILING_DIRECTORIES": str(CHECKOUT.parent), "GIT_OPTIONAL_LOCKS": "0"}
-    command = ["git", "-c", "core.fsmonitor=false", "-c", "core.hooksPath=/dev/null", *arguments]
-    options: dict[str, Any] = {"capture_output": True, "text": True, "timeout": 20, "env": environment}
+    where = child_environment(GIT_DIR=str(CHECKOUT / ".git"), GIT_WORK_TREE=str(CHECKOUT))
     try:
-        done = subprocess.run(command, cwd=CHECKOUT, **options)
+        done = subprocess.run([*_GIT, *arguments], env=where, capture_output=True, text=True, timeout=20)
     except (OSError, subprocess.TimeoutExpired):
         return None
     return done.stdout.strip() if done.returncode == 0 else None
@@ -86,7 +82,7 @@ def git(*arguments: str) -> str | None:
 def versions() -> dict[str, str]:
     """Python's version and those of the libraries that can move a number."""
     installed = {d.name.lower(): d.version for d in importlib.metadata.distributions()}
-    shown = {name: installed[name] for name in _SHOWN_VERSIONS if name in installed}
+    shown = {name: installed[name] for name in _SHOWN_VERSIONS.split() if name in installed}
     return {"python": platform.python_version()} | shown
 
 
@@ -164,7 +160,7 @@ def provenance_html(stamp: dict[str, Any]) -> str:
         "Machine": _listed(stamp["machine"]),
         "Wall time": f"{stamp['wall_s']:.1f} s",
     }
-    body = "".join(f'<tr><th scope="row">{k}</th><td>{plain(v)}</td></tr>' for k, v in rows.items())
+    body = "".join(f'<tr><th scope="row">{k}</th><td>{escaped(v)}</td></tr>' for k, v in rows.items())
     return (
         '<details class="hicp-provenance"><summary>What this page was made with</summary>'
         f"<table><tbody>{body}</tbody></table></details>"

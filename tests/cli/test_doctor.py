@@ -216,6 +216,34 @@ def test_a_registry_that_cannot_be_read_is_one_line(tmp_path, monkeypatch):
     assert (check.status, check.finding) == (doctor.FAIL, "data/detectors.json: not JSON")
 
 
+@pytest.mark.parametrize("name", ["check_weights", "check_opencv", "check_probes", "check_system_libraries"])
+def test_a_check_that_breaks_is_a_line_and_the_others_go_on(monkeypatch, name):
+    def broken(*_):
+        raise OSError(13, "Permission denied", "/weights/a.onnx")
+
+    for one in ("check_probes", "check_weights"):
+        monkeypatch.setattr(doctor, one, lambda: doctor.Check("x", doctor.OK, ""))
+    n_lines = len(doctor.run_checks())
+    monkeypatch.setattr(doctor, name, broken)
+    checks = doctor.run_checks()
+    assert len(checks) == n_lines
+    assert [c.finding for c in checks if c.status == doctor.FAIL and "Errno 13" in c.finding] == [
+        "[Errno 13] Permission denied: '/weights/a.onnx'"
+    ]
+
+
+def test_an_unreadable_weight_is_told_with_its_name(monkeypatch):
+    from hicp_lib.detectors.weights import default
+
+    def unreadable(path):
+        raise PermissionError(13, "Permission denied", path)
+
+    monkeypatch.setattr(default, "sha256_file", unreadable)
+    check = doctor.check_weights()
+    assert check.status == doctor.FAIL
+    assert " unreadable" in check.finding
+
+
 def test_without_a_checkout_there_is_no_lock_to_keep(monkeypatch, tmp_path):
     monkeypatch.setattr(doctor.provenance, "CHECKOUT", None)
     assert doctor.check_locked_versions(tmp_path / "no.lock").status == doctor.OK
