@@ -32,11 +32,10 @@ def child_environment(**variables: str) -> dict[str, str]:
 @contextmanager
 def safe_start() -> Iterator[None]:
     """A block in which multiprocessing starts processes, with one thread each in linear algebra."""
-    here = Path.cwd()
-    is_library = here == _LIBRARY_ROOT  # a checkout that is not installed
+    untrusted = {Path.cwd()} - {_LIBRARY_ROOT}  # that of a checkout that is not installed
     with with_variables(**_SAFE_PATH, **dict.fromkeys(_THREADS, "1")):  # one thread at a time
         before = sys.path
-        sys.path = [entry for entry in before if is_library or Path(entry).resolve() != here]
+        sys.path = [entry for entry in before if Path(entry).resolve() not in untrusted]
         try:
             yield
         finally:

@@ -80,9 +80,8 @@ def make_report(
 def _plan(profile: str, pairs: list[tuple[str, str]], folder: Path, only: str | None) -> list[Run]:
     """Every notebook with its parameters, of three sources the last one counts: cell, profile, `pairs`."""
     notebooks = read_notebooks(folder)
-    names = [notebook.name for notebook in notebooks]
     if only is not None:
-        refuse_unknown("--only: notebook", only, names)
+        refuse_unknown("--only: notebook", only, [notebook.name for notebook in notebooks])
     chosen = read_profile(folder / "profiles.toml", profile, notebooks)
     overrides = parse_overrides(pairs, notebooks)
     runs = []
@@ -165,9 +164,8 @@ def without_absent(
         False where no detector is left in a list, or a single one is absent that no list offers.
     """
     free = {name: value for name, value in parameters.items() if name not in asked_for}
-    named = {one for value in free.values() for one in (value if isinstance(value, list) else [value])
-             if isinstance(one, str)}  # fmt: skip
-    dropped = {one for one in named if absent_weights(one)}
+    named = [one for value in free.values() for one in (value if isinstance(value, list) else [value])]
+    dropped = {one for one in named if isinstance(one, str) and absent_weights(one)}
     lists = {name: value for name, value in free.items() if isinstance(value, list)}
     kept = parameters | {name: [one for one in value if one not in dropped] for name, value in lists.items()}
     can_run = all(kept[name] or not value for name, value in lists.items())

@@ -32,13 +32,9 @@ class IpcKernelManager(AsyncKernelManager):
 def main(job_path: str) -> int:
     """Run the job; 0 when every cell ran, 1 when one raised (the copy then holds the error)."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    job = json.loads(Path(job_path).read_text())
     try:
         papermill.execute_notebook(
-            job["notebook"],
-            job["output"],
-            parameters=job["parameters"],
-            cwd=job["folder"],
+            **json.loads(Path(job_path).read_text()),
             progress_bar=False,
             kernel_name="python3",
             language="python",

@@ -21,7 +21,6 @@ _COMMENTED = re.compile(r"((?:^#.*\n)+)(\w+)", re.MULTILINE)
 _NUMBER = r"(\d+(?:\.\d+)?)"
 _FROM = re.compile(rf"{_NUMBER} or more|from {_NUMBER} |{_NUMBER} to|above {_NUMBER}")
 _UP_TO = re.compile(rf"\d to (?:below )?{_NUMBER}")
-_NONE_WILL_DO = "some or none"  # in the words about a list that may be empty
 _MOST, _SHOWN = 2.0**63, 80  # numbers, characters of a refused value
 
 
@@ -244,8 +243,9 @@ def _fits(value: Any, default: Any, allowed: str) -> bool:
         return all(_fits(one, known, allowed) for one in value.values() for known in [*default.values()][:1])
     if any(value.count(one) > 1 for one in value) or allowed.startswith("two ") and len(value) != 2:
         return False
-    can_be_empty = not default or _NONE_WILL_DO in allowed
-    return all(_fits(one, default[0], allowed) for one in value) if value else can_be_empty
+    if not value:
+        return not default or "some or none" in allowed
+    return all(_fits(one, kind, allowed) for one in value for kind in default[:1])
 
 
 def _is_in_range(value: float, allowed: str) -> bool:

@@ -190,9 +190,8 @@ def render_page(source: Path, results: Results, profile: str) -> str:
     InputError
         If the page uses a name that does not exist, or is not a valid template.
     """
-    environment = jinja2.Environment(
-        undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, finalize=_shown
-    )
+    environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.finalize = lambda value: escaped(value) if type(value) is str else value  # not of Markup
     offered = ("value", "raw", "table", "figure", "stamp", "repetition")
     names = {name: getattr(results, name) for name in offered}
     names |= {"data": lambda name: json.loads((DATA_DIR / name).read_text())}
@@ -202,8 +201,3 @@ def render_page(source: Path, results: Results, profile: str) -> str:
     except jinja2.TemplateError as error:
         line = f", line {error.lineno}" if isinstance(error, jinja2.TemplateSyntaxError) else ""
         raise InputError(f"{source}{line}: {error.message}; correct the page") from None
-
-
-def _shown(value: Any) -> Any:
-    """What a page shows of a value: Markdown as it is, any other text without markup."""
-    return escaped(value) if isinstance(value, str) and not isinstance(value, Markup) else value

@@ -232,18 +232,6 @@ def test_a_check_that_breaks_is_a_line_and_the_others_go_on(monkeypatch, name):
     ]
 
 
-def test_an_unreadable_weight_is_told_with_its_name(monkeypatch):
-    from hicp_lib.detectors.weights import default
-
-    def unreadable(path):
-        raise PermissionError(13, "Permission denied", path)
-
-    monkeypatch.setattr(default, "sha256_file", unreadable)
-    check = doctor.check_weights()
-    assert check.status == doctor.FAIL
-    assert " unreadable" in check.finding
-
-
 def test_without_a_checkout_there_is_no_lock_to_keep(monkeypatch, tmp_path):
     monkeypatch.setattr(doctor.provenance, "CHECKOUT", None)
     assert doctor.check_locked_versions(tmp_path / "no.lock").status == doctor.OK

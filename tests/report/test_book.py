@@ -114,8 +114,8 @@ def test_names_of_the_data_are_text_on_every_page(study):
 @pytest.mark.parametrize(
     ("profile", "pairs", "expected"),
     [
-        ("quik", [], "has no profile 'quik'; choose one of full, quick"),
-        ("quick", [("sed", "1")], "-p sed: no notebook has such a parameter"),
+        ("quik", [], "profile 'quik' is not known; expected one of: full, quick"),
+        ("quick", [("sed", "1")], "-p: parameter 'sed' is not known"),
         ("quick", [("images", "/nowhere")], "/nowhere: does not exist; parameter 'images'"),
     ],
 )

@@ -67,12 +67,15 @@ def test_profile_and_order_are_read(study):
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
-        ("[full]", "has no profile 'quick'; choose one of full"),
-        ("[quick.99_none]\nseed = 1", "names notebook '99_none'; known are 00_first, 01_second"),
-        ("[quick.00_first]\nsed = 1", "00_first has no parameter 'sed'; known are seed, "),
+        ("[full]", "profile 'quick' is not known; expected one of: full"),
+        (
+            "[quick.99_none]\nseed = 1",
+            "notebook '99_none' is not known; expected one of: 00_first, 01_second",
+        ),
+        ("[quick.00_first]\nsed = 1", "00_first: parameter 'sed' is not known; expected one of: seed, "),
         ("[quick.00_first]\nseed = 1.5", "'seed' is 1.5; expected an integer such as 0"),
         ("[quick.00_first]\nseed = true", "'seed' is true; expected an integer such as 0"),
-        ("[quick]\n[after]\n01_second = ['x']", "names notebook 'x'"),
+        ("[quick]\n[after]\n01_second = ['x']", "notebook 'x' is not known"),
         (
             "[quick]\n[after]\n01_second = ['00_first']\n00_first = ['01_second']",
             "01_second waits for 00_first waits for 01_second; break the circle",
@@ -116,7 +119,7 @@ def test_relative_paths_are_those_of_the_caller(study, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("name", "text", "expected"),
     [
-        ("sed", "1", "-p sed: no notebook has such a parameter; known are detectors, images, scale, seed"),
+        ("sed", "1", "-p: parameter 'sed' is not known; expected one of: detectors, images, scale, seed"),
         ("seed", "x", "'seed' is \"x\"; expected an integer such as 0"),
         ("seed", "1.5", "expected an integer"),
         ("scale", "[1]", "expected a number such as 1.5"),

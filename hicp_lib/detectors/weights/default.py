@@ -143,13 +143,10 @@ def load(name: str) -> bytes:
 
 
 def status(weight: Weight) -> str:
-    """`present`, `absent`, `unreadable` or `corrupt` (there, but not the file the registry names)."""
-    try:
-        if not weight.path.is_file():
-            return "absent"
-        return "present" if sha256_file(weight.path) == weight.sha256 else "corrupt"
-    except OSError:
-        return "unreadable"
+    """`present`, `absent` or `corrupt` (there, but not the file the registry names)."""
+    if not weight.path.is_file():
+        return "absent"
+    return "present" if sha256_file(weight.path) == weight.sha256 else "corrupt"
 
 
 def fetch(names: Iterable[str] | None = None) -> list[str]:
