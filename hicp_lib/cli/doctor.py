@@ -237,8 +237,7 @@ def check_weights() -> Check:
 def check_folders() -> list[Check]:
     """The folders that are written to."""
     cache = check_folder("cache", cache_dir(), "set HICP_CACHE to a folder you may write to")
-    results = working_folder() / "results"
-    return cache + check_folder("results", results, "give yourself the right to write there")
+    return cache + check_folder("results", working_folder() / "results", "give yourself the right to do so")
 
 
 def check_folder(name: str, folder: Path, remedy: str) -> list[Check]:

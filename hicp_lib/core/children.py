@@ -5,17 +5,18 @@ own library; Jupyter puts it on that of notebooks, and multiprocessing hands it 
 """
 
 import os
+import signal
 import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 from hicp_lib.core.environment import with_variables
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 _SAFE_PATH = {"PYTHONSAFEPATH": "1"}
-_LIBRARY_ROOT = Path(__file__).resolve().parents[2]
 
 
 def child_environment(**variables: str) -> dict[str, str]:
@@ -32,7 +33,7 @@ def child_environment(**variables: str) -> dict[str, str]:
 @contextmanager
 def safe_start() -> Iterator[None]:
     """A block in which multiprocessing starts processes, with one thread each in linear algebra."""
-    untrusted = {Path.cwd()} - {_LIBRARY_ROOT}  # that of a checkout that is not installed
+    untrusted = {Path.cwd()} - {Path(__file__).resolve().parents[2]}  # a checkout that is not installed
     with with_variables(**_SAFE_PATH, **dict.fromkeys(_THREADS, "1")):  # one thread at a time
         before = sys.path
         sys.path = [entry for entry in before if Path(entry).resolve() not in untrusted]
@@ -40,6 +41,21 @@ def safe_start() -> Iterator[None]:
             yield
         finally:
             sys.path = before
+
+
+def begin(pipe: Connection) -> None:
+    """What a process of a pool does first, before it imports what takes long: see that it ends.
+
+    Parameters
+    ----------
+    pipe : Connection
+        Its other end is open as long as the pool is.
+    """
+    end_with(pipe.fileno())
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the caller's, who ends this one
+    import cv2
+
+    cv2.setNumThreads(1)
 
 
 @contextmanager

@@ -8,7 +8,6 @@ number nor the place is in any result.
 import multiprocessing
 import os
 import re
-import signal
 import threading
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, ThreadPoolExecutor, wait
@@ -22,7 +21,7 @@ from typing import Any, TypeVar
 import cv2
 import numpy as np
 
-from hicp_lib.core.children import end_with, safe_start
+from hicp_lib.core.children import begin, safe_start
 from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
@@ -193,7 +192,7 @@ class Processes(ProcessPoolExecutor):
         context = multiprocessing.get_context("spawn")
         self._theirs, self._ours = context.Pipe(duplex=False)
         with safe_start():
-            super().__init__(n, context, _begin, (self._theirs,))
+            super().__init__(n, context, begin, (self._theirs,))
 
     def submit(self, *arguments: Any, **named: Any) -> Any:
         """As any executor's; it may start a process."""
@@ -206,13 +205,6 @@ class Processes(ProcessPoolExecutor):
         self.shutdown(cancel_futures=True)
         for end in (self._ours, self._theirs):
             end.close()
-
-
-def _begin(pipe: Any) -> None:
-    """What a process does first."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the caller's, who ends this one
-    cv2.setNumThreads(1)
-    end_with(pipe.fileno())
 
 
 _opencv_lock, _n_threads_before = threading.Lock(), list[int]()

@@ -26,6 +26,7 @@ _RC: dict[Any, Any] = {
     "axes.axisbelow": True,
     "legend.frameon": False,
     "svg.hashsalt": "hicp",
+    "text.parse_math": False,  # a name with dollars is a name
     "svg.fonttype": "none",
 }
 
