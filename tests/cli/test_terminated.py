@@ -27,7 +27,7 @@ def test_rendering_ends_with_its_processes(tmp_path, to):
         text=True,
         start_new_session=True,
     )
-    while not list(Path(tmp_path, "out").glob(".scenes/*.json")):
+    while not list(Path(tmp_path, "out", "images").glob("*.jpg")):
         assert started.poll() is None, started.communicate()
         time.sleep(0.05)
     workers = psutil.Process(started.pid).children(recursive=True)
