@@ -165,13 +165,13 @@ def without_absent(
     """
     free = {name: value for name, value in parameters.items() if name not in asked_for}
     named = [one for value in free.values() for one in (value if isinstance(value, list) else [value])]
-    dropped = {one for one in named if isinstance(one, str) and absent_weights(one)}
+    absent = [one for one in named if isinstance(one, str) and absent_weights(one)]
     lists = {name: value for name, value in free.items() if isinstance(value, list)}
-    kept = parameters | {name: [one for one in value if one not in dropped] for name, value in lists.items()}
+    kept = parameters | {name: [one for one in value if one not in absent] for name, value in lists.items()}
     can_run = all(kept[name] or not value for name, value in lists.items())
     for name, value in free.items():
-        if isinstance(value, str) and value in dropped:
+        if isinstance(value, str) and value in absent:
             offered = [key for key, one in parameters.items() if isinstance(one, list) and value in one]
             can_run &= bool(offered)
             kept[name] = next((kept[key][0] for key in offered if kept[key]), value)
-    return kept, dropped, can_run
+    return kept, set(absent), can_run
