@@ -9,6 +9,7 @@ import json
 import math
 import os
 import shlex
+import signal
 import sys
 import warnings
 from dataclasses import asdict
@@ -47,6 +48,7 @@ def main() -> NoReturn:
     sys.stderr = os.fdopen(os.dup(2), "w", 1, sys.stderr.encoding, "backslashreplace")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     warnings.filterwarnings("ignore", module="PIL")
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))  # tidied up as at an error
     sys.exit(run(sys.argv[1:]))
 
 
@@ -61,7 +63,7 @@ def run(arguments: list[str]) -> int:
     Returns
     -------
     int
-        0 done, 1 a notebook or the book failed, 2 bad input or usage, 130 stopped.
+        0 done, 1 a notebook or the book failed, 2 bad input or usage, 130 stopped, 143 terminated.
 
     Examples
     --------
@@ -77,8 +79,8 @@ def run(arguments: list[str]) -> int:
         context = getattr(error, "ctx", None)
         where = context.command_path if context else "hicp"
         return _fail(f"{' '.join(error.format_message().split())} See: {where} --help", 2)
-    except (click.Abort, KeyboardInterrupt):
-        return _fail("stopped; run the same command again to go on", 130)
+    except (click.Abort, KeyboardInterrupt, SystemExit) as error:
+        return _fail("stopped; run the same command again to go on", getattr(error, "code", 130))
     except InputError as error:
         return _fail(error, 2)
     except OSError as error:

@@ -34,11 +34,11 @@ def mistake(capsys, *arguments: str) -> str:
         (["nonsense"], "No such command 'nonsense'"),
         (["report", "--nonsense"], "No such option"),
         (["report", "-p", "seed"], "requires 2 arguments"),
-        (["report", "--profile", "slow"], "has no profile 'slow'; choose one of"),
+        (["report", "--profile", "slow"], "profile 'slow' is not known; expected one of:"),
         (["report", "--dask", "somewhere"], "somewhere: no Dask scheduler answers"),
         (["scenes", "render", "out", "--workers", "2", "--dask", ""], "Give either --workers N or --dask"),
         (["scenes", "render", "out", "--dask", ""], ": no Dask scheduler answers (no address)"),
-        (["report", "-p", "sed", "1"], "-p sed: no notebook has such a parameter; known are"),
+        (["report", "-p", "sed", "1"], "-p: parameter 'sed' is not known; expected one of:"),
         (["detect", "--out", "x.json"], "Missing option '--detector'"),
         (["detect", "--detector", "x", "--out", "x.json"], "Give either --dataset DIR or --images DIR"),
         (

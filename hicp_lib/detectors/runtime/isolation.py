@@ -23,6 +23,7 @@ from typing import IO
 
 import numpy as np
 
+from hicp_lib.core.children import child_environment
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.limited import raised
 from hicp_lib.detectors.mediapipe.child import receive, send
@@ -136,11 +137,11 @@ class _Child:
         self._pipe, theirs = multiprocessing.Pipe()
         inherited = self._shared.fileno(), theirs.fileno()
         self._process = subprocess.Popen(
-            [sys.executable, "-P", *program, *map(str, inherited)],
+            [sys.executable, *program, *map(str, inherited)],
             stdin=subprocess.DEVNULL,
             stdout=self._stderr,  # what the library prints is no answer
             stderr=self._stderr,
-            env=child_environment(),
+            env=offline_environment(),
             pass_fds=inherited,
             start_new_session=True,  # an interrupt from the keyboard is for the caller
         )
@@ -180,10 +181,10 @@ class _Child:
         return _in_words(status) + (f" ({last})" if last else "")
 
 
-def child_environment() -> dict[str, str]:
-    """This process's environment, but with every way out led to a closed port."""
+def offline_environment() -> dict[str, str]:
+    """This process's environment for a child, but with every way out led to a closed port."""
     nowhere = _NOWHERE | {name.upper(): value for name, value in _NOWHERE.items()}
-    return os.environ | _FEW_THREADS | nowhere
+    return child_environment() | _FEW_THREADS | nowhere
 
 
 def _unnamed_file() -> IO[bytes]:

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.cache import code_identity, key
+from hicp_lib.core.children import safe_start
 from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.executor import resolved, run_jobs
@@ -107,7 +108,9 @@ def run_all(jobs: Iterable[Job]) -> list[Run]:
     missing.sort(key=lambda job: (job.detector in IDEAL, job.latency.inference_s))
     workers = resolved(None)
     is_shared = isinstance(workers, int) and len(missing) > 1
-    with multiprocessing.get_context("spawn").Manager() if is_shared else nullcontext() as manager:
+    with safe_start():
+        shared = multiprocessing.get_context("spawn").Manager() if is_shared else nullcontext()
+    with shared as manager:
         images = manager.dict() if manager else {}  # shared by the processes of this machine
         todo = {job: partial(_simulate, run=folders[job].name, job=job, images=images) for job in missing}
         named = [(f"{folders[job].name}/{_TABLES[0]}", call) for job, call in todo.items()]

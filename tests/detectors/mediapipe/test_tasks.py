@@ -17,7 +17,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.cached_parts import Runner
-from hicp_lib.detectors.runtime.isolation import child_environment
+from hicp_lib.detectors.runtime.isolation import offline_environment
 from tests.detectors.conftest import N_PEOPLE
 
 
@@ -355,7 +355,7 @@ def test_it_would_send_metrics_but_for_its_process_environment(weights, behind):
     assert run_script(_CLOSE).returncode == 0
     assert any(request.startswith("CONNECT") for request in behind.requests)
     behind.requests.clear()
-    assert run_script(_CLOSE, child_environment()).returncode == 0
+    assert run_script(_CLOSE, offline_environment()).returncode == 0
     assert behind.requests == []
 
 
@@ -364,7 +364,7 @@ def test_no_exception_from_the_proxy_lets_it_out(monkeypatch):
 
     for name, value in {"https_proxy": "http://gate:3128", "no_proxy": "*", "NO_PROXY": "*"}.items():
         monkeypatch.setenv(name, value)
-    environment = child_environment()
+    environment = offline_environment()
     assert os.environ["https_proxy"] == "http://gate:3128"
     for name, value in environment.items():
         monkeypatch.setenv(name, value)
