@@ -17,7 +17,18 @@ class FiniteRange(click.FloatRange):
     """Numbers of a range; click lets NaN pass, and infinity where there is no bound."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """As click's, of what is a finite number."""
+        """As click's, of what is a finite number.
+
+        Parameters
+        ----------
+        value : Any
+        param : click.Parameter, optional
+        ctx : click.Context, optional
+
+        Returns
+        -------
+        float
+        """
         number = super().convert(value, param, ctx)
         return number if math.isfinite(number) else self.fail(f"{value} is no finite number.", param, ctx)
 

@@ -59,7 +59,7 @@ def decode(content: bytes | np.ndarray, path: str | Path, flags: int) -> np.ndar
 
     Parameters
     ----------
-    content : bytes or array of uint8
+    content : bytes or array, dtype uint8
     path : str or Path
         For messages.
     flags : int
@@ -89,6 +89,12 @@ def decode(content: bytes | np.ndarray, path: str | Path, flags: int) -> np.ndar
 
 def refuse_too_large(path: str | Path, width_px: int, height_px: int) -> None:
     """Tell an image, or a frame of a video, of more pixels than are decoded.
+
+    Parameters
+    ----------
+    path : str or Path
+        For the message.
+    width_px, height_px : int
 
     Raises
     ------
