@@ -14,7 +14,7 @@ from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at
 from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
 from hicp_lib.simulation.rendering.mesh import Mesh, quad, vertex_normals
 from hicp_lib.simulation.rendering.render import World, render
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Surface
+from hicp_lib.simulation.rendering.surfaces import Look, Surface
 
 _GLOSS, _ROUGHNESS = 0.04, 0.35  # of painted covers
 
@@ -40,8 +40,8 @@ def robot_surfaces(icub: ICub, posture: Posture, whole: bool = False) -> list[Su
     return [Surface(Mesh(vertices_m, triangles, normals, shape.colours), _painted)]
 
 
-def _painted(hits: Hits) -> Look:
-    return Look(hits.coords, gloss=_GLOSS, roughness=_ROUGHNESS)
+def _painted(coords: np.ndarray, footprint_m: np.ndarray) -> Look:
+    return Look(coords, gloss=_GLOSS, roughness=_ROUGHNESS)
 
 
 _EYE_M, _TARGET_M = (-2.0, 0.42, 1.35), (0.0, 0.45, 0.85)  # world: from the robot's left, a little from above
