@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.experiments import laboratory
+from hicp_lib.experiments.avoidance.head_camera import robot_surfaces
 from hicp_lib.experiments.avoidance.reaching import PHASES_S, SCRIPTS, script
-from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
 from hicp_lib.experiments.recordings.gestures import Gestures
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
