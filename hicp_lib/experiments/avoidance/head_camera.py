@@ -190,7 +190,7 @@ def robot_surfaces(icub: ICub, posture: Posture, whole: bool = False) -> list[Su
     return [Surface(Mesh(vertices_m, triangles, normals, shape.colours), _painted)]
 
 
-def _painted(coords: np.ndarray, widths_m: np.ndarray) -> Look:
+def _painted(coords: np.ndarray, footprint_m: np.ndarray) -> Look:
     return Look(coords, gloss=_GLOSS, roughness=_ROUGHNESS)
 
 
