@@ -217,7 +217,7 @@ def test_damaged_members_are_told_at_once(weights, tmp_path):
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as file:
         for member in ("hand_detector.tflite", "hand_landmarks_detector.tflite"):
-            file.writestr(member, b"TFL3" + bytes(1000))
+            file.writestr(member, bytes(4) + b"TFL3" + bytes(1000))
     path.write_bytes(content.getvalue())
     with pytest.raises(InputError, match=r"hand\.task: cannot be used by .*; give another \.task") as told:
         make_detector("mediapipe-hands", model=path)
