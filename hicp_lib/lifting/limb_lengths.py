@@ -65,7 +65,7 @@ def limbs_outwards(
     for kind in np.unique(alike):
         some = alike == kind
         costs = _length_costs(grid_m, rays[pairs[:, some]], limits[:, some])
-        limbs.append(Limbs(*pairs[:, some], costs, int(reach[some].max())))
+        limbs.append(Limbs(pairs[0, some], pairs[1, some], costs, int(reach[some].max())))
     return limbs
 
 

@@ -17,7 +17,6 @@ from jupyter_client.manager import AsyncKernelManager
 from papermill.exceptions import PapermillExecutionError
 
 START_TIMEOUT_S = 120
-CELL_TIMEOUT_S = 3600
 
 
 class IpcKernelManager(AsyncKernelManager):
@@ -40,7 +39,6 @@ def main(job_path: str) -> int:
             language="python",
             request_save_on_cell_execute=False,
             start_timeout=START_TIMEOUT_S,
-            execution_timeout=CELL_TIMEOUT_S,
             kernel_manager_class=IpcKernelManager,
             # What C++ libraries write to the terminal goes to the log; Python's own warnings stay visible.
             # Nothing beside a notebook is imported: its key would not know of it.

@@ -13,6 +13,7 @@ from typing import IO, Any, cast
 from hicp_lib.core.checkout import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
 from hicp_lib.core.children import child_environment
 from hicp_lib.core.files import write_json
+from hicp_lib.core.limited import raised
 from hicp_lib.report.notebooks import Notebook
 
 WALL_LIMIT_S = 2 * 3600
@@ -117,7 +118,7 @@ class Children:
             pipe = cast(IO[bytes], process.stdin)
             self._pipes.add(pipe)
             try:
-                return process.wait(WALL_LIMIT_S)
+                return process.wait(raised(WALL_LIMIT_S))
             except subprocess.TimeoutExpired:
                 return None
             finally:

@@ -27,7 +27,7 @@ from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at
 from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
 from hicp_lib.simulation.rendering.mesh import Mesh, quad, vertex_normals
 from hicp_lib.simulation.rendering.render import World, render
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Surface
+from hicp_lib.simulation.rendering.surfaces import Look, Surface
 
 RgbdImage = tuple[np.ndarray, np.ndarray]
 """Image (480, 640, 3), RGB uint8, and depth in metres (480, 640)."""
@@ -190,8 +190,8 @@ def robot_surfaces(icub: ICub, posture: Posture, whole: bool = False) -> list[Su
     return [Surface(Mesh(vertices_m, triangles, normals, shape.colours), _painted)]
 
 
-def _painted(hits: Hits) -> Look:
-    return Look(hits.coords, gloss=_GLOSS, roughness=_ROUGHNESS)
+def _painted(coords: np.ndarray, footprint_m: np.ndarray) -> Look:
+    return Look(coords, gloss=_GLOSS, roughness=_ROUGHNESS)
 
 
 _EYE_M, _TARGET_M = (-2.0, 0.42, 1.35), (0.0, 0.45, 0.85)  # world: from the robot's left, a little from above
