@@ -24,8 +24,7 @@ def with_and_without_head(errors: pd.DataFrame) -> pd.DataFrame:
     """
     body = errors[errors["group"] == "body"]
     basic, headless = (body[body["subset"] == subset] for subset in ("basic", "headless"))
-    same = ["detector", "keypoint", "annotation_id", "source_image"]
-    return basic.merge(headless, on=same, suffixes=("", "_headless"))
+    return basic.merge(headless, on=["detector", "annotation_id", "keypoint"], suffixes=("", "_headless"))
 
 
 def change_per_keypoint(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
@@ -45,7 +44,8 @@ def change_per_keypoint(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.Data
         interval is the change's, over source images.
     """
     by = ["detector", "keypoint"]
-    both = with_and_without_head(errors).sort_values(by)
+    both = with_and_without_head(errors)
+    both = both[both["source_image"] == both["source_image_headless"]].sort_values(by)
     both["change"] = both["hit_headless"].astype(float) - both["hit"]
     rates = both.groupby(by)[["hit", "hit_headless"]].mean().reset_index()
     table = proportions(both, by, "change", draws).merge(rates, on=by)

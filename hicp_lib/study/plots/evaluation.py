@@ -124,8 +124,8 @@ def _with_and_without(rows: pd.DataFrame, labels: dict[str, str], across: str):
     groups = rows["group"].unique()
     names = {group: list(rows.loc[rows["group"] == group, "detector"].unique()) for group in groups}
     heights = [len(of_group) + 0.8 for of_group in names.values()]
-    size, shared = (WIDTH_IN, 0.5 * sum(heights) + 0.9), {"sharex": "col", "sharey": "row"}
-    figure, axes, panels = marks.panels(rows, ["group", across], *size, height_ratios=heights, **shared)
+    height_in, shared = 0.5 * sum(heights) + 0.9, {"height_ratios": heights, "sharex": "col", "sharey": "row"}
+    figure, axes, panels = marks.panels(rows, ["group", across], WIDTH_IN, height_in, **shared)
     for axis, part, group, what in panels:
         for detector, pair in part.dropna(subset="value").groupby("detector", sort=False):
             y = names[group].index(detector) + 0.24 * (pair["subset"].map(_SUBSETS).fillna(0.5) - 0.5)

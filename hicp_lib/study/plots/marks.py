@@ -71,8 +71,8 @@ def panels(table: pd.DataFrame, by: Sequence[str], width_in: float, height_in: f
         Of each panel its axis, its rows of the table, which may be none, and the value of each column.
     """
     values = [table[name].unique() for name in by]
-    shape = [1, *(max(len(of), 1) for of in values)][-2:]
-    figure, axes = new_figure(*shape, width_in, height_in, squeeze=False, **shared)
+    n_rows, n_columns = [1, *(max(len(of), 1) for of in values)][-2:]
+    figure, axes = new_figure(n_rows, n_columns, width_in, height_in, squeeze=False, **shared)
     cases = zip(axes.flat, itertools.product(*values), strict=False)
     found = [(axis, table[(table[list(by)] == list(case)).all(axis=1)], *case) for axis, case in cases]
     return figure, axes, found
