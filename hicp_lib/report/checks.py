@@ -25,7 +25,7 @@ def _page_problems(page: str) -> Iterator[str]:
         is_moving = tag.name == "video" or "hicp-scene" in given.get("class", "")
         if is_moving and not given.get("aria-label", "").strip():
             yield "film or 3D scene without a description"
-        is_harmless = _HARMLESS_LINKS.intersection(map(str.lower, tag.get_attribute_list("rel", [])))
+        is_harmless = _HARMLESS_LINKS.intersection(str(rel).lower() for rel in tag.get("rel") or ())
         loading = _LOADING if tag.name != "link" else () if is_harmless else ("href",)
         for name in loading:
             if _REMOTE.match(given.get(name, "")):
