@@ -10,6 +10,7 @@ import math
 import os
 import shlex
 import sys
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -31,7 +32,7 @@ from hicp_lib.cli.options import (
     worker_options,
 )
 from hicp_lib.cli.recordings import lift, record
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, one_line, printable
 
 _keypoint_map_option = click.option(
     "--keypoint-map", type=PATH, metavar="FILE.json",
@@ -42,7 +43,13 @@ _keypoint_map_option = click.option(
 def main() -> NoReturn:
     """Run the command line and exit."""
     os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # an image cut off is told in one line, by us
-    sys.exit(run(sys.argv[1:]))
+    code = run(sys.argv[1:])
+    try:
+        sys.stdout.flush()
+    except OSError:  # whoever read it has gone, or the disk is full: told above, if at all
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = code or 2
+    sys.exit(code)
 
 
 def run(arguments: list[str]) -> int:
@@ -63,6 +70,25 @@ def run(arguments: list[str]) -> int:
     >>> run(["no-such-command"])
     2
     """
+    with redirect_stdout(_Shown(sys.stdout)), redirect_stderr(_Shown(sys.stderr)):  # type: ignore[type-var]
+        return _run(arguments)
+
+
+class _Shown:
+    """A stream that shows what a terminal would obey: names and messages come from outside."""
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        self._stream.write(printable(text, kept="\n\r\t"))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def _run(arguments: list[str]) -> int:
     try:
         return hicp(arguments, prog_name="hicp", standalone_mode=False) or 0
     except click.exceptions.NoArgsIsHelpError as error:
@@ -77,10 +103,11 @@ def run(arguments: list[str]) -> int:
     except InputError as error:
         return _fail(error, 2)
     except OSError as error:
-        if error.filename is None:
-            raise
         name = error.filename2 or error.filename  # of two, the one to be written
-        return _fail(f"{name}: {error.strerror}; check the path, the rights and the disk space", 2)
+        what = one_line(error) if name is None else f"{name}: {error.strerror}"
+        return _fail(f"{what}; check the path, the rights and the disk space", 2)
+    except MemoryError:
+        return _fail("the memory is not enough; give less at once, or fewer --workers", 2)
 
 
 def _tell_notes(path: Path, notes: dict[str, str], area: str = "segment") -> None:
@@ -91,7 +118,7 @@ def _tell_notes(path: Path, notes: dict[str, str], area: str = "segment") -> Non
 
 
 def _fail(message: object, code: int) -> int:
-    click.echo(f"hicp: {message}", err=True)
+    click.echo(f"hicp: {printable(str(message))}", err=True)
     return code
 
 

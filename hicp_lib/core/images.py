@@ -142,6 +142,16 @@ def write_png(path: str | Path, image: np.ndarray) -> None:
     write_bytes(path, encoded.tobytes())
 
 
+def is_whole_png(path: str | Path) -> bool:
+    """Whether a file is a PNG whose checksums are right, up to its end."""
+    try:
+        with Image.open(path, formats=["PNG"]) as image:
+            image.verify()
+        return True
+    except Exception:  # Pillow raises many kinds
+        return False
+
+
 def inside(pixels_px: np.ndarray, box_px: Box) -> np.ndarray:
     """Whether positions lie on the pixels of a box; pixel i is [i - 0.5, i + 0.5).
 

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import regular_file
 
 SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".webm")
 
@@ -30,7 +31,7 @@ def open_video(path: str | Path) -> tuple[int, Iterator[tuple[float, np.ndarray]
     InputError
         If it cannot be read.
     """
-    capture = cv2.VideoCapture(str(path))
+    capture = cv2.VideoCapture(str(regular_file(path, "give a video")))
     if not capture.isOpened():
         raise InputError(f"{path}: is no video that OpenCV can read; give .mp4, .avi or .mov, or images")
 

@@ -1,12 +1,13 @@
 """Folders that many results at once are written to."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_json, write_json
+from hicp_lib.core.files import listed, read_json, remove_inside, sha256_file, write_json
 
 
 def check_numbers(**limits: tuple[object, int, int]) -> None:
@@ -31,8 +32,13 @@ def check_numbers(**limits: tuple[object, int, int]) -> None:
             raise InputError(f"{name} is {value!r}; expected a whole number from {low} to {high}")
 
 
-def keep_parts(out: Path, parts_dir: str, stamp: dict, made: Iterable[str]) -> None:
-    """Keep what an interrupted run finished; drop what was made with something else.
+def keep_parts(
+    out: Path, parts_dir: str, stamp: dict, n: int, made: Callable[[int], Iterable[Path]], once: Iterable[str]
+) -> None:
+    """Keep what an interrupted run finished; drop what was made with something else, or is beyond `n`.
+
+    What was made is known by what is kept beside the stamp: how many, and the names in `once`. All other
+    files, whoever's they are, stay.
 
     Parameters
     ----------
@@ -42,16 +48,43 @@ def keep_parts(out: Path, parts_dir: str, stamp: dict, made: Iterable[str]) -> N
         Name of the folder in it that says what is finished.
     stamp : dict
         What results depend on, JSON-able; kept there.
-    made : iterable of str
-        Patterns of the files that are made, relative to `out`.
+    n : int
+        How many there will be.
+    made : callable
+        Files of each.
+    once : iterable of str
+        Names of files, relative to `out`, that are made for all together.
+
+    Raises
+    ------
+    InputError
+        If a file that would be written is there, and was not made by a run before.
     """
-    stamp_file = out / parts_dir / "stamp.json"
-    if stamp_file.exists() and read_json(stamp_file) == stamp:
-        return
-    for pattern in (f"{parts_dir}/*.json", *made):
-        for path in out.glob(pattern):
-            path.unlink()
-    write_json(stamp_file, stamp)
+    stamp_file, names = out / parts_dir / "stamp.json", list(once)
+    before = read_json(stamp_file) if stamp_file.exists() else {"n": 0, "once": []}
+    is_same, n_before = before.get("stamp") == stamp, before.get("n", 0)
+    dropped = range(n if is_same else 0, n_before)
+    for path in chain.from_iterable(map(made, dropped)):
+        path.unlink(missing_ok=True)
+    remove_inside(out, [] if is_same else before.get("once", []))
+    for path in chain.from_iterable(map(made, range(n_before, n))):
+        if path.exists():
+            raise InputError(f"{path}: was not made by this command; take it away, or give another folder")
+    write_json(stamp_file, {"stamp": stamp, "n": n, "once": names})
+
+
+def write_part(content: dict, part: Path, *files: Path) -> None:
+    """Say in the file `part` that it is finished, its files being there; with JSON-able content."""
+    write_json(part, content | {"sha256": [sha256_file(path) for path in files]})
+
+
+def read_part(part: Path, *files: Path) -> dict | None:
+    """What `write_part` wrote; None where it, or a file, is not there or not whole."""
+    try:
+        content = read_json(part)
+        return content if content["sha256"] == [sha256_file(path) for path in files] else None
+    except (InputError, KeyError, TypeError):
+        return None
 
 
 def check_output(out: Path, marker: str, purpose: str, made: str) -> None:
@@ -72,5 +105,5 @@ def check_output(out: Path, marker: str, purpose: str, made: str) -> None:
     """
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; give a folder {purpose}")
-    if out.is_dir() and any(out.iterdir()) and not (out / marker).is_dir():
+    if out.is_dir() and listed(out) and not (out / marker).is_dir():
         raise InputError(f"{out}: holds files that were not {made}; give an empty or new folder")
