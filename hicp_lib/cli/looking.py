@@ -2,12 +2,11 @@
 
 import json
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 
 import click
 
-from hicp_lib.cli.options import PATH
+from hicp_lib.cli.options import PATH, say
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import locked_folder
 
@@ -49,12 +48,12 @@ def draw(
     people = None if annotations is None else read_annotations(annotations)
     found = read_detections(detections, people)
     chosen = pictures(image_paths(detections, images, found, people), found, people)
-    first, note = chosen[:limit], partial(click.echo, err=True)
+    first = chosen[:limit]
     if out.suffix:
-        write_page(first, out, f"{detections.name} over {images.name}", note)
+        write_page(first, out, f"{detections.name} over {images.name}", say)
     else:
         with locked_folder(out):
             refuse_used_folder(out)
-            write_pngs(first, out, min_score, note)
+            write_pngs(first, out, min_score, say)
     rest = f" of {len(chosen)}, worst first; --limit N for more" if len(chosen) > limit else ""
     click.echo(f"{out}: {len(first)} pictures{rest}")

@@ -27,6 +27,7 @@ from hicp_lib.cli.options import (
     detector_options,
     given,
     people_option,
+    say,
     tell_assumed,
     text_table,
     worker_options,
@@ -34,6 +35,7 @@ from hicp_lib.cli.options import (
 from hicp_lib.cli.recordings import lift, record
 from hicp_lib.core.errors import InputError, one_line, printable
 
+_MOST_SHOWN = 1000  # characters of a message: a file may hold a name of megabytes
 _keypoint_map_option = click.option(
     "--keypoint-map", type=PATH, metavar="FILE.json",
     help="What keypoint names of the annotations mean: their names to ours, or null to leave one out.",
@@ -46,9 +48,8 @@ def main() -> NoReturn:
     code = run(sys.argv[1:])
     try:
         sys.stdout.flush()
-    except OSError:  # whoever read it has gone, or the disk is full: told above, if at all
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = code or 2
+    except OSError:  # whoever read it has gone, or the disk is full: nothing more can be told there
+        sys.stdout, code = None, code or 2  # type: ignore[assignment]
     sys.exit(code)
 
 
@@ -114,11 +115,11 @@ def _tell_notes(path: Path, notes: dict[str, str], area: str = "segment") -> Non
     """Say what a reader of figures must know of a file; of areas, if they are used."""
     for about, note in notes.items():
         if about != "area" or area == "segment":
-            click.echo(f"{path}: {note}", err=True)
+            say(f"{path}: {note}")
 
 
 def _fail(message: object, code: int) -> int:
-    click.echo(f"hicp: {printable(str(message))}", err=True)
+    say(f"hicp: {message}"[:_MOST_SHOWN])
     return code
 
 
@@ -170,7 +171,8 @@ def dataset_create(out: Path, annotations: Path, images: Path, **options) -> Non
     counts = create_hicp(annotations, images, out, progress=sys.stderr.isatty(), **options)
     _tell_notes(annotations, counts.get("notes", {}))
     click.echo(json.dumps(counts, indent=2))
-    click.echo("".join(f"{note}\n" for note in notes(counts)), nl=False, err=True)
+    for note in notes(counts):
+        say(note)
 
 
 @hicp.command()
@@ -203,10 +205,8 @@ def detect(
     made = make_detector(detector, **given(**chosen)) if needs_model else None
     pictures = open_pictures(source) if dataset_dir is None else open_dataset(source)
     options = {"workers": workers, "strict": strict} | given(**chosen)
-    lines = click.echo if by_image else None
-    n_people, n_images, n_broken = detect_to_file(
-        detector, pictures, out, partial(click.echo, err=True), lines, **options
-    )
+    lines = partial(say, err=False) if by_image else None
+    n_people, n_images, n_broken = detect_to_file(detector, pictures, out, say, lines, **options)
     passed_over = f"; {n_broken} could not be read" * bool(n_broken)
     click.echo(f"{out}: {n_people} people in {n_images} images{passed_over}")
     if source.is_dir():

@@ -55,11 +55,11 @@ def atomic_path(path: str | Path, sync: bool = True) -> Iterator[Path]:
     Raises
     ------
     InputError
-        If `path` is a folder, a device or the like, or a file that is write-protected.
+        If `path` is a folder, a device, a link to nothing or the like, or a file that is write-protected.
     """
     named, path = path, Path(os.path.realpath(path))
-    with suppress(FileNotFoundError):
-        mode = os.stat(path).st_mode
+    if os.path.lexists(named):
+        mode = os.stat(path).st_mode if path.exists() else stat.S_IFLNK
         if not stat.S_ISREG(mode):
             raise InputError(f"{named}: is {_kind(mode)}; give the name of a file to write")
         if not (mode & stat.S_IWUSR and os.access(path, os.W_OK)):
@@ -146,8 +146,8 @@ def regular_file(path: str | Path, expected: str, max_bytes: float = math.inf) -
 
 
 def _kind(mode: int) -> str:
-    kinds = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a named pipe", stat.S_IFSOCK: "a socket"}
-    return kinds.get(stat.S_IFMT(mode), "a device")
+    kinds = {"d": "a folder", "p": "a named pipe", "s": "a socket", "l": "a link to nothing"}
+    return kinds.get(stat.filemode(mode)[0], "a device")
 
 
 def read_bytes(path: str | Path, expected: str) -> bytes:
@@ -197,8 +197,7 @@ def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "") -> list[str
         names = os.listdir(folder)
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); give a folder") from None
-    shown = (name for name in names if name[0] != "." and name.lower().endswith(suffixes))
-    return sorted(shown, key=natural_order)
+    return sorted((n for n in names if n[0] != "." and n.lower().endswith(suffixes)), key=natural_order)
 
 
 def remove_inside(folder: Path, names: Iterable[str]) -> None:

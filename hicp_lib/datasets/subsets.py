@@ -29,7 +29,7 @@ from hicp_lib.core.cache import content, digest
 from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.executor import run_jobs
-from hicp_lib.core.files import locked_folder, read_json, remove_inside, write_json
+from hicp_lib.core.files import locked_folder, read_json, regular_file, remove_inside, write_json
 from hicp_lib.core.images import Box, as_seen, inside, is_whole_png, read_image, write_png
 from hicp_lib.core.keypoints import HEAD
 from hicp_lib.datasets.crops import crop_people, image_name, n_pixels, on_pixels, person_crops
@@ -267,12 +267,8 @@ def create_hicp(
 def _digest(table: pd.DataFrame, boxes: dict, images_dir: Path, turned: dict[str, int]) -> str:
     """What the pixels of the crops depend on."""
     names = sorted({table["file_name"].iloc[row] for kept in boxes.values() for row in kept})
-    try:
-        files = [(name, content(images_dir / name)) for name in names]
-    except OSError as error:
-        raise InputError(
-            f"{error.filename}: an annotated image cannot be read; give the folder that holds the images"
-        ) from None
+    expected = "give the folder that holds the annotated images"
+    files = [(name, content(Path(regular_file(images_dir / name, expected)))) for name in names]
     ids = table["annotation_id"].tolist()
     crops = {subset: [(ids[row], box) for row, box in kept.items()] for subset, kept in boxes.items()}
     return digest([files, crops, str(images_dir.resolve()), turned])

@@ -397,7 +397,7 @@ def test_what_is_wrong_with_the_images_is_said(source, tmp_path):
     with pytest.raises(InputError, match="5.jpg: is not an image"):
         create(source, tmp_path / "hicp")
     image.unlink()
-    with pytest.raises(InputError, match="5.jpg: an annotated image cannot be read"):
+    with pytest.raises(InputError, match="5.jpg: cannot be read .*annotated images"):
         create(source, tmp_path / "hicp")
     assert not list((tmp_path / "hicp").rglob("annotations.json"))
 

@@ -66,15 +66,10 @@ DEPTH_UNITS_PER_M = 1000.0
 START_S = 100.0  # what the camera's clock shows at the first frame: clocks seldom start together
 
 
-def part_path(out: Path, k: int) -> Path:
-    """File of the truth of frame `k`; written last, so a frame with it is finished."""
-    return out / PARTS_DIR / f"{k:06d}.json"
-
-
 def files_of(out: Path, k: int) -> list[Path]:
-    """All files of frame `k`, that of its truth first."""
+    """All files of frame `k`: that of its truth, written last, then images."""
     depth = out / depth_name(k)
-    return [part_path(out, k), out / rgb_name(k), depth, out / EXACT_DEPTH_DIR / depth.name]
+    return [out / PARTS_DIR / f"{k:06d}.json", out / rgb_name(k), depth, out / EXACT_DEPTH_DIR / depth.name]
 
 
 def finish_recording(out: Path, plan: Scenario, n: int, stamp: dict) -> None:
@@ -103,7 +98,7 @@ def finish_recording(out: Path, plan: Scenario, n: int, stamp: dict) -> None:
 
 
 def _truth(out: Path, times_s: np.ndarray, T_base_cam: np.ndarray) -> pd.DataFrame:
-    parts = [read_json(part_path(out, k)) for k in range(len(times_s))]
+    parts = [read_json(files_of(out, k)[0]) for k in range(len(times_s))]
     points_m = np.array([part["keypoints_m"] for part in parts])
     pixels_px = project(COLOUR, transform(np.linalg.inv(T_base_cam), points_m))
     frame = np.repeat(np.arange(len(parts)), len(NAMES))

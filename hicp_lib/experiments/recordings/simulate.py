@@ -65,7 +65,7 @@ def simulate_recording(
     n = plan.n_frames if n_frames is None else n_frames
     workers = resolved(workers)
     check_numbers(n_frames=(n, 1, plan.max_frames))
-    check_output(out, frames.PARTS_DIR, "for the recording", "simulated")
+    check_output(out, frames.PARTS_DIR, "simulated")
     with locked_folder(out):
         (out / RGB_LIST).unlink(missing_ok=True)  # it is no recording until it is finished
         who = {"subject": asdict(subject), "identity": asdict(subject.identity)}
@@ -75,7 +75,7 @@ def simulate_recording(
         missing = [k for k in range(n) if read_part(*frames.files_of(out, k)) is None]
         one = partial(record_one, name=name, subject=subject)
         todo: list[tuple[str, Callable]]
-        todo = [(str(frames.part_path(Path(), k)), partial(one, k=k)) for k in missing]
+        todo = [(str(frames.files_of(Path(), k)[0]), partial(one, k=k)) for k in missing]
         if plan.capture is not None and not _is_captured(out, n):  # the longest first
             capture = partial(_capture_all, name=name, subject=subject, n=int(n))
             todo.insert(0, (str(_mocap_files(Path())[0]), capture))

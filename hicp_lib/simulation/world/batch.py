@@ -87,7 +87,7 @@ def read_part(part: Path, *files: Path) -> dict | None:
         return None
 
 
-def check_output(out: Path, marker: str, purpose: str, made: str) -> None:
+def check_output(out: Path, marker: str, made: str) -> None:
     """Refuse a folder that holds something else.
 
     Parameters
@@ -95,15 +95,13 @@ def check_output(out: Path, marker: str, purpose: str, made: str) -> None:
     out : Path
     marker : str
         Name of a folder that is only in what was made here.
-    purpose, made : str
-        What the folder is for and what is done to files there, in the words of the message.
+    made : str
+        What is done to files there, in the words of the message.
 
     Raises
     ------
     InputError
         If `out` is a file, or holds files and no `marker`.
     """
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: is a file; give a folder {purpose}")
-    if out.is_dir() and listed(out) and not (out / marker).is_dir():
+    if out.exists() and listed(out) and not (out / marker).is_dir():
         raise InputError(f"{out}: holds files that were not {made}; give an empty or new folder")

@@ -74,7 +74,7 @@ def render_dataset(
     out, workers = Path(out), resolved(workers)
     check_numbers(n=(n, 1, MAX_SCENES), seed=(seed, 0, _MAX_NUMBER))
     split_members(split)  # a wrong name is told before anything is written
-    check_output(out, _PARTS_DIR, "to render into", "rendered")
+    check_output(out, _PARTS_DIR, "rendered")
     with locked_folder(out):
         (out / "annotations.json").unlink(missing_ok=True)
         stamp = {"renderer": key([render_dataset]), "seed": int(seed), "people": split}
@@ -91,21 +91,13 @@ def render_dataset(
 
 
 def _files(out: Path, index: int) -> list[Path]:
-    """The people of an image, and the image."""
-    return [_people_path(out, index), _image_path(out, index)]
-
-
-def _image_path(out: Path, index: int) -> Path:
-    return out / "images" / f"{index:06d}.jpg"
-
-
-def _people_path(out: Path, index: int) -> Path:
-    return out / _PARTS_DIR / f"{index:06d}.json"
+    """What is known of an image, and the image."""
+    return [out / _PARTS_DIR / f"{index:06d}.json", out / "images" / f"{index:06d}.jpg"]
 
 
 def _render_one(out: Path, seed: int, index: int, split: str) -> None:
     image, people = render_scene(seed, index, split)
-    write_rgb(_image_path(out, index), image)
+    write_rgb(_files(out, index)[1], image)
     height, width = image.shape[:2]
     write_part({"width": width, "height": height, "people": people}, *_files(out, index))
 
@@ -162,9 +154,9 @@ def annotate(stage: Stage, frame: Frame) -> list[dict]:
 
 
 def _collect(out: Path, n: int) -> Annotations:
-    scenes = [read_json(_people_path(out, index)) for index in range(n)]
+    scenes = [read_json(_files(out, index)[0]) for index in range(n)]
     images = {
-        k: ImageInfo(k, _image_path(out, k).name, scene["width"], scene["height"])
+        k: ImageInfo(k, _files(out, k)[1].name, scene["width"], scene["height"])
         for k, scene in enumerate(scenes)
     }
     people = [person for scene in scenes for person in scene["people"]]
