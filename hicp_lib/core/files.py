@@ -175,7 +175,7 @@ def read_bytes(path: str | Path, expected: str) -> bytes:
         raise InputError(f"{path}: cannot be read ({error.strerror}); {expected}") from None
 
 
-def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "") -> list[str]:
+def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "", what: str = "a folder") -> list[str]:
     """Names in a folder, the numbers in them in their order, without hidden ones.
 
     Parameters
@@ -183,6 +183,8 @@ def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "") -> list[str
     folder : str or Path
     suffixes : str or tuple of str, optional
         In lower case; names that end otherwise are left out.
+    what : str, optional
+        Which folder to give, for the message.
 
     Returns
     -------
@@ -196,7 +198,7 @@ def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "") -> list[str
     try:
         names = os.listdir(folder)
     except OSError as error:
-        raise InputError(f"{folder}: cannot be read ({error.strerror}); give a folder") from None
+        raise InputError(f"{folder}: cannot be read ({error.strerror}); give {what}") from None
     return sorted((n for n in names if n[0] != "." and n.lower().endswith(suffixes)), key=natural_order)
 
 
