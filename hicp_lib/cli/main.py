@@ -49,7 +49,7 @@ def main() -> NoReturn:
     try:
         sys.stdout.flush()
     except OSError:  # whoever read it has gone, or the disk is full: nothing more can be told there
-        sys.stdout, code = None, code or 2  # type: ignore[assignment]
+        sys.stdout, code = None, code or 2
     sys.exit(code)
 
 
@@ -71,7 +71,7 @@ def run(arguments: list[str]) -> int:
     >>> run(["no-such-command"])
     2
     """
-    with redirect_stdout(_Shown(sys.stdout)), redirect_stderr(_Shown(sys.stderr)):  # type: ignore[type-var]
+    with redirect_stdout(_Shown(sys.stdout)), redirect_stderr(_Shown(sys.stderr)):
         return _run(arguments)
 
 

@@ -17,7 +17,7 @@ class _Path(click.Path):
     """A path; what a command reads is not what it writes, its `out`."""
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Path:
-        path = super().convert(value, param, ctx)
+        path = Path(str(super().convert(value, param, ctx)))
         paths = {name: of for name, of in (ctx.params | {param.name: path}).items() if isinstance(of, Path)}
         out, given = paths.pop("out", None), [*paths.values()]
         read = given + [of / name for of in given for name in _READ_OF_FOLDERS]
@@ -26,7 +26,7 @@ class _Path(click.Path):
         return path
 
 
-PATH = _Path(path_type=Path)
+PATH = _Path()
 people_option = click.option(
     "--people", default="held-out", show_default=True, type=click.Choice(["development", "held-out"]),
     help="What is tuned is tuned on people for development.",

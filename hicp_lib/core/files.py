@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 MAX_BYTES = 2e9  # of a file that is read whole
-_TEMPORARY = re.compile(r"\.partial-[0-9a-f]{16}")
 _OLD_S = 3600.0  # a temporary file that nobody wrote to for so long was left behind
 
 
@@ -202,10 +201,35 @@ def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "", what: str =
     return sorted((n for n in names if n[0] != "." and n.lower().endswith(suffixes)), key=natural_order)
 
 
+def kept_beside(path: Path, **kinds: type) -> dict[str, Any]:
+    """What a command kept about the files it made in a folder; empty values where it made none.
+
+    Parameters
+    ----------
+    path : Path
+        A file of JSON.
+    **kinds : type
+        Of the values it holds.
+
+    Returns
+    -------
+    dict of str to object
+
+    Raises
+    ------
+    InputError
+        If it holds something else.
+    """
+    kept = read_json(path) if path.exists() else {name: kind() for name, kind in kinds.items()}
+    if not (isinstance(kept, dict) and all(isinstance(kept.get(name), kind) for name, kind in kinds.items())):
+        raise InputError(f"{path}: another version or something else made this; give another folder")
+    return kept
+
+
 def remove_inside(folder: Path, names: Iterable[str]) -> None:
     """Remove files that a list found in a folder calls its own; names that lead out of it are passed over."""
     for name in names:
-        if ".." not in Path(name).parts and not Path(name).is_absolute():
+        if isinstance(name, str) and ".." not in Path(name).parts and not Path(name).is_absolute():
             (folder / name).unlink(missing_ok=True)
 
 
@@ -243,21 +267,16 @@ def locked_folder(folder: str | Path) -> Iterator[None]:
                 raise InputError(f"{folder}: another command writes there; wait for it to end") from None
             except OSError:
                 pass  # of a file system without locks
-        _remove_old(folder)
+        for left in folder.rglob(f".partial-{'[0-9a-f]' * 16}*"):
+            with suppress(OSError):
+                if time.time() - left.stat().st_mtime > _OLD_S:
+                    left.unlink()
         try:
             yield
         except BaseException:
-            with suppress(OSError):
-                is_new and folder.rmdir()  # only if it is empty
+            if is_new and not os.listdir(folder):
+                folder.rmdir()
             raise
-
-
-def _remove_old(folder: Path) -> None:
-    for where, _, names in os.walk(folder):
-        for path in (Path(where, name) for name in names if _TEMPORARY.match(name)):
-            with suppress(OSError):
-                if time.time() - path.stat().st_mtime > _OLD_S:
-                    path.unlink()
 
 
 def write_json(path: str | Path, value: Any, *, indent: int | None = None) -> None:

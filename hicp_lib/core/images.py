@@ -8,6 +8,7 @@ TIFF alone is turned as it is read, by OpenCV and by every viewer, and counts as
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 
@@ -144,12 +145,10 @@ def write_png(path: str | Path, image: np.ndarray) -> None:
 
 def is_whole_png(path: str | Path) -> bool:
     """Whether a file is a PNG whose checksums are right, up to its end."""
-    try:
-        with Image.open(path, formats=["PNG"]) as image:
-            image.verify()
+    with suppress(Exception), Image.open(path, formats=["PNG"]) as image:  # Pillow raises many kinds
+        image.verify()
         return True
-    except Exception:  # Pillow raises many kinds
-        return False
+    return False
 
 
 def inside(pixels_px: np.ndarray, box_px: Box) -> np.ndarray:

@@ -29,7 +29,7 @@ from hicp_lib.core.cache import content, digest
 from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.executor import run_jobs
-from hicp_lib.core.files import locked_folder, read_json, regular_file, remove_inside, write_json
+from hicp_lib.core.files import kept_beside, locked_folder, regular_file, remove_inside, write_json
 from hicp_lib.core.images import Box, as_seen, inside, is_whole_png, read_image, write_png
 from hicp_lib.core.keypoints import HEAD
 from hicp_lib.datasets.crops import crop_people, image_name, n_pixels, on_pixels, person_crops
@@ -277,11 +277,11 @@ def _digest(table: pd.DataFrame, boxes: dict, images_dir: Path, turned: dict[str
 def _claim(out: Path, digest: str, crops: Iterable[_Crop]) -> None:
     """Make `out` ours: crops of another digest are removed, what is a stranger's is refused."""
     marker, names = out / "crops.json", ["summary.json", *(f"{name}/annotations.json" for name in SUBSETS)]
-    before = read_json(marker) if marker.exists() else {"names": []}
+    before = kept_beside(marker, digest=str, names=list)
     names += [path.relative_to(out).as_posix() for path, _ in crops]
-    if before.get("digest") == digest:
+    if before["digest"] == digest:
         return
-    remove_inside(out, before.get("names", []))
+    remove_inside(out, before["names"])
     for name in (*names, *(() if marker.exists() else SUBSETS)):
         if (out / name).exists():
             raise InputError(f"{out / name}: was not made by this command; choose another folder")

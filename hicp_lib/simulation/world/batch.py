@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import listed, read_json, remove_inside, sha256_file, write_json
+from hicp_lib.core.files import kept_beside, listed, read_json, remove_inside, sha256_file, write_json
 
 
 def check_numbers(**limits: tuple[object, int, int]) -> None:
@@ -61,12 +61,12 @@ def keep_parts(
         If a file that would be written is there, and was not made by a run before.
     """
     stamp_file, names = out / parts_dir / "stamp.json", list(once)
-    before = read_json(stamp_file) if stamp_file.exists() else {"n": 0, "once": []}
-    is_same, n_before = before.get("stamp") == stamp, before.get("n", 0)
+    before = kept_beside(stamp_file, stamp=dict, n=int, once=list)
+    is_same, n_before = before["stamp"] == stamp, before["n"]
     dropped = range(n if is_same else 0, n_before)
     for path in chain.from_iterable(map(made, dropped)):
         path.unlink(missing_ok=True)
-    remove_inside(out, [] if is_same else before.get("once", []))
+    remove_inside(out, [] if is_same else before["once"])
     for path in chain.from_iterable(map(made, range(n_before, n))):
         if path.exists():
             raise InputError(f"{path}: was not made by this command; take it away, or give another folder")

@@ -149,6 +149,15 @@ def test_what_a_power_cut_left_is_rendered_again(quick, tmp_path, name, left):
     assert quick == [0, 1, 1] and (tmp_path / "images" / "000001.jpg").read_bytes() == before
 
 
+@pytest.mark.parametrize("stamp", ["[]", "{}", '{"n": "2", "once": [], "stamp": {}}', ""])
+def test_a_stamp_of_something_else_is_refused(quick, tmp_path, stamp):
+    render_quickly(tmp_path)
+    (tmp_path / ".scenes" / "stamp.json").write_text(stamp)
+    with pytest.raises(InputError, match="stamp.json: "):
+        render_quickly(tmp_path)
+    assert quick == [0, 1]
+
+
 def test_two_do_not_render_into_one_folder(quick, tmp_path):
     with locked_folder(tmp_path), pytest.raises(InputError, match="another command writes there"):
         render_quickly(tmp_path)
