@@ -111,7 +111,7 @@ def read_checked(path: str | Path) -> bytes | None:
     return payload if hashlib.sha256(payload).digest() == stated else None
 
 
-def regular_file(path: str | Path, expected: str, max_bytes: float = math.inf) -> str | Path:
+def regular_file(path: str | Path, expected: str, max_bytes: float = math.inf) -> Path:
     """The path, if it is that of a regular file: what else there is may never end, or never begin.
 
     Parameters
@@ -124,7 +124,7 @@ def regular_file(path: str | Path, expected: str, max_bytes: float = math.inf) -
 
     Returns
     -------
-    str or Path
+    Path
 
     Raises
     ------
@@ -141,7 +141,7 @@ def regular_file(path: str | Path, expected: str, max_bytes: float = math.inf) -
     if state.st_size > max_bytes:
         sizes = f"has {state.st_size / 1e9:.3g} GB, more than {max_bytes / 1e9:.3g}"
         raise InputError(f"{path}: {sizes}; HICP_LIMITS=4 in the environment allows four times as much")
-    return path
+    return Path(path)
 
 
 def _kind(mode: int) -> str:
@@ -201,15 +201,16 @@ def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "", what: str =
     return sorted((n for n in names if n[0] != "." and n.lower().endswith(suffixes)), key=natural_order)
 
 
-def kept_beside(path: Path, **kinds: type) -> dict[str, Any]:
-    """What a command kept about the files it made in a folder; empty values where it made none.
+def kept_beside(folder: Path, name: str, **kinds: type) -> dict[str, Any]:
+    """What a command kept about the files it made in a folder; empty values where the folder is empty.
 
     Parameters
     ----------
-    path : Path
-        A file of JSON.
+    folder : Path
+    name : str
+        Of the file of JSON in it that holds this.
     **kinds : type
-        Of the values it holds.
+        Of the values.
 
     Returns
     -------
@@ -218,11 +219,15 @@ def kept_beside(path: Path, **kinds: type) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If it holds something else.
+        If the folder holds something else.
     """
-    kept = read_json(path) if path.exists() else {name: kind() for name, kind in kinds.items()}
-    if not (isinstance(kept, dict) and all(isinstance(kept.get(name), kind) for name, kind in kinds.items())):
-        raise InputError(f"{path}: another version or something else made this; give another folder")
+    kept: Any = {of: kind() for of, kind in kinds.items()}
+    if (folder / name).exists():
+        kept = read_json(folder / name)
+    elif listed(folder):
+        raise InputError(f"{folder}: holds files not made by this command; give an empty or new folder")
+    if not (isinstance(kept, dict) and all(isinstance(kept.get(of), kind) for of, kind in kinds.items())):
+        raise InputError(f"{folder / name}: is of another version or tool; give another folder")
     return kept
 
 

@@ -267,8 +267,7 @@ def create_hicp(
 def _digest(table: pd.DataFrame, boxes: dict, images_dir: Path, turned: dict[str, int]) -> str:
     """What the pixels of the crops depend on."""
     names = sorted({table["file_name"].iloc[row] for kept in boxes.values() for row in kept})
-    expected = "give the folder that holds the annotated images"
-    files = [(name, content(Path(regular_file(images_dir / name, expected)))) for name in names]
+    files = [(name, content(regular_file(images_dir / name, "give the images' folder"))) for name in names]
     ids = table["annotation_id"].tolist()
     crops = {subset: [(ids[row], box) for row, box in kept.items()] for subset, kept in boxes.items()}
     return digest([files, crops, str(images_dir.resolve()), turned])
@@ -277,12 +276,12 @@ def _digest(table: pd.DataFrame, boxes: dict, images_dir: Path, turned: dict[str
 def _claim(out: Path, digest: str, crops: Iterable[_Crop]) -> None:
     """Make `out` ours: crops of another digest are removed, what is a stranger's is refused."""
     marker, names = out / "crops.json", ["summary.json", *(f"{name}/annotations.json" for name in SUBSETS)]
-    before = kept_beside(marker, digest=str, names=list)
+    before = kept_beside(out, marker.name, digest=str, names=list)
     names += [path.relative_to(out).as_posix() for path, _ in crops]
     if before["digest"] == digest:
         return
     remove_inside(out, before["names"])
-    for name in (*names, *(() if marker.exists() else SUBSETS)):
+    for name in names:
         if (out / name).exists():
             raise InputError(f"{out / name}: was not made by this command; choose another folder")
     write_json(marker, {"digest": digest, "names": names})

@@ -397,7 +397,7 @@ def test_what_is_wrong_with_the_images_is_said(source, tmp_path):
     with pytest.raises(InputError, match="5.jpg: is not an image"):
         create(source, tmp_path / "hicp")
     image.unlink()
-    with pytest.raises(InputError, match="5.jpg: cannot be read .*annotated images"):
+    with pytest.raises(InputError, match="5.jpg: cannot be read .*images' folder"):
         create(source, tmp_path / "hicp")
     assert not list((tmp_path / "hicp").rglob("annotations.json"))
 
@@ -406,9 +406,9 @@ def test_a_folder_of_something_else_is_left_alone(source, tmp_path):
     mine = tmp_path / "hicp" / "basic" / "thesis.txt"
     mine.parent.mkdir(parents=True)
     mine.write_text("precious")
-    with pytest.raises(InputError, match="not made by this command"):
+    with pytest.raises(InputError, match="holds files not made by this command"):
         create(source, tmp_path / "hicp")
-    assert mine.read_text() == "precious"
+    assert mine.read_text() == "precious" and len(list((tmp_path / "hicp").rglob("*"))) == 2
 
 
 def test_files_of_others_stay_beside_the_crops(source, tmp_path):

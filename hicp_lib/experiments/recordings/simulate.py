@@ -24,7 +24,7 @@ from hicp_lib.recordings.qualisys import write_c3d, write_tsv
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, MOCAP_FILE, RGB_LIST, Recording, open_recording
 from hicp_lib.recordings.writer import depth_name, write_depth, write_frame
 from hicp_lib.simulation.body.identities import Subject
-from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts, read_part, write_part
+from hicp_lib.simulation.world.batch import check_numbers, keep_parts, read_part, write_part
 
 
 def simulate_recording(
@@ -65,13 +65,11 @@ def simulate_recording(
     n = plan.n_frames if n_frames is None else n_frames
     workers = resolved(workers)
     check_numbers(n_frames=(n, 1, plan.max_frames))
-    check_output(out, frames.PARTS_DIR, "simulated")
     with locked_folder(out):
-        (out / RGB_LIST).unlink(missing_ok=True)  # it is no recording until it is finished
         who = {"subject": asdict(subject), "identity": asdict(subject.identity)}
         stamp = {"scenario": name, **who, "version": key([simulate_recording])}
         once = [] if plan.capture is None else list(map(str, _mocap_files(Path())))
-        keep_parts(out, frames.PARTS_DIR, stamp, int(n), partial(frames.files_of, out), once)
+        keep_parts(out, frames.PARTS_DIR, RGB_LIST, stamp, int(n), partial(frames.files_of, out), once)
         missing = [k for k in range(n) if read_part(*frames.files_of(out, k)) is None]
         one = partial(record_one, name=name, subject=subject)
         todo: list[tuple[str, Callable]]

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import kept_beside, listed, read_json, remove_inside, sha256_file, write_json
+from hicp_lib.core.files import kept_beside, read_json, remove_inside, sha256_file, write_json
 
 
 def check_numbers(**limits: tuple[object, int, int]) -> None:
@@ -33,8 +33,9 @@ def check_numbers(**limits: tuple[object, int, int]) -> None:
 
 
 def keep_parts(
-    out: Path, parts_dir: str, stamp: dict, n: int, made: Callable[[int], Iterable[Path]], once: Iterable[str]
-) -> None:
+    out: Path, parts_dir: str, index: str, stamp: dict, n: int, made: Callable[[int], Iterable[Path]],
+    once: Iterable[str],
+) -> None:  # fmt: skip
     """Keep what an interrupted run finished; drop what was made with something else, or is beyond `n`.
 
     What was made is known by what is kept beside the stamp: how many, and the names in `once`. All other
@@ -46,6 +47,8 @@ def keep_parts(
         Folder that is written to.
     parts_dir : str
         Name of the folder in it that says what is finished.
+    index : str
+        Name of the file in it without which it is nothing finished; it is removed.
     stamp : dict
         What results depend on, JSON-able; kept there.
     n : int
@@ -58,10 +61,11 @@ def keep_parts(
     Raises
     ------
     InputError
-        If a file that would be written is there, and was not made by a run before.
+        If the folder holds something else, or a file where one would be written.
     """
-    stamp_file, names = out / parts_dir / "stamp.json", list(once)
-    before = kept_beside(stamp_file, stamp=dict, n=int, once=list)
+    stamp_name = f"{parts_dir}/stamp.json"
+    before = kept_beside(out, stamp_name, stamp=dict, n=int, once=list)
+    (out / index).unlink(missing_ok=True)
     is_same, n_before = before["stamp"] == stamp, before["n"]
     dropped = range(n if is_same else 0, n_before)
     for path in chain.from_iterable(map(made, dropped)):
@@ -70,7 +74,7 @@ def keep_parts(
     for path in chain.from_iterable(map(made, range(n_before, n))):
         if path.exists():
             raise InputError(f"{path}: was not made by this command; take it away, or give another folder")
-    write_json(stamp_file, {"stamp": stamp, "n": n, "once": names})
+    write_json(out / stamp_name, {"stamp": stamp, "n": n, "once": list(once)})
 
 
 def write_part(content: dict, part: Path, *files: Path) -> None:
@@ -85,23 +89,3 @@ def read_part(part: Path, *files: Path) -> dict | None:
         return content if content["sha256"] == [sha256_file(path) for path in files] else None
     except (InputError, KeyError, TypeError):
         return None
-
-
-def check_output(out: Path, marker: str, made: str) -> None:
-    """Refuse a folder that holds something else.
-
-    Parameters
-    ----------
-    out : Path
-    marker : str
-        Name of a folder that is only in what was made here.
-    made : str
-        What is done to files there, in the words of the message.
-
-    Raises
-    ------
-    InputError
-        If `out` is a file, or holds files and no `marker`.
-    """
-    if out.exists() and listed(out) and not (out / marker).is_dir():
-        raise InputError(f"{out}: holds files that were not {made}; give an empty or new folder")

@@ -23,7 +23,7 @@ from hicp_lib.simulation.body.identities import HELD_OUT, split_members, stream
 from hicp_lib.simulation.rendering.camera import project_world
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import Frame, render
-from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts, read_part, write_part
+from hicp_lib.simulation.world.batch import check_numbers, keep_parts, read_part, write_part
 from hicp_lib.simulation.world.staging import Stage, random_stage
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
@@ -74,11 +74,9 @@ def render_dataset(
     out, workers = Path(out), resolved(workers)
     check_numbers(n=(n, 1, MAX_SCENES), seed=(seed, 0, _MAX_NUMBER))
     split_members(split)  # a wrong name is told before anything is written
-    check_output(out, _PARTS_DIR, "rendered")
     with locked_folder(out):
-        (out / "annotations.json").unlink(missing_ok=True)
         stamp = {"renderer": key([render_dataset]), "seed": int(seed), "people": split}
-        keep_parts(out, _PARTS_DIR, stamp, int(n), partial(_files, out), [])
+        keep_parts(out, _PARTS_DIR, "annotations.json", stamp, int(n), partial(_files, out), [])
         missing = [k for k in range(n) if read_part(*_files(out, k)) is None]
         one = partial(_render_one, seed=seed, split=split)
         jobs = [(str(_files(Path(), k)[0]), partial(one, index=k)) for k in missing]

@@ -161,7 +161,7 @@ def test_what_cannot_be_simulated_is_refused(tmp_path, arguments, expected):
 
 def test_a_folder_with_other_things_is_refused(tmp_path):
     (tmp_path / "thesis.tex").write_text("precious")
-    with pytest.raises(InputError, match="holds files that were not simulated"):
+    with pytest.raises(InputError, match="holds files not made by this command"):
         simulate_recording(tmp_path, "relative-lower", n_frames=1)
 
 
