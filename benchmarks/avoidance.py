@@ -20,12 +20,12 @@ from timing import Comparison, run
 from hicp_lib.core.camera import Camera, transform
 from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.registry import make_detector
-from hicp_lib.lifting.robust import METHODS, lift_in_steps
+from hicp_lib.lifting.robust import METHODS, lift_robust
 from hicp_lib.robot.controller import Controller
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.loop import AvoidanceLoop, Perception
-from hicp_lib.robot.peripersonal_space import ReceptiveField, gains, response
+from hicp_lib.robot.peripersonal_space import ReceptiveField, response
 from hicp_lib.simulation.rendering.camera import project_world
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import render
@@ -84,8 +84,8 @@ def run_cycles(detector, frames: list, n_cycles: int, method: str = "robust") ->
     for k in range(n_cycles):
         image, depth, intrinsics, true = frames[k // 4 % len(frames)]
         found = clock.measure("detector", detector.detect, image) if detector else true
-        arguments = found.keypoints_px, depth, intrinsics, [METHODS[method]]
-        (lifted,) = clock.measure("lifting", lift_in_steps, *arguments)
+        arguments = found.keypoints_px, depth, intrinsics, METHODS[method]
+        lifted = clock.measure("lifting", lift_robust, *arguments)
         T = clock.measure("camera pose", icub.T_root_camera, posture.angles("head"))
         points = transform(T, lifted.points_m)
         seen = Perception(k * PERIOD_S, points, found.scores)
@@ -126,7 +126,7 @@ def compare_activations(n_people: int, repeats: int) -> Comparison:
     rng, field, clock = np.random.default_rng(SEED), ReceptiveField(), Clock()
     positions, normals = rng.uniform(-0.2, 0.2, (N_SKIN, 3)), rng.normal(size=(N_SKIN, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    points, factors = rng.uniform(-0.4, 0.4, (136 * n_people, 3)), gains(np.ones(136 * n_people))
+    points, factors = rng.uniform(-0.4, 0.4, (136 * n_people, 3)), np.ones(136 * n_people)
     for _ in range(repeats):
         ours = clock.measure("ours", field.activations, positions, normals, points, factors)
         plain = clock.measure("plain", one_keypoint_at_a_time, field, positions, normals, points, factors)

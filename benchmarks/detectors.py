@@ -130,7 +130,7 @@ def measure(options) -> Iterator[Comparison]:
     """All detectors on one thread and on all cores."""
     weights = default_weights.weights_dir()
     # What runs in this process, here only, would send usage metrics.
-    os.environ.update(native.child_environment())
+    os.environ.update(native.offline_environment())
     with tempfile.TemporaryDirectory() as folder:
         os.environ["HICP_CACHE"] = folder
         (Path(folder) / "weights").symlink_to(weights)

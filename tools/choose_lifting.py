@@ -45,9 +45,9 @@ CONSTANTS = {
     },
     **{name: (depth_candidates, name, None) for name in ("_STEEP_M", "_ON_STEP", "_IN_FRONT")},
     **{
-        f"{part} {key}": (limb_lengths, part, key)
+        f"{part} {key}": (limb_lengths, part, number)
         for part in ("_BODY", "_HAND")
-        for key in ("share", "more_m", "most_short")
+        for number, key in enumerate(("share", "more_m", "most_short"))
     },
     "_MOST_LONG": (limb_lengths, "_MOST_LONG", None),
     **{
@@ -100,7 +100,7 @@ def lift_person(person: dict[str, np.ndarray], n_steps: int = len(robust.STEPS))
     lifted = np.empty((4, *person["found"].shape[:3]))
     for k, (depth_m, true_m) in enumerate(zip(person["depth_m"], person["true_m"], strict=True)):
         for d, found in enumerate(person["found"][k]):
-            (one,) = robust.lift_in_steps(found[None, :, :2], depth_m, COLOUR, [n_steps])
+            one = robust.lift_robust(found[None, :, :2], depth_m, COLOUR, n_steps)
             off_m = np.where(found[:, 2:] >= MIN_SCORE, one.points_m[0] - true_m, np.nan)
             lifted[:, k, d] = np.linalg.norm(off_m, axis=1), off_m[:, 2], one.sigma_m[0], one.reason[0]
     return lifted
@@ -112,8 +112,6 @@ def scaled(name: str, factor: float) -> None:
     value = getattr(module, attribute)
     if part is None:
         setattr(module, attribute, value * factor)
-    elif isinstance(value, dict):
-        setattr(module, attribute, value | {part: value[part] * factor})
     else:
         scale = np.ones(len(value))
         scale[part] = factor

@@ -11,7 +11,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -20,8 +20,9 @@ from typing import Any
 from hicp_lib.cli.probes import EXIT_ABSENT, EXIT_FAILED, probes
 from hicp_lib.cli.system_libraries import LIBRARIES, missing_packages
 from hicp_lib.core.checkout import working_folder
+from hicp_lib.core.children import child_environment, lifeline
 from hicp_lib.core.environment import usable_cores
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.executor import run_jobs
 from hicp_lib.core.files import cache_dir
 from hicp_lib.study import provenance
@@ -31,7 +32,7 @@ MIN_FREE_GB = 3.0
 PROBE_LIMIT_S = 120.0
 OK, ABSENT, FAIL = "ok", "--", "FAIL"
 """What a check came to; absent is a part that was not installed, which is no fault."""
-PROBE = (sys.executable, "-P", "-m", "hicp_lib.cli.probes")
+PROBE = (sys.executable, "-m", "hicp_lib.cli.probes")
 _LOCKED = "locked environment"
 _OPENCV = "opencv-python-headless"
 _OTHER_OPENCVS = ("opencv-contrib-python", "opencv-contrib-python-headless", "opencv-python")
@@ -83,16 +84,19 @@ class Check:
 
 def run_checks() -> list[Check]:
     """Every check; none of them raises, and none contacts a network."""
-    return [
-        check_python(),
-        check_system_libraries(),
-        check_locked_versions(provenance.LOCK_PATH),
-        check_opencv(),
-        check_weights(),
-        *check_probes(),
-        *check_folder("cache", cache_dir(), "set HICP_CACHE to a folder you may write to"),
-        *check_folder("results", working_folder() / "results", "give yourself the right to write there"),
-    ]
+    checks = [check_python, check_system_libraries, check_locked_versions, check_opencv, check_weights]
+    checks += [check_probes, check_folders]
+    return [line for check in checks for line in _lines(check)]
+
+
+def _lines(check: Callable[[], Check | list[Check]]) -> list[Check]:
+    """What a check found; that it could not look is a finding, too."""
+    try:
+        found = check()
+    except Exception as error:  # a broken installation may raise anything
+        name = check.__name__.removeprefix("check_").replace("_", " ")
+        return [Check(name, FAIL, one_line(error), _remedy(one_line(error)))]
+    return found if isinstance(found, list) else [found]
 
 
 def check_python() -> Check:
@@ -110,7 +114,7 @@ def check_system_libraries() -> Check:
     return Check.of("system libraries", not missing, finding, f"sudo apt-get install {' '.join(missing)}")
 
 
-def check_locked_versions(lock_path: Path) -> Check:
+def check_locked_versions(lock_path: Path = provenance.LOCK_PATH) -> Check:
     """That what is installed is what the lock says."""
     if provenance.CHECKOUT is None:
         return Check(_LOCKED, OK, "none: hicp was installed without a checkout")
@@ -168,16 +172,18 @@ def check_probe(name: str, command: tuple[str, ...] = PROBE, limit_s: float = PR
         After this the trial and all its processes are ended.
     """
     pipe = subprocess.PIPE
-    streams: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": pipe, "stderr": pipe, "text": True}
-    process = subprocess.Popen([*command, name], **streams, errors="replace", start_new_session=True)
-    try:
-        output, errors = process.communicate(timeout=limit_s)
-    except subprocess.TimeoutExpired:
-        return Check(name, FAIL, f"no answer within {limit_s:g} s, ended", _remedy(""))
-    finally:
-        with contextlib.suppress(ProcessLookupError):  # itself, and what it started
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+    streams: dict[str, Any] = {"stdout": pipe, "stderr": pipe, "text": True, "errors": "replace"}
+    streams |= {"env": child_environment(), "start_new_session": True}
+    with lifeline() as stdin:
+        process = subprocess.Popen([*command, name], stdin=stdin, **streams)
+        try:
+            output, errors = process.communicate(timeout=limit_s)
+        except subprocess.TimeoutExpired:
+            return Check(name, FAIL, f"no answer within {limit_s:g} s, ended", _remedy(""))
+        finally:
+            with contextlib.suppress(ProcessLookupError):  # itself, and what it started
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
     return _outcome(name, process.returncode, _last_line(output), _last_line(errors))
 
 
@@ -226,6 +232,12 @@ def check_weights() -> Check:
         return Check("weights", FAIL, str(error), "git restore data/detectors.json")
     wrong = ", ".join(f"{name} {state}" for name, state in found.items() if state != "present")
     return Check.of("weights", not wrong, wrong or f"{len(found)} present and sound", "hicp models fetch")
+
+
+def check_folders() -> list[Check]:
+    """The folders that are written to."""
+    cache = check_folder("cache", cache_dir(), "set HICP_CACHE to a folder you may write to")
+    return cache + check_folder("results", working_folder() / "results", "give yourself the right to do so")
 
 
 def check_folder(name: str, folder: Path, remedy: str) -> list[Check]:

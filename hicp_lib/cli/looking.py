@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from hicp_lib.cli.options import PATH, say
+from hicp_lib.cli.options import PATH, FiniteRange, say
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import locked_folder
 
@@ -33,7 +33,7 @@ def inspect_(path: Path, as_json: bool) -> int:
 @click.option("--out", type=PATH, required=True, help="An .html page, or a new folder for PNG files.")
 @click.option("--limit", default=100, show_default=True, type=click.IntRange(min=1),
               help="At most so many pictures, worst first.")  # fmt: skip
-@click.option("--min-score", default=0.1, show_default=True, type=click.FloatRange(0, 1),
+@click.option("--min-score", default=0.1, show_default=True, type=FiniteRange(0, 1),
               help="In PNG files, keypoints below it are left out; a page has a slider.")  # fmt: skip
 def draw(
     detections: Path, images: Path, annotations: Path | None, out: Path, limit: int, min_score: float

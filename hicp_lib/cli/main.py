@@ -9,7 +9,9 @@ import json
 import math
 import os
 import shlex
+import signal
 import sys
+import warnings
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import asdict
 from functools import partial
@@ -24,6 +26,7 @@ from hicp_lib.cli.looking import draw, inspect_
 from hicp_lib.cli.models import models
 from hicp_lib.cli.options import (
     PATH,
+    FiniteRange,
     detector_options,
     given,
     people_option,
@@ -44,7 +47,11 @@ _keypoint_map_option = click.option(
 
 def main() -> NoReturn:
     """Run the command line and exit."""
-    os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # an image cut off is told in one line, by us
+    # What is damaged is told in one line, by us: what libraries written in C say of it goes nowhere.
+    sys.stderr = os.fdopen(os.dup(2), "w", 1, sys.stderr.encoding, "backslashreplace")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    warnings.filterwarnings("ignore", module="PIL")
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))  # tidied up as at an error
     code = run(sys.argv[1:])
     try:
         sys.stdout.flush()
@@ -64,7 +71,7 @@ def run(arguments: list[str]) -> int:
     Returns
     -------
     int
-        0 done, 1 a notebook or the book failed, 2 bad input or usage, 130 stopped.
+        0 done, 1 a notebook or the book failed, 2 bad input or usage, 130 stopped, 143 terminated.
 
     Examples
     --------
@@ -99,8 +106,8 @@ def _run(arguments: list[str]) -> int:
         context = getattr(error, "ctx", None)
         where = context.command_path if context else "hicp"
         return _fail(f"{' '.join(error.format_message().split())} See: {where} --help", 2)
-    except (click.Abort, KeyboardInterrupt):
-        return _fail("stopped; run the same command again to go on", 130)
+    except (click.Abort, KeyboardInterrupt, SystemExit) as error:
+        return _fail("stopped; run the same command again to go on", getattr(error, "code", 130))
     except InputError as error:
         return _fail(error, 2)
     except OSError as error:
@@ -223,7 +230,7 @@ def detect(
 @click.option("--annotations", type=PATH, required=True, help="Annotations of the images the tool saw.")
 @_keypoint_map_option
 @click.option("--out", type=PATH, required=True, help="COCO keypoint results to write.")
-@click.option("--score-scale", type=float, help="Divides keypoint scores; the format's own if not given.")
+@click.option("--score-scale", type=FiniteRange(0, min_open=True), help="Divides scores; else the format's.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def import_(
     kind: str, predictions: Path, annotations: Path, keypoint_map, out: Path, score_scale, as_json: bool

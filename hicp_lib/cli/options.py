@@ -1,5 +1,6 @@
 """Kinds of options that the `hicp` command's parts share."""
 
+import math
 from collections.abc import Callable, Sequence
 from functools import wraps
 from pathlib import Path
@@ -27,6 +28,17 @@ class _Path(click.Path):
 
 
 PATH = _Path()
+
+
+class FiniteRange(click.FloatRange):
+    """Numbers of a range; click lets NaN pass, and infinity where there is no bound."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """As click's, of what is a finite number."""
+        number = super().convert(value, param, ctx)
+        return number if math.isfinite(number) else self.fail(f"{value} is no finite number.", param, ctx)
+
+
 people_option = click.option(
     "--people", default="held-out", show_default=True, type=click.Choice(["development", "held-out"]),
     help="What is tuned is tuned on people for development.",
@@ -43,7 +55,7 @@ def worker_options(kind: str) -> Callable[[Callable], Callable]:
     """
 
     def decorate(command: Callable) -> Callable:
-        @click.option("--workers", type=click.IntRange(min=1), help=f"{kind}; all cores if not given.")
+        @click.option("--workers", type=click.IntRange(1, 1024), help=f"{kind}; all cores if not given.")
         @click.option("--dask", metavar="ADDRESS", help="Scheduler of a Dask cluster, which does the work.")
         @wraps(command)
         def chosen(*arguments: Any, workers: int | None, dask: str | None, **named: Any) -> Any:

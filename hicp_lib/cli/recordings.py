@@ -5,7 +5,8 @@ from pathlib import Path
 
 import click
 
-from hicp_lib.cli.options import PATH, detector_options, given, people_option, say, worker_options
+from hicp_lib.cli import options
+from hicp_lib.cli.options import PATH, FiniteRange, detector_options, given, people_option, worker_options
 from hicp_lib.core.files import locked_folder, write_table
 
 
@@ -81,8 +82,8 @@ def pose_options(command):
 @click.option("--base-frame", help="Poses are the camera's in this frame, by the bag's transforms.")
 @click.option("--joint-states", is_flag=True, help="Poses are by the bag's angles of the iCub's joints.")
 @click.option("--open3d", "folder", type=PATH, help="A folder with color/, depth/ and intrinsic.json.")
-@click.option("--rate", type=click.FloatRange(min=0, min_open=True), help="Frames per second of a folder.")
-@click.option("--depth-scale", type=click.FloatRange(min=1), help="Depth units per metre of a folder.")
+@click.option("--rate", type=FiniteRange(min=0, min_open=True), help="Frames per second of a folder.")
+@click.option("--depth-scale", type=FiniteRange(min=1), help="Depth units per metre of a folder.")
 @pose_options
 def import_(
     out, bag, color_topic, depth_topic, base_frame, joint_states, folder, rate, depth_scale, poses, mount
@@ -112,7 +113,7 @@ def import_(
 
 def _tell(out: Path, n_frames: int, notes: list[str]) -> None:
     for note in notes:
-        say(note)
+        options.say(note)
     click.echo(f"{out}: {n_frames} frames; check them with: hicp record check {out}")
 
 
@@ -121,7 +122,7 @@ def _tell(out: Path, n_frames: int, notes: list[str]) -> None:
 @click.option("--color", "color_px", nargs=2, type=int, default=(640, 480), help="Width, height: 640 480.")
 @click.option("--depth", "depth_px", nargs=2, type=int, default=(848, 480), help="Width, height: 848 480.")
 @click.option("--rate", "rate_hz", default=30, show_default=True, type=int, help="Frames per second.")
-@click.option("--seconds", "duration_s", type=click.FloatRange(min=0), help="Until Ctrl-C if not given.")
+@click.option("--seconds", "duration_s", type=FiniteRange(min=0), help="Until Ctrl-C if not given.")
 @click.option("--joints", type=click.File(), help="Lines of joint angles as they come; - is standard input.")
 @pose_options
 def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> None:

@@ -246,11 +246,46 @@ def input_sha256(path: Path) -> str:
     """Identity of an input: a file's content, or a folder's file names, sizes and modification times.
 
     A folder of images is not read: hashing gigabytes on every call would cost more than it protects.
+
+    Raises
+    ------
+    InputError
+        If it is neither, or links of the folder lead in a circle.
     """
     if path.is_file():
         return sha256_file(path)
-    files = sorted(p for p in path.rglob("*") if p.is_file())
-    return digest([[p.relative_to(path).as_posix(), p.stat().st_size, p.stat().st_mtime_ns] for p in files])
+    if not path.is_dir():
+        raise InputError(f"{path}: is neither a file nor a folder; name one of them")
+    states = [(p.relative_to(path).as_posix(), p.stat()) for p in sorted(files_below(path))]
+    return digest([[name, state.st_size, state.st_mtime_ns] for name, state in states])
+
+
+def files_below(folder: Path, above: frozenset[Path] = frozenset()) -> Iterator[Path]:
+    """Every file in a folder and in those below it, through links too.
+
+    Parameters
+    ----------
+    folder : Path
+    above : frozenset of Path
+        The folders it lies in, links resolved.
+
+    Yields
+    ------
+    Path
+
+    Raises
+    ------
+    InputError
+        If a link leads to a folder that it lies in.
+    """
+    here = folder.resolve()
+    if here in above:
+        raise InputError(f"{folder}: leads to a folder that it lies in; remove the link")
+    for path in folder.iterdir() if folder.is_dir() else ():
+        if path.is_dir():
+            yield from files_below(path, above | {here})
+        elif path.is_file():
+            yield path
 
 
 def _module_name(entry: Any) -> str:

@@ -24,14 +24,16 @@ def working_folder() -> Path:
 
 
 def sources() -> Path:
-    """The study to run: the one the working folder lies in, or the library's own checkout.
+    """The study to run: the library's own checkout, or if it has none the one the working folder lies in.
+
+    Notebooks are code: those that happen to lie in a folder of data are not run in the place of the study's.
 
     Raises
     ------
     InputError
         If there is neither: an installed package brings the library, not the notebooks.
     """
-    found = _study_around(Path.cwd()) or CHECKOUT
+    found = CHECKOUT or _study_around(Path.cwd())
     if found is None:
         raise InputError(f"{Path.cwd()}: has no {_MARK}; run the report in a checkout of the study")
     return found

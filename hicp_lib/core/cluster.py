@@ -10,6 +10,7 @@ Dask's workers execute what its clients send them: connect only to a cluster you
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import math
 import tempfile
@@ -18,7 +19,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from concurrent.futures import CancelledError
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
 from itertools import chain
@@ -32,14 +33,15 @@ from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.executor import as_they_come, resolved
 from hicp_lib.core.extras import needs
 from hicp_lib.core.files import write_bytes
+from hicp_lib.core.limited import raised
 
 if TYPE_CHECKING:
     from distributed import Client
 
 Key = TypeVar("Key", bound=Hashable)
 Answer = TypeVar("Answer")
-# How long to wait for the scheduler, and for workers where there are none.
-PATIENCE_S = 30.0
+# How long to wait for the scheduler, and for workers where there are none: at first, and later.
+SOON_S, PATIENCE_S = 3.0, 30.0
 _ANEW_S = 1.0  # when to look again how many workers there are
 _LOGGERS = ("distributed", "distributed.client", "tornado.application", "asyncio")
 
@@ -114,23 +116,38 @@ def connected(address: str) -> Iterator[Client]:
     with needs("dask"):
         from distributed import Client
     resolved(address)
+    soon_s = raised(SOON_S)
     with _quiet():
         try:
-            client = Client(address, timeout=PATIENCE_S)
-        except (OSError, ValueError, RuntimeError, AssertionError) as error:  # its thread is late
+            with ThreadPoolExecutor(1) as thread:  # a notebook's own has a loop already
+                thread.submit(asyncio.run, _greet(address, soon_s)).result()
+            client = Client(address, timeout=soon_s)
+        except Exception as error:  # what is no scheduler may say anything
             raise InputError(
                 f"{address}: no Dask scheduler answers ({one_line(error)}); give tcp://HOST:PORT"
             ) from None
         try:
             with _explained(address, client):
                 try:
-                    client.wait_for_workers(1, timeout=PATIENCE_S)
+                    client.wait_for_workers(1, timeout=soon_s)
                 except TimeoutError:
                     raise InputError(f"{address}: the Dask cluster has no workers; start some") from None
             yield client
         finally:
             with suppress(OSError, RuntimeError):  # it may be gone; what was found is here
                 client.close()
+
+
+async def _greet(address: str, soon_s: float) -> None:
+    """Raise unless a scheduler says in time that it is one: Dask's client waits for minutes for others."""
+    from distributed import Security
+    from distributed.core import rpc
+
+    security = Security().get_connection_args("client")
+    async with asyncio.timeout(soon_s), rpc(address, connection_args=security) as server:
+        who = await server.identity()
+    if who["type"] != "Scheduler":
+        raise ValueError(f"it is a {who['type']}")
 
 
 @contextmanager

@@ -48,7 +48,7 @@ class Detections:
     def of_parts(
         cls, positions_px: np.ndarray, scores: np.ndarray, person_scores: np.ndarray, convention: str
     ) -> Detections:
-        """People from the keypoints a network gives.
+        """People from the keypoints a network gives; who has none is nobody.
 
         Parameters
         ----------
@@ -67,7 +67,8 @@ class Detections:
         """
         scores = np.where(np.isnan(positions_px).any(axis=-1), 0.0, scores)
         given_px, given = to_halpe(positions_px, convention, axis=-2), to_halpe(scores, convention, -1, 0.0)
-        return cls(given_px, given, person_scores)
+        is_somebody = np.isfinite(given_px).all(axis=-1).any(axis=-1)
+        return cls(given_px[is_somebody], given[is_somebody], np.asarray(person_scores)[is_somebody])
 
     def concatenate(self, more: Detections) -> Detections:
         """These people, then others in the same image."""

@@ -8,12 +8,11 @@ number nor the place is in any result.
 import multiprocessing
 import os
 import re
-import signal
 import threading
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
+from contextlib import contextmanager
 from functools import partial
 from operator import length_hint
 from pathlib import Path
@@ -22,7 +21,8 @@ from typing import Any, TypeVar
 import cv2
 import numpy as np
 
-from hicp_lib.core.environment import usable_cores, with_variables
+from hicp_lib.core.children import begin, safe_start
+from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.extras import needs
 
@@ -31,9 +31,6 @@ Key = TypeVar("Key", bound=Hashable)
 Workers = int | str | None
 # Checked here, since Dask starts threads, and for an empty address a cluster, before it looks.
 _ADDRESS = re.compile(r"(tcp|tls|ws|wss|ucx)://\S+:\d{1,5}")
-_ONE_THREAD = dict.fromkeys(
-    ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
-)
 
 
 def resolved(workers: Workers) -> int | str:
@@ -112,7 +109,7 @@ def run_jobs(
         return
     n = min(workers, length_hint(jobs, workers))
     todo = jobs if folder is None else ((key, job and partial(job, folder)) for key, job in jobs)
-    with single_threaded_opencv:
+    with single_threaded_opencv():
         if n < 2:
             yield from ((key, job and job()) for key, job in todo)
             return
@@ -194,11 +191,12 @@ class Processes(ProcessPoolExecutor):
     def __init__(self, n: int) -> None:
         context = multiprocessing.get_context("spawn")
         self._theirs, self._ours = context.Pipe(duplex=False)
-        super().__init__(n, context, _begin, (self._theirs,))
+        with safe_start():
+            super().__init__(n, context, begin, (self._theirs,))
 
     def submit(self, *arguments: Any, **named: Any) -> Any:
         """As any executor's; it may start a process."""
-        with with_variables(**_ONE_THREAD):
+        with safe_start():
             return super().submit(*arguments, **named)
 
     def __exit__(self, kind: object, *_: object) -> None:
@@ -209,40 +207,20 @@ class Processes(ProcessPoolExecutor):
             end.close()
 
 
-def _begin(pipe: Any) -> None:
-    """What a process does first."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the caller's, who ends this one
-    cv2.setNumThreads(1)
-    threading.Thread(target=_end_with, args=(pipe,), daemon=True).start()
+_opencv_lock, _n_threads_before = threading.Lock(), list[int]()
 
 
-def _end_with(pipe: Any) -> None:
-    with suppress(EOFError, OSError):
-        pipe.recv_bytes()  # nothing is ever written: this ends when the other end closes
-    os._exit(1)
+@contextmanager
+def single_threaded_opencv() -> Iterator[None]:
+    """Hold OpenCV to one thread for a block: the jobs are what is spread.
 
-
-class _OneThread:
-    """Holds OpenCV to one thread: the jobs are what is spread.
-
-    The number is the whole process's: the first of several who want it sets it, the last one restores it.
+    The number is the whole process's: of several who want it, the last to leave restores what the first met.
     """
-
-    def __init__(self) -> None:
-        self._lock, self._depth, self._before = threading.Lock(), 0, 0
-
-    def __enter__(self) -> None:
-        with self._lock:
-            if self._depth == 0:
-                self._before = cv2.getNumThreads()
-                cv2.setNumThreads(1)
-            self._depth += 1
-
-    def __exit__(self, *_) -> None:
-        with self._lock:
-            self._depth -= 1
-            if self._depth == 0:
-                cv2.setNumThreads(self._before)
-
-
-single_threaded_opencv = _OneThread()
+    with _opencv_lock:
+        _n_threads_before.append(cv2.getNumThreads())
+        cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        with _opencv_lock:
+            cv2.setNumThreads(_n_threads_before.pop())

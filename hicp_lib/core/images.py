@@ -17,8 +17,13 @@ import numpy as np
 from PIL import ExifTags, Image
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_bytes, write_bytes
+from hicp_lib.core.files import read_bytes, regular_file, write_bytes
+from hicp_lib.core.limited import LIMITS_VARIABLE, raised
 
+MAX_PIXELS = 100e6
+"""Of an image; more would be a gigabyte before anything looks at them."""
+_MAX_SCANS = 15
+_FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "JPEG2000", "PPM")  # as Pillow calls them
 Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom exclusive
 _EXIF = re.compile(b"Exif|eXIf|EXIF")  # of JPEG, PNG and WebP
 
@@ -39,30 +44,71 @@ def read_image(path: str | Path) -> np.ndarray:
     Raises
     ------
     InputError
-        If the file is missing or not an image OpenCV can decode.
+        If the file is missing, not an image OpenCV can decode or has too many pixels.
     """
-    return decode_image(image_bytes(path), path)
-
-
-def image_bytes(path: str | Path) -> bytes:
-    """Content of an image file, as it lies there.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read.
-    """
-    return read_bytes(path, "expected an image file")
+    return decode_image(read_bytes(path, "expected an image file"), path)
 
 
 def decode_image(content: bytes | np.ndarray, path: str | Path) -> np.ndarray:
     """An image out of a file's content, as `read_image` does; `path` is for the error's message."""
-    coded = np.frombuffer(content, dtype=np.uint8)
-    flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-    bgr = cv2.imdecode(coded, flags) if coded.size else None
-    if bgr is None:
+    return decode(content, path, cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
+
+
+def decode(content: bytes | np.ndarray, path: str | Path, flags: int) -> np.ndarray:
+    """Pixels out of a file's content, which is looked at before memory is taken for them.
+
+    Parameters
+    ----------
+    content : bytes or array of uint8
+    path : str or Path
+        For messages.
+    flags : int
+        OpenCV's.
+
+    Returns
+    -------
+    array
+        As the flags say.
+
+    Raises
+    ------
+    InputError
+        If it is no image that can be decoded, or has more than `MAX_PIXELS`.
+    """
+    content = bytes(content)
+    width_px, height_px, _ = image_header(BytesIO(content))
+    # Each scan of a JPEG costs as much as decoding it anew; those that are written have ten.
+    refuse_too_large(path, width_px, height_px * max(1, content.count(b"\xff\xda") // _MAX_SCANS))
+    pixels = None
+    with suppress(cv2.error):
+        pixels = cv2.imdecode(np.frombuffer(content, np.uint8), flags) if width_px else None
+    if pixels is None:
         raise InputError(f"{path}: is not an image (PNG, JPEG, ...) or is cut off; replace the file")
-    return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
+    return pixels
+
+
+def refuse_too_large(path: str | Path, width_px: int, height_px: int) -> None:
+    """Tell an image, or a frame of a video, of more pixels than are decoded.
+
+    Raises
+    ------
+    InputError
+        With the variable of the environment that raises the limit.
+
+    Examples
+    --------
+    >>> refuse_too_large("a.png", 30_000, 30_000)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    hicp_lib.core.errors.InputError: a.png: 30000 x 30000 pixels are more than 100 million; make ...
+    """
+    most = raised(MAX_PIXELS)
+    if width_px * height_px > most:
+        times = -(-width_px * height_px // MAX_PIXELS)
+        raise InputError(
+            f"{path}: {width_px} x {height_px} pixels are more than {most / 1e6:g} million; make it smaller, "
+            f"or set {LIMITS_VARIABLE}={times:.0f} in the environment"
+        )
 
 
 def image_header(path: str | Path | BytesIO) -> tuple[int, int, int]:
@@ -76,7 +122,12 @@ def image_header(path: str | Path | BytesIO) -> tuple[int, int, int]:
         2 to 8 for pictures that viewers turn (see `as_seen`), 1 for all others.
     """
     try:
-        with Image.open(path) as image:
+        with path if isinstance(path, BytesIO) else open(regular_file(path, ""), "rb") as file:
+            Image.init()
+            start, readers = file.read(16), (Image.OPEN[kind] for kind in _FORMATS)
+            file.seek(0)
+            # Pillow's own `open` would warn of large pictures, on its own account.
+            image = next(read for read, accepts in readers if accepts and accepts(start))(file, "")
             exif = Image.Exif()
             # A TIFF has nothing there, as it should; `getexif` would decode a PNG to its end.
             exif.load(image.info.get("exif", b""))

@@ -20,7 +20,7 @@ from hicp_lib.core.errors import InputError
 
 LIMITS_VARIABLE = "HICP_LIMITS"
 _LEAST_S, _S_PER_BYTE, _MOST_S_PER_BYTE = 4.0, 1e-6, 1e-4  # of computing; the last one for readers that go on
-_LEAST_BYTES, _BYTES_PER_BYTE = 900 * 2**20, 40  # of memory
+_LEAST_BYTES, _BYTES_PER_BYTE = 800 * 2**20, 40  # of memory
 _FEW_THREADS = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OPENCV_FOR_THREADS_NUM", "OMP_NUM_THREADS"), "1")
 _PROGRAM = "import sys; sys.path.append(sys.argv[1]); from hicp_lib.core import limited; limited.serve()"
 _RAISE = f"if the file is sound, {LIMITS_VARIABLE}=4 in the environment allows four times as much"
@@ -113,15 +113,18 @@ def serve() -> None:
     answers = os.dup(1)
     os.dup2(2, 1)  # what a library prints is no answer
     module, name, arguments, (limit_s, most_s, most_bytes) = json.loads(sys.stdin.buffer.read())
+    function = getattr(import_module(module), name)
     with suppress(ImportError, ValueError, OSError):  # no such limits on this system
         import resource
 
+        # Beside what is there already: libraries set memory aside that they do not use.
+        most_bytes += int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
         for limit in (resource.RLIMIT_DATA, resource.RLIMIT_FSIZE):
             resource.setrlimit(limit, (int(most_bytes), int(most_bytes)))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         resource.setrlimit(resource.RLIMIT_CPU, (int(limit_s), int(most_s) + 1))
     try:
-        answer = {"value": getattr(import_module(module), name)(*arguments)}
+        answer = {"value": function(*arguments)}
     except InputError as error:
         answer = {"error": str(error)}
     except OSError as error:

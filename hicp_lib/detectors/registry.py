@@ -88,6 +88,9 @@ COMBINED = "combined:"
 # Within a combination the body vouches for the hands: the hand model may be less sure, and others' hands
 # in a square must not use up the number.
 _HANDS_WITHIN: dict[str, dict[str, Any]] = {"mediapipe-hands": {"num_hands": 4, "min_score": 0.2}}
+# What numbers may be, by how their option's name ends; all others count something.
+_BOUNDS = {"score": (0, 1), "overlap": (0, 1), "hz": (0, 1e4), "threads": (1, 256), "padding": (0.1, 10)}
+_BOUNDS |= {"scale": (0.001, 1000), "": (1, 10_000)}
 # Their counts are those of the committed and fetched files' convolutions and fully connected layers.
 DETECTORS: dict[str, Entry] = {
     name: Entry(name, row.pop("label"), tuple(row.pop("groups")), _MODULE_OF[row["class_name"]],
@@ -203,6 +206,12 @@ def _check_options(name: str, detector_class: type, options: dict) -> None:
         if not isinstance(value, kind) or (isinstance(value, bool) and not takes_bool):
             wanted = getattr(kinds[option], "__name__", None) or str(kinds[option])
             raise InputError(f"detector {name!r}: option {option!r} is {value!r}; expected {wanted}")
+        least, most = next(of for end, of in _BOUNDS.items() if option.endswith(end))
+        numbers = value if isinstance(value, list) else [value]
+        if not all(least <= one <= most for one in numbers if type(one) in (int, float)):  # NaN is neither
+            raise InputError(
+                f"detector {name!r}: option {option!r} is {value!r}; expected {least:g} to {most:g}"
+            )
 
 
 def describe(detector: Detector) -> list[tuple[str, str, str]]:

@@ -18,7 +18,6 @@ that the same error in body sizes counts the same at every level.
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import chain
 from pathlib import Path
 
 import cv2
@@ -29,7 +28,7 @@ from hicp_lib.core.executor import run_jobs
 from hicp_lib.core.files import cache_dir
 from hicp_lib.core.images import write_png
 from hicp_lib.datasets.crops import inside, whole_pixel_boxes
-from hicp_lib.experiments.laboratory import PHOTOGRAPHIC, facing_robot, furnished
+from hicp_lib.experiments.laboratory import MOVEMENTS, PHOTOGRAPHIC, facing_robot, furnished
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.simulation.appearance import materials as m
 from hicp_lib.simulation.appearance.people import appearance_of, dress
@@ -43,15 +42,9 @@ from hicp_lib.simulation.rendering.render import Frame, World, render
 from hicp_lib.simulation.rendering.surfaces import Surface
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
-LEVELS: dict[str, tuple[float, ...]] = {
-    "distance": (0.5, 0.75, 1.0, 1.5, 2.5, 3.5),
-    "light": (1.0, 0.3, 0.1, 0.03, 0.01),
-    "hidden": (0.0, 0.2, 0.4, 0.6, 0.8),
-    "resolution": (640, 320, 160, 80, 48),
-    "upper part": (1.0, 0.8, 0.6, 0.4, 0.2),
-    "lower part": (1.0, 0.8, 0.6, 0.4, 0.2),
-}
+LEVELS: dict[str, list[float]] = MOVEMENTS["doses"]
 DISTANCE_M, EYE_M = 2.5, 1.3
+_UNCHANGED = {"distance": DISTANCE_M, "light": 1.0, "hidden": 0.0, "resolution": 640}  # at these levels
 _KEY_LENGTH = 16  # of a data set's folder
 _WIDTH_PX, _HEIGHT_PX, _FOCAL_PX = 480, 640, 560.0
 _PERSON_Y_M, _BOARD_M, _BOARD_HALF_M = 1.2, 0.85, 0.6
@@ -92,8 +85,8 @@ def open_doses(n_people: int = 10, seed: int = 0) -> Path:
     if not (folder / "annotations.json").is_file():
         subjects = [Subject(seed, number) for number in range(n_people)]
         people = dict(run_jobs([(s, partial(_write_person, subject=s)) for s in subjects], folder=folder))
-        rows = chain.from_iterable(people[subject] for subject in subjects)
-        write_annotations(folder / "annotations.json", _joined([*rows]))
+        rows = [row for subject in subjects for row in people[subject]]
+        write_annotations(folder / "annotations.json", _joined(rows))
     return folder
 
 
@@ -111,7 +104,7 @@ def doses(subject: Subject) -> Iterator[tuple[str, float, Picture]]:
     }
     for dose, levels in LEVELS.items():
         for level in levels:
-            yield dose, level, taken[dose](level)
+            yield dose, level, base if level == _UNCHANGED.get(dose) else taken[dose](level)
 
 
 def _stage(subject: Subject) -> tuple[PosedBody, World]:
@@ -150,16 +143,12 @@ def _dim(light: float) -> Sensor:
 
 
 def _at_distance(person, world, distance_m: float, base: Picture, subject: Subject) -> Picture:
-    if distance_m == DISTANCE_M:
-        return base
     _, picture = _photograph(person, world, distance_m, subject)
     return replace(picture, area_px2=base.area_px2 * (DISTANCE_M / distance_m) ** 2)
 
 
 def _hidden(person, world, share: float, base: Picture, subject: Subject) -> Picture:
     """A board whose upper edge is seen at the given share of the person's height above their feet."""
-    if share == 0:
-        return base
     rows = np.flatnonzero(base.mask.any(axis=1))
     edge_px = rows[-1] - share * (rows[-1] - rows[0])
     depth_m = DISTANCE_M - _BOARD_M
@@ -172,8 +161,6 @@ def _hidden(person, world, share: float, base: Picture, subject: Subject) -> Pic
 
 
 def _smaller(base: Picture, scale: float) -> Picture:
-    if scale == 1:
-        return base
     size = round(_WIDTH_PX * scale), round(_HEIGHT_PX * scale)
     factor = np.array(size) / [_WIDTH_PX, _HEIGHT_PX]
     image = cv2.resize(base.image, size, interpolation=cv2.INTER_AREA)

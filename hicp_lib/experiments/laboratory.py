@@ -10,6 +10,8 @@ from itertools import product
 import numpy as np
 
 from hicp_lib.core.camera import Camera, transform
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import read_json
 from hicp_lib.experiments.minimum_jerk import Posture
 from hicp_lib.simulation.appearance import materials as m
 from hicp_lib.simulation.body.identities import Identity
@@ -28,6 +30,8 @@ from hicp_lib.simulation.world.room import make_room
 
 Rng = np.random.Generator
 
+MOVEMENTS = read_json(DATA_DIR / "movements.json")
+"""What people do in experiments: joint angles (degrees; from two of them one is drawn), and doses."""
 PELVIS_LEAN = "pelvis_flexion"  # a joint of postures only: the whole trunk bends at the hips
 ROOT_HEIGHT_M = 0.6
 T_WORLD_ROOT = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 1, ROOT_HEIGHT_M], [0, 0, 0, 1]])

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.datafiles import DATA_DIR, read_arrays
+from hicp_lib.core.files import read_json
 from hicp_lib.core.keypoints import FACE, HAND_LIMBS, INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 from hicp_lib.core.memo import memoised
 
@@ -21,19 +22,10 @@ _KNUCKLES = np.concatenate([hand[[5, 9, 13, 17]] for hand in (LEFT_HAND, RIGHT_H
 _SLEEVE_M, _BACK_OF_HAND_M = 0.010, 0.011
 
 
-_CHAINS = ("right_shoulder left_shoulder", "right_shoulder neck", "right_shoulder nose head_top",
-           "left_hip mid_hip")  # fmt: skip
-_CHAINS_OF_A_SIDE = (
-    "{0}_shoulder {0}_hip {0}_knee {0}_ankle {0}_big_toe", "{0}_ankle {0}_small_toe", "{0}_ankle {0}_heel",
-    "{0}_shoulder {0}_elbow {0}_wrist {0}_hand_root", "nose {0}_eye", "nose {0}_ear",
-)  # fmt: skip
-
-
 def _parents() -> np.ndarray:
     parents = np.full(N_KEYPOINTS, -1)
-    of_sides = (chain.format(side) for side in ("left", "right") for chain in _CHAINS_OF_A_SIDE)
-    for chain in (*_CHAINS, *of_sides):
-        above, *below = (INDEX[name] for name in chain.split())
+    for chain in read_json(DATA_DIR / "keypoints.json")["chains"]:
+        above, *below = (INDEX[name] for name in chain)
         parents[below] = [above, *below[:-1]]
     parents[FACE] = INDEX["nose"]
     begin, end = np.array(HAND_LIMBS).T

@@ -205,9 +205,7 @@ class _SeenHand:
         per_m, last = 1 / (self.grid_m[1] - self.grid_m[0]), len(self.grid_m) - 1
         place = behind_m - self.grid_m[0]  # in place from here on, as memory is what takes the time
         place *= per_m
-        np.rint(place, out=place)
-        np.minimum(place, last, out=place)
-        np.maximum(place, 0, out=place)
+        np.clip(np.rint(place, out=place), 0, last, out=place)
         place += _beside(np.arange(len(self.costs), dtype=np.float32) * (last + 1), behind_m)
         return self.costs.take(place.astype(np.intp))
 

@@ -37,7 +37,6 @@ LIFTED, NOT_DETECTED, OUTSIDE_IMAGE, NO_DEPTH, GUESSED = range(5)
 MIN_DEPTH_M = 0.1  # nearer than depth cameras measure; bounds the neighbourhood
 
 _BLOCK = 1 << 20  # pixels gathered at a time
-_LITTLE = 1 << 14  # pixels that cost less to look at than another round
 
 
 @dataclass(frozen=True)
@@ -165,13 +164,11 @@ def _of_like_size(half_px: np.ndarray) -> Iterator[np.ndarray]:
 def _half_widths(depth_m: np.ndarray, at: np.ndarray, radius_px: np.ndarray) -> np.ndarray:
     """Half widths of the neighbourhoods in whole pixels, (n,); `radius_px` is fx r, (n,), pixels x metres."""
     half = _sizes(radius_px, depth_m[*at])
-    lost, reach = np.flatnonzero(half < 0), 0
-    while len(lost):  # in holes; no corner of a neighbourhood is farther away than that of the least depth
+    lost, reach, limit = np.flatnonzero(half < 0), 1, 2
+    while len(lost) and reach < limit:
+        # No corner of a neighbourhood is farther away than that of the least depth.
         limit = int(np.ceil(np.sqrt(2) * radius_px[lost].max() / MIN_DEPTH_M))
-        if reach >= limit:
-            break
-        is_little = len(lost) * (2 * limit + 1) ** 2 <= _LITTLE
-        reach = limit if reach and is_little else min(max(4 * reach, 2), limit)
+        reach = min(4 * reach, limit)
         half[lost] = _sizes_that_reach(depth_m, at[:, lost], radius_px[lost], reach)
         lost = lost[half[lost] < 0]
     return np.maximum(half, 0)  # a hole that nothing reaches is alone, and has no depth

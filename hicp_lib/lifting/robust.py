@@ -37,7 +37,7 @@ choose (.50 and .91 with the hands' value). No other sensor had a part in it. Wh
 they are 1.8 cm too wide in the median there, 1.3 of it in the image already, which no cost of depth mends.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -69,7 +69,9 @@ _AHEAD = np.array(
 )
 
 
-def lift_robust(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera) -> Lifted:
+def lift_robust(
+    keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera, n_steps: int = len(STEPS)
+) -> Lifted:
     """Lift the keypoints of everyone in an image; this module's head says how.
 
     Keypoints are lifted when there is depth within 30 mm (body and feet) or 10 mm (face and hands) of them.
@@ -82,6 +84,8 @@ def lift_robust(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camer
         Depth along the camera's z axis; 0, NaN or infinite: no depth.
     intrinsics : Camera
         Of that image.
+    n_steps : int, optional
+        How many of `STEPS` to take, to see what each brings; 0 for the paper's method.
 
     Returns
     -------
@@ -102,56 +106,25 @@ def lift_robust(keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camer
     >>> bool(2.0 < lifted.points_m[0, 9, 2] < 2.05)
     True
     """
-    return lift_in_steps(keypoints_px, depth_m, intrinsics, [len(STEPS)])[0]
-
-
-def lift_in_steps(
-    keypoints_px: np.ndarray, depth_m: np.ndarray, intrinsics: Camera, n_steps: Sequence[int]
-) -> list[Lifted]:
-    """Lift the keypoints of everyone in an image with the first of `STEPS`: what each brings.
-
-    What results have in common is worked out once.
-
-    Parameters
-    ----------
-    keypoints_px : array, shape (n_people, 136, 2)
-    depth_m : array, shape (height, width)
-    intrinsics : Camera
-        These three as in `lift_robust`.
-    n_steps : sequence of int
-        How many of the steps, for each result: 0 for the paper's method.
-
-    Returns
-    -------
-    list of Lifted
-        One for each of `n_steps`.
-
-    Raises
-    ------
-    ValueError
-        If the shapes are not these.
-    """
     depth_m = np.asarray(depth_m, np.result_type(depth_m, np.float32))
     paper = lift(keypoints_px, depth_m, intrinsics)
-    below_m = load_measures().below_skin_m
-    away_m = np.linalg.norm(paper.points_m, axis=2)
-    lifted = {0: paper, 1: replace(paper, points_m=paper.points_m * (1 + below_m / away_m)[..., None])}
-    for n in set(n_steps) - lifted.keys():
-        points_m, sigma_m = (np.full(array.shape, np.nan) for array in (paper.points_m, paper.sigma_m))
-        lifted[n] = Lifted(points_m, np.where(paper.reason == LIFTED, NO_DEPTH, paper.reason), sigma_m)
-    beyond = sorted(set(n_steps) - {0, 1})
-    for person, pixels_px in enumerate(np.asarray(keypoints_px, float) if beyond else ()):
+    if n_steps < 2:
+        away_m = np.linalg.norm(paper.points_m, axis=2)
+        below_m = n_steps * load_measures().below_skin_m
+        return replace(paper, points_m=paper.points_m * (1 + below_m / away_m)[..., None])
+    points_m, sigma_m = (np.full(array.shape, np.nan) for array in (paper.points_m, paper.sigma_m))
+    reason = np.where(paper.reason == LIFTED, NO_DEPTH, paper.reason)
+    for person, pixels_px in enumerate(np.asarray(keypoints_px, float)):
         found = np.flatnonzero(np.isin(paper.reason[person], (LIFTED, NO_DEPTH)))
         first_m = paper.points_m[person, found, 2]
         if np.isfinite(first_m).any():
             grid_m, candidates = _depths(found, first_m, pixels_px[found], depth_m, intrinsics)
-            seen = np.flatnonzero(np.isfinite(candidates.depth_m).any(axis=1))
-            chosen = _choose(found[seen], grid_m, candidates.take(seen), beyond)
-            for n, (points, is_seen, sigma) in zip(beyond, chosen, strict=True):
-                lifted[n].points_m[person, found[seen]] = points
-                lifted[n].reason[person, found[seen]] = np.where(is_seen, LIFTED, GUESSED)
-                lifted[n].sigma_m[person, found[seen]] = sigma
-    return [lifted[n] for n in n_steps]
+            is_near = np.isfinite(candidates.depth_m).any(axis=1)
+            found, candidates = found[is_near], candidates.take(is_near)
+            points, is_seen, sigma = _choose(found, grid_m, candidates, STEPS[:n_steps])
+            points_m[person, found], sigma_m[person, found] = points, sigma
+            reason[person, found] = np.where(is_seen, LIFTED, GUESSED)
+    return Lifted(points_m, reason, sigma_m)
 
 
 def _depths(
@@ -170,26 +143,24 @@ def _depths(
 
 
 def _choose(
-    found: np.ndarray, grid_m: np.ndarray, candidates: Candidates, n_steps: Sequence[int]
-) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """After each number of steps, two or more: points (m, 3), whether depths are seen, and sigmas (m,)."""
-    of_surfaces = depth_costs(candidates, grid_m)
-    on = np.flatnonzero(~_IN_FACE[found])  # what hangs on limbs
-    limbs = limbs_outwards(grid_m, candidates.rays[on], found[on], load_measures())
-    for n in n_steps:
-        costs, steps = of_surfaces.copy(), STEPS[:n]
-        if "hand_shapes" in steps:
-            costs = with_hand_shapes(costs, grid_m, candidates.rays, found)
-        chosen = costs.argmin(axis=1)
-        if "limb_lengths" in steps:
-            chosen[on], costs[on] = choose_along_limbs(costs[on], limbs)
-        depth_m, is_seen = refine_depths(candidates, grid_m[chosen], _GRID_M)
-        points_m = candidates.rays * depth_m[:, None]
-        if "limb_lengths" in steps:
-            is_seen[on] &= ~out_of_reach(chosen[on], limbs)
-            points_m *= 1 + _deeper_end_on(points_m, found)[:, None]
-        unlikely = np.where(is_seen, _COST_SEEN, _COST_GUESSED[found])
-        yield points_m, is_seen, _sigmas_m(costs, grid_m, depth_m, unlikely)
+    found: np.ndarray, grid_m: np.ndarray, candidates: Candidates, steps: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """After the first two of `STEPS` or more: points (m, 3), whether depths are seen, and sigmas (m,)."""
+    costs = depth_costs(candidates, grid_m)
+    if "hand_shapes" in steps:
+        costs = with_hand_shapes(costs, grid_m, candidates.rays, found)
+    chosen = costs.argmin(axis=1)
+    if "limb_lengths" in steps:
+        on = np.flatnonzero(~_IN_FACE[found])  # what hangs on limbs
+        limbs = limbs_outwards(grid_m, candidates.rays[on], found[on], load_measures())
+        chosen[on], costs[on] = choose_along_limbs(costs[on], limbs)
+    depth_m, is_seen = refine_depths(candidates, grid_m[chosen], _GRID_M)
+    points_m = candidates.rays * depth_m[:, None]
+    if "limb_lengths" in steps:
+        is_seen[on] &= ~out_of_reach(chosen[on], limbs)
+        points_m *= 1 + _deeper_end_on(points_m, found)[:, None]
+    unlikely = np.where(is_seen, _COST_SEEN, _COST_GUESSED[found])
+    return points_m, is_seen, _sigmas_m(costs, grid_m, depth_m, unlikely)
 
 
 def _deeper_end_on(points_m: np.ndarray, found: np.ndarray) -> np.ndarray:

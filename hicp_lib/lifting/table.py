@@ -10,13 +10,11 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES
 from hicp_lib.lifting.paper import BODY_RADIUS_M, REASONS, lift
-from hicp_lib.lifting.robust import METHODS, lift_in_steps
+from hicp_lib.lifting.robust import METHODS, lift_robust
 from hicp_lib.recordings.recording import Recording, read_depth_m
 
 _NAMES = {"keypoint": pd.Series(NAMES), "reason": pd.Series(REASONS)}
 _COORDINATES = ("x_m", "y_m", "z_m", "x_cam_m", "y_cam_m", "z_cam_m")
-_Columns = dict[str, np.ndarray]
-_Frame = tuple[_Columns, list[_Columns]]
 
 
 def lift_recording(
@@ -76,16 +74,12 @@ def lift_found(
         if len(detections) != len(recording):
             counts = f"{len(recording)} frames, but detections of {len(detections)} images"
             raise InputError(f"{recording.folder}: {counts}; detect people in the frames of this recording")
-    frames: dict[str, list[_Frame]] = {detector: [] for detector in found}
+    frames: dict[tuple[str, str], list] = {(detector, method): [] for detector in found for method in n_steps}
     for k in range(len(recording)):
         depth_m = read_depth_m(recording, k)
-        for detector, detections in found.items():
-            frames[detector].append(_lift_frame(recording, k, depth_m, detections[k], list(n_steps.values())))
-    tables = {
-        (detector, method): _table(detector_frames, i)
-        for detector, detector_frames in frames.items()
-        for i, method in enumerate(n_steps)
-    }
+        for (detector, method), of_one in frames.items():
+            of_one.append(_lift_frame(recording, k, depth_m, found[detector][k], n_steps[method]))
+    tables = {key: _table(of_one) for key, of_one in frames.items()}
     return pd.concat(tables, names=["detector", "method"]).droplevel(2).reset_index()
 
 
@@ -146,31 +140,27 @@ def steps_of(method: str) -> int:
 
 
 def _lift_frame(
-    recording: Recording, k: int, depth_m: np.ndarray, found: Detections, n_steps: Sequence[int]
-) -> _Frame:
-    """Columns that no method changes, and the others for each method; keypoints and reasons as numbers."""
+    recording: Recording, k: int, depth_m: np.ndarray, found: Detections, n_steps: int
+) -> dict[str, np.ndarray]:
+    """A frame's columns, keypoints and reasons as numbers."""
     best_first = np.argsort(-found.person_scores, kind="stable")
     keypoints_px, scores = found.keypoints_px[best_first], found.scores[best_first]
     person, keypoint = np.nonzero(np.isfinite(keypoints_px).all(axis=2))
     u_px, v_px = keypoints_px[person, keypoint].T
-    detected = {
+    lifted = lift_robust(keypoints_px, depth_m, recording.intrinsics, n_steps)
+    seen_m = lifted.points_m[person, keypoint]
+    base_m = transform(recording.T_base_cam[k], seen_m)
+    return {
         "frame": np.full(len(person), k), "t_s": np.full(len(person), recording.times_s[k]), "person": person,
         "keypoint": keypoint, "u_px": u_px, "v_px": v_px, "score": scores[person, keypoint],
+        **dict(zip(_COORDINATES, [*base_m.T, *seen_m.T], strict=True)),
+        "sigma_m": lifted.sigma_m[person, keypoint], "reason": lifted.reason[person, keypoint],
     }  # fmt: skip
-    in_space = []
-    for lifted in lift_in_steps(keypoints_px, depth_m, recording.intrinsics, n_steps):
-        seen_m = lifted.points_m[person, keypoint]
-        base_m = transform(recording.T_base_cam[k], seen_m)
-        columns = dict(zip(_COORDINATES, [*base_m.T, *seen_m.T], strict=True))
-        columns |= {"sigma_m": lifted.sigma_m[person, keypoint], "reason": lifted.reason[person, keypoint]}
-        in_space.append(columns)
-    return detected, in_space
 
 
-def _table(frames: Sequence[_Frame], method: int) -> pd.DataFrame:
-    """One method's table of the columns of all frames."""
-    parts = [detected | in_space[method] for detected, in_space in frames]
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+def _table(frames: Sequence[dict[str, np.ndarray]]) -> pd.DataFrame:
+    """The columns of all frames, keypoints and reasons by name."""
+    columns = {name: np.concatenate([frame[name] for frame in frames]) for name in frames[0]}
     for name, texts in _NAMES.items():
         columns[name] = texts.array.take(columns[name])
     return pd.DataFrame(columns)

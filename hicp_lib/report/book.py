@@ -13,16 +13,21 @@ from typing import Any
 
 import nbformat
 
+from hicp_lib.core.cache import files_below
+from hicp_lib.core.children import child_environment, lifeline
 from hicp_lib.core.datafiles import REFERENCE_DIR
+from hicp_lib.core.escape import escaped
 from hicp_lib.core.files import sha256_file, write_json
 from hicp_lib.report.checks import book_problems
 from hicp_lib.report.prose import Results, render_page
 from hicp_lib.report.run import Folders, RunError
-from hicp_lib.report.runs import read_stamp
+from hicp_lib.report.runs import outputs, read_stamp
 from hicp_lib.report.sphinx_extension import PLOTLY_PATH, SCRIPTS_DIR
 from hicp_lib.study import provenance
 
 BUILD_LIMIT_S = 900
+_SPHINX = "from hicp_lib.core.children import end_with; end_with(0); "
+_SPHINX += "from jupyter_book.cli.main import main; main()"
 # Links lead to files of the checkout. In the book, `book/` is the top and `notebooks/` lies in it.
 _LINK_TO_PAGE, _LINK_TO_NOTEBOOK = ("](../book/", "](../"), ("](../notebooks/", "](notebooks/")
 # MathJax in one file with its fonts inside: browsers refuse font files to pages that are read from disk.
@@ -74,6 +79,8 @@ def build_book(folders: Folders, left_out: Mapping[str, str] | None = None) -> t
         shutil.copytree(folders.results, built / "results" / folders.profile)
         if problems := book_problems(built):
             raise RunError(f"book: {problems[0]} ({len(problems)} such problems in all)")
+        if _key(folders, left_out) != key:
+            raise RunError("book: what it is made of was changed while it was built; run the report again")
         stamp.unlink(missing_ok=True)
         shutil.rmtree(book, ignore_errors=True)
         os.replace(built, book)
@@ -82,11 +89,15 @@ def build_book(folders: Folders, left_out: Mapping[str, str] | None = None) -> t
 
 
 def _key(folders: Folders, left_out: Mapping[str, str]) -> str:
-    """Digest of all that the book is made of; the runs' stamps stand for notebooks and their results."""
+    """Digest of all that the book is made of."""
+    runs = {path.stem: read_stamp(path) for path in folders.executed.glob("*.json")}
+    for name, stamp in runs.items():
+        if stamp is None or stamp["outputs"] != outputs(name, folders):
+            raise RunError(f"book: the results of {name} were changed; run the report again")
     return provenance.digest(
         {
             "pages": _hashes(folders.sources / "book"),
-            "runs": {path.name: sha256_file(path) for path in folders.executed.glob("*.json")},
+            "runs": runs,
             "library": provenance.library_sha256(),
             "data": provenance.data_sha256(),
             "reference run": _hashes(REFERENCE_DIR / folders.profile),
@@ -97,8 +108,7 @@ def _key(folders: Folders, left_out: Mapping[str, str]) -> str:
 
 
 def _hashes(folder: Path) -> dict[str, str]:
-    files = (path for path in folder.rglob("*") if path.is_file())
-    return {path.relative_to(folder).as_posix(): sha256_file(path) for path in files}
+    return {path.relative_to(folder).as_posix(): sha256_file(path) for path in files_below(folder)}
 
 
 def _assemble(source: Path, folders: Folders, left_out: Mapping[str, str]) -> None:
@@ -125,7 +135,7 @@ def _write_stub(original: Path, stub: Path, reason: str) -> None:
     """A page with a notebook's title that says why it was not run."""
     whole = nbformat.read(original, as_version=4)
     title = whole.cells[0].source.splitlines()[0]
-    text = nbformat.v4.new_markdown_cell(f"{title}\n\nNot run: {reason}.", id="not-run")
+    text = nbformat.v4.new_markdown_cell(f"{title}\n\nNot run: {escaped(reason)}.", id="not-run")
     nbformat.write(nbformat.v4.new_notebook(cells=[text], metadata=whole.metadata), stub)
 
 
@@ -140,12 +150,12 @@ def _book_stamp(folders: Folders) -> dict:
 
 def _run_sphinx(staging: Path, log: Path) -> Path:
     """Build with every warning an error; the folder of the pages."""
-    command = [sys.executable, "-c", "from jupyter_book.cli.main import main; main()"]
+    command = [sys.executable, "-c", _SPHINX]
     command += ["build", str(staging / "source"), "--path-output", str(staging), "-W", "--keep-going", "-q"]
-    environment = os.environ | {"PYTHONNOUSERSITE": "1"}
-    with open(log, "wb") as output:
-        streams: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stdout": output, "stderr": subprocess.STDOUT}
-        done = subprocess.run(command, **streams, timeout=BUILD_LIMIT_S, env=environment)
+    environment = child_environment(PYTHONNOUSERSITE="1")
+    with open(log, "wb") as output, lifeline() as stdin:
+        streams: dict[str, Any] = {"stdin": stdin, "stdout": output, "stderr": subprocess.STDOUT}
+        done = subprocess.run(command, **streams, timeout=BUILD_LIMIT_S, env=environment, cwd=staging)
     built = staging / "_build" / "html"
     if done.returncode != 0 or not (built / "index.html").is_file():
         lines = _COLOURS.sub("", log.read_text(errors="replace")).splitlines()

@@ -11,14 +11,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import locked_folder
-from hicp_lib.detectors.registry import COMBINED
+from hicp_lib.detectors.registry import COMBINED, DETECTORS
 from hicp_lib.detectors.weights.default import registry
 from hicp_lib.report.book import build_book
-from hicp_lib.report.notebooks import parse_overrides, read_notebooks, read_profile
+from hicp_lib.report.notebooks import Notebook, parse_overrides, read_notebooks, read_profile
 from hicp_lib.report.run import Folders, Run
 from hicp_lib.report.runs import run_all
+
+_DETECTORS = ("names", "two names", "a name")  # how the words about a parameter begin that names detectors
 
 
 def make_report(
@@ -77,17 +79,24 @@ def make_report(
 def _plan(profile: str, pairs: list[tuple[str, str]], folder: Path, only: str | None) -> list[Run]:
     """Every notebook with its parameters, of three sources the last one counts: cell, profile, `pairs`."""
     notebooks = read_notebooks(folder)
-    names = [notebook.name for notebook in notebooks]
-    if only is not None and only not in names:
-        raise InputError(f"--only {only}: there is no such notebook; choose one of {', '.join(names)}")
+    if only is not None:
+        refuse_unknown("--only: notebook", only, [notebook.name for notebook in notebooks])
     chosen = read_profile(folder / "profiles.toml", profile, notebooks)
     overrides = parse_overrides(pairs, notebooks)
     runs = []
     for notebook in notebooks:
         name = notebook.name
         parameters = notebook.defaults | chosen.parameters.get(name, {}) | overrides[name]
+        _refuse_unknown_detectors(notebook, parameters)
         runs.append(Run(notebook, parameters, chosen.after.get(name, [])))
     return runs
+
+
+def _refuse_unknown_detectors(notebook: Notebook, parameters: dict[str, Any]) -> None:
+    for name in (name for name, words in notebook.allowed.items() if words.startswith(_DETECTORS)):
+        for one in [value] if isinstance(value := parameters[name], str) else value:
+            if not one.startswith(COMBINED):
+                refuse_unknown(f"-p {name}: detector", one, [*DETECTORS, f"{COMBINED}BODY+HANDS"])
 
 
 def _without_absent(
@@ -139,17 +148,15 @@ def without_absent(
     can_run : bool
         False where no detector is left in a list, or a single one is absent that no list offers.
     """
-    kept, dropped, can_run = dict(parameters), set(), True
-    for name, value in parameters.items():
-        if isinstance(value, list) and name not in asked_for:
-            absent = {one for one in value if isinstance(one, str) and absent_weights(one)}
-            kept[name] = [one for one in value if not (isinstance(one, str) and one in absent)]
-            dropped |= absent
-            can_run &= bool(kept[name]) or not absent
-    for name, value in parameters.items():
-        if isinstance(value, str) and name not in asked_for and absent_weights(value):
+    free = {name: value for name, value in parameters.items() if name not in asked_for}
+    named = [one for value in free.values() for one in (value if isinstance(value, list) else [value])]
+    absent = [one for one in named if isinstance(one, str) and absent_weights(one)]
+    lists = {name: value for name, value in free.items() if isinstance(value, list)}
+    kept = parameters | {name: [one for one in value if one not in absent] for name, value in lists.items()}
+    can_run = all(kept[name] or not value for name, value in lists.items())
+    for name, value in free.items():
+        if isinstance(value, str) and value in absent:
             offered = [key for key, one in parameters.items() if isinstance(one, list) and value in one]
-            dropped.add(value)
             can_run &= bool(offered)
             kept[name] = next((kept[key][0] for key in offered if kept[key]), value)
-    return kept, dropped, can_run
+    return kept, set(absent), can_run

@@ -17,7 +17,6 @@ from jupyter_client.manager import AsyncKernelManager
 from papermill.exceptions import PapermillExecutionError
 
 START_TIMEOUT_S = 120
-CELL_TIMEOUT_S = 3600
 
 
 class IpcKernelManager(AsyncKernelManager):
@@ -32,22 +31,18 @@ class IpcKernelManager(AsyncKernelManager):
 def main(job_path: str) -> int:
     """Run the job; 0 when every cell ran, 1 when one raised (the copy then holds the error)."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    job = json.loads(Path(job_path).read_text())
     try:
         papermill.execute_notebook(
-            job["notebook"],
-            job["output"],
-            parameters=job["parameters"],
-            cwd=job["folder"],
+            **json.loads(Path(job_path).read_text()),
             progress_bar=False,
             kernel_name="python3",
             language="python",
             request_save_on_cell_execute=False,
             start_timeout=START_TIMEOUT_S,
-            execution_timeout=CELL_TIMEOUT_S,
             kernel_manager_class=IpcKernelManager,
             # What C++ libraries write to the terminal goes to the log; Python's own warnings stay visible.
-            extra_arguments=["--IPKernelApp.capture_fd_output=False"],
+            # Nothing beside a notebook is imported: its key would not know of it.
+            extra_arguments=["--IPKernelApp.capture_fd_output=False", "--IPKernelApp.ignore_cwd=True"],
         )
     except PapermillExecutionError:
         return 1

@@ -2,8 +2,10 @@
 
 import ast
 import json
+import os
+import re
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
@@ -11,10 +13,15 @@ from typing import Any
 import nbformat
 
 from hicp_lib.core.cache import digest, imports_of
-from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_bytes
+from hicp_lib.core.errors import InputError, refuse_unknown
+from hicp_lib.core.files import json_or_text, read_bytes
 
 PARAMETERS_TAG = "parameters"
+_COMMENTED = re.compile(r"((?:^#.*\n)+)(\w+)", re.MULTILINE)
+_NUMBER = r"(\d+(?:\.\d+)?)"
+_FROM = re.compile(rf"{_NUMBER} or more|from {_NUMBER} |{_NUMBER} to|above {_NUMBER}")
+_UP_TO = re.compile(rf"\d to (?:below )?{_NUMBER}")
+_MOST, _SHOWN = 2.0**63, 80  # numbers, characters of a refused value
 
 
 @dataclass(frozen=True)
@@ -31,12 +38,15 @@ class Notebook:
         Hash of its cells' kinds, tags and text; outputs and other metadata do not count.
     imports : frozenset of str
         Names of the modules it imports.
+    allowed : dict of str to str
+        By a parameter's name, what the comment above it says in brackets: its unit and range.
     """
 
     path: Path
     defaults: dict[str, Any]
     source_sha256: str
     imports: frozenset[str]
+    allowed: dict[str, str] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -89,9 +99,15 @@ def read_notebook(path: Path) -> Notebook:
     tagged = [cell.source for cell in cells if PARAMETERS_TAG in cell.metadata.get("tags", [])]
     if len(tagged) != 1:
         raise InputError(f"{path}: has {len(tagged)} cells tagged `{PARAMETERS_TAG}`; expected exactly one")
-    source = [[cell.cell_type, cell.metadata.get("tags", []), cell.source] for cell in cells]
     code = [cell.source for cell in cells if cell.cell_type == "code"]
-    return Notebook(path, _assignments(tagged[0], path), digest(source), _imports(path, code))
+    declared = _assignments(tagged[0], path), source_sha256(cells), _imports(path, code)
+    return Notebook(path, *declared, _allowed(tagged[0]))
+
+
+def source_sha256(cells: list[Any]) -> str:
+    """Hash of what is run of a notebook, or was run of an executed one."""
+    rows = [[cell.cell_type, cell.metadata.get("tags", []), cell.source] for cell in cells]
+    return digest([row for row in rows if "injected-parameters" not in row[1]])  # papermill's own
 
 
 def _imports(path: Path, cells: list[str]) -> frozenset[str]:
@@ -117,6 +133,11 @@ def _assignments(source: str, path: Path) -> dict[str, Any]:
             f"{path}: its parameters cell is not `name = value` lines with literal values; rewrite it so"
         ) from None
     return values
+
+
+def _allowed(source: str) -> dict[str, str]:
+    above = {name: text.replace("\n# ", " ") for text, name in _COMMENTED.findall(source)}
+    return {name: found[1] for name, text in above.items() if (found := re.search(r"\[(.+)\]", text))}
 
 
 def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
@@ -147,12 +168,10 @@ def read_profile(path: Path, name: str, notebooks: list[Notebook]) -> Profile:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: not TOML ({error}); correct the file") from None
     after = content.pop("after", {})
-    if name not in content:
-        raise InputError(f"{path}: has no profile '{name}'; choose one of {', '.join(sorted(content))}")
+    refuse_unknown(f"{path}: profile", name, sorted(content))
     known = {notebook.name: notebook for notebook in notebooks}
     for notebook in [*content[name], *after, *(item for items in after.values() for item in items)]:
-        if notebook not in known:
-            raise InputError(f"{path}: names notebook '{notebook}'; known are {', '.join(known)}")
+        refuse_unknown(f"{path}: notebook", notebook, known)
     try:
         TopologicalSorter(after).prepare()
     except CycleError as error:
@@ -178,7 +197,7 @@ def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> 
     Raises
     ------
     InputError
-        Naming the unknown parameter and the known ones, or the type that was expected.
+        Naming the unknown parameter and the known ones, or the type and range that were expected.
 
     Examples
     --------
@@ -191,30 +210,56 @@ def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> 
     hicp_lib.core.errors.InputError: -p seed: 05_tiny: 'seed' is "one"; expected an integer such as 0
     """
     for name, value in given.items():
-        if name not in notebook.defaults:
-            known = ", ".join(notebook.defaults) or "none"
-            raise InputError(f"{origin}: {notebook.name} has no parameter '{name}'; known are {known}")
+        refuse_unknown(f"{origin}: {notebook.name}: parameter", name, notebook.defaults)
         default = notebook.defaults[name]
-        expected, several = type(default), isinstance(value, list) and is_path(name, default)
-        if not all(_fits(one, expected) for one in (value if several else [value])):
+        several = isinstance(value, list) and is_path(name, default)
+        allowed = notebook.allowed.get(name, "")
+        if (
+            several
+            and not value
+            or not all(_fits(v, default, allowed) for v in (value if several else [value]))
+        ):
             raise InputError(
-                f"{origin}: {notebook.name}: '{name}' is {json.dumps(value, default=str)}; "
-                f"expected {_article(expected)} such as {default!r}"
+                f"{origin}: {notebook.name}: '{name}' is {json.dumps(value, default=str)[:_SHOWN]}; "
+                f"expected {_article(type(default))} such as {default!r}{allowed and f' [{allowed}]'}"
             )
     return given
 
 
-def _fits(value: Any, expected: type) -> bool:
-    if expected is type(None):
-        return True
-    if expected is float:
-        return isinstance(value, (int, float)) and not isinstance(value, bool)
-    return type(value) is expected
+def _fits(value: Any, default: Any, allowed: str) -> bool:
+    """Whether a value is of the kind of the default, and all numbers in it in the range that is allowed."""
+    if isinstance(default, bool | None):
+        return default is None or isinstance(value, bool)
+    if isinstance(default, int | float):
+        is_number = type(value) is int or isinstance(default, float) and type(value) is float
+        return is_number and abs(value) < _MOST and _is_in_range(value, allowed)
+    if type(value) is not type(default):
+        return False
+    if isinstance(default, str):
+        choices = re.findall('"(.+?)"', allowed)
+        is_one = value in choices if default in choices and len(choices) > 1 else value or not default
+        return bool(is_one) and value.isprintable()
+    if isinstance(default, dict):
+        return all(_fits(one, known, allowed) for one in value.values() for known in [*default.values()][:1])
+    if any(value.count(one) > 1 for one in value) or allowed.startswith("two ") and len(value) != 2:
+        return False
+    if not value:
+        return not default or "some or none" in allowed
+    return all(_fits(one, kind, allowed) for one in value for kind in default[:1])
+
+
+def _is_in_range(value: float, allowed: str) -> bool:
+    """Whether a number is in the range that words such as "1 or more" or "0 to below 1" say."""
+    low, high = _FROM.search(allowed), _UP_TO.search(allowed)
+    least = float(low[low.lastindex or 0]) if low else 0.0 if "standard deviation" in allowed else -_MOST
+    most = float(high[1]) if high else _MOST
+    is_low_enough = value < most if high and "below" in high[0] else value <= most
+    return is_low_enough and (value > least if low and low[0].startswith("above") else value >= least)
 
 
 def _article(kind: type) -> str:
-    names = {int: "an integer", float: "a number", bool: "true or false", str: "text", list: "a list"}
-    return names.get(kind, f"a {kind.__name__}")
+    names = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
+    return (names | {list: "a list of different values"}).get(kind, f"a {kind.__name__}")
 
 
 def is_path(name: str, default: Any) -> bool:
@@ -256,12 +301,10 @@ def parse_overrides(pairs: list[tuple[str, str]], notebooks: list[Notebook]) -> 
     {'05_tiny': {'seed': 3, 'detectors': ['openpose', 'mmpose']}}
     """
     overrides: dict[str, dict[str, Any]] = {notebook.name: {} for notebook in notebooks}
+    known = sorted({name for notebook in notebooks for name in notebook.defaults})
     for name, text in pairs:
-        users = [notebook for notebook in notebooks if name in notebook.defaults]
-        if not users:
-            known = ", ".join(sorted({key for notebook in notebooks for key in notebook.defaults})) or "none"
-            raise InputError(f"-p {name}: no notebook has such a parameter; known are {known}")
-        for notebook in users:
+        refuse_unknown("-p: parameter", name, known)
+        for notebook in (notebook for notebook in notebooks if name in notebook.defaults):
             value = _parse(name, text, notebook.defaults[name])
             overrides[notebook.name] |= check_parameters(notebook, {name: value}, f"-p {name}")
     return overrides
@@ -269,13 +312,10 @@ def parse_overrides(pairs: list[tuple[str, str]], notebooks: list[Notebook]) -> 
 
 def _parse(name: str, text: str, default: Any) -> Any:
     """`text` as a value of the type of `default`; unchanged text when it is not one."""
-    try:
-        value = json.loads(text)
-    except json.JSONDecodeError:
-        value = text
+    value = json_or_text(text)
     if text and is_path(name, default):
         several = isinstance(value, list)
-        paths = [str(Path(str(one)).resolve()) for one in (value if several else [text])]
+        paths = [os.path.abspath(str(one)) for one in (value if several else [text])]
         return paths if several else paths[0]
     if isinstance(default, list) and not text.startswith("["):
         first = default[0] if default else ""

@@ -11,10 +11,10 @@ In a page of `book/`, between double braces:
     data("paper.json")                                a JSON file of `data/`, for loops over its rows
     repetition()                                      this run beside the profile's reference run
 
-A name that no result file has stops the build.
+A name that no result file has stops the build. Texts are shown as they are, whatever is in them; what is
+Markdown, as texts of `data` may be, says so: `data("paper.json").why | safe`.
 """
 
-import html
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,9 +22,11 @@ from typing import Any
 
 import jinja2
 import pandas as pd
+from markupsafe import Markup
 
 from hicp_lib.core.datafiles import DATA_DIR, REFERENCE_DIR
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.escape import escaped
 from hicp_lib.core.files import read_json
 from hicp_lib.report import repetition
 
@@ -74,7 +76,7 @@ class Results:
         """A recorded value as it is, for conditions in a template."""
         return self._entry(notebook, "values.json", name)
 
-    def table(self, notebook: str, name: str, columns: list[str] | None = None, digits: int = 2) -> str:
+    def table(self, notebook: str, name: str, columns: list[str] | None = None, digits: int = 2) -> Markup:
         """A saved table in Markdown; what is missing is a dash.
 
         Parameters
@@ -96,13 +98,13 @@ class Results:
         table = pd.read_parquet(path)
         return markdown_table(table[columns] if columns else table, digits)
 
-    def figure(self, notebook: str, name: str) -> str:
+    def figure(self, notebook: str, name: str) -> Markup:
         """A saved figure as HTML, with a link to the notebook that made it."""
         texts = self._entry(notebook, "captions.json", name)
         source = f"results/{self.profile}/{notebook}/{texts['file']}"
-        return (
-            f'<figure class="hicp"><img src="{source}" alt="{html.escape(texts["alt"])}">'
-            f"<figcaption>{html.escape(texts['caption'])} "
+        return Markup(
+            f'<figure class="hicp"><img src="{source}" alt="{escaped(texts["alt"])}">'
+            f"<figcaption>{escaped(texts['caption'])} "
             f'<a href="notebooks/{notebook}.html#{name}">How it was made</a></figcaption></figure>'
         )
 
@@ -147,7 +149,7 @@ class Results:
         return entries[name]
 
 
-def markdown_table(table: pd.DataFrame, digits: int = 2) -> str:
+def markdown_table(table: pd.DataFrame, digits: int = 2) -> Markup:
     """A table in Markdown, numbers rounded to `digits` decimals; what is missing is a dash.
 
     Examples
@@ -155,18 +157,17 @@ def markdown_table(table: pd.DataFrame, digits: int = 2) -> str:
     >>> print(markdown_table(pd.DataFrame({"detector": ["a|b"], "AP": [0.714]})))
     | detector | AP |
     |---|---|
-    | a\\|b | 0.71 |
+    | a&#124;b | 0.71 |
     """
 
     def cell(value: Any) -> str:
         if value is None or value is pd.NA or value != value:
             return "–"
-        text = f"{value:.{digits}f}" if isinstance(value, float) else str(value)
-        return text.replace("|", "\\|").replace("\n", " ")
+        return f"{value:.{digits}f}" if isinstance(value, float) else escaped(value)
 
     rows = [list(table.columns), *table.itertuples(index=False)]
     lines = ["| " + " | ".join(cell(value) for value in row) + " |" for row in rows]
-    return "\n".join([lines[0], "|" + "---|" * len(table.columns), *lines[1:]])
+    return Markup("\n".join([lines[0], "|" + "---|" * len(table.columns), *lines[1:]]))
 
 
 def render_page(source: Path, results: Results, profile: str) -> str:
@@ -190,6 +191,7 @@ def render_page(source: Path, results: Results, profile: str) -> str:
         If the page uses a name that does not exist, or is not a valid template.
     """
     environment = jinja2.Environment(undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.finalize = lambda value: escaped(value) if type(value) is str else value  # not of Markup
     offered = ("value", "raw", "table", "figure", "stamp", "repetition")
     names = {name: getattr(results, name) for name in offered}
     names |= {"data": lambda name: json.loads((DATA_DIR / name).read_text())}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -12,7 +11,9 @@ from pathlib import Path
 from typing import IO, Any, cast
 
 from hicp_lib.core.checkout import EARLIER_RESULTS_VARIABLE, PROFILE_VARIABLE, RESULTS_VARIABLE
+from hicp_lib.core.children import child_environment
 from hicp_lib.core.files import write_json
+from hicp_lib.core.limited import raised
 from hicp_lib.report.notebooks import Notebook
 
 WALL_LIMIT_S = 2 * 3600
@@ -103,22 +104,21 @@ class Children:
         """
         if self._ended:
             raise RunError("was not run, the report was stopped")
-        folder = run.notebook.path.parent.resolve()
-        defaults = run.notebook.defaults
-        changed = {name: value for name, value in run.parameters.items() if value != defaults[name]}
-        job = {"notebook": str(run.notebook.path), "output": str(copy), "folder": str(folder)}
+        changed = {k: value for k, value in run.parameters.items() if value != run.notebook.defaults[k]}
+        path = run.notebook.path.resolve()
+        job = {"input_path": str(path), "output_path": str(copy), "cwd": str(path.parent)}
         write_json(staging / "job.json", job | {"parameters": changed})
         command = [sys.executable, "-m", "hicp_lib.report.execute", str(staging / "job.json")]
         with open(staging / "log.txt", "wb") as log, tempfile.TemporaryDirectory(prefix="hicp-") as private:
-            streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": log, "stderr": log}
             environment = _environment(staging, folders, private)
             # In a session of its own: what ends the report's whole process group must not end this one
             # before it has ended the kernel's workers.
+            streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": log, "stderr": log}
             process = subprocess.Popen(command, **streams, env=environment, start_new_session=True)
             pipe = cast(IO[bytes], process.stdin)
             self._pipes.add(pipe)
             try:
-                return process.wait(WALL_LIMIT_S)
+                return process.wait(raised(WALL_LIMIT_S))
             except subprocess.TimeoutExpired:
                 return None
             finally:
@@ -131,7 +131,7 @@ def _environment(staging: Path, folders: Folders, private: str) -> dict[str, str
     """A kernel's environment: nothing of the user's own set-up may move a number or a pixel."""
     import matplotlib
 
-    return os.environ | {
+    return child_environment() | {
         RESULTS_VARIABLE: str(staging / "results"),
         EARLIER_RESULTS_VARIABLE: str(folders.results.resolve()),
         PROFILE_VARIABLE: folders.profile,

@@ -13,21 +13,26 @@ import tempfile
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import nbformat
 import psutil
 
-from hicp_lib.core.cache import Code, code, digest, input_sha256
+from hicp_lib.core.cache import code, digest, input_sha256
 from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, sha256_file, write_json
-from hicp_lib.report.notebooks import is_path
+from hicp_lib.core.limited import LIMITS_VARIABLE, raised
+from hicp_lib.report.notebooks import is_path, read_notebook, source_sha256
 from hicp_lib.report.run import WALL_LIMIT_S, Children, Folders, Run, RunError
 from hicp_lib.report.schedule import needed, run_when_ready
 from hicp_lib.study import provenance
 
+Earlier = Callable[[], list[str]]
+"""Digests of the runs before one, as they are when it is called."""
 MEMORY_PER_RUN_BYTES = 2 * 10**9
 """What one notebook may need with its workers; the study's largest takes 0.7 GB without them."""
 
@@ -67,8 +72,10 @@ def run_all(runs: list[Run], folders: Folders, log: Callable[[str], None], only:
     n_workers = n_parallel()
     with ThreadPoolExecutor(n_workers) as pool, Children() as children:
 
-        def job(name: str, before: list[Future]) -> str:
-            return _bring_up_to_date(named[name], before, folders, children, log)
+        def job(name: str, before: list[Future]) -> None:
+            if any(future.exception() for future in before):
+                raise _SkippedError
+            _bring_up_to_date(named[name], partial(_made, after[name], folders), folders, children, log)
 
         done = run_when_ready(after, job, pool, n_workers)
     for error in (done[name].exception() for name in after):
@@ -86,20 +93,24 @@ class _SkippedError(Exception):
     """A notebook that was not run because one before it failed."""
 
 
-def _bring_up_to_date(run: Run, before: list[Future], folders: Folders, children: Children, log) -> str:
-    """Run the notebook unless it is fresh; its key's digest."""
-    if any(future.exception() for future in before):
-        raise _SkippedError
-    name, key = run.notebook.name, run_key(run, [future.result() for future in before])
+def _made(names: list[str], folders: Folders) -> list[str]:
+    """Of earlier notebooks, what tells their results from others."""
+    return [digest([read_stamp(folders.executed / f"{name}.json"), outputs(name, folders)]) for name in names]
+
+
+def _bring_up_to_date(
+    run: Run, earlier: Earlier, folders: Folders, children: Children, log: Callable
+) -> None:
+    """Run the notebook unless it is fresh."""
+    name, key = run.notebook.name, run_key(run, earlier())
     reason = why_stale(name, key, folders)
     if reason is None:
         log(f"{name}: unchanged")
-    else:
-        log(f"{name}: running ({reason}) ...")
-        start_s = time.perf_counter()
-        run_notebook(run, key, folders, children)
-        log(f"{name}: done in {time.perf_counter() - start_s:.1f} s")
-    return digest(key)
+        return
+    log(f"{name}: running ({reason}) ...")
+    start_s = time.perf_counter()
+    _run_notebook(run, key, earlier, folders, children)
+    log(f"{name}: done in {time.perf_counter() - start_s:.1f} s")
 
 
 def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
@@ -109,7 +120,7 @@ def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
     ----------
     run : Run
     before : list of str, optional
-        Digests of the keys of the runs before it.
+        Digests of the runs before it.
 
     Returns
     -------
@@ -120,7 +131,7 @@ def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
     InputError
         If a parameter names a file or folder that does not exist.
     """
-    made_by = _made_by(run)
+    made_by = code([*run.notebook.imports, "hicp_lib.report.execute"])
     inputs = {name: input_sha256(path) for name, path in _input_paths(run).items()}
     return {
         "notebook": run.notebook.source_sha256,
@@ -133,10 +144,6 @@ def run_key(run: Run, before: list[str] | None = None) -> dict[str, Any]:
         "input files": digest(inputs),
         "earlier notebooks": digest(before or []),
     }
-
-
-def _made_by(run: Run) -> Code:
-    return code([*run.notebook.imports, "hicp_lib.report.execute"])
 
 
 def _input_paths(run: Run) -> dict[str, Path]:
@@ -168,7 +175,7 @@ def why_stale(name: str, key: dict[str, Any], folders: Folders) -> str | None:
         return "no complete run yet"
     if changed := [part for part in key if stamp["key"].get(part) != key[part]]:
         return f"changed: {', '.join(changed)}"
-    return None if stamp["outputs"] == _outputs(name, folders) else "its outputs were changed"
+    return None if stamp["outputs"] == outputs(name, folders) else "its outputs were changed"
 
 
 def read_stamp(path: Path) -> dict[str, Any] | None:
@@ -180,28 +187,17 @@ def read_stamp(path: Path) -> dict[str, Any] | None:
         return None
 
 
-def _outputs(name: str, folders: Folders) -> dict[str, str]:
+def outputs(name: str, folders: Folders) -> dict[str, str]:
     """SHA-256 of the executed copy and of every result file."""
     paths = [folders.executed / f"{name}.ipynb", *sorted((folders.results / name).rglob("*"))]
     return {path.relative_to(folders.root).as_posix(): sha256_file(path) for path in paths if path.is_file()}
 
 
-def run_notebook(run: Run, key: dict[str, Any], folders: Folders, children: Children) -> None:
-    """Run a notebook and put its outcome in place of the last one.
+def _run_notebook(run: Run, key: dict, earlier: Earlier, folders: Folders, children: Children) -> None:
+    """Run a notebook and put its outcome, stamped with its key, in place of the last one.
 
-    Parameters
-    ----------
-    run : Run
-    key : dict of str to str
-        As from `run_key`: what its stamp will say.
-    folders : Folders
-    children : Children
-        Runs it, and ends it when the report ends.
-
-    Raises
-    ------
-    RunError
-        If a cell failed, wrote to stderr or took too long, or the results are not those of this run.
+    Raises RunError if a cell failed, wrote to stderr or took too long, the results are not those of this run,
+    or something its key stands for was changed meanwhile.
     """
     name = run.notebook.name
     prefix, parent = f".run-{name}-", folders.executed
@@ -211,15 +207,14 @@ def run_notebook(run: Run, key: dict[str, Any], folders: Folders, children: Chil
         try:
             status = children.execute(run, copy, staging, folders)
             _check(run, status, copy, staging)
-            if digest(_made_by(run).modules) != key["library"]:
-                raise RunError("hicp_lib was changed while it ran; run the report again")
+            _refuse_changed(run, key, copy, earlier)
         except RunError as error:
             raise RunError(f"{name}: {error}{_keep_failed(copy, staging, folders)}") from None
         _discard(name, folders)
         folders.results.mkdir(parents=True, exist_ok=True)
         os.replace(staging / "results" / name, folders.results / name)
         os.replace(copy, folders.executed / copy.name)
-    stamp = {"key": key, "parameters": run.parameters, "outputs": _outputs(name, folders)}
+    stamp = {"key": key, "parameters": run.parameters, "outputs": outputs(name, folders)}
     write_json(folders.executed / f"{name}.json", stamp, indent=2)
 
 
@@ -245,7 +240,8 @@ def _keep_failed(copy: Path, staging: Path, folders: Folders) -> str:
 def _check(run: Run, status: int | None, copy: Path, staging: Path) -> None:
     """Raise RunError unless the executed copy and its results are whole."""
     if status is None:
-        raise RunError(f"took longer than {WALL_LIMIT_S} s and was stopped")
+        took = f"took longer than {raised(WALL_LIMIT_S):g} s and was stopped"
+        raise RunError(f"{took}; run it again to go on, {LIMITS_VARIABLE}=4 allows four times as much")
     if not copy.is_file():
         lines = (staging / "log.txt").read_text(errors="replace").strip().splitlines()
         raise RunError(f"did not run: {lines[-1] if lines else f'exit code {status}'}")
@@ -258,6 +254,15 @@ def _check(run: Run, status: int | None, copy: Path, staging: Path) -> None:
         raise RunError("ended without results; its last line must be `study.finish()`") from None
     if stamp["parameters"] != json.loads(json.dumps(run.parameters)):
         raise RunError("its results state other parameters than it ran with; pass all to `Study`")
+
+
+def _refuse_changed(run: Run, key: dict[str, Any], copy: Path, earlier: Earlier) -> None:
+    """Raise RunError if what was run, or what there is now, is not what the key says; InputError if gone."""
+    now = run_key(replace(run, notebook=read_notebook(run.notebook.path)), earlier())
+    if source_sha256(nbformat.read(copy, as_version=4).cells) != key["notebook"]:
+        now["notebook"] = "another was run"
+    if changed := [part for part in key if now[part] != key[part]]:
+        raise RunError(f"{', '.join(changed)} changed while it ran; run the report again")
 
 
 def first_problem(executed: Path) -> str | None:

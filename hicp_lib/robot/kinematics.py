@@ -47,14 +47,13 @@ class Chain:
 
     def __init__(self, name: str, tables: Tables, rows: Sequence[Row], limits: str):
         self.name = name
-        self.joints = tuple(row.joint for row in rows if row.joint)
-        self.links = tuple(row.link for row in rows)
+        self.joints = tuple(joint for joint, *_ in rows if joint)
+        self.links = tuple(link for _, link, *_ in rows)
         self.limits_rad = np.array([tables.limits_rad[limits][joint] for joint in self.joints])
-        mine = [cable for cable in tables.cables if set(cable.joints) <= set(self.joints)]
-        factors = [cable.joints.get(joint, 0.0) for cable in mine for joint in self.joints]
-        self.cables = np.reshape(factors, (len(mine), len(self.joints)))
-        self.cables_lower_rad = np.array([cable.lower_rad for cable in mine])
-        self.cables_upper_rad = np.array([cable.upper_rad for cable in mine])
+        mine = [(factors, sums) for factors, sums in tables.cables if factors.keys() <= set(self.joints)]
+        rows_of_factors = [[factors.get(joint, 0.0) for joint in self.joints] for factors, _ in mine]
+        self.cables = np.reshape(rows_of_factors, (len(mine), len(self.joints)))
+        self.cables_lower_rad, self.cables_upper_rad = np.reshape([sums for _, sums in mine], (-1, 2)).T
         self._model = _model(tables.T_root_base, rows)
         self._data = self._model.createData()
         self._frames = {link: self._model.getFrameId(link) for link in self.links}
@@ -231,15 +230,11 @@ def _model(T_root_base: np.ndarray, rows: Sequence[Row]) -> pin.Model:
     """A serial model with a joint about z for each row that has one, and a frame after every row."""
     model = pin.Model()
     joint, placement = 0, pin.SE3(T_root_base)
-    for row in rows:
-        if row.joint:
-            joint = model.addJoint(joint, pin.JointModelRZ(), placement, row.joint)
+    for name, link, a_m, d_m, alpha_rad, offset_rad in rows:
+        if name:
+            joint = model.addJoint(joint, pin.JointModelRZ(), placement, name)
             placement = pin.SE3.Identity()
-        placement = placement * _after_joint(row)
-        model.addFrame(pin.Frame(row.link, joint, 0, placement, pin.FrameType.OP_FRAME))
+        turn = pin.SE3(pin.utils.rotate("z", offset_rad), np.array([0.0, 0.0, d_m]))
+        placement = placement * (turn * pin.SE3(pin.utils.rotate("x", alpha_rad), np.array([a_m, 0.0, 0.0])))
+        model.addFrame(pin.Frame(link, joint, 0, placement, pin.FrameType.OP_FRAME))
     return model
-
-
-def _after_joint(row: Row) -> pin.SE3:
-    turn = pin.SE3(pin.utils.rotate("z", row.offset_rad), np.array([0.0, 0.0, row.d_m]))
-    return turn * pin.SE3(pin.utils.rotate("x", row.alpha_rad), np.array([row.a_m, 0.0, 0.0]))

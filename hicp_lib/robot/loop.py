@@ -10,7 +10,7 @@ import numpy as np
 
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.robot.controller import Controller, NoSolution
-from hicp_lib.robot.peripersonal_space import ACTIVATION_THRESHOLD, Obstacle, ReceptiveField, gains, obstacles
+from hicp_lib.robot.peripersonal_space import ACTIVATION_THRESHOLD, Obstacle, ReceptiveField, obstacles
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.skin import Skin, read_skin
 from hicp_lib.robot.tracking import KeypointTracker
@@ -106,8 +106,6 @@ class AvoidanceLoop:
         What a taxel senses.
     tracker : KeypointTracker
         Which keypoints are believed.
-    valence : array, shape (136,)
-        Factors on how threatening each keypoint is, -1 to 1; 0: all alike, as in the paper.
     avoids : bool
         Whether to give way at all; without it the arm keeps its post, and threats are still reported.
     blind_after_s : float
@@ -133,7 +131,6 @@ class AvoidanceLoop:
     skin: Skin = field(default_factory=read_skin)
     sensing: ReceptiveField = field(default_factory=ReceptiveField)
     tracker: KeypointTracker = field(default_factory=KeypointTracker)
-    valence: np.ndarray = field(default_factory=lambda: np.zeros(N_KEYPOINTS))
     avoids: bool = True
     blind_after_s: float = 1.0
 
@@ -183,8 +180,7 @@ class AvoidanceLoop:
         """
         points, weights = self.tracker.points(now_s)
         positions, normals = self.skin.in_root(self.controller.icub, posture)
-        felt = gains(weights, self.valence).ravel()
-        activations = self.sensing.activations(positions, normals, points.reshape(-1, 3), felt)
+        activations = self.sensing.activations(positions, normals, points.reshape(-1, 3), weights.ravel())
         return Threat(activations, obstacles(self.skin, activations, self.controller.settings.onset))
 
     def _stop(self, now_s: float, reason: str) -> Command:

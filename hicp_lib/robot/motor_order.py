@@ -9,25 +9,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.robot.kinematics import ARM_JOINTS, HEAD_JOINTS
 from hicp_lib.robot.tables import read_tables
 
 TOLERANCE_DEG = 5.0  # robots overshoot their limits a little; a swapped order or radians go beyond
 
 
-def head_from_motor_order(torso_deg: ArrayLike, head_deg: ArrayLike) -> np.ndarray:
-    """Angles of `HEAD_JOINTS` from the boards of torso and head.
+def from_motor_order(torso_deg: ArrayLike, limb_deg: ArrayLike, joints: tuple[str, ...]) -> np.ndarray:
+    """Angles of a chain from the boards of the torso and of head or arm.
 
     Parameters
     ----------
     torso_deg : array, shape (..., 3)
         Yaw, roll, pitch.
-    head_deg : array, shape (..., 3 or more)
-        Neck pitch, roll, yaw; what follows (the eyes) is left out.
+    limb_deg : array, shape (..., n - 3 or more)
+        Neck pitch, roll, yaw, or the arm's seven; what follows (eyes, fingers) is left out.
+    joints : tuple of str
+        The chain's n, `HEAD_JOINTS` or `ARM_JOINTS` of `hicp_lib.robot.kinematics`.
 
     Returns
     -------
-    array, shape (..., 6)
+    array, shape (..., n)
         Radians.
 
     Raises
@@ -37,36 +38,10 @@ def head_from_motor_order(torso_deg: ArrayLike, head_deg: ArrayLike) -> np.ndarr
 
     Examples
     --------
-    >>> np.rad2deg(head_from_motor_order([30, 20, 10], [1, 2, 3, 0, 0, 0])).round(9)
+    >>> from hicp_lib.robot.kinematics import HEAD_JOINTS
+    >>> np.rad2deg(from_motor_order([30, 20, 10], [1, 2, 3, 0, 0, 0], HEAD_JOINTS)).round(9)
     array([10., 20., 30.,  1.,  2.,  3.])
     """
-    return _join(torso_deg, head_deg, HEAD_JOINTS)
-
-
-def arm_from_motor_order(torso_deg: ArrayLike, arm_deg: ArrayLike) -> np.ndarray:
-    """Angles of `ARM_JOINTS` from the boards of torso and arm.
-
-    Parameters
-    ----------
-    torso_deg : array, shape (..., 3)
-        Yaw, roll, pitch.
-    arm_deg : array, shape (..., 7 or more)
-        What follows (the fingers) is left out.
-
-    Returns
-    -------
-    array, shape (..., 10)
-        Radians.
-
-    Raises
-    ------
-    InputError
-        As `head_from_motor_order`.
-    """
-    return _join(torso_deg, arm_deg, ARM_JOINTS)
-
-
-def _join(torso_deg: ArrayLike, limb_deg: ArrayLike, joints: tuple[str, ...]) -> np.ndarray:
     torso, limb = np.asarray(torso_deg, dtype=float), np.asarray(limb_deg, dtype=float)
     n_limb = len(joints) - 3
     if torso.shape[-1:] != (3,) or limb.ndim != torso.ndim or limb.shape[-1] < n_limb:
@@ -74,16 +49,13 @@ def _join(torso_deg: ArrayLike, limb_deg: ArrayLike, joints: tuple[str, ...]) ->
         shapes = f"joint angles of shapes {torso.shape} and {limb.shape}"
         raise InputError(f"{shapes}: {expected}; give as many rows of both")
     angles = np.concatenate([torso[..., ::-1], limb[..., :n_limb]], axis=-1)
-    _check(angles.reshape(-1, len(joints)), joints)
-    return np.deg2rad(angles)
-
-
-def _check(angles_deg: np.ndarray, joints: tuple[str, ...]) -> None:
-    limits = np.rad2deg([read_tables().limits_rad["table"][joint] for joint in joints])
-    possible = (angles_deg >= limits[:, 0] - TOLERANCE_DEG) & (angles_deg <= limits[:, 1] + TOLERANCE_DEG)
+    limits_deg = np.rad2deg([read_tables().limits_rad["table"][joint] for joint in joints])
+    low_deg, high_deg = (limits_deg + (-TOLERANCE_DEG, TOLERANCE_DEG)).T
+    possible = (angles >= low_deg) & (angles <= high_deg)
     if not possible.all():
-        row, column = np.argwhere(~possible)[0]
-        low, high = limits[column]
-        wrong = f"{angles_deg[row, column]:g} degrees, expected {low:g} to {high:g}"
+        row, column = np.argwhere(~possible.reshape(-1, len(joints)))[0]
+        low, high = limits_deg[column]
+        wrong = f"{angles.reshape(-1, len(joints))[row, column]:g} degrees, expected {low:g} to {high:g}"
         hint = "give degrees, the torso as yaw, roll, pitch"
         raise InputError(f"joint angles: row {row}, {joints[column]}: {wrong}; {hint}")
+    return np.deg2rad(angles)

@@ -81,7 +81,7 @@ class ReceptiveField:
         points_m : array, shape (m, 3)
             What is not finite is left out.
         gains : array, shape (m,)
-            Factor on the response to each point, at least 0; see `gains`.
+            Factor on the response to each point, at least 0.
 
         Returns
         -------
@@ -173,29 +173,6 @@ def response(distance_m: ArrayLike) -> np.ndarray:
     array([0.96, 0.43, 0.02])
     """
     return _parzen(np.asarray(distance_m, dtype=float)) / _highest()
-
-
-def gains(weights: ArrayLike, valence: ArrayLike = 0.0) -> np.ndarray:
-    """Factors on the responses to points: how far they are believed, times `1 + min(1, valence)`.
-
-    Parameters
-    ----------
-    weights : float or array
-        0 to 1, how far each point is believed.
-    valence : float or array, optional
-        -1 to 1; 0 neutral, 1 doubles the response, -0.5 halves it.
-
-    Returns
-    -------
-    array
-        Of the arguments' shape.
-
-    Examples
-    --------
-    >>> gains(np.array([1.0, 0.5]), np.array([-0.5, 1.0]))
-    array([0.5, 1. ])
-    """
-    return np.asarray(weights) * (1 + np.clip(valence, -1.0, 1.0))
 
 
 def obstacles(skin: Skin, activations: np.ndarray, threshold: float = ACTIVATION_THRESHOLD) -> list[Obstacle]:

@@ -10,22 +10,9 @@ import numpy as np
 
 from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
+from hicp_lib.robot.tables import read_tables
 
 _TIPS_M = 0.075  # from the origin of the hand's link along its x axis to the fingertips
-_ARM = (
-    ("upper_arm", "shoulder_pitch", "upper_arm", 0.035),
-    ("forearm", "elbow", "forearm", 0.03),
-    ("hand", "forearm", "hand", 0.025),
-    ("fingers", "hand", "tips", 0.036),
-)
-_CAPSULES = (
-    ("torso", "root", "head torso", 0.07),
-    ("shoulders", "left shoulder_pitch", "right shoulder_pitch", 0.05),
-    ("neck", "head torso", "head neck_roll", 0.03),
-    ("head", "head neck_roll", "head head", 0.06),
-    *((f"{s}_{part}", f"{s} {a}", f"{s} {b}", r_m) for s in ("left", "right") for part, a, b, r_m in _ARM),
-)
-"""Part, chain and link where it begins and where it ends, radius in metres; fingers with the thumb."""
 
 
 class Segment(NamedTuple):
@@ -69,7 +56,10 @@ def body_segments(icub: ICub, posture: Posture) -> list[Segment]:
     origin_m = {link: T[:3, 3] for link, T in poses.items()}
     for side in ("left", "right"):
         origin_m[f"{side} tips"] = origin_m[f"{side} hand"] + _TIPS_M * poses[f"{side} hand"][:3, 0]
-    return [Segment(part, origin_m[start], origin_m[end], radius) for part, start, end, radius in _CAPSULES]
+    return [
+        Segment(part, origin_m[start], origin_m[end], radius_m)
+        for part, start, end, radius_m in read_tables().capsules
+    ]
 
 
 def link_poses(icub: ICub, posture: Posture, mount: str = "tilted") -> dict[str, np.ndarray]:

@@ -22,43 +22,13 @@ Read = TypeVar("Read")
 _MAX_SKEW = 1e-4  # by which a rotation may differ from the nearest one: numbers are rounded
 
 
-@dataclass(frozen=True)
-class Row:
-    """One row of a Denavit-Hartenberg table.
+Row = tuple[str | None, str, float, float, float, float]
+"""One row of a Denavit-Hartenberg table: joint (without one it is held at zero), the frame after the row,
+a and d (metres), alpha and offset (radians)."""
 
-    Attributes
-    ----------
-    joint : str or None
-        Without one it is held at zero.
-    link : str
-        The frame after the row.
-    a_m, d_m : float
-    alpha_rad, offset_rad : float
-    """
-
-    joint: str | None
-    link: str
-    a_m: float
-    d_m: float
-    alpha_rad: float
-    offset_rad: float
-
-
-@dataclass(frozen=True)
-class Cable:
-    """A bound on a sum of joint angles, from the cables inside the shoulder.
-
-    Attributes
-    ----------
-    joints : dict of str to float
-        Joint -> factor.
-    lower_rad, upper_rad : float
-        Infinite where open.
-    """
-
-    joints: dict[str, float]
-    lower_rad: float
-    upper_rad: float
+Cable = tuple[dict[str, float], tuple[float, float]]
+"""A bound on a sum of joint angles, from the cables inside the shoulder: joint -> factor; lowest and highest
+sum in radians, infinite where open."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +50,9 @@ class Tables:
         Name of the camera holder -> pose of the colour camera in the head-centre frame.
     parts : dict of str to tuple of str
         Part of the skin -> (chain, link) whose frame it is described in.
+    capsules : tuple of tuple
+        Part of the body, chain and link where it begins and where it ends ("tips" are a hand's), radius in
+        metres; fingers with the thumb.
     """
 
     T_root_base: np.ndarray
@@ -89,6 +62,7 @@ class Tables:
     cables: tuple[Cable, ...]
     T_head_camera: dict[str, np.ndarray]
     parts: dict[str, tuple[str, str]]
+    capsules: tuple[tuple[str, str, str, float], ...]
 
 
 @memoised(4)
@@ -168,12 +142,15 @@ def _tables(data: dict[str, Any]) -> Tables:
             name: _transform(holder["T_head_camera_m"]) for name, holder in data["camera_mounts"].items()
         },
         parts={name: (part["chain"], part["link"]) for name, part in data["parts"].items()},
+        capsules=tuple(
+            (part, begin, end, float(radius_m)) for part, begin, end, radius_m in data["capsules"]
+        ),
     )
 
 
 def _rows(rows: list[list[Any]]) -> tuple[Row, ...]:
     return tuple(
-        Row(joint, link, float(a), float(d), np.deg2rad(float(alpha)), np.deg2rad(float(offset)))
+        (joint, link, float(a), float(d), np.deg2rad(float(alpha)), np.deg2rad(float(offset)))
         for joint, link, a, d, alpha, offset in rows
     )
 
@@ -189,8 +166,8 @@ def _limits(limits_deg: dict[str, list[float]]) -> dict[str, tuple[float, float]
 
 def _cable(cable: dict[str, Any]) -> Cable:
     given = zip(cable["limits_deg"], (-np.inf, np.inf), strict=True)
-    lower_rad, upper_rad = (float(np.deg2rad(none if limit is None else limit)) for limit, none in given)
-    return Cable({joint: float(factor) for joint, factor in cable["joints"].items()}, lower_rad, upper_rad)
+    low_rad, high_rad = (float(np.deg2rad(none if limit is None else limit)) for limit, none in given)
+    return {joint: float(factor) for joint, factor in cable["joints"].items()}, (low_rad, high_rad)
 
 
 def _transform(rows: list[list[float]]) -> np.ndarray:

@@ -17,6 +17,8 @@ from hicp_lib.robot.loop import AVOIDING
 
 MARKS_M = (0.05, 0.10)
 """Clearances that are asked for."""
+UNTIL = {"in the first reach": "reach_m", "until they leave": "min_distance_m"}
+"""Until when a least distance is: the column of `metrics` that has it."""
 FIELD_M = 0.25
 """The person is near the robot's skin when nearer than this: about where its receptive fields begin."""
 REACH_M = 0.4  # keypoints this near the post can threaten the hand
@@ -73,21 +75,36 @@ def over_people(table: pd.DataFrame, by: Sequence[str], of: str = "min_distance_
     rows = []
     for group, part in table.groupby(list(by), sort=False):
         people = part["script"] + part["subject"].astype(str)
-        row = dict(zip(by, group, strict=True))
         interval = mean_with_interval(part[of], people, subjects=people)
-        row |= dict(zip(("value", "low", "high"), interval, strict=True))
+        row = dict(zip([*by, "value", "low", "high"], (*group, *interval), strict=True))
         for mark_m in MARKS_M:
-            kept, name = part[of] >= mark_m, f"kept_{100 * mark_m:.0f}cm"
-            low, high = _wilson(int(kept.sum()), len(kept))
-            row |= {name: kept.mean(), f"{name}_low": low, f"{name}_high": high}
+            name = f"kept_{100 * mark_m:.0f}cm"
+            row |= zip((name, f"{name}_low", f"{name}_high"), _share(part[of] >= mark_m), strict=True)
         rows.append(row | {"n_people": people.nunique()})
     return pd.DataFrame(rows)
 
 
-def _wilson(k: int, n: int) -> tuple[float, float]:
-    """Wilson's score interval of a share k/n."""
+def clearance(table: pd.DataFrame) -> pd.DataFrame:
+    """`over_people` for each of `UNTIL`, of all conditions: a column `until`, and its own.
+
+    Parameters
+    ----------
+    table : pd.DataFrame
+        As from `metrics`.
+
+    Returns
+    -------
+    pd.DataFrame
+    """
+    parts = {until: over_people(table, ["detector", "gains"], of) for until, of in UNTIL.items()}
+    return pd.concat(parts, names=["until"]).reset_index(level=0)
+
+
+def _share(flags: pd.Series) -> tuple[float, float, float]:
+    """How many of flags are set, with Wilson's score interval."""
+    k, n = int(flags.sum()), len(flags)
     centre, half = (k + Z**2 / 2) / (n + Z**2), Z / (n + Z**2) * np.sqrt(k * (n - k) / n + Z**2 / 4)
-    return max(centre - half, 0.0), min(centre + half, 1.0)  # rounding may leave them
+    return k / n, max(centre - half, 0.0), min(centre + half, 1.0)  # rounding may leave them
 
 
 def reasons(table: pd.DataFrame) -> pd.DataFrame:
@@ -123,13 +140,10 @@ def false_retreats(table: pd.DataFrame) -> pd.DataFrame:
         Columns `script, detector, value, low, high` (share of people, Wilson's interval), `retreat_m` (the
         largest), `n_people`.
     """
-    rows = []
-    for (script, detector), part in table.groupby(["script", "detector"], sort=False):
-        moved, n = int((part["retreat_m"] > MOVED_M).sum()), len(part)
-        row = {"script": script, "detector": detector, "value": moved / n}
-        row |= dict(zip(("low", "high"), _wilson(moved, n), strict=True))
-        rows.append(row | {"retreat_m": part["retreat_m"].max(), "n_people": n})
-    return pd.DataFrame(rows)
+    case = ["script", "detector"]
+    retreats = table.groupby(case, sort=False)["retreat_m"]
+    rows = [(*group, *_share(of_m > MOVED_M), of_m.max(), len(of_m)) for group, of_m in retreats]
+    return pd.DataFrame(rows, columns=[*case, "value", "low", "high", "retreat_m", "n_people"])
 
 
 def model_check(table: pd.DataFrame, swept: pd.DataFrame, follow_m_s: float) -> pd.DataFrame:
@@ -222,14 +236,14 @@ def measured_times(runs: Iterable[Run]) -> pd.DataFrame:
     the images, those that took no longer than `inference_s`). The first image of a run is left out: the
     detector is made ready with it.
     """
-    runs, table = [run for run in runs if len(run.frames)], []
+    runs, rows = [run for run in runs if len(run.frames)], []
     for detector, latency in {run.job.detector: run.job.latency for run in runs}.items():
         frames = [run.frames for run in runs if run.job.detector == detector]
         times_ms = np.concatenate([part["time_ms"].to_numpy()[1:] for part in frames])
-        row = {"detector": detector, "inference_s": latency.inference_s, "latency_s": latency.total_s}
-        row |= dict(zip(("median_ms", "p99_ms"), np.percentile(times_ms, (50, 99)), strict=True))
-        table.append(row | {"within_share": np.mean(times_ms <= 1e3 * latency.inference_s)})
-    return pd.DataFrame(table)
+        measured = *np.percentile(times_ms, (50, 99)), np.mean(times_ms <= 1e3 * latency.inference_s)
+        rows.append((detector, latency.inference_s, latency.total_s, *measured))
+    columns = ["detector", "inference_s", "latency_s", "median_ms", "p99_ms", "within_share"]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def _metrics(run: Run) -> dict:
@@ -258,8 +272,8 @@ def _sightings(run: Run, near_s: np.ndarray) -> dict:
     sights = [sure_keypoints(frame) for _, frame in frames.iterrows()]
     seen = np.array([is_sure.any() for _, is_sure, _ in sights], bool)
     times = np.concatenate([[near_s[0]], frames["t_s"].to_numpy()[seen], [near_s[-1]]])
-    shares = {"seen_share": seen.mean(), "head_share": np.mean([_shows_head(*sight) for sight in sights])}
-    return {name: float(share) for name, share in shares.items()} | {"blind_s": float(np.diff(times).max())}
+    numbers = seen.mean(), np.mean([_shows_head(*sight) for sight in sights]), np.diff(times).max()
+    return dict(zip(("seen_share", "head_share", "blind_s"), map(float, numbers), strict=True))
 
 
 def _shows_head(points_m: np.ndarray, is_sure: np.ndarray, truth_m: np.ndarray) -> bool:

@@ -12,10 +12,12 @@ import pandas as pd
 from hicp_lib.core.cached_tables import cached
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.keypoints import BODY
 from hicp_lib.detectors.runtime.results import detections_of
 from hicp_lib.detectors.runtime.run import detect_images
 from hicp_lib.evaluation.cases import labelled, over_people
 from hicp_lib.evaluation.space import mocap_error
+from hicp_lib.evaluation.space.error_sources import true_detections
 from hicp_lib.evaluation.space.lifting_ablation import N_STEPS, lifting_errors, sigma_coverage, summary
 from hicp_lib.evaluation.space.occlusion import joint_occlusion
 from hicp_lib.evaluation.space.stability import POSITION, position_array
@@ -26,7 +28,7 @@ from hicp_lib.mocap.registration import Registration
 from hicp_lib.mocap.synchronisation import ClockOffset, clock_offset
 from hicp_lib.recordings.qualisys import MotionCapture, read_mocap
 from hicp_lib.recordings.recording import MOCAP_FILE, Recording, read_simulation, read_truth
-from hicp_lib.study.mocap_floor import perfect_detections
+from hicp_lib.study.plots.palette import PERFECT
 from hicp_lib.study.registration import Registered
 
 _CLOCKS = [
@@ -131,6 +133,25 @@ def detect_frames(recording: Recording, detectors: Sequence[str]) -> dict[str, l
     return {detector: list(detections_of(detect_images(detector, paths)).values()) for detector in detectors}
 
 
+def perfect_detections(recording: Recording) -> dict[str, list[Detections]]:
+    """The body's true keypoints in every frame, hidden ones too, with scores of 1.
+
+    Markers lie on the skin, joints below it, and depth sees the skin: the floor that detectors are compared
+    with is some centimetres. It is no bound: errors that lean towards the skin may bring a detector below.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    dict of str to list of Detections
+        Under `PERFECT`, in the order of the frames; empty where the truth is not known.
+    """
+    truth = read_truth(recording)
+    return {} if truth is None else {PERFECT: true_detections(truth, len(recording), BODY)}
+
+
 def lift_frames(
     recording: Recording, found: Mapping[str, Sequence[Detections]]
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -204,18 +225,16 @@ def medians_under(
         Column `registration`, then as from `median_errors`, score above 0.1; the exact transform, where it is
         known, comes last.
     """
-    errors, least = dict[str, tuple[list, list]](), mocap_error.MIN_SCORES[-1:]
+    errors: dict[str, list[tuple[pd.DataFrame, int]]] = {}
     for one, lifted in zip(registered, points, strict=True):
         exact = [] if one.exact is None else [Registration("exact", one.exact)]
         for fit in [*one.fits, *exact]:
-            tables, n_frames = errors.setdefault(fit.method, ([], []))
-            tables.append(mocap_error.mocap_errors(lifted, one.reference(fit, mocap_error.TABLE_JOINTS)))
-            n_frames.append(len(one.recording))
-    medians = [
-        labelled(mocap_error.median_errors(over_people(*of), least, draws), registration=method)
-        for method, of in errors.items()
-    ]
-    return pd.concat(medians, ignore_index=True)
+            table = mocap_error.mocap_errors(lifted, one.reference(fit, mocap_error.TABLE_JOINTS))
+            errors.setdefault(fit.method, []).append((table, len(one.recording)))
+    of_all = {method: over_people(*zip(*of, strict=True)) for method, of in errors.items()}
+    least = mocap_error.MIN_SCORES[-1:]
+    medians = {method: mocap_error.median_errors(table, least, draws) for method, table in of_all.items()}
+    return pd.concat([labelled(of, registration=method) for method, of in medians.items()], ignore_index=True)
 
 
 def errors_at_joints(registered: Sequence[Registered], points: Sequence[pd.DataFrame]) -> pd.DataFrame:

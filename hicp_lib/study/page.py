@@ -13,7 +13,6 @@ runs it into `results/<profile>/<name>/`. The book takes every number and figure
 from __future__ import annotations
 
 import base64
-import html
 import io
 import json
 import math
@@ -26,6 +25,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core import checkout
+from hicp_lib.core.escape import escaped
 from hicp_lib.core.extras import needs
 from hicp_lib.core.files import atomic_path, write_bytes, write_json
 from hicp_lib.study.provenance import peak_memory_mb, provenance, provenance_html
@@ -121,10 +121,9 @@ class Study:
         caption, alt : str
         """
         write_bytes(self.folder / f"{name}.mp4", film)
-        self._captions[name] = {"file": f"{name}.mp4", "caption": caption, "alt": alt}
-        words, source = html.escape(alt), _inline("video/mp4", film)
+        words, source = escaped(alt), _inline("video/mp4", film)
         body = f'<video controls loop muted playsinline aria-label="{words}" src="{source}">{words}</video>'
-        self._show_figure(name, body, caption, ["mp4"])
+        self._show_figure(name, body, caption, ["mp4"], file=f"{name}.mp4", alt=alt)
 
     def scene(self, name: str, scene: go.Figure, caption: str, alt: str) -> None:
         """Save an interactive 3D scene (its data as JSON) and show it.
@@ -140,10 +139,9 @@ class Study:
         data = scene.to_json()
         write_bytes(self.folder / f"{name}.json", data.encode())
         body = scene.to_html(full_html=False, include_plotlyjs=False, div_id=f"scene-{name}")
-        body = f'<div class="hicp-scene" role="img" aria-label="{html.escape(alt)}">{body}</div>'
-        self._captions[name] = {"caption": caption, "alt": alt}
+        body = f'<div class="hicp-scene" role="img" aria-label="{escaped(alt)}">{body}</div>'
         display({PLOTLY_MIME: json.loads(data), "text/html": body}, raw=True)
-        self._show_figure(name, "", caption, ["json"])
+        self._show_figure(name, "", caption, ["json"], alt=alt)
 
     def table(self, name: str, table: pd.DataFrame, caption: str, digits: int = 3) -> None:
         """Save a table (Parquet, CSV) and show it; NaN is shown as a dash.
@@ -157,10 +155,10 @@ class Study:
             Decimals of its floats, as shown.
         """
         self._save_for_download(name, table)
-        self._captions[name] = {"caption": caption}
-        style = table.style.hide(axis="index").format(precision=digits, na_rep="–").set_uuid(name)
-        shown = style.to_html(table_attributes='class="table"')
-        self._show_figure(name, f'<div class="hicp-table">{shown}</div>', caption, ["parquet", "csv"])
+        shown = table.rename(columns=escaped).map(_cell)
+        style = shown.style.hide(axis="index").format(precision=digits, na_rep="–").set_uuid(name)
+        body = style.to_html(table_attributes='class="table"')
+        self._show_figure(name, f'<div class="hicp-table">{body}</div>', caption, ["parquet", "csv"])
 
     def save(self, name: str, table: pd.DataFrame) -> None:
         """Save a table as Parquet without showing it; its parameters travel in the file's metadata."""
@@ -173,7 +171,7 @@ class Study:
     def note(self, sentences: list[str]) -> None:
         """Show what could not be computed, and why, as a paragraph; nothing where there is nothing to say."""
         if sentences:
-            display(HTML(f'<p class="hicp-note"><em>{html.escape(" ".join(sentences))}</em></p>'))
+            display(HTML(f'<p class="hicp-note"><em>{escaped(" ".join(sentences))}</em></p>'))
 
     def value(self, name: str, value: Any) -> None:
         """Record a number, text or list for the prose of the book; None means "not run".
@@ -202,15 +200,23 @@ class Study:
     def _show_image(self, name: str, content: bytes, alt: str, caption: str, downloads: list[str]) -> None:
         """Show the first of the downloads, an image."""
         kind = downloads[0]
-        self._captions[name] = {"file": f"{name}.{kind}", "caption": caption, "alt": alt}
         source = _inline(f"image/{kind}", content)
-        self._show_figure(name, f'<img src="{source}" alt="{html.escape(alt)}">', caption, downloads)
+        image = f'<img src="{source}" alt="{escaped(alt)}">'
+        self._show_figure(name, image, caption, downloads, file=f"{name}.{kind}", alt=alt)
 
-    def _show_figure(self, name: str, body: str, caption: str, downloads: list[str]) -> None:
+    def _show_figure(self, name: str, body: str, caption: str, downloads: list[str], **said: str) -> None:
+        self._captions[name] = said | {"caption": caption}
         link = f'<a href="{self._link}/{name}.{{}}" download>{{}}</a>'
         links = " ".join(link.format(kind, kind.upper()) for kind in downloads)
-        caption = f'{html.escape(caption)} <span class="hicp-download">{links}</span>'
-        display(HTML(f'<figure class="hicp" id="{name}">{body}<figcaption>{caption}</figcaption></figure>'))
+        caption = f'{escaped(caption)} <span class="hicp-download">{links}</span>'
+        whole = f"{body}<figcaption>{caption}</figcaption>"
+        display(HTML(f'<figure class="hicp mathjax_ignore" id="{name}">{whole}</figure>'))
+
+
+def _cell(value: Any) -> Any:
+    """Numbers as they are, and all else as text without markup."""
+    is_number = pd.api.types.is_scalar(value) and not isinstance(value, str | bytes)
+    return value if is_number else escaped(value)
 
 
 def _inline(kind: str, content: bytes) -> str:

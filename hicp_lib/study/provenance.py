@@ -4,8 +4,6 @@ Printed below a page (`hicp_lib.study.page`): the library and the data as a whol
 fresh (`hicp_lib.report.runs`) follows from the part of them that it uses.
 """
 
-import functools
-import html
 import importlib.metadata
 import json
 import os
@@ -17,25 +15,26 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from hicp_lib.core.cache import LIBRARY_DIR, digest, files_sha256
+from hicp_lib.core.cache import LIBRARY_DIR, digest, files_below, files_sha256
 from hicp_lib.core.checkout import CHECKOUT
+from hicp_lib.core.children import child_environment
 from hicp_lib.core.datafiles import DATA_DIR, REFERENCE_DIR
 from hicp_lib.core.environment import usable_cores
+from hicp_lib.core.escape import escaped
 from hicp_lib.core.files import read_json, sha256_file
 from hicp_lib.detectors.weights.user import user_weights_sha256
 
 LOCK_PATH = (CHECKOUT or LIBRARY_DIR) / "environment.lock"
 
-_SHOWN_VERSIONS = (
-    "numpy", "pandas", "opencv-python-headless", "onnxruntime", "mediapipe", "open3d-cpu", "open3d",
-    "matplotlib",
-)  # fmt: skip
+_SHOWN_VERSIONS = "numpy pandas opencv-python-headless onnxruntime mediapipe open3d-cpu open3d matplotlib"
+# No program of a checkout's configuration is run.
+_GIT = ("git", "--no-optional-locks", "-c", "core.fsmonitor=false", "-c", "core.hooksPath=/dev/null")
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 
 def library_sha256() -> str:
     """SHA-256 of every source file of `hicp_lib`."""
-    return files_sha256(LIBRARY_DIR.rglob("*.py"), LIBRARY_DIR)
+    return files_sha256((path for path in files_below(LIBRARY_DIR) if path.suffix == ".py"), LIBRARY_DIR)
 
 
 def data_sha256() -> str:
@@ -43,7 +42,7 @@ def data_sha256() -> str:
 
     Not of the reference runs: they follow from the rest.
     """
-    files = (path for path in DATA_DIR.rglob("*") if path.is_file())
+    files = files_below(DATA_DIR)
     return files_sha256((path for path in files if REFERENCE_DIR not in path.parents), DATA_DIR)
 
 
@@ -52,7 +51,6 @@ def lock_sha256() -> str:
     return sha256_file(LOCK_PATH) if LOCK_PATH.is_file() else "missing"
 
 
-@functools.cache
 def installed_sha256() -> str:
     """SHA-256 of what is installed, whatever the lock says: distributions, Python, the kind of machine."""
     distributions = {d.name: d.version for d in importlib.metadata.distributions()}
@@ -73,8 +71,9 @@ def git(*arguments: str) -> str | None:
     """What git says in the library's checkout; None without git or a checkout, or where it refuses."""
     if CHECKOUT is None:
         return None
+    where = child_environment(GIT_DIR=str(CHECKOUT / ".git"), GIT_WORK_TREE=str(CHECKOUT))
     try:
-        done = subprocess.run(["git", *arguments], cwd=CHECKOUT, capture_output=True, text=True, timeout=20)
+        done = subprocess.run([*_GIT, *arguments], env=where, capture_output=True, text=True, timeout=20)
     except (OSError, subprocess.TimeoutExpired):
         return None
     return done.stdout.strip() if done.returncode == 0 else None
@@ -83,7 +82,7 @@ def git(*arguments: str) -> str | None:
 def versions() -> dict[str, str]:
     """Python's version and those of the libraries that can move a number."""
     installed = {d.name.lower(): d.version for d in importlib.metadata.distributions()}
-    shown = {name: installed[name] for name in _SHOWN_VERSIONS if name in installed}
+    shown = {name: installed[name] for name in _SHOWN_VERSIONS.split() if name in installed}
     return {"python": platform.python_version()} | shown
 
 
@@ -161,7 +160,7 @@ def provenance_html(stamp: dict[str, Any]) -> str:
         "Machine": _listed(stamp["machine"]),
         "Wall time": f"{stamp['wall_s']:.1f} s",
     }
-    body = "".join(f'<tr><th scope="row">{k}</th><td>{html.escape(v)}</td></tr>' for k, v in rows.items())
+    body = "".join(f'<tr><th scope="row">{k}</th><td>{escaped(v)}</td></tr>' for k, v in rows.items())
     return (
         '<details class="hicp-provenance"><summary>What this page was made with</summary>'
         f"<table><tbody>{body}</tbody></table></details>"

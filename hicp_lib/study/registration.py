@@ -106,8 +106,7 @@ def register(
     fits.append(register_by_reprojection(recording, clicks, mocap, fits[-1], offset_s))
     if r.CAMERA_MARKER in mocap.names:
         places = eight_clicks.camera_places(recording, mocap, offset_s)
-        ways = (False, True)
-        fits = [eight_clicks.register_by_camera_marker(eight, *places, way) for way in ways] + fits
+        fits = [eight_clicks.register_by_camera_marker(eight, *places, way) for way in (False, True)] + fits
     return Registered(recording, mocap, offset_s, fits, exact, clicks.merge(eight[_CLICK]))
 
 

@@ -137,8 +137,8 @@ def lift_views(views: Views, found: Found) -> pd.DataFrame:
     tables = []
     for view, people in views.items():
         there = {name: of_people for (seen, name), of_people in found.items() if seen == view}
-        found_of = [{name: of[k] for name, of in there.items()} for k in range(len(people))]
-        lifted = [lift_found(one, of_one) for one, of_one in zip(people, found_of, strict=True)]
+        theirs = ({name: of[k] for name, of in there.items()} for k in range(len(people)))
+        lifted = list(map(lift_found, people, theirs))
         tables.append(labelled(over_people(lifted, [*map(len, people)]), view=view))
     points = pd.concat(tables, ignore_index=True)
     if points["x_m"].isna().all():

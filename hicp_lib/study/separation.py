@@ -107,12 +107,9 @@ def _development_people() -> list[PosedBody]:
 
 def _found(runs: Sequence[Run], detector: str) -> np.ndarray:
     """Which keypoints a detector has ever been sure of, (136,)."""
-    found = np.zeros(N_KEYPOINTS, bool)
-    for run in runs:
-        if run.job.detector == detector:
-            for _, frame in run.frames.iterrows():
-                found |= sure_keypoints(frame)[1].any(axis=0)
-    return found
+    frames = (frame for run in runs if run.job.detector == detector for _, frame in run.frames.iterrows())
+    sure = (sure_keypoints(frame)[1].any(axis=0) for frame in frames)
+    return np.any([np.zeros(N_KEYPOINTS, bool), *sure], axis=0)
 
 
 def _speeds(cycles: pd.DataFrame) -> tuple[float, float]:

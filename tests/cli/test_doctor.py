@@ -216,6 +216,22 @@ def test_a_registry_that_cannot_be_read_is_one_line(tmp_path, monkeypatch):
     assert (check.status, check.finding) == (doctor.FAIL, "data/detectors.json: not JSON")
 
 
+@pytest.mark.parametrize("name", ["check_weights", "check_opencv", "check_probes", "check_system_libraries"])
+def test_a_check_that_breaks_is_a_line_and_the_others_go_on(monkeypatch, name):
+    def broken(*_):
+        raise OSError(13, "Permission denied", "/weights/a.onnx")
+
+    for one in ("check_probes", "check_weights"):
+        monkeypatch.setattr(doctor, one, lambda: doctor.Check("x", doctor.OK, ""))
+    n_lines = len(doctor.run_checks())
+    monkeypatch.setattr(doctor, name, broken)
+    checks = doctor.run_checks()
+    assert len(checks) == n_lines
+    assert [c.finding for c in checks if c.status == doctor.FAIL and "Errno 13" in c.finding] == [
+        "[Errno 13] Permission denied: '/weights/a.onnx'"
+    ]
+
+
 def test_without_a_checkout_there_is_no_lock_to_keep(monkeypatch, tmp_path):
     monkeypatch.setattr(doctor.provenance, "CHECKOUT", None)
     assert doctor.check_locked_versions(tmp_path / "no.lock").status == doctor.OK

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import subprocess
@@ -11,6 +12,7 @@ from contextlib import nullcontext
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 
 from hicp_lib.cli import main as cli
 from hicp_lib.core.keypoints import NAMES
@@ -32,11 +34,11 @@ def mistake(capsys, *arguments: str) -> str:
         (["nonsense"], "No such command 'nonsense'"),
         (["report", "--nonsense"], "No such option"),
         (["report", "-p", "seed"], "requires 2 arguments"),
-        (["report", "--profile", "slow"], "has no profile 'slow'; choose one of"),
+        (["report", "--profile", "slow"], "profile 'slow' is not known; expected one of:"),
         (["report", "--dask", "somewhere"], "somewhere: no Dask scheduler answers"),
         (["scenes", "render", "out", "--workers", "2", "--dask", ""], "Give either --workers N or --dask"),
         (["scenes", "render", "out", "--dask", ""], ": no Dask scheduler answers (no address)"),
-        (["report", "-p", "sed", "1"], "-p sed: no notebook has such a parameter; known are"),
+        (["report", "-p", "sed", "1"], "-p: parameter 'sed' is not known; expected one of:"),
         (["detect", "--out", "x.json"], "Missing option '--detector'"),
         (["detect", "--detector", "x", "--out", "x.json"], "Give either --dataset DIR or --images DIR"),
         (
@@ -52,6 +54,16 @@ def mistake(capsys, *arguments: str) -> str:
             "x: ends in 'no suffix'; expected .json",
         ),
         (["scenes", "render", "out", "--n", "0"], "0 is not in the range x>=1"),
+        (["scenes", "render", "out", "--workers", "1000000"], "1000000 is not in the range 1<=x<=1024"),
+        (["draw", "--min-score", "nan"], "nan is no finite number"),
+        (["import", "--score-scale", "1e999"], "1e999 is no finite number"),
+        (["import", "--score-scale", "-1"], "-1.0 is not in the range x>0"),
+        (["record", "import", "a", "b", "--rate", "inf"], "inf is no finite number"),
+        (["record", "camera", "out", "--seconds", "nan"], "nan is no finite number"),
+        (
+            ["models", "show", "--detector", "posenet", "-o", "min_root_score", "NaN"],
+            "is nan; expected 0 to 1",
+        ),
         (["evaluate", "--annotations", "/no.json", "--detections", "x"], "/no.json: cannot be read"),
         (["dataset", "create", "--annotations", "/no.json", "--images", ".", "--out", "x"], "/no.json: "),
         (["models", "fetch", "nonsense"], "'nonsense'"),
@@ -338,3 +350,19 @@ def test_evaluation_tells_visible_keypoints_and_each_hand(capsys, tmp_path):
     assert cli.run(arguments) == 0
     said = capsys.readouterr().out
     assert "each hand, visible keypoints: 12 in 12 images; wholebody sigmas, segment area" in said
+
+
+def test_what_c_libraries_say_of_damaged_pictures_is_not_shown(tmp_path):
+    """libpng and libjpeg write to standard error themselves."""
+    for name, at in (("a.png", 300), ("b.jpg", 700)):
+        content = io.BytesIO()
+        noise = np.random.default_rng(1).integers(0, 255, (40, 60, 3)).astype(np.uint8)
+        Image.fromarray(noise).save(content, {"a": "PNG", "b": "JPEG"}[name[0]])
+        damaged = bytearray(content.getvalue())
+        damaged[at : at + 40] = bytes(40)
+        (tmp_path / name).write_bytes(damaged)
+    options = ["--detector", "movenet-lightning", "--images", ".", "--out", "found.json", "--workers", "1"]
+    program = [sys.executable, "-c", "from hicp_lib.cli.main import main; main()"]
+    done = subprocess.run([*program, "detect", *options], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.startswith("found.json: ")
+    assert done.stderr == "./a.png: is not an image (PNG, JPEG, ...) or is cut off; replace the file\n"

@@ -25,7 +25,7 @@ def small(tmp_path):
         (["import", "out"], "Give either --bag FILE or --open3d DIR"),
         (["import", "out", "--open3d", "/no"], "/no/intrinsic.json: cannot be read"),
         (["import", "out", "--open3d", "/no", "--poses", "/no.txt"], "/no.txt: cannot be read"),
-        (["import", "out", "--open3d", "/no", "--rate", "nan"], "rate is nan; expected frames per second"),
+        (["import", "out", "--open3d", "/no", "--rate", "nan"], "nan is no finite number"),
         (["import", "out", "--open3d", "/no", "--mount", "x"], "'x' is not one of"),
         (["import", "out", "--bag", "x", "--base-frame", "a", "--joint-states"], "Give one of --poses"),
         (["camera", "out", "--poses", "x", "--joints", "-"], "Give either --poses FILE or --joints FILE"),

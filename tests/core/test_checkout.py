@@ -17,7 +17,14 @@ def study(tmp_path):
 
 def test_jupyter_works_in_notebooks_and_its_results_are_the_studys(study, monkeypatch):
     monkeypatch.chdir(study / "notebooks")
-    assert checkout.working_folder() == checkout.sources() == study
+    assert checkout.working_folder() == study
+
+
+def test_notebooks_of_a_folder_of_data_are_not_run_in_the_place_of_the_librarys_own(study, monkeypatch):
+    monkeypatch.chdir(study)
+    assert checkout.sources() == checkout.CHECKOUT
+    monkeypatch.setattr(checkout, "CHECKOUT", None)
+    assert checkout.sources() == study
 
 
 def test_elsewhere_results_stay_in_the_working_folder(study, tmp_path, monkeypatch):

@@ -28,13 +28,13 @@ def test_threads_that_overlap_leave_nothing_behind(monkeypatch):
     inside, leave = threading.Event(), threading.Event()
 
     def first() -> None:
-        with with_variables(HICP_A="1"), single_threaded_opencv:
+        with with_variables(HICP_A="1"), single_threaded_opencv():
             inside.set()
             leave.wait()
 
     def second() -> None:
         inside.wait()
-        with single_threaded_opencv:
+        with single_threaded_opencv():
             leave.set()
             with with_variables(HICP_A="2"):
                 pass

@@ -1,5 +1,8 @@
 """What is on offer, and how its options are refused."""
 
+import math
+import subprocess
+
 import pytest
 
 from hicp_lib.core.errors import InputError
@@ -42,6 +45,33 @@ def test_an_option_of_another_kind_is_refused(option, value):
     with pytest.raises(InputError, match=f"option '{option}' is .*; expected") as caught:
         make_detector("mmpose", **{"model": "m.onnx", option: value})
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("mediapipe-hands", {"min_score": 5}),
+        ("mediapipe-hands", {"num_hands": 0}),
+        ("mediapipe-hands", {"num_hands": 10**20}),
+        ("mediapipe-pose", {"min_score": math.nan}),
+        ("mediapipe-pose", {"tracking_hz": math.inf}),
+        ("movenet-thunder", {"padding": math.nan}),
+        ("movenet-thunder", {"padding": 0}),
+        ("movenet-thunder", {"person_max_overlap": -0.1}),
+        ("movenet-multipose", {"min_person_score": -math.inf}),
+        ("posenet", {"max_people": -1}),
+        ("posenet", {"threads": 10**6}),
+        ("openpose-mobilenet", {"net_height_px": 16 * 10**6}),
+        ("mmpose", {"model": "m.onnx", "input_size_px": [192, math.nan]}),
+        ("combined:movenet-thunder+mediapipe-hands", {"min_side_px": 0}),
+        ("combined:movenet-thunder+mediapipe-hands", {"hands_min_score": math.nan}),
+    ],
+)
+def test_numbers_that_make_no_sense_are_refused_before_anything_starts(name, options, monkeypatch):
+    monkeypatch.setattr(subprocess, "Popen", None)
+    with pytest.raises(InputError, match=r"option '\w+' is .*; expected [\d.]+ to \d+") as error:
+        make_detector(name, **options)
+    assert "\n" not in str(error.value)
 
 
 def test_an_unknown_detector_is_refused():

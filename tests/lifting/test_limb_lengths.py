@@ -27,12 +27,13 @@ def test_lengths_cost_the_square_beyond_what_people_have(begin, end, share, more
     assert (limbs.begin.tolist(), limbs.end.tolist()) == ([0], [1])
     least_m, most_m = measures.closest_m[*found], measures.farthest_m[*found]
     sigma_m = share * most_m + more_m
-    reach = limbs.costs.shape[1] // 2
-    assert reach * STEP_M == pytest.approx(most_m + np.sqrt(40) * sigma_m, abs=STEP_M)
-    length_m = STEP_M * abs(np.arange(-reach, reach + 1))
+    middle = len(grid_m) // 2
+    length_m = abs(grid_m - grid_m[middle])
     short = np.minimum((np.maximum(least_m - length_m, 0) / sigma_m) ** 2, most_short)
-    long = np.minimum((np.maximum(length_m - most_m, 0) / sigma_m) ** 2, 40)
-    np.testing.assert_allclose(limbs.costs[0, :, len(grid_m) // 2], short + long, rtol=5e-3, atol=5e-3)
+    long = np.minimum((np.maximum(length_m - most_m, 0) / sigma_m) ** 2, 40.0)
+    np.testing.assert_allclose(limbs.costs[0, middle], short + long, rtol=5e-3, atol=5e-3)
+    np.testing.assert_allclose(limbs.costs[0], limbs.costs[0].T, rtol=0.02, atol=0.02)
+    assert limbs.reach * STEP_M == pytest.approx(most_m + np.sqrt(40) * sigma_m, abs=STEP_M)
 
 
 @pytest.mark.parametrize(("near_cost", "chosen"), [(39.9, 5), (40.1, 0)])
@@ -40,45 +41,49 @@ def test_an_end_out_of_reach_costs_forty(near_cost, chosen):
     costs = np.full((2, 8), 1000.0)
     costs[0, 5] = 0.0
     costs[1, [0, 5]] = 0.0, near_cost
-    limb = Limbs(np.array([0]), np.array([1]), np.zeros((1, 3, 8)))
+    limb = Limbs(
+        np.array([0]), np.array([1]), np.minimum(100.0 * abs(np.arange(8) - np.c_[:8]), 40.0)[None], 1
+    )
     found = choose_along_limbs(costs, [limb])[0]
     assert found.tolist() == [5, chosen]
     assert out_of_reach(found, [limb]).tolist() == [False, chosen == 0]
 
 
-def test_the_steps_to_an_end_are_counted_from_the_beginning():
+def test_costs_go_by_the_depth_of_the_beginning_and_then_of_the_end():
     costs = np.full((2, 8), 100.0)
     costs[0, 4] = 0.0
     costs[1] = 0.0
-    for step, place in ((-1, 3), (0, 4), (1, 5)):
-        of_steps = np.where(np.arange(-1, 2) == step, 0.0, 9.0)
-        limb = Limbs(np.array([0]), np.array([1]), np.tile(of_steps[:, None], (1, 8))[None])
-        assert choose_along_limbs(costs, [limb])[0].tolist() == [4, place]
+    for end in (3, 4, 5):
+        of_depths = np.full((1, 8, 8), 9.0)
+        of_depths[0, 4, end] = 0.0
+        limb = Limbs(np.array([0]), np.array([1]), of_depths, 7)
+        assert choose_along_limbs(costs, [limb])[0].tolist() == [4, end]
 
 
 def test_a_limb_may_reach_from_one_end_of_the_grid_to_the_other():
     found, rays = np.array([INDEX["left_elbow"], INDEX["left_wrist"]]), np.tile([0.0, 0.0, 1.0], (2, 1))
     (limbs,) = limbs_outwards(np.array([1.0, 1.1, 1.2]), rays, found, load_measures())
-    assert limbs.costs.shape == (1, 5, 3)
     costs = np.array([[0.0, 1e3, 1e3], [1e3, 1e3, 0.0]])
     assert choose_along_limbs(costs, [limbs])[0].tolist() == [0, 2]
 
 
-@pytest.mark.parametrize("widths", [(3, 7), (7, 3)])
-def test_limbs_of_any_reach_go_together(widths):
-    """A chain of three; the second limb may be as much longer or shorter as it likes."""
-    costs = np.full((3, 9), 30.0)  # less than an end out of reach
-    costs[0, 4] = costs[1, 5] = costs[2, 6] = 0.0
-    limbs = [Limbs(np.array([k]), np.array([k + 1]), np.zeros((1, w, 9))) for k, w in enumerate(widths)]
-    assert choose_along_limbs(costs, limbs)[0].tolist() == [4, 5, 6]
-    limbs = []
-    for k, width in enumerate(widths):
-        one_back = np.where(np.arange(width) == width // 2 - 1, 0.0, 30.0)
-        limbs.append(Limbs(np.array([k]), np.array([k + 1]), np.tile(one_back[:, None], (1, 9))[None]))
-    flat = np.zeros((3, 9))
-    flat[0] = 100.0
-    flat[0, 8] = 0.0
-    assert choose_along_limbs(flat, limbs)[0].tolist() == [8, 7, 6]
+def test_a_chain_is_chosen_outwards():
+    """A chain of three; each end lies one step nearer than its beginning."""
+    one_nearer = np.where(np.arange(9) == np.c_[:9] - 1, 0.0, 30.0)[None]
+    limbs = [Limbs(np.array([k]), np.array([k + 1]), one_nearer, 8) for k in range(2)]
+    costs = np.zeros((3, 9))
+    costs[0] = 100.0
+    costs[0, 8] = 0.0
+    assert choose_along_limbs(costs, limbs)[0].tolist() == [8, 7, 6]
+
+
+def test_an_end_out_of_reach_is_rather_at_the_edge_of_it():
+    costs = np.zeros((2, 9))
+    costs[0] = 1000.0
+    costs[0, 5] = 0.0
+    too_long = np.full((1, 9, 9), 40.0)
+    limb = Limbs(np.array([0]), np.array([1]), too_long, 3)
+    assert choose_along_limbs(costs, [limb])[0].tolist() == [5, 2]
 
 
 def test_other_depths_cost_what_the_best_choice_with_them_does():
@@ -86,18 +91,15 @@ def test_other_depths_cost_what_the_best_choice_with_them_does():
     rng, g = np.random.default_rng(0), 6
     costs = rng.uniform(0, 50, (5, g))
     limbs = [
-        Limbs(np.array(begin), np.array(end), rng.uniform(0, 45, (2, width, g)))
-        for begin, end, width in (([0, 0], [1, 3], 5), ([1, 3], [2, 4], 3))
+        Limbs(np.array(begin), np.array(end), rng.uniform(0, 40, (2, g, g)), g)
+        for begin, end in (([0, 0], [1, 3]), ([1, 3], [2, 4]))
     ]
     least = np.full((5, g), np.inf)
     for depths in itertools.product(range(g), repeat=5):
         total = costs[range(5), depths].sum()
         for some in limbs:
-            reach = some.costs.shape[1] // 2
-            for begin, end, of_steps in zip(some.begin, some.end, some.costs, strict=True):
-                step = depths[end] - depths[begin] + reach
-                is_near = 0 <= step <= 2 * reach
-                total += min(of_steps[step, depths[begin]], 40.0) if is_near else 40.0
+            for begin, end, of_depths in zip(some.begin, some.end, some.costs, strict=True):
+                total += of_depths[depths[begin], depths[end]]
         least[range(5), depths] = np.minimum(least[range(5), depths], total)
     chosen, in_all = choose_along_limbs(costs, limbs)
     np.testing.assert_allclose(in_all, least, rtol=1e-5)

@@ -12,7 +12,7 @@ from hicp_lib.core.keypoints import HANDS, INDEX
 from hicp_lib.lifting.body_measures import load_measures
 from hicp_lib.lifting.limb_lengths import choose_along_limbs, limbs_outwards
 from hicp_lib.lifting.paper import GUESSED, LIFTED, NO_DEPTH, NOT_DETECTED, OUTSIDE_IMAGE, lift
-from hicp_lib.lifting.robust import STEPS, lift_in_steps, lift_robust
+from hicp_lib.lifting.robust import STEPS, lift_robust
 from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.simulation.body.poses import sample_pose
 from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at, pixel_rays, project_world
@@ -63,7 +63,8 @@ def length_cost(begin_m, end_m, pair, measures) -> float:
 
 def test_before_a_wall_a_keypoint_is_as_deep_as_below_the_skin():
     depth_m = np.full((240, 320), 1.5)
-    for lifted in lift_in_steps(keypoints(left_wrist=(210.3, 80.7)), depth_m, CAMERA, [1, 2, len(STEPS)]):
+    for n_steps in (1, 2, len(STEPS)):
+        lifted = lift_robust(keypoints(left_wrist=(210.3, 80.7)), depth_m, CAMERA, n_steps)
         point = lifted.points_m[0, INDEX["left_wrist"]]
         skin = lift(keypoints(left_wrist=(210.3, 80.7)), depth_m, CAMERA).points_m[0, INDEX["left_wrist"]]
         below_m = load_measures().below_skin_m[INDEX["left_wrist"]]
@@ -119,21 +120,17 @@ def test_reasons_are_the_papers():
     assert lift_robust(np.empty((0, 136, 2)), depth_m, CAMERA).points_m.shape == (0, 136, 3)
 
 
-def test_steps_together_give_what_each_gives_alone():
+def test_every_step_changes_what_the_ones_before_it_give():
     rng = np.random.default_rng(4)
     depth_m = 1.2 + 0.3 * rng.random((240, 320))
     people_px = rng.uniform(20, 220, (2, 136, 2))
     people_px[1, HANDS[:21]] = np.nan
-    together = lift_in_steps(people_px, depth_m, CAMERA, [3, 0, 4, 2, 1])
-    for n, lifted in zip([3, 0, 4, 2, 1], together, strict=True):
-        alone = lift_in_steps(people_px, depth_m, CAMERA, [n])[0]
-        np.testing.assert_array_equal(lifted.points_m, alone.points_m)
-        np.testing.assert_array_equal(lifted.reason, alone.reason)
-        np.testing.assert_array_equal(lifted.sigma_m, alone.sigma_m)
-        assert np.isfinite(lifted.sigma_m).any() == (n > 1)
-    np.testing.assert_array_equal(together[1].points_m, lift(people_px, depth_m, CAMERA).points_m)
-    np.testing.assert_array_equal(together[2].points_m, lift_robust(people_px, depth_m, CAMERA).points_m)
-    assert not np.array_equal(together[0].points_m, together[3].points_m, equal_nan=True)
+    by_steps = [lift_robust(people_px, depth_m, CAMERA, n) for n in range(len(STEPS) + 1)]
+    np.testing.assert_array_equal(by_steps[0].points_m, lift(people_px, depth_m, CAMERA).points_m)
+    np.testing.assert_array_equal(by_steps[-1].points_m, lift_robust(people_px, depth_m, CAMERA).points_m)
+    assert [np.isfinite(lifted.sigma_m).any() for lifted in by_steps] == [False, False, True, True, True]
+    for before, after in itertools.pairwise(by_steps):
+        assert not np.array_equal(before.points_m, after.points_m, equal_nan=True)
 
 
 def test_joints_of_people_are_found_closer_than_by_the_paper():

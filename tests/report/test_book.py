@@ -2,31 +2,38 @@
 
 from __future__ import annotations
 
+import html
+import re
 import shutil
+from html.parser import HTMLParser
+from pathlib import Path
 
 import matplotlib
 import pytest
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import locked_folder
+from hicp_lib.report import book
 from hicp_lib.report.build import make_report
 from hicp_lib.report.run import Folders, RunError
+from tests.core.untrusted import fill
+from tests.report.tiny_study import FINISH, MEASURE, START, write_notebook
 
 
 def test_report_of_two_notebooks(study):
     lines: list[str] = []
     page = make_report("quick", [("scale", "2")], lines.append, sources=study, root=study)
-    book = page.parent
+    built = page.parent
     assert page == study / "_build" / "book" / "quick" / "index.html"
     assert "The seed is 3." in page.read_text(), "the profile's parameter reaches the prose"
     assert "mathjax.js" in page.read_text()
-    assert (book / "_static" / "mathjax.js").stat().st_size > 1e6
-    assert (book / "results" / "quick" / "01_second" / "t.parquet").is_file()
+    assert (built / "_static" / "mathjax.js").stat().st_size > 1e6
+    assert (built / "results" / "quick" / "01_second" / "t.parquet").is_file()
     for name in ("index", "notebooks/00_first", "notebooks/01_second"):
-        html = (book / f"{name}.html").read_text()
-        assert "What this page was made with" in html
-        assert "thebe" not in html.lower()
-        assert "plotly" not in html
+        text = (built / f"{name}.html").read_text()
+        assert "What this page was made with" in text
+        assert "thebe" not in text.lower()
+        assert "plotly" not in text
     assert str(page) in lines[-1]
 
     lines.clear()
@@ -51,14 +58,65 @@ def test_report_of_two_notebooks(study):
     home.write_text("# Home\n\n{{ value('00_first', 'none') }}\n")
     with pytest.raises(InputError, match="needs 'none'"):
         make_report("quick", [("scale", "2")], lines.append, sources=study, root=study)
-    assert not list(book.parent.glob(".build-*"))
+    assert not list(built.parent.glob(".build-*"))
+
+
+def write_page(study: Path, text: str) -> None:
+    (study / "book" / "index.md").write_text(f"# Home\n\n{text}")
+
+
+SHOWS = """import pandas as pd
+name = "{hostile}"
+study.table("names", pd.DataFrame({{name: [name, name]}}), name)
+study.note([name])
+study.value("name", name)
+study.value("names", [name])
+pd.DataFrame({{name: [name]}})"""
+
+
+class Elements(HTMLParser):
+    """What of a page could run, or be fetched."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[tuple] = []
+
+    def handle_starttag(self, tag: str, attributes: list) -> None:
+        given = dict(attributes)
+        if [name for name in given if name.startswith("on")] or "javascript:" in str(given.get("href")):
+            self.found.append((tag, given))
+        if tag in ("svg", "iframe", "embed", "object") and "onload" in self.get_starttag_text():
+            self.found.append((tag, given))
+
+
+def test_names_of_the_data_are_text_on_every_page(study):
+    hostile = "<svg onload=alert(1)></script><script>alert(1)</script>[a](javascript:alert(1))|`{include}`$x$"
+    (study / "a" / hostile.replace("/", "")).mkdir(parents=True)
+    write_notebook(
+        study / "notebooks" / "00_first.ipynb", START, MEASURE, SHOWS.format(hostile=hostile), FINISH
+    )
+    write_page(
+        study,
+        '{{ value("00_first", "name") }} {{ raw("00_first", "names") | join(", ") }}\n\n'
+        '{{ table("00_first", "names") }}\n\n- {{ raw("00_first", "names")[0] }}\n',
+    )
+    images = str(study / "a" / hostile.replace("/", ""))
+    page = make_report("quick", [("images", images)], print, sources=study, root=study)
+    for path in page.parent.rglob("*.html"):
+        text, elements = path.read_text(), Elements()
+        elements.feed(text)
+        assert not elements.found, path
+        assert not re.search(r"<script[^>]*>alert", text) and "<svg onload" not in text, path
+        assert 'class="math' not in text, path
+    shown = html.unescape(re.sub("<[^>]*>", "", page.read_text()))
+    assert shown.count(hostile) >= 5
 
 
 @pytest.mark.parametrize(
     ("profile", "pairs", "expected"),
     [
-        ("quik", [], "has no profile 'quik'; choose one of full, quick"),
-        ("quick", [("sed", "1")], "-p sed: no notebook has such a parameter"),
+        ("quik", [], "profile 'quik' is not known; expected one of: full, quick"),
+        ("quick", [("sed", "1")], "-p: parameter 'sed' is not known"),
         ("quick", [("images", "/nowhere")], "/nowhere: does not exist; parameter 'images'"),
     ],
 )
@@ -72,3 +130,33 @@ def test_two_reports_of_one_profile_do_not_mix(study):
     with locked_folder(Folders(study, study, "quick").executed):
         with pytest.raises(InputError, match="another command writes there"):
             make_report("quick", [], print, sources=study, root=study)
+
+
+def test_a_book_is_not_shown_for_sources_that_were_edited_while_it_was_built(study, monkeypatch):
+    run_sphinx = book._run_sphinx
+
+    def and_edit(*arguments):
+        built = run_sphinx(*arguments)
+        (study / "book" / "index.md").write_text("# Other\n")
+        return built
+
+    monkeypatch.setattr(book, "_run_sphinx", and_edit)
+    with pytest.raises(
+        RunError, match="book: what it is made of was changed while it was built; run the report"
+    ):
+        make_report("quick", [], print, sources=study, root=study)
+    assert not (study / "_build" / "book" / "quick").exists()
+    monkeypatch.undo()
+    values = study / "results" / "quick" / "00_first" / "values.json"
+    values.write_text('{"seed": 4}')
+    with pytest.raises(RunError, match="book: the results of 00_first were changed; run the report again"):
+        book.build_book(Folders(study, study, "quick"))
+
+
+def test_a_report_imports_nothing_from_the_working_folder(study, tmp_path_factory, monkeypatch):
+    folder = tmp_path_factory.mktemp("untrusted") / "data"
+    marker = fill(folder)
+    monkeypatch.chdir(folder)
+    fill(study / "notebooks")  # where kernels work
+    make_report("quick", [("images", str(folder))], print, sources=study, root=study)
+    assert not marker.exists() and not (study / "imported").exists()

@@ -65,7 +65,7 @@ def test_of_the_others_neither_mistakes_nor_faults_matter(study, lines):
 
 def test_a_name_that_is_no_notebook_lists_those_there_are(study, lines):
     with pytest.raises(
-        InputError, match="--only 03: there is no such notebook; choose one of 00_first, 01_s"
+        InputError, match="--only: notebook '03' is not known; expected one of: 00_first, 01_s"
     ):
         make_report("quick", [], lines.append, study, study, only="03")
     assert lines == []

@@ -6,7 +6,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.core.errors import InputError
+from hicp_lib.report.build import make_report
 from hicp_lib.report.notebooks import (
     check_parameters,
     parse_overrides,
@@ -65,12 +67,15 @@ def test_profile_and_order_are_read(study):
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
-        ("[full]", "has no profile 'quick'; choose one of full"),
-        ("[quick.99_none]\nseed = 1", "names notebook '99_none'; known are 00_first, 01_second"),
-        ("[quick.00_first]\nsed = 1", "00_first has no parameter 'sed'; known are seed, "),
+        ("[full]", "profile 'quick' is not known; expected one of: full"),
+        (
+            "[quick.99_none]\nseed = 1",
+            "notebook '99_none' is not known; expected one of: 00_first, 01_second",
+        ),
+        ("[quick.00_first]\nsed = 1", "00_first: parameter 'sed' is not known; expected one of: seed, "),
         ("[quick.00_first]\nseed = 1.5", "'seed' is 1.5; expected an integer such as 0"),
         ("[quick.00_first]\nseed = true", "'seed' is true; expected an integer such as 0"),
-        ("[quick]\n[after]\n01_second = ['x']", "names notebook 'x'"),
+        ("[quick]\n[after]\n01_second = ['x']", "notebook 'x' is not known"),
         (
             "[quick]\n[after]\n01_second = ['00_first']\n00_first = ['01_second']",
             "01_second waits for 00_first waits for 01_second; break the circle",
@@ -114,7 +119,7 @@ def test_relative_paths_are_those_of_the_caller(study, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("name", "text", "expected"),
     [
-        ("sed", "1", "-p sed: no notebook has such a parameter; known are detectors, images, scale, seed"),
+        ("sed", "1", "-p: parameter 'sed' is not known; expected one of: detectors, images, scale, seed"),
         ("seed", "x", "'seed' is \"x\"; expected an integer such as 0"),
         ("seed", "1.5", "expected an integer"),
         ("scale", "[1]", "expected a number such as 1.5"),
@@ -138,3 +143,77 @@ def test_any_text_is_taken_or_refused(study, name, text):
         assert "\n" not in str(error)
         return
     check_parameters(notebooks[0], overrides["00_first"], "again")
+
+
+STUDY = read_notebooks(CHECKOUT / "notebooks")
+TEXTS = (
+    "",
+    "NaN",
+    "inf",
+    "-inf",
+    "-1",
+    "-0.5",
+    "[]",
+    '[""]',
+    "[NaN]",
+    "[[]]",
+    "{}",
+    "1e999",
+    "9" * 5000,
+    "true",
+    "null",
+)
+
+
+def is_number(value) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_no_number_or_list_of_a_notebook_takes_nonsense(text):
+    """Of every parameter of the study: none that is empty, infinite, negative or of another kind."""
+    for notebook in STUDY:
+        for name, default in notebook.defaults.items():
+            try:
+                taken = parse_overrides([(name, text)], [notebook])[notebook.name][name]
+            except InputError as error:
+                assert str(error).startswith(f"-p {name}: {notebook.name}: ") and "\n" not in str(error)
+                continue
+            numbers = taken if isinstance(taken, list) else [taken]
+            assert not is_number(default) and not any(map(is_number, numbers)), (name, taken)
+            if isinstance(default, list):
+                assert all(numbers) and (numbers or "some or none" in notebook.allowed[name]), (name, taken)
+            assert taken != "" or default == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("n_scenes", "0", "expected an integer such as 160 [scenes, 1 or more]"),
+        ("seed", "-1", "[integer, 0 or more]"),
+        ("hit_term", "1.1", "[term, 0 to 1]"),
+        ("n_frames", "101", "[frames, 3 to 100]"),
+        ("swept_losses", "0.5,1", "[0 to below 1]"),
+        ("camera_hz", "0", "[Hz, above 0]"),
+        ("duration_s", "4.6", "[s, above 4.6]"),
+        ("mount_m", "-0.1", "[m, standard deviation]"),
+        ("paradigms", "posenet", "[two names]"),
+        ("method", "best", '["robust" or "paper"]'),
+        ("detectors", "posenet,posenet", "a list of different values"),
+        ("inference_s", '{"mediapipe": -1}', "[s by detector, 0 or more]"),
+    ],
+)
+def test_ranges_are_those_the_comments_state(name, text, expected):
+    with pytest.raises(InputError) as error:
+        parse_overrides([(name, text)], STUDY)
+    assert expected in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["detectors", "paradigms", "detector"])
+def test_an_unknown_detector_is_told_before_anything_runs(tmp_path, name):
+    text = "nobody,mediapipe" if name != "detector" else "nobody"
+    with pytest.raises(
+        InputError, match=f"^-p {name}: detector 'nobody' is not known; expected one of: mediapipe"
+    ):
+        make_report("quick", [(name, text)], pytest.fail, sources=CHECKOUT, root=tmp_path)
+    assert not list(tmp_path.iterdir())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 
 import pytest
 
@@ -136,17 +137,79 @@ def test_every_dependency_is_in_the_key(tmp_path, monkeypatch, library):
     assert changed() == ["installed packages"]
 
 
-def test_a_library_edited_during_the_run_is_not_stamped(tmp_path, monkeypatch, library):
-    run, folders = tiny_run(tmp_path, START, FINISH)
+def edit_library(folder, library) -> None:
+    (library / "study" / "page.py").write_text("a = 2")
 
-    def edit(*arguments):
-        (library / "study" / "page.py").write_text("a = 2")
+
+def edit_notebook(folder, library) -> None:
+    write_notebook(folder / "notebooks" / "05_tiny.ipynb", START, MEASURE, FINISH)
+
+
+def break_notebook(folder, library) -> None:
+    (folder / "notebooks" / "05_tiny.ipynb").write_text("{")
+
+
+def edit_image(folder, library) -> None:
+    (folder / "images" / "1.png").write_bytes(b"22")
+
+
+def edit_earlier_results(folder, library) -> None:
+    (folder / "results" / "quick" / "00_earlier" / "provenance.json").write_text("{}")
+
+
+@pytest.mark.parametrize("when", ["before it is read", "after"])
+@pytest.mark.parametrize(
+    ("edit", "expected"),
+    [
+        (edit_library, "library changed while it ran; run the report again"),
+        (edit_notebook, "notebook changed while it ran; run the report again"),
+        (break_notebook, "is not a notebook"),
+        (edit_image, "input files changed while it ran; run the report again"),
+        (edit_earlier_results, "earlier notebooks changed while it ran; run the report again"),
+    ],
+)
+def test_what_is_edited_during_the_run_is_not_vouched_for(
+    tmp_path, monkeypatch, library, edit, expected, when
+):
+    (tmp_path / "images").mkdir()
+    (tmp_path / "images" / "1.png").write_bytes(b"1")
+    run, folders = tiny_run(tmp_path, START, FINISH, images=str(tmp_path / "images"))
+    path = write_notebook(tmp_path / "notebooks" / "00_earlier.ipynb", START, FINISH)
+    earlier = read_notebook(path)
+    run = replace(run, after=("00_earlier",))
+    monkeypatch.setattr(Children, "execute", pretend_to_execute)
+    both = [Run(earlier, earlier.defaults), run]
+    run_all(both, folders, print, only="00_earlier")
+
+    def and_edit(*arguments):
+        if when == "after" or edit is break_notebook:
+            status = pretend_to_execute(*arguments)
+            edit(tmp_path, library)
+            return status
+        edit(tmp_path, library)
         return pretend_to_execute(*arguments)
 
-    monkeypatch.setattr(Children, "execute", edit)
-    with pytest.raises(RunError, match="hicp_lib was changed while it ran"):
+    monkeypatch.setattr(Children, "execute", and_edit)
+    with pytest.raises((RunError, InputError), match=rf"05_tiny(\.ipynb)?: {expected}") as error:
+        run_all(both, folders, print)
+    assert "\n" not in str(error.value)
+    assert not (folders.results / "05_tiny").exists()
+    assert why_stale("05_tiny", run_key(Run(earlier, earlier.defaults), []), folders) == "no complete run yet"
+
+
+def test_what_was_run_is_what_the_key_names(tmp_path, monkeypatch):
+    """Edited before it is read, and back after."""
+    run, folders = tiny_run(tmp_path, START, FINISH)
+
+    def swap(*arguments):
+        write_notebook(run.notebook.path, START, MEASURE, FINISH)
+        status = pretend_to_execute(*arguments)
+        write_notebook(run.notebook.path, START, FINISH)
+        return status
+
+    monkeypatch.setattr(Children, "execute", swap)
+    with pytest.raises(RunError, match="05_tiny: notebook changed while it ran"):
         run_all([run], folders, print)
-    assert not folders.results.exists()
 
 
 def test_an_input_that_is_not_there_is_told_before_anything_runs(tmp_path, monkeypatch):

@@ -64,7 +64,7 @@ def first_violation(rng: np.random.Generator, icub: ICub, home: Posture, n_cycle
     """Drive the robot by one random stream; says what was violated first, or nothing."""
     settings = Settings(gain=float(rng.uniform(0.2, 20)), fastest_rad_s=float(rng.uniform(0.1, 3)))
     controller = Controller(icub, np.array(HOME_M["left"]), home.angles("left"), settings=settings)
-    loop = AvoidanceLoop(controller, valence=rng.uniform(-1, 1, 136))
+    loop = AvoidanceLoop(controller)
     posture = random_posture(rng, icub, home)
     for now_s, perception in random_stream(rng, n_cycles):
         command, threat = loop.cycle(now_s, posture, perception)

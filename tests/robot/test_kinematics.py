@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.robot.kinematics import ARM_JOINTS, HEAD_JOINTS, load_icub
-from hicp_lib.robot.motor_order import arm_from_motor_order, head_from_motor_order
+from hicp_lib.robot.motor_order import from_motor_order
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.segments import body_segments
 from hicp_lib.robot.tables import ICUB_FILE, read_tables
@@ -206,7 +206,7 @@ def test_arms_mirror_each_other(version, left):
 def test_positions_a_real_robot_logged(angles_deg, logged_m):
     """Right hand, from the controller's log in robotology/skeleton3D, Humanoids 2018 data set."""
     close(pose("right", "hand", angles_deg, arm="v1")[:3, 3], logged_m, 2e-6)
-    q = arm_from_motor_order(angles_deg[2::-1], [*angles_deg[3:], *np.zeros(9)])
+    q = from_motor_order(angles_deg[2::-1], [*angles_deg[3:], *np.zeros(9)], ARM_JOINTS)
     close(load_icub().chains["right"].T_root_link("hand", q)[:3, 3], logged_m, 2e-6)
 
 
@@ -311,7 +311,7 @@ def test_limits_and_cables():
 
 
 def test_boards_report_the_torso_the_other_way_round():
-    q = head_from_motor_order([[30, 20, 10]], [[1, 2, 3, 4, 5, 6]])
+    q = from_motor_order([[30, 20, 10]], [[1, 2, 3, 4, 5, 6]], HEAD_JOINTS)
     close(np.rad2deg(q), [[10, 20, 30, 1, 2, 3]], 1e-12)
 
 
@@ -327,7 +327,7 @@ def test_boards_report_the_torso_the_other_way_round():
 )
 def test_impossible_angles_are_refused(torso_deg, head_deg, says):
     with pytest.raises(InputError, match=says):
-        head_from_motor_order(torso_deg, head_deg)
+        from_motor_order(torso_deg, head_deg, HEAD_JOINTS)
 
 
 @pytest.mark.parametrize("versions", [{"head": "v3"}, {"arm": "v3"}, {"limits": "none"}])
@@ -412,13 +412,13 @@ def test_a_posture_says_which_limb_and_cannot_be_changed():
 def test_angles_may_overshoot_the_limits_by_five_degrees():
     low, high = np.rad2deg(load_icub().chains["head"].limits_rad[4])
     for limit, outward in ((low, -1), (high, 1)):
-        q = head_from_motor_order(np.zeros(3), [0, limit + 4.999 * outward, 0])
+        q = from_motor_order(np.zeros(3), [0, limit + 4.999 * outward, 0], HEAD_JOINTS)
         close(np.rad2deg(q[4]), limit + 4.999 * outward)
         with pytest.raises(InputError, match="row 0, neck_roll: .* expected"):
-            head_from_motor_order(np.zeros(3), [0, limit + 5.001 * outward, 0])
-    assert arm_from_motor_order(np.zeros(3), [0, 10, 0, 50, 0, 0, 0]).shape == (10,)
+            from_motor_order(np.zeros(3), [0, limit + 5.001 * outward, 0], HEAD_JOINTS)
+    assert from_motor_order(np.zeros(3), [0, 10, 0, 50, 0, 0, 0], ARM_JOINTS).shape == (10,)
     with pytest.raises(InputError, match="of 7 or more"):
-        arm_from_motor_order(np.zeros(3), [0, 10, 0, 50, 0, 0])
+        from_motor_order(np.zeros(3), [0, 10, 0, 50, 0, 0], ARM_JOINTS)
 
 
 @pytest.mark.parametrize(("rounding", "fits"), [(0.9e-4, True), (1.1e-4, False)])

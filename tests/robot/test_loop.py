@@ -119,18 +119,6 @@ def test_threats_reported_without_avoidance_do_not_move_the_arm(home, make_loop)
     assert threat.obstacles and command.status == FREE
 
 
-def test_valence_changes_the_response(home, make_loop):
-    def highest(valence):
-        loop = make_loop(valence=np.full(136, valence))
-        for now_s in (0.0, 0.03):
-            _, threat = loop.cycle(now_s, home, wrist_at(POST + (-0.1, 0.1, 0), now_s))
-        return threat.activations.max()
-
-    assert highest(1.0) == pytest.approx(2 * highest(0.0), rel=1e-5)
-    assert highest(-0.5) == pytest.approx(0.5 * highest(0.0), rel=1e-5)
-    assert highest(-1.0) == 0
-
-
 def test_without_perception_the_arm_stops_and_says_why(home, make_loop):
     loop = make_loop()
     command, _ = loop.cycle(0.0, home)

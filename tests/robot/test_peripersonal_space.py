@@ -13,7 +13,6 @@ from hicp_lib.robot.peripersonal_space import (
     NEGATIVES,
     POSITIVES,
     ReceptiveField,
-    gains,
     obstacles,
     response,
 )
@@ -84,11 +83,6 @@ def test_unknown_and_far_points_do_nothing():
     assert field.activations(np.zeros((1, 3)), up, points, np.ones(4)) == 0
     assert field.activations(np.zeros((1, 3)), up, np.zeros((0, 3)), np.zeros(0)) == 0
     assert field.activations(np.zeros((1, 3)), up, [[0, 0, 0.1]], np.zeros(1)) == 0
-
-
-def test_gains_by_valence():
-    np.testing.assert_allclose(gains(0.5, np.array([0, 1, -0.5, -1, 3, -7])), [0.5, 1, 0.25, 0, 1, 0])
-    assert gains(1.0) == 1
 
 
 def test_obstacles_are_weighted_by_activation():

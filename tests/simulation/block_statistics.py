@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.experiments import laboratory
+from hicp_lib.experiments.avoidance.head_camera import robot_surfaces
 from hicp_lib.experiments.avoidance.reaching import PHASES_S, SCRIPTS, script
-from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
 from hicp_lib.experiments.recordings.gestures import Gestures
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
@@ -40,7 +40,7 @@ from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at
 from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
 from hicp_lib.simulation.rendering.mesh import Mesh, quad
 from hicp_lib.simulation.rendering.render import World, render
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, Surface
+from hicp_lib.simulation.rendering.surfaces import Look, Material, Surface
 from hicp_lib.simulation.world import furniture, room, staging
 
 EXPECTED_FILE = Path(__file__).with_suffix(".json")
@@ -74,7 +74,7 @@ def looks(material: Material, n_coords: int = 2, span_m: float = 1.0) -> np.ndar
     rng = np.random.default_rng(5)
     coords = rng.uniform(0, span_m, (n_coords, 400)).astype(np.float32)
     footprint_m = np.repeat(np.float32([0.0005, 0.01]), 200)
-    look = material if isinstance(material, Look) else material(Hits(footprint_m, coords))
+    look = material if isinstance(material, Look) else material(coords, footprint_m)
     return np.concatenate(
         [
             np.broadcast_to(getattr(look, part), (n, 400))
@@ -178,7 +178,7 @@ def cloths() -> list[np.ndarray]:
     for k, fabric in enumerate(made):
         limbs = ("arms", "legs", "")[k % 3]
         look = fabrics.cloth_material(fabric, panels, limbs, trims[k % 3])(
-            Hits(np.full(600, 0.001, np.float32), coords)
+            coords, np.full(600, 0.001, np.float32)
         )
         found.append(np.column_stack([look.albedo.T, look.height_m]))
     chest = fabrics.printed(np.random.default_rng(0))(rng.uniform(-0.1, 0.4, (2, 600)), np.full(600, 0.001))
@@ -248,7 +248,7 @@ def skins() -> list[np.ndarray]:
     numbers = [[c.tone, c.warmth, *c.hair, *c.iris, c.lips, c.brows, c.stubble, c.freckles] for c in drawn]
     rows = coords[np.argsort(BODY.regions, kind="stable")[::7]]
     footprint_m = np.full(len(rows), 0.0005, np.float32)
-    seen = [skin.skin_material(c, 0.7)(Hits(footprint_m, rows.T)) for c in drawn[3:7]]
+    seen = [skin.skin_material(c, 0.7)(rows.T, footprint_m) for c in drawn[3:7]]
     columns = [np.column_stack([s.albedo.T, s.height_m, s.gloss, s.roughness, s.softness]) for s in seen]
     return [coords, np.array(numbers), *columns]
 

@@ -8,7 +8,7 @@ from itertools import islice
 
 import numpy as np
 
-from hicp_lib.experiments.avoidance.closed_loop import Trial, TrueKeypoints, simulate, start_posture
+from hicp_lib.experiments.avoidance.closed_loop import Trial, simulate, start_posture, true_keypoints
 from hicp_lib.experiments.avoidance.head_camera import photograph
 from hicp_lib.experiments.avoidance.reaching import SCRIPTS, Moment
 from hicp_lib.experiments.doses import doses
@@ -29,7 +29,7 @@ def dressed(number: int) -> str:
 def closed_loop(number: int) -> str:
     """The first steps of a run of avoidance, and what the robot's camera sees then."""
     name = list(SCRIPTS)[number % len(SCRIPTS)]
-    cycles = simulate(Trial(name, 1.2, Subject(number=number)), TrueKeypoints())
+    cycles = simulate(Trial(name, 1.2, Subject(number=number)), true_keypoints)
     seen = photograph(Moment(name, Subject(number=number), 2.0), start_posture())
     return content(cycles.to_dict("list"), seen)
 

@@ -45,8 +45,8 @@ def line_figure() -> Figure:
 
 def test_a_figure_is_shown_with_its_words_and_saved_the_same_each_time(study, shown):
     study.figure("line", line_figure())
-    assert 'alt="Says &quot;up&quot;"' in shown[0]
-    assert "<figcaption>A &lt;caption&gt;" in shown[0]
+    assert 'alt="Says &#34;up&#34;"' in shown[0]
+    assert "<figcaption>A &#60;caption&#62;" in shown[0]
     assert 'href="../results/quick/07_x/line.csv"' in shown[0]
     first = {kind: (study.folder / f"line.{kind}").read_bytes() for kind in ("svg", "png", "csv")}
     study.figure("line", line_figure())
@@ -101,8 +101,8 @@ def test_the_stamp_says_what_was_run(study, shown, tmp_path):
 def test_an_animation_is_saved_whole_and_shown_with_its_words(study, shown):
     study.animation("moves", b"....ftypisom", "It <moves>.", 'An "arm"')
     assert (study.folder / "moves.mp4").read_bytes() == b"....ftypisom"
-    assert 'src="data:video/mp4;base64,' in shown[0] and 'aria-label="An &quot;arm&quot;"' in shown[0]
-    assert "It &lt;moves&gt;." in shown[0] and 'href="../results/quick/07_x/moves.mp4"' in shown[0]
+    assert 'src="data:video/mp4;base64,' in shown[0] and 'aria-label="An &#34;arm&#34;"' in shown[0]
+    assert "It &#60;moves&#62;." in shown[0] and 'href="../results/quick/07_x/moves.mp4"' in shown[0]
 
 
 def test_a_film_has_controls_and_waits_to_be_started(study, shown):
@@ -115,6 +115,6 @@ def test_a_scene_is_described_and_carries_no_library_of_its_own(study, shown):
     import plotly.graph_objects as go
 
     study.scene("s", go.Figure(go.Scatter3d(x=[0], y=[0], z=[0])), "A scene.", 'One "point"')
-    assert 'aria-label="One &quot;point&quot;"' in shown[0]
+    assert 'aria-label="One &#34;point&#34;"' in shown[0]
     assert len(shown[0]) < 50_000
     assert json.loads((study.folder / "s.json").read_text())["data"][0]["type"] == "scatter3d"

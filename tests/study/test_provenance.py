@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import shutil
 import subprocess
@@ -66,6 +67,45 @@ def test_an_input_folder_is_known_by_names_sizes_and_times(tmp_path):
     assert input_sha256(tmp_path / "a") != input_sha256(tmp_path / "b")
 
 
+def test_links_of_a_folder_are_followed_and_circles_refused(tmp_path):
+    images, elsewhere = tmp_path / "images", tmp_path / "elsewhere"
+    images.mkdir()
+    (elsewhere / "deeper").mkdir(parents=True)
+    (elsewhere / "deeper" / "1.png").write_bytes(b"1")
+    empty = input_sha256(images)
+    (images / "train").symlink_to(elsewhere)
+    linked = input_sha256(images)
+    (elsewhere / "deeper" / "1.png").write_bytes(b"22")
+    assert len({empty, linked, input_sha256(images)}) == 3
+    (images / "nowhere").symlink_to(tmp_path / "none")
+    input_sha256(images)
+    (elsewhere / "deeper" / "back").symlink_to(images)
+    with pytest.raises(InputError, match=r"images/train/deeper/back: leads to a folder that it lies in"):
+        input_sha256(images)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no such files")
+def test_what_is_no_file_and_no_folder_has_no_identity(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="pipe: is neither a file nor a folder"):
+        input_sha256(tmp_path / "pipe")
+
+
+def test_git_runs_nothing_of_a_checkout_and_speaks_of_no_other(tmp_path, monkeypatch):
+    subprocess.run(["git", "init", "-q", tmp_path], check=True)
+    marker, program = tmp_path / "ran", tmp_path / "program"
+    program.write_text(f"#!/bin/sh\ntouch {marker}\n")
+    program.chmod(0o755)
+    for name in ("core.fsmonitor", "core.pager", "core.sshCommand"):
+        subprocess.run(["git", "-C", tmp_path, "config", name, program], check=True)
+    monkeypatch.setattr(provenance, "CHECKOUT", tmp_path)
+    assert provenance.git_state()["changed_files"] == 1 and not marker.exists()
+    (tmp_path / "within").mkdir()
+    monkeypatch.setattr(provenance, "CHECKOUT", tmp_path / "within")
+    monkeypatch.setenv("GIT_DIR", str(tmp_path / ".git"))
+    assert provenance.git_state() == {"commit": "unknown", "changed_files": None}
+
+
 def test_the_stamp_tells_code_data_machine_and_libraries():
     stamp = provenance.provenance({"seed": 3})
     assert stamp["parameters"] == {"seed": 3}
@@ -101,7 +141,7 @@ def test_the_footer_shows_all_that_was_stamped(changed, words):
     }  # fmt: skip
     footer = provenance.provenance_html(stamp)
     for text in (
-        f"<td>{words}</td>", "source = &quot;&lt;rendered&gt;&quot;, names = [&quot;ä&quot;]",
+        f"<td>{words}</td>", "source = &#34;&#60;rendered&#62;&#34;, names = &#91;&#34;ä&#34;&#93;",
         f"library {'1' * 12}, lock {'2' * 12}, data {'3' * 12}<", f"pose {'4' * 12}<", "python 3.11",
         "ONNX Runtime not used", "cpu x, cores 2", "1.2 s",
     ):  # fmt: skip

@@ -3,7 +3,7 @@
 import math
 
 from hicp_lib.detectors.registry import DETECTORS
-from hicp_lib.study.survey import PAPER_SYSTEMS, surveyed_data_sets, surveyed_detectors
+from hicp_lib.study.paper_tables import PAPER_SYSTEMS, surveyed_data_sets, surveyed_detectors
 
 
 def test_every_detector_is_told_and_the_papers_come_first():

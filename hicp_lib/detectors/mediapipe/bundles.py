@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.extras import needs
+from hicp_lib.core.files import read_bytes
 from hicp_lib.detectors.mediapipe.program import program_folder
 from hicp_lib.detectors.weights.default import load
 from hicp_lib.detectors.weights.published import check_use
@@ -63,12 +64,16 @@ def read_bundle(task: str, path: str | Path) -> bytes:
         If the file is unreadable, lacks a model the task needs or, if it was fetched by name, is not the
         one that was recorded then.
     """
+    content, found = read_bytes(path, f"give the .task file of the {task} landmarker"), dict[str, bytes]()
     try:
-        content = Path(path).read_bytes()
-        members = set(zipfile.ZipFile(io.BytesIO(content)).namelist())
-    except (OSError, zipfile.BadZipFile) as error:
-        raise InputError(f"{path}: is not a MediaPipe .task bundle ({error}); give another file") from None
-    absent = [member for member in BUNDLES[task] if member not in members]
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            # MediaPipe reads them where they lie: a compressed one is none, nor a bomb.
+            stored = [one for one in archive.infolist() if one.compress_type == zipfile.ZIP_STORED]
+            found = {one.filename: archive.read(one) for one in stored if one.filename in BUNDLES[task]}
+    except Exception as error:  # zipfile raises many kinds for damaged archives
+        why = one_line(error)
+        raise InputError(f"{path}: is not a MediaPipe .task bundle ({why}); give another file") from None
+    absent = [member for member in BUNDLES[task] if found.get(member, b"")[4:8] != b"TFL3"]
     if absent:
         raise InputError(f"{path}: has no {absent[0]}; give the .task file of the {task} landmarker")
     check_use(Path(path), content)

@@ -24,7 +24,6 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.core.keypoints import COCO_17, to_halpe
 from hicp_lib.detectors.combined.arbitration import Hands, give_hands, in_pairs, nearest_first
@@ -35,7 +34,33 @@ from hicp_lib.detectors.runtime.isolation import IsolatedProcess
 _WRISTS = [9, 10]
 
 
-class MediaPipePose:
+class _Task:
+    """One of MediaPipe's tasks, in a process of its own."""
+
+    name: str
+
+    def _prepare(
+        self, task: str, n: int, min_score: float, model: str | Path | None, tracking_hz: float
+    ) -> None:
+        """Its start takes half a second and waits for the first image; of a given bundle it does not."""
+        bundle = bundles.read_bundle(task, model) if model else bundles.assemble(task)
+        self._process = IsolatedProcess(
+            [child.__file__, str(program_folder().parent)],
+            {"task": task, "n": n, "min_score": min_score, "tracking_hz": tracking_hz},
+            bundle,
+            name=f"{model}: cannot be used by {self.name}" if model else self.name,
+            remedy="give another .task file" if model else "run: hicp doctor",
+        )
+        self.start = self._process.start
+        if model:
+            self.start()
+        self.settings = {f"num_{task}s": n, "min_score": min_score, "bundle_sha256": sha256_bytes(bundle)}
+        self.settings["mediapipe"] = program_version()
+        if tracking_hz:
+            self.settings["tracking_hz"] = tracking_hz
+
+
+class MediaPipePose(_Task):
     """MediaPipe Pose Landmarker: 33 landmarks, of which 21 have a Halpe counterpart.
 
     Parameters
@@ -59,9 +84,7 @@ class MediaPipePose:
         model: str | Path | None = None,
         tracking_hz: float = 0,
     ) -> None:
-        self._process, identity = _process(self.name, "pose", num_poses, min_score, model, tracking_hz)
-        self.settings = {"num_poses": num_poses, "min_score": min_score, **identity}
-        self.start = self._process.start
+        self._prepare("pose", num_poses, min_score, model, tracking_hz)
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find people in an RGB image, shape (height, width, 3), uint8."""
@@ -73,7 +96,7 @@ class MediaPipePose:
         return Detections(keypoints_px, scores, scores[:, COCO_17].mean(axis=1))
 
 
-class MediaPipeHands:
+class MediaPipeHands(_Task):
     """MediaPipe Hand Landmarker: 21 landmarks of each hand.
 
     One instance holds the best left and the best right hand; further hands pair up in the
@@ -100,9 +123,7 @@ class MediaPipeHands:
         model: str | Path | None = None,
         tracking_hz: float = 0,
     ) -> None:
-        self._process, identity = _process(self.name, "hand", num_hands, min_score, model, tracking_hz)
-        self.settings = {"num_hands": num_hands, "min_score": min_score, **identity}
-        self.start = self._process.start
+        self._prepare("hand", num_hands, min_score, model, tracking_hz)
 
     def detect(self, image: np.ndarray) -> Detections:
         """Find hands in an RGB image, shape (height, width, 3), uint8, paired into instances."""
@@ -158,30 +179,6 @@ def attach_hands(bodies: Detections, found: Detections) -> Detections:
     chosen = nearest_first(bodies.keypoints_px[:, _WRISTS], hands, np.full((len(bodies), 2), -1))
     rest = np.setdiff1d(np.arange(len(hands)), chosen)
     return give_hands(bodies, hands, chosen).concatenate(in_pairs(hands.take(rest)))
-
-
-def _process(
-    name: str, task: str, n: int, min_score: float, model: str | Path | None, tracking_hz: float
-) -> tuple[IsolatedProcess, dict]:
-    """MediaPipe's task in a process of its own, and what identifies its models in a detector's settings.
-
-    Its start takes half a second and waits for the first image; a bundle of the user's own is tried at once.
-    """
-    if n < 1 or not 0 <= min_score <= 1 or not 0 <= tracking_hz < np.inf:
-        given = f"finds {n} at scores from {min_score}, tracks at {tracking_hz} Hz"
-        raise InputError(f"{name}: {given}; expected 1 or more, a score from 0 to 1, and a rate or 0")
-    bundle = bundles.read_bundle(task, model) if model else bundles.assemble(task)
-    process = IsolatedProcess(
-        [child.__file__, str(program_folder().parent)],
-        {"task": task, "n": n, "min_score": min_score, "tracking_hz": tracking_hz},
-        bundle,
-        name=f"{model}: cannot be used by {name}" if model else name,
-        remedy="give another .task file" if model else "run: hicp doctor",
-    )
-    if model:
-        process.start()
-    known = {"bundle_sha256": sha256_bytes(bundle), "mediapipe": program_version()}
-    return process, known | ({"tracking_hz": tracking_hz} if tracking_hz else {})
 
 
 def _positions_px(fractions: np.ndarray, image: np.ndarray) -> np.ndarray:

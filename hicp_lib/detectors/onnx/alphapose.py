@@ -11,18 +11,14 @@ from hicp_lib.detectors.onnx import pose_nms
 from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.box_source import BoxSource
 from hicp_lib.detectors.onnx.decode import decode_combined, decode_integral, decode_quarter
-from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.facts import TEXTS, Fact, facts
 from hicp_lib.detectors.onnx.pose_net import Decoder, PoseNet
 from hicp_lib.detectors.onnx.session import OnnxModel, open_model
 
 # Points of face and hands at the end of a set, or of the hands alone.
 _N_INTEGRAL = {"halpe136": 110, "wholebody133": 110, "halpe68_noface": 42}
 # By the name of the decoding: what a keypoint's score is.
-_SCORES = {
-    "heatmap": "maximum of the map",
-    "integral": "maximum of the map's sigmoid",
-    "combined": "maximum of the map; of its sigmoid for face and hands",
-}
+_SCORES: dict[str, str] = TEXTS["alphapose scores"]
 # Taken off the R, G and B values, which are then divided.
 _MEAN, _STD = (0.406 * 255, 0.457 * 255, 0.480 * 255), (255.0,) * 3
 # Weight of the greatest keypoint score in a person's score.
@@ -98,16 +94,9 @@ class AlphaPose:
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""
         told = "told by the network's answer to the mean colour" if self._is_told else "given"
-        return [
-            *self._net.describe(),
-            Fact("pixels", "RGB / 255 - (0.406, 0.457, 0.480)", "as AlphaPose trains"),
-            Fact("decoding", self.decoding, f"{told}; option decoding"),
-            Fact("transform", "classic", "as AlphaPose"),
-            Fact("keypoint score", _SCORES[self.decoding] + ", cut off at 1", "as AlphaPose"),
-            Fact("person score", f"mean + {_GREATEST_WEIGHT} x greatest keypoint score + box score",
-                 "as AlphaPose; pose-NMS"),
-            *self._boxes.describe(),
-        ]  # fmt: skip
+        score = {"score": _SCORES[self.decoding], "greatest_weight": _GREATEST_WEIGHT}
+        own = facts("alphapose", told=told, **score, **self.settings)
+        return [*self._net.describe(), *own, *self._boxes.describe()]
 
 
 def _told_decoding(maps: np.ndarray, n_integral: int) -> str:

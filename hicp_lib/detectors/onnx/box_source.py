@@ -6,15 +6,11 @@ from typing import Any
 import numpy as np
 
 from hicp_lib.core.errors import InputError, refuse_unknown
-from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.facts import TEXTS, Fact
 from hicp_lib.detectors.onnx.nanodet import NanoDet
 from hicp_lib.detectors.onnx.person_boxes import PersonBoxes
 
-_MEANINGS = {
-    "gt": "the annotated boxes",
-    "image": "one person per image, the whole of it",
-    "detected": "by a person detector",
-}
+_MEANINGS: dict[str, str] = TEXTS["boxes"]
 
 
 class BoxSource:

@@ -29,6 +29,7 @@ def peaks(maps: np.ndarray) -> Decoded:
     return np.stack([best % maps.shape[3], best // maps.shape[3]], axis=-1).astype(float), scores
 
 
+@np.errstate(invalid="ignore", over="ignore")
 def decode_quarter(maps: np.ndarray, *, needs_both_axes: bool = False) -> Decoded:
     """Heat maps (n, k, h, w): the highest cell, moved a quarter cell towards its higher neighbour.
 
@@ -44,12 +45,12 @@ def decode_quarter(maps: np.ndarray, *, needs_both_axes: bool = False) -> Decode
     else:
         moves_x, moves_y = inner_x & (0 < y), inner_y & (0 < x)
     at = _around(maps, cells)
-    with np.errstate(invalid="ignore"):
-        step = np.stack([at(1, 0) - at(-1, 0), at(0, 1) - at(0, -1)], axis=-1)
+    step = np.stack([at(1, 0) - at(-1, 0), at(0, 1) - at(0, -1)], axis=-1)
     moved = cells + 0.25 * np.sign(step) * np.stack([moves_x, moves_y], axis=-1)
     return given(moved, scores)
 
 
+@np.errstate(invalid="ignore", over="ignore")  # a network may give infinity
 def decode_dark(maps: np.ndarray, kernel: int = 11) -> Decoded:
     """Heat maps (n, k, h, w), decoded aware of their distribution (Zhang et al., DARK, CVPR 2020).
 
@@ -69,6 +70,7 @@ def decode_dark(maps: np.ndarray, kernel: int = 11) -> Decoded:
     return given(cells + np.where(inner[..., None], offset, 0.0), scores)
 
 
+@np.errstate(invalid="ignore", over="ignore")
 def decode_dark_udp(maps: np.ndarray, kernel: int = 11) -> Decoded:
     """Heat maps (n, k, h, w) of a network trained with unbiased data processing, as MMPose decodes them.
 
@@ -159,8 +161,7 @@ def _log_around(
     """Logarithms of the blurred maps beside a cell of each, for values cut to [least, most]."""
     # The factor keeps the maximum; it matters only to what is cut.
     blurred = _blur(maps, kernel)
-    with np.errstate(invalid="ignore"):
-        factor = scores / np.maximum(blurred.max(axis=(2, 3)), np.finfo(np.float32).tiny)
+    factor = scores / np.maximum(blurred.max(axis=(2, 3)), np.finfo(np.float32).tiny)
     neighbours = _around(blurred, cells)
     return lambda dx, dy: np.log(np.clip(neighbours(dx, dy) * factor, least, most))
 

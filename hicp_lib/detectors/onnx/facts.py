@@ -1,6 +1,13 @@
 """What a detector takes for granted about a model file, and what the others take, for people to read."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import read_json
+
+TEXTS = read_json(DATA_DIR / "model_facts.json")
+KNOWN_NETWORKS = ", ".join(TEXTS["networks"])
+"""The networks that the detectors take, in one line."""
 
 
 class Fact(NamedTuple):
@@ -18,14 +25,19 @@ class Fact(NamedTuple):
     why: str
 
 
-KNOWN_NETWORKS = (
-    "mmpose (crops (n, 3, h, w) in; heat maps (n, k, h, w), or SimCC x, y and perhaps z, (n, k, bins), out), "
-    "alphapose (crops in; heat maps out), "
-    "openpose (image (1, 3, h, w) in; 57 or 78 maps at an eighth out, for hands 22), "
-    "detectron2 (image (3, h, w) in; boxes, scores, keypoints (n, 17, 3) or maps (n, 17, h, w) out), "
-    "one-stage (image in; RTMO's dets (1, n, 5) and keypoints (1, n, k, 3), or YOLO-pose's (1, 5 + 3 k, n) "
-    "or (1, n, 6 + 3 k), out), "
-    "person models (image in; dets (1, n, 5), or YOLOX's (1, cells, 5 + classes), out); "
-    "k is 14 (CrowdPose), 17 (COCO), 21 (hand), 26, 68, 136 (Halpe) or 133 (COCO-WholeBody)"
-)
-"""The networks that the detectors take, in one line."""
+def facts(name: str, **values: Any) -> list[Fact]:
+    """What is taken for granted about one kind of networks.
+
+    Parameters
+    ----------
+    name : str
+        Key of `facts` in `data/model_facts.json`.
+    **values : object
+        What stands there in braces.
+
+    Examples
+    --------
+    >>> facts("nanodet", min_score=0.3, max_overlap=0.6)[1]
+    Fact(what='person score', value='>= 0.3', why='overlaps above 0.6 are suppressed')
+    """
+    return [Fact(*(text.format(**values) for text in row)) for row in TEXTS["facts"][name]]

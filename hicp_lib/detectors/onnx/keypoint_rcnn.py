@@ -18,7 +18,7 @@ import numpy as np
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import refuse_unknown
 from hicp_lib.detectors.onnx.decode import decode_roi_maps, given
-from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.facts import Fact, facts
 from hicp_lib.detectors.onnx.letterbox import Letterbox, letterbox
 from hicp_lib.detectors.onnx.session import Port, open_model
 
@@ -86,21 +86,11 @@ class KeypointRcnn:
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""
-        is_detectron = self._family == "detectron2"
         told = "told by its outputs" if self._is_told else "given"
-        mass = f"softmax mass of the peak over the map, cut off at 1 ({told})"
-        logit = f"logistic of (logit - {_LOGIT_MIDDLE:g}), 0.5 where Detectron draws points ({told})"
-        height, width = self._model.inputs[0].shape[-2:]
-        return [
-            *self._model.describe(),
-            Fact("family", self._family, f"{told}; option family"),
-            Fact("input", f"{width or 'any'} wide, {height or 'any'} high", "read from the file"),
-            Fact("pixels", "BGR 0-255" if is_detectron else "RGB 0-1", "as the family exports"),
-            Fact("keypoints", "coco17", "pixel corners at integers, half a pixel is taken off"
-                 if is_detectron else "as annotated, nothing is taken off"),
-            Fact("keypoint score", mass if is_detectron else logit, "as the family's networks give it"),
-            Fact("person score", f"box score, >= {self._min_score}", "as the originals; option min_score"),
-        ]  # fmt: skip
+        height, width = (side or "any" for side in self._model.inputs[0].shape[-2:])
+        size = {"width": width, "height": height}
+        own = facts(self._family, told=told, logit_middle=_LOGIT_MIDDLE, **size, **self.settings)
+        return [*self._model.describe(), *own]
 
     def _fit(self, image: np.ndarray) -> Letterbox:
         """The image at the size the network takes."""

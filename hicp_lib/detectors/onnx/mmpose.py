@@ -10,7 +10,7 @@ from hicp_lib.core.keypoints import SIGMAS, TO_HALPE
 from hicp_lib.detectors.onnx.affine import Regions
 from hicp_lib.detectors.onnx.box_source import BoxSource
 from hicp_lib.detectors.onnx.decode import decode_dark, decode_dark_udp, decode_quarter
-from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.facts import Fact, facts
 from hicp_lib.detectors.onnx.letterbox import IMAGENET_RGB
 from hicp_lib.detectors.onnx.pose_net import PoseNet
 from hicp_lib.detectors.onnx.pose_nms import oks_nms
@@ -111,21 +111,11 @@ class MMPose:
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""
-        kind = "SimCC" if self._net.is_simcc else "heat maps" + (", DARK" if self._dark else ", quarter cell")
-        peak = "lower of the two maxima" if self._net.is_simcc else "maximum"
-        why = "told by the outputs" if self._net.is_simcc else "the file does not tell; option dark"
-        return [
-            *self._net.describe(),
-            Fact("pixels", "RGB, mean and deviation of ImageNet", "as MMPose trains"),
-            Fact("transform", "UDP: sizes less one" if self._udp else "classic, not UDP", self._udp_from),
-            Fact("decoding", kind, why),
-            Fact("keypoint score", f"{peak} / {self._score_scale:g}, cut off at 1",
-                 "10 if the head shuffles pixels (RTMW), else 1; option score_scale"),
-            Fact("person score",
-                 f"box score x mean of the scores above {_MIN_COUNTED_SCORE}, before they are divided",
-                 "as MMPose; OKS-NMS at 0.9"),
-            *self._boxes.describe(),
-        ]  # fmt: skip
+        transform = "UDP: sizes less one" if self._udp else "classic, not UDP"
+        how = {"transform": transform, "transform_from": self._udp_from, "least": _MIN_COUNTED_SCORE}
+        how["decoding"] = "heat maps, DARK" if self._dark else "heat maps, quarter cell"
+        own = facts("mmpose SimCC" if self._net.is_simcc else "mmpose", **how, **self.settings)
+        return [*self._net.describe(), *own, *self._boxes.describe()]
 
 
 def _hand_convention(convention: str, hand: str) -> str:

@@ -13,6 +13,7 @@ from hicp_lib.core.files import json_or_text
 
 # Under this name exporters keep what a network expects, as a JSON object.
 _CONTRACT = "cigpose_meta"
+_MOST_NODES = 20_000  # published networks have up to 5,000
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,8 @@ def read_model(path: Path, content: bytes) -> ModelFile:
         raise InputError(
             f"{path}: is not an ONNX file or is cut off ({len(content)} bytes); get it again, or export it"
         ) from None
+    if (n := len(model.graph.node)) > _MOST_NODES:
+        raise InputError(f"{path}: has {n} nodes; expected a network of up to {_MOST_NODES}")
     # A second file would be read from wherever the program was started, and its content is in no hash.
     outside = next(
         (tensor for tensor in _tensors(model) if tensor.data_location or tensor.external_data), None

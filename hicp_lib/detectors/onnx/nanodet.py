@@ -9,7 +9,7 @@ its file.
 import numpy as np
 
 from hicp_lib.detectors.onnx.affine import Regions
-from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.facts import Fact, facts
 from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, blob
 from hicp_lib.detectors.onnx.person_boxes import unsuppressed
 from hicp_lib.detectors.onnx.session import open_committed
@@ -58,12 +58,7 @@ class NanoDet:
 
     def describe(self) -> list[Fact]:
         """What it is, and what it keeps."""
-        return [
-            Fact("person detector", "NanoDet-g", "comes with the library; option person_model takes another"),
-            Fact(
-                "person score", f">= {self._min_score}", f"overlaps above {self._max_overlap} are suppressed"
-            ),
-        ]
+        return facts("nanodet", **self.settings)
 
     def _read(self, outputs: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Corners (n, 2, 2: left-top, right-bottom; x, y) and scores (n,), in input pixels."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.detectors.onnx.decode import given
-from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.facts import Fact, facts
 from hicp_lib.detectors.onnx.letterbox import letterbox
 from hicp_lib.detectors.onnx.person_boxes import DEFAULT_SIDE_PX, FILL, N_BOX, unsuppressed
 from hicp_lib.detectors.onnx.pose_net import CONVENTIONS, convention_of
@@ -75,18 +75,9 @@ class OneStage:
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""
-        width, height = self._size_px
-        size = "read from the file, its metadata imgsz, or else 640"
-        where = "BGR 0-255, top-left" if self._is_rtmo else "RGB 0-1, in the middle"
-        return [
-            *self._model.describe(),
-            Fact("family", "RTMO" if self._is_rtmo else "YOLO-pose", "told by its outputs"),
-            Fact("input", f"{width} wide, {height} high", size),
-            Fact("pixels", f"{where}, filled with 114", "as the family exports"),
-            Fact("keypoints", self._convention, "told by their number"),
-            Fact("person score", f"box score, >= {self._min_score:g}",
-                 f"overlaps above {self._max_overlap:g} are suppressed; options min_score, max_overlap"),
-        ]  # fmt: skip
+        family = "RTMO" if self._is_rtmo else "YOLO-pose"
+        own = facts(family, size_px=self._size_px, convention=self._convention, **self.settings)
+        return [*self._model.describe(), *own]
 
     def _read(self, outputs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Corners and score (n, 5) and keypoints with scores (n, k, 3), in input pixels."""

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.errors import refuse_unknown
-from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.facts import Fact, facts
 from hicp_lib.detectors.onnx.letterbox import IMAGENET_BGR, blob, letterbox
 from hicp_lib.detectors.onnx.session import open_model
 
@@ -89,17 +89,9 @@ class PersonBoxes:
 
     def describe(self) -> list[Fact]:
         """What is taken for granted about the model."""
-        width, height = self._size_px
         told = "read from the first convolution" if self._is_told else "given"
-        return [
-            Fact("person detector", self._family, f"{told}; option person_family"),
-            Fact("person input", f"{width} x {height}, BGR, top-left, filled with 114", "read from the file"),
-            Fact("person boxes", "decoded" if self._is_decoded else "as the network gives them",
-                 "told by its answer to zeros"),
-            Fact("person score", f">= {self._min_score:g}",
-                 f"overlaps above {self._max_overlap:g} are suppressed where the export does not do it; "
-                 "options person_min_score, person_max_overlap"),
-        ]  # fmt: skip
+        boxes = "decoded" if self._is_decoded else "as the network gives them"
+        return facts("person models", told=told, size_px=self._size_px, boxes=boxes, **self.settings)
 
     def _rows(self, outputs: list[np.ndarray]) -> np.ndarray:
         """Rows (n, 5) of an export that does its own suppression, or YOLOX's (cells, 5 + classes)."""

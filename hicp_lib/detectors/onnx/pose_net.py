@@ -14,7 +14,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import mirror
 from hicp_lib.detectors.onnx.affine import PADDING, Regions
 from hicp_lib.detectors.onnx.decode import Decoded, decode_simcc
-from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.facts import Fact, facts
 from hicp_lib.detectors.onnx.letterbox import blob
 from hicp_lib.detectors.onnx.session import OnnxModel
 
@@ -106,18 +106,11 @@ class PoseNet:
 
     def describe(self) -> list[Fact]:
         """What the file tells, and how crops are made."""
-        width, height = self.input_size_px
-        return [
-            *self.model.describe(),
-            Fact("input", f"{width} wide, {height} high", self._size_from),
-            Fact("batch", str(self.batch or "any"), "read from the file"),
-            Fact("output", f"{'x'.join(map(str, self.grid_size))} {'bins' if self.is_simcc else 'cells'}",
-                 "read from the file"),
-            Fact("keypoints", self.convention, "told by their number"),
-            Fact("crop", f"box x {PADDING}, grown to the input's shape, black outside the image",
-                 "as the originals"),
-            Fact("flip test", "yes" if self._flip_test else "no", "option flip_test"),
-        ]  # fmt: skip
+        size = {"size_px": self.input_size_px, "size_from": self._size_from, "batch": self.batch or "any"}
+        grid = "x".join(map(str, self.grid_size)) + (" bins" if self.is_simcc else " cells")
+        output = {"grid": grid, "convention": self.convention, "padding": PADDING}
+        own = facts("top-down", flip_test="yes" if self._flip_test else "no", **size, **output)
+        return [*self.model.describe(), *own]
 
     def _respond(self, crops: list[np.ndarray], udp: bool) -> list[np.ndarray]:
         """The outputs for n crops, flip test included; n of each."""

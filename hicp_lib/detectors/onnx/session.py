@@ -4,28 +4,25 @@ A model is opened once per process, however many detectors (one per thread) use 
 Runtime allows its sessions to be run from several threads at a time.
 """
 
+import math
 import threading
 import weakref
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from hicp_lib.core.environment import with_variables
 from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.files import read_bytes, sha256_bytes
+from hicp_lib.core.images import MAX_PIXELS
+from hicp_lib.core.limited import raised
 from hicp_lib.detectors.onnx.facts import KNOWN_NETWORKS, Fact
 from hicp_lib.detectors.onnx.model_file import ModelFile, read_model
+from hicp_lib.detectors.onnx.starting import DTYPES, VERSION, available_providers, start, try_out
 from hicp_lib.detectors.weights.default import find, load
 from hicp_lib.detectors.weights.published import check_use
-
-# ONNX Runtime would tell its vendor of every model that is opened, and keep an identifier for that in the
-# user's cache folder. It reads the variable once, when it is loaded.
-with with_variables(ORT_DISABLE_TELEMETRY="1"):
-    import onnxruntime
-
-_DTYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
-_FATAL_ONLY = 4
 
 
 @dataclass(frozen=True)
@@ -62,20 +59,23 @@ class OnnxModel:
         What its file tells.
     """
 
-    def __init__(self, path: Path, content: bytes, provider: str, threads: int) -> None:
+    def __init__(self, path: Path, content: bytes, provider: str, threads: int, is_ours: bool) -> None:
         self.told: ModelFile = read_model(path, content)
+        if not is_ours:
+            try_out(path)
         self.path, self.sha256, self.provider = path, sha256_bytes(content), provider
-        self._session = _start(path, content, provider, threads)
+        self._session = start(path, content, provider, threads)
         self._responses: dict[tuple[int, ...], list[np.ndarray]] = {}
         self.inputs = [_port(node) for node in self._session.get_inputs()]
         self.outputs = [_port(node) for node in self._session.get_outputs()]
-        if len(self.inputs) != 1 or self.inputs[0].dtype not in _DTYPES:
-            raise self.refusal("expected a network with one input, an image in floating point")
+        are_numbers = all(of.dtype.startswith("tensor(") and "str" not in of.dtype for of in self.outputs)
+        if len(self.inputs) != 1 or self.inputs[0].dtype not in DTYPES or not are_numbers:
+            raise self.refusal("expected one input, an image in floating point, and outputs of numbers")
 
     @property
     def settings(self) -> dict:
         """What identifies the model's results."""
-        return {"sha256": self.sha256, "provider": self.provider, "onnxruntime": onnxruntime.__version__}
+        return {"sha256": self.sha256, "provider": self.provider, "onnxruntime": VERSION}
 
     @property
     def image_size_px(self) -> tuple[int | None, int | None]:
@@ -133,10 +133,10 @@ class OnnxModel:
         Raises
         ------
         InputError
-            If the network does not accept the array or fails on it.
+            If the network does not accept the array, fails on it, or gives NaN.
         """
         port = self.inputs[0]
-        feed = {port.name: pixels.astype(_DTYPES[port.dtype], copy=False)}
+        feed = {port.name: pixels.astype(DTYPES[port.dtype], copy=False)}
         try:
             outputs = self._session.run(None, feed)
         except Exception as error:  # ONNX Runtime's errors share no base class of their own
@@ -144,6 +144,9 @@ class OnnxModel:
                 f"{self.path}: the network failed on an input of shape {pixels.shape} "
                 f"({one_line(error)}); export it again for this input"
             ) from None
+        for port, output in zip(self.outputs, outputs, strict=True):
+            if output.dtype.kind == "f" and output.size and np.isnan(output.min()):
+                raise InputError(f"{self.path}: its output {port.name} is NaN in places; export in 32 bits")
         return [np.asarray(output) for output in outputs]
 
     def run_named(self, pixels: np.ndarray) -> dict[str, np.ndarray]:
@@ -161,8 +164,10 @@ class OnnxModel:
         if size_px not in self._responses:
             shape, one_image = self.inputs[0].shape, (1, 3, *size_px)
             sizes = one_image if len(shape) == len(one_image) else [1] * len(shape)
-            zeros = np.zeros([size or given for size, given in zip(shape, sizes, strict=True)], np.float32)
-            self._responses[size_px] = self.run(zeros)
+            sizes = [size or given for size, given in zip(shape, sizes, strict=True)]
+            if math.prod(sizes) > raised(MAX_PIXELS):
+                raise self.refusal(f"its input would be {_text(sizes)}, more than {MAX_PIXELS:.0e} values")
+            self._responses[size_px] = self.run(np.zeros(sizes, np.float32))
         return self._responses[size_px]
 
 
@@ -186,44 +191,26 @@ def open_model(path: str | Path, provider: str = "cpu", threads: int = 1) -> Onn
     ------
     InputError
         If the file is absent, not a network ONNX Runtime can run or, if it was fetched by name, not the one
-        that was recorded then, or the provider is not to be had.
+        that was recorded then, takes too much time or memory, or the provider is not to be had.
     """
     path = Path(path)
     content = read_bytes(path, "give the path of an ONNX file")
     check_use(path, content)
-    return open_content(content, path, provider, threads)
+    return _opened(content, path, provider, threads, is_ours=False)
 
 
-def open_content(content: bytes, path: Path, provider: str = "cpu", threads: int = 1) -> OnnxModel:
-    """As `open_model`, from the bytes of an ONNX model.
-
-    Parameters
-    ----------
-    content : bytes
-    path : Path
-        The file they were made from.
-    provider : str
-    threads : int
-
-    Examples
-    --------
-    >>> open_content(b"no network", Path("a.onnx"), "abacus")  # doctest: +ELLIPSIS
-    Traceback (most recent call last):
-    ...
-    hicp_lib.core.errors.InputError: a.onnx: execution provider 'abacus' is not available here; expected ...
-    """
+def _opened(content: bytes, path: Path, provider: str, threads: int, is_ours: bool) -> OnnxModel:
+    """A model of this content; networks that do not come with the library are tried before."""
     if provider not in available_providers():
         raise InputError(
             f"{path}: execution provider {provider!r} is not available here; expected one of: "
             f"{', '.join(available_providers())} (others need another build of onnxruntime)"
         )
-    if threads < 1:
-        raise InputError(f"{path}: threads {threads}: expected 1 or more")
     key = (sha256_bytes(content), str(path), provider, threads)
     with _lock:
         model = _open.get(key)
         if model is None:
-            model = _open[key] = OnnxModel(path, content, provider, threads)
+            model = _open[key] = OnnxModel(path, content, provider, threads, is_ours)
         return model
 
 
@@ -242,41 +229,13 @@ def open_committed(name: str, provider: str = "cpu", threads: int = 1) -> OnnxMo
     >>> open_committed("movenet-lightning.onnx").inputs[0].shape
     (1, 3, 192, 192)
     """
-    return open_content(load(name), find(name).path, provider, threads)
+    return _opened(load(name), find(name).path, provider, threads, is_ours=True)
 
 
-def available_providers() -> dict[str, str]:
-    """Execution providers of this onnxruntime that compute on this machine, full names by short ones."""
-    found = onnxruntime.get_available_providers()
-    return {name.removesuffix("ExecutionProvider").lower(): name for name in found if "Azure" not in name}
-
-
-def _start(path: Path, content: bytes, provider: str, threads: int) -> onnxruntime.InferenceSession:
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads, options.inter_op_num_threads = threads, 1
-    options.log_severity_level = _FATAL_ONLY
-    # Threads that wait by spinning would take the cores from the other images.
-    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    full_name = available_providers()[provider]
-    try:
-        session = onnxruntime.InferenceSession(content, options, providers=[full_name])
-    except Exception as error:  # ONNX Runtime's errors share no base class of their own
-        raise InputError(
-            f"{path}: ONNX Runtime cannot run it ({one_line(error)}); export it again, in one file"
-        ) from None
-    got = session.get_providers()[0]
-    if got != full_name:
-        raise InputError(
-            f"{path}: {provider} was asked for, but its libraries did not load and {got} would run; "
-            "install them, or ask for cpu"
-        )
-    return session
-
-
-def _text(shape: tuple[int | None, ...]) -> str:
+def _text(shape: Sequence[int | None]) -> str:
     return f"({', '.join('?' if size is None else str(size) for size in shape)})"
 
 
-def _port(node: onnxruntime.NodeArg) -> Port:
+def _port(node: Any) -> Port:
     shape = tuple(size if isinstance(size, int) and size > 0 else None for size in node.shape or ())
     return Port(node.name, shape, node.type)

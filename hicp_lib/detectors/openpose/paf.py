@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+import cv2
 import numpy as np
 
 from hicp_lib.core.datafiles import DATA_DIR
@@ -84,12 +85,12 @@ class PafOptions:
 
 
 @dataclass
-class _Person:
-    """Peaks of one person by part, and the sum of the limb scores."""
+class Person:
+    """Peaks of one person by part, the sum of the scores that count (here of limbs) and their number."""
 
     peaks: dict[int, int] = field(default_factory=dict)
-    limb_score: float = 0.0
-    n_limbs: int = 0
+    score: float = 0.0
+    n_scores: int = 0
 
 
 # Peaks at its start and end, by their row, and how well the field supports it.
@@ -137,16 +138,13 @@ def find_peaks(heat_maps: np.ndarray, stride: int, min_peak: float) -> list[np.n
     return [peaks[order[part[order] == index]][:MAX_PEAKS] for index in range(len(heat_maps))]
 
 
+_BEFORE = np.array([[1, 1, 1], [1, 0, 0], [0, 0, 0]], np.uint8)  # a cell's neighbours, row by row
+
+
 def _is_maximum(maps: np.ndarray) -> np.ndarray:
     """Cells above their eight neighbours; of a plateau of equals, one remains."""
-    height, width = maps.shape[1:]
-    padded = np.pad(maps, ((0, 0), (1, 1), (1, 1)), constant_values=-np.inf)
-    result = np.ones(maps.shape, dtype=bool)
-    for dy, dx in np.ndindex(3, 3):
-        neighbour = padded[:, dy : dy + height, dx : dx + width]
-        if (dy, dx) != (1, 1):
-            result &= (maps > neighbour) if (dy, dx) < (1, 1) else (maps >= neighbour)
-    return result
+    before, after = (np.stack([cv2.dilate(one, of) for one in maps]) for of in (_BEFORE, _BEFORE[::-1, ::-1]))
+    return (maps > before) & (maps >= after)
 
 
 def _vertex(before: np.ndarray, middle: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -260,7 +258,7 @@ def assemble(
         (sum of part and limb scores) / (parts + limbs).
     """
     peaks = find_peaks(heat_maps, stride, options.min_peak)
-    people: list[_Person] = []
+    people: list[Person] = []
     for index, limbs in enumerate(find_limbs(peaks, fields, model, stride, options)):
         a, b = model.pairs[index].tolist()
         for start, end, score in limbs:
@@ -302,7 +300,7 @@ def part_rows(person: dict[int, int], peaks: list[np.ndarray]) -> np.ndarray:
 
 
 def _join(
-    people: list[_Person], a: tuple[int, int], b: tuple[int, int], score: float, completing: bool
+    people: list[Person], a: tuple[int, int], b: tuple[int, int], score: float, completing: bool
 ) -> None:
     """Add the limb between peak `a` and peak `b` (part, index) to the people found so far."""
     with_a = next((person for person in people if person.peaks.get(a[0]) == a[1]), None)
@@ -311,31 +309,31 @@ def _join(
     if person is None:
         if completing:
             return
-        person = _Person()
+        person = Person()
         people.append(person)
     elif with_b is not None and with_b is not person:
         if person.peaks.keys() & with_b.peaks.keys():
             return
         person.peaks.update(with_b.peaks)
-        person.limb_score += with_b.limb_score
-        person.n_limbs += with_b.n_limbs
+        person.score += with_b.score
+        person.n_scores += with_b.n_scores
         people[:] = [other for other in people if other is not with_b]
     for part, peak in (a, b):
         if person.peaks.setdefault(part, peak) != peak:
             return
-    person.limb_score += score
-    person.n_limbs += 1
+    person.score += score
+    person.n_scores += 1
 
 
 def _keep(
-    people: list[_Person], peaks: list[np.ndarray], model: PartModel, options: PafOptions
+    people: list[Person], peaks: list[np.ndarray], model: PartModel, options: PafOptions
 ) -> tuple[np.ndarray, np.ndarray]:
     parts, scores = [], []
     for person in people:
         rows = part_rows(person.peaks, peaks)
-        total = rows[:, 2].sum() + person.limb_score
+        total = rows[:, 2].sum() + person.score
         n_counted = len(person.peaks.keys() - model.uncounted)
         if n_counted >= options.min_parts and total / len(person.peaks) >= options.min_score:
             parts.append(rows)
-            scores.append(total / (len(person.peaks) + person.n_limbs))
+            scores.append(total / (len(person.peaks) + person.n_scores))
     return np.array(parts).reshape(-1, model.n_parts, 3), np.array(scores)

@@ -24,13 +24,12 @@ Its rules, followed to the letter where they look odd, too, since the program's 
 `hicp_lib.detectors.openpose.paf` joins by its own, simpler rules.
 """
 
-from dataclasses import dataclass
 from functools import partial
 
 import cv2
 import numpy as np
 
-from hicp_lib.detectors.openpose.paf import Limb, PafOptions, PartModel, find_limbs, part_rows
+from hicp_lib.detectors.openpose.paf import Limb, PafOptions, PartModel, Person, find_limbs, part_rows
 
 _MAX_PEAKS = 127
 _REACH_PX = 3
@@ -121,15 +120,6 @@ def _nearest(maps: np.ndarray, positions_px: np.ndarray, stride: int, offset_px:
 _MOST_BESIDE_FEET = 4
 
 
-@dataclass
-class _Person:
-    """Peaks by part, how many were counted, and the sum of parts' and limbs' scores."""
-
-    peaks: dict[int, int]
-    n_counted: int
-    score: float
-
-
 def join_as_released(
     peaks: list[np.ndarray], limbs: list[list[Limb]], model: PartModel, options: PafOptions
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -150,7 +140,7 @@ def join_as_released(
         x, y as in `peaks`, score; NaN, NaN, 0 if missing.
     scores : array, shape (n_people,)
     """
-    people: list[_Person] = []
+    people: list[Person] = []
     for index, (a, b) in enumerate(model.pairs.tolist()):
         if not (len(peaks[a]) and len(peaks[b])):
             _begin_alone(people, a if len(peaks[a]) else b, peaks)
@@ -164,13 +154,13 @@ def join_as_released(
     return parts, np.array([person.score / n_terms for person in kept])
 
 
-def _begin_alone(people: list[_Person], part: int, peaks: list[np.ndarray]) -> None:
+def _begin_alone(people: list[Person], part: int, peaks: list[np.ndarray]) -> None:
     taken = {person.peaks.get(part) for person in people}
     new = [(peak, value) for peak, value in enumerate(peaks[part][:, 2]) if peak not in taken]
-    people += [_Person({part: peak}, 1, value) for peak, value in new]
+    people += [Person({part: peak}, value, 1) for peak, value in new]
 
 
-def _complete(people: list[_Person], a: int, b: int, limbs: list[Limb]) -> None:
+def _complete(people: list[Person], a: int, b: int, limbs: list[Limb]) -> None:
     for start, end, _ in limbs:
         for person in people:
             if person.peaks.get(a) == start:
@@ -179,22 +169,22 @@ def _complete(people: list[_Person], a: int, b: int, limbs: list[Limb]) -> None:
                 person.peaks.setdefault(a, start)
 
 
-def _extend(people: list[_Person], a: int, b: int, limbs: list[Limb], peaks: list[np.ndarray]) -> None:
+def _extend(people: list[Person], a: int, b: int, limbs: list[Limb], peaks: list[np.ndarray]) -> None:
     for start, end, score in limbs:
         person = next((person for person in people if person.peaks.get(a) == start), None)
         if person is None:
-            person = _Person({a: start}, 1, peaks[a][start, 2])
+            person = Person({a: start}, peaks[a][start, 2], 1)
             people.append(person)
         person.peaks[b] = end
-        person.n_counted += 1
+        person.n_scores += 1
         person.score += peaks[b][end, 2] + score
 
 
-def _keep(people: list[_Person], uncounted: frozenset[int], options: PafOptions) -> list[_Person]:
+def _keep(people: list[Person], uncounted: frozenset[int], options: PafOptions) -> list[Person]:
     kept = []
     for person in people:
         n_uncounted = len(person.peaks.keys() & uncounted)
-        n = person.n_counted - n_uncounted
+        n = person.n_scores - n_uncounted
         if n_uncounted and n <= _MOST_BESIDE_FEET:
             continue
         if n >= options.min_parts and person.score / n >= options.min_score:

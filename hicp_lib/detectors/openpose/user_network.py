@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.detectors.onnx.facts import Fact
+from hicp_lib.detectors.onnx.facts import Fact, facts
 from hicp_lib.detectors.onnx.session import OnnxModel, open_model
 from hicp_lib.detectors.openpose.hands import OpenPoseHands
 from hicp_lib.detectors.openpose.mobilenet import COCO_18, STRIDE, as_detections, check_height
@@ -78,20 +78,12 @@ class OpenPose:
     def describe(self) -> list[Fact]:
         """What is taken for granted about the models."""
         height, width = self._size_px
-        size = f"{width or 'any'} wide, {height} high"
+        open_size = "option net_height_px; width in proportion, to a multiple of 16, at most 16 / 9 of it"
+        size = {"width": width or "any", "height": height}
+        size["size_from"] = "read from the file" if width else open_size
         hands = "by the hand model" if self._hands else "none; option hand_model"
-        return [
-            *self._model.describe(),
-            Fact("input", size, "read from the file" if width else "option net_height_px; width in "
-                 "proportion, to a multiple of 16, at most 16 / 9 of it"),
-            Fact("pixels", "BGR / 256 - 0.5, aspect kept, padded right and below", "as OpenPose"),
-            Fact("keypoints", self._convention, "told by the number of maps"),
-            Fact("decoding", "maps enlarged, centroids of peaks", "as OpenPose's program"),
-            Fact("hands", hands, "square around wrist + 0.33 (wrist - elbow), side 1.5 x the greater of "
-                 "forearm and 0.9 x upper arm"),
-            Fact("keypoint score", "value of the map's peak, cut off at 1", "as OpenPose"),
-            Fact("person score", "sum of part and limb scores / number of all there could be", "as OpenPose"),
-        ]  # fmt: skip
+        own = facts("openpose", convention=self._convention, hands=hands, **size)
+        return [*self._model.describe(), *own]
 
 
 def _split(

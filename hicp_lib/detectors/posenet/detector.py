@@ -49,7 +49,7 @@ class DecodingRule:
 
 @dataclass(frozen=True)
 class Maps:
-    """What the network says of each cell, (h, w) cells that are `stride_px` apart.
+    """What the network says of each cell, (h, w) cells that are `STRIDE_PX` apart.
 
     Attributes
     ----------
@@ -59,25 +59,23 @@ class Maps:
         x, y from the cell to the keypoint.
     to_child_px, to_parent_px : array, shape (16, h, w, 2)
         x, y along each of `EDGES`.
-    stride_px : int
     """
 
     heat: np.ndarray
     offsets_px: np.ndarray
     to_child_px: np.ndarray
     to_parent_px: np.ndarray
-    stride_px: int
 
     def cell(self, x_px: float, y_px: float) -> tuple[int, int]:
         """Row and column of the cell nearest to a position."""
         height, width = self.heat.shape[1:]
-        row, column = math.floor(y_px / self.stride_px + 0.5), math.floor(x_px / self.stride_px + 0.5)
+        row, column = math.floor(y_px / STRIDE_PX + 0.5), math.floor(x_px / STRIDE_PX + 0.5)
         return min(max(row, 0), height - 1), min(max(column, 0), width - 1)
 
     def keypoint(self, part: int, cell: tuple[int, int]) -> tuple[float, float]:
         """x and y of a keypoint near a cell."""
         off_x, off_y = self.offsets_px[(part, *cell)].tolist()
-        return cell[1] * self.stride_px + off_x, cell[0] * self.stride_px + off_y
+        return cell[1] * STRIDE_PX + off_x, cell[0] * STRIDE_PX + off_y
 
 
 def decode(maps: Maps, rule: DecodingRule) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -183,4 +181,4 @@ class PoseNetMobileNet:
         paired = (outputs[name].reshape(2, -1, *outputs[name].shape[2:]) for name in names)
         to_child, to_parent, offsets = (np.moveaxis(of_both[::-1], 0, -1) for of_both in paired)
         heat = 1 / (1 + np.exp(-outputs["heatmap"][0]))
-        return Maps(heat, offsets, to_child, to_parent, STRIDE_PX)
+        return Maps(heat, offsets, to_child, to_parent)

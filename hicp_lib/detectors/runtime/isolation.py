@@ -23,7 +23,9 @@ from typing import IO
 
 import numpy as np
 
+from hicp_lib.core.children import child_environment
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.limited import raised
 from hicp_lib.detectors.mediapipe.child import receive, send
 
 # Port 9 ("discard") of this machine: a connection is refused at once.
@@ -34,6 +36,8 @@ _NOWHERE = {
 _FEW_THREADS = {"OPENBLAS_NUM_THREADS": "1"}  # NumPy's, which have nothing to do there
 # A call takes milliseconds, and a start seconds on a busy machine.
 LIMIT_S = 120.0
+# Of memory for its data, with stacks of a thread per core; and for each byte of an image, which it copies.
+_MOST_BYTES, _MOST_BYTES_PER_BYTE = 700 * 2**20 + 2**24 * (os.cpu_count() or 1), 3
 
 
 class IsolationError(InputError):
@@ -133,21 +137,31 @@ class _Child:
         self._pipe, theirs = multiprocessing.Pipe()
         inherited = self._shared.fileno(), theirs.fileno()
         self._process = subprocess.Popen(
-            [sys.executable, "-P", *program, *map(str, inherited)],
+            [sys.executable, *program, *map(str, inherited)],
             stdin=subprocess.DEVNULL,
             stdout=self._stderr,  # what the library prints is no answer
             stderr=self._stderr,
-            env=child_environment(),
+            env=offline_environment(),
             pass_fds=inherited,
             start_new_session=True,  # an interrupt from the keyboard is for the caller
         )
         theirs.close()
         files = self._pipe, self._stderr, self._shared
         self.close = weakref.finalize(self, _close, self._process, files, self.owner)
+        self._limit(0)
+
+    def _limit(self, image_bytes: int) -> None:
+        """Bound the program's memory, where the system can: what its models ask for is not known before."""
+        most = int(raised(_MOST_BYTES + _MOST_BYTES_PER_BYTE * image_bytes))
+        with suppress(ImportError, AttributeError, OSError):
+            import resource
+
+            resource.prlimit(self._process.pid, resource.RLIMIT_DATA, (most, resource.RLIM_INFINITY))
 
     def show(self, image: np.ndarray) -> None:
         """Put an image where the program sees it."""
         if image.size > len(self._pixels):
+            self._limit(image.size)
             self._shared.truncate(image.size)
             self._pixels = mmap.mmap(self._shared.fileno(), image.size)
         np.ndarray(image.shape, np.uint8, self._pixels)[...] = image
@@ -167,10 +181,10 @@ class _Child:
         return _in_words(status) + (f" ({last})" if last else "")
 
 
-def child_environment() -> dict[str, str]:
-    """This process's environment, but with every way out led to a closed port."""
+def offline_environment() -> dict[str, str]:
+    """This process's environment for a child, but with every way out led to a closed port."""
     nowhere = _NOWHERE | {name.upper(): value for name, value in _NOWHERE.items()}
-    return os.environ | _FEW_THREADS | nowhere
+    return child_environment() | _FEW_THREADS | nowhere
 
 
 def _unnamed_file() -> IO[bytes]:

@@ -23,8 +23,8 @@ from tqdm import tqdm
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.executor import Workers, resolved, run_jobs, threads_beside
-from hicp_lib.core.files import sha256_bytes
-from hicp_lib.core.images import decode_image, image_bytes, note_rotation
+from hicp_lib.core.files import read_bytes, sha256_bytes
+from hicp_lib.core.images import decode_image, note_rotation
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.cached_parts import Runner
 from hicp_lib.detectors.runtime.isolation import IsolationError
@@ -251,7 +251,7 @@ def _content(image: Image) -> tuple[bytes | np.ndarray, str]:
     """What a job is given of an image, and its hash."""
     if isinstance(image, np.ndarray):
         return image, pixels_sha256(image)
-    content = image_bytes(image)
+    content = read_bytes(image, "expected an image file")
     return content, sha256_bytes(content)
 
 

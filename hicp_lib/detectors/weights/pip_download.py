@@ -1,8 +1,12 @@
 """Get wheels from the package index through pip, which checks their hashes; nothing in them is executed."""
 
-import os
 import subprocess
 import sys
+
+from hicp_lib.core.children import child_environment
+
+# pip gives up a server that says nothing, but not one that says a byte now and then.
+TIMEOUT_S = 3600.0
 
 
 def run_pip(*arguments: str) -> str | None:
@@ -20,14 +24,20 @@ def run_pip(*arguments: str) -> str | None:
     str or None
         None when it succeeded, otherwise one line saying what went wrong.
     """
-    # -P: a file `json.py` in the folder where one works is none of pip's modules.
-    command = [sys.executable, "-P", "-m", "pip", *arguments, "--quiet", "--no-input", "--no-deps"]
+    command = [sys.executable, "-m", "pip", *arguments, "--quiet", "--no-input", "--no-deps"]
     command += ["--only-binary", ":all:", "--require-hashes"]
-    environment = os.environ | {"PIP_DISABLE_PIP_VERSION_CHECK": "1", "PIP_USER": "0"}
+    environment = child_environment(PIP_DISABLE_PIP_VERSION_CHECK="1", PIP_USER="0")
     try:
         run = subprocess.run(
-            command, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True
+            command,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT_S,
         )
+    except subprocess.TimeoutExpired:
+        return f"it was not done within {TIMEOUT_S:g} s"
     except OSError as error:
         return f"Python could not be started: {error.strerror}"
     return None if run.returncode == 0 else reason(run.stderr) or f"pip ended with code {run.returncode}"

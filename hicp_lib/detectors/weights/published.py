@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.files import cache_dir, read_json, sha256_bytes, sha256_file, write_bytes, write_json
-from hicp_lib.detectors.weights.default import refuse_other_names, weights_dir
+from hicp_lib.detectors.weights.default import file_status, refuse_other_names, weights_dir
 from hicp_lib.detectors.weights.url_download import download
 
 REGISTRY_PATH = DATA_DIR / "published_weights.json"
@@ -100,13 +100,10 @@ def published() -> dict[str, Published]:
 
 
 def status(model: Published) -> str:
-    """`present`, `absent`, `corrupt` (not the file that was recorded) or `unrecorded`."""
-    if not model.path.is_file():
-        return "absent"
+    """`present`, `absent`, `unreadable`, `corrupt` (not the file that was recorded) or `unrecorded`."""
     record = _records().get(model.name)
-    if record is None:
-        return "unrecorded"
-    return "present" if sha256_file(model.path) == record["file_sha256"] else "corrupt"
+    state = file_status(model.path, record["file_sha256"] if record else "")
+    return "unrecorded" if record is None and state == "corrupt" else state
 
 
 def fetch_published(name: str) -> Published:

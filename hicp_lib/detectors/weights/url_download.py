@@ -1,14 +1,18 @@
 """Get one file from a web address: whole or not at all, and never waiting without end."""
 
+import time
+from functools import partial
 from http.client import HTTPException
+from multiprocessing import ProcessError
+from multiprocessing.pool import ThreadPool
 from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import Request, build_opener
 
 from hicp_lib.core.errors import one_line
 
-# Without an answer for so long, the server is given up.
-TIMEOUT_S = 30.0
+# Without an answer for so long, the server is given up; and when it is slower than that from then on.
+TIMEOUT_S, LEAST_BYTES_PER_S = 30.0, 5000
 
 
 def download(url: str, target: Path, max_bytes: int) -> str | None:
@@ -28,18 +32,23 @@ def download(url: str, target: Path, max_bytes: int) -> str | None:
         not to be used.
     """
     request = Request(url, headers={"User-Agent": "hicp"})
+    opened, begin_s = partial(build_opener().open, request, timeout=TIMEOUT_S), time.monotonic()
     try:
-        with build_opener().open(request, timeout=TIMEOUT_S) as response, open(target, "wb") as file:
+        with ThreadPool(1) as thread:  # a server may take its time over each letter of what it says first
+            answer = thread.apply_async(opened).get(TIMEOUT_S)
+        with answer as response, open(target, "wb") as file:
             if urlsplit(response.url).scheme != urlsplit(url).scheme:
                 return f"led to {response.url}"
             # Without the announced size, a connection that broke off would pass for a whole file.
             announced = int(response.headers["Content-Length"] or -1)
             if not 0 < announced <= max_bytes:
                 return f"size announced: {announced} bytes, expected up to {max_bytes}"
-            while chunk := response.read(1 << 20):
+            while file.tell() <= announced and (chunk := response.read1(1 << 20)):
                 file.write(chunk)
+                if time.monotonic() > begin_s + TIMEOUT_S + file.tell() / LEAST_BYTES_PER_S:
+                    return f"too slow: {file.tell()} bytes in {time.monotonic() - begin_s:.0f} s"
             if file.tell() != announced:
-                return f"broke off after {file.tell()} of {announced} bytes"
-    except (OSError, HTTPException, ValueError) as error:
+                return f"ended after {file.tell()} bytes, {announced} were announced"
+    except (OSError, HTTPException, ValueError, ProcessError) as error:  # the last: within TIMEOUT_S
         return one_line(error).strip("<>")
     return None

@@ -41,7 +41,7 @@ def user_options(name: str) -> dict[str, Any]:
 
 def keep_user_options(name: str, options: dict[str, Any]) -> None:
     """Keep a detector's options, files by their absolute path, in the place of those kept before."""
-    kept = {key: str(Path(value).resolve()) if _is_file(value) else value for key, value in options.items()}
+    kept = {key: str(Path(of).resolve()) if _is_file(key, of) else of for key, of in options.items()}
     write_json(user_options_path(), all_user_options() | {name: kept}, indent=2)
 
 
@@ -49,10 +49,11 @@ def user_weights_sha256() -> dict[str, str]:
     """By detector, one SHA-256 of its options with the content of their files."""
     digests = {}
     for name, kept in all_user_options().items():
-        content = {key: sha256_file(value) if _is_file(value) else value for key, value in kept.items()}
+        content = {key: sha256_file(of) if _is_file(key, of) else of for key, of in kept.items()}
         digests[name] = sha256_bytes(json.dumps(content).encode())
     return digests
 
 
-def _is_file(value: Any) -> bool:
-    return isinstance(value, str | Path) and Path(value).is_file()
+def _is_file(option: str, value: Any) -> bool:
+    """Whether an option names a file, as `model` and `hand_model` do; others may be called as a file is."""
+    return option.split("_")[-1] == "model" and isinstance(value, str | Path) and Path(value).is_file()

@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.detections import Detections
+from hicp_lib.core.files import read_json
 from hicp_lib.detectors.combined.arbitration import ArbitrationRule
 from hicp_lib.detectors.combined.hand_squares import SEED_11, SEED_11_THUNDER, SquareRule
 from hicp_lib.evaluation.ap.bootstrap import difference, intervals, resample
@@ -27,18 +29,7 @@ FOUND_OKS = 0.5
 
 # Options of `combined.detector.Combined` and its hand detector. Each step changes one thing of the one before
 # it; the last is the default. The thresholds come second, so that all further steps are at the same.
-_STEPS: dict[str, dict] = {
-    "image, nearest wrist": {
-        "looks": "image", "min_side_px": 1, "arbitrate": False, "agreement": False, "hands_num_hands": 2,
-        "hands_min_score": 0.5,
-    },
-    "+ low thresholds": {"hands_num_hands": 4, "hands_min_score": 0.2},
-    "+ square at each wrist": {"looks": "image+wrists"},
-    "+ upscaling": {"min_side_px": 320},
-    "+ several looks": {"looks": "image+wrists+along"},
-    "+ arbitration": {"arbitrate": True},
-    "+ scores by agreement": {"agreement": True},
-}  # fmt: skip
+_STEPS: dict[str, dict] = read_json(DATA_DIR / "combination_steps.json")
 # How the thresholds among these were chosen.
 _CHOSEN = {
     "hands_num_hands": "two of one person and two of others in a square; no other was tried",

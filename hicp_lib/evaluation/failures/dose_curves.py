@@ -88,35 +88,29 @@ def observed_doses(truth: Truth, folders: Mapping[str, Path], source: Annotation
         Columns `subset, image_id, keypoint` and those of `OBSERVED` (NaN where not known).
     """
     extras = zip(source.ids.tolist(), source.extras, strict=True)
-    distances = {i: extra.get("distance_m", np.nan) for i, extra in extras}
+    distances_m = {i: extra.get("distance_m", np.nan) for i, extra in extras}
     tables = []
     for subset, of_subset in truth.items():
         people = of_subset.take(~of_subset.is_crowd)
-        for row, image_id in enumerate(people.image_ids.tolist()):
-            image = people.images[image_id]
-            pixels = read_image(Path(folders[subset]) / "images" / image.file_name)
-            table = _doses_of(people, row, np.array([image.width_px, image.height_px]))
-            distance = distances.get(people.extras[row].get("source_id", -1), np.nan)
-            brightness = cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY).mean()
-            labels = {"subset": subset, "image_id": image_id}
-            tables.append(table.assign(**labels, distance=distance, brightness=brightness))
-    return pd.concat(tables, ignore_index=True)[["subset", "image_id", "keypoint", *OBSERVED]]
-
-
-def _doses_of(people: Annotations, row: int, size_px: np.ndarray) -> pd.DataFrame:
-    flags = people.visibility[row, COCO_17]
-    labelled = flags > 0
-    points = people.keypoints_px[row, COCO_17][labelled]
-    gap = np.minimum(points + 0.5, size_px - points - 0.5).min(axis=1)
-    return pd.DataFrame(
-        {
-            "keypoint": np.flatnonzero(labelled),
-            "share of keypoints in the picture": labelled.mean(),
-            "share of keypoints hidden": (labelled & (flags < 2)).sum() / max(labelled.sum(), 1),
-            "picture": np.sqrt(size_px.prod()),
-            "distance to the border": gap / size_px.min(),
+        images = [people.images[image_id] for image_id in people.image_ids.tolist()]
+        pictures = (read_image(Path(folders[subset]) / "images" / image.file_name) for image in images)
+        sizes_px = np.array([(image.width_px, image.height_px) for image in images]).reshape(-1, 2)
+        flags, points_px = people.visibility[:, COCO_17], people.keypoints_px[:, COCO_17]
+        gaps_px = np.minimum(points_px + 0.5, sizes_px[:, None] - points_px - 0.5).min(axis=2)
+        n_labelled, n_hidden = (flags > 0).sum(axis=1), ((flags > 0) & (flags < 2)).sum(axis=1)
+        of_person = {
+            "image_id": people.image_ids,
+            "share of keypoints in the picture": (flags > 0).mean(axis=1),
+            "share of keypoints hidden": n_hidden / np.maximum(n_labelled, 1),
+            "picture": np.sqrt(sizes_px.prod(axis=1)),
+            "distance": [distances_m.get(extra.get("source_id", -1), np.nan) for extra in people.extras],
+            "brightness": [cv2.cvtColor(pixels, cv2.COLOR_RGB2GRAY).mean() for pixels in pictures],
         }
-    )
+        who, keypoint = np.nonzero(flags > 0)
+        of_keypoint = {"subset": subset, "keypoint": keypoint}
+        of_keypoint["distance to the border"] = gaps_px[who, keypoint] / sizes_px[who].min(axis=1)
+        tables.append(pd.DataFrame(of_person).iloc[who].assign(**of_keypoint))
+    return pd.concat(tables, ignore_index=True)[["subset", "image_id", "keypoint", *OBSERVED]]
 
 
 def observed_curves(errors: pd.DataFrame, observed: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:

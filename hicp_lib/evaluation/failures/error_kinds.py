@@ -15,7 +15,7 @@ there is nothing to judge: *not given* by a detection that matches the person, a
 detection does (an OKS of .1 is asked for, as in the paper).
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -80,12 +80,11 @@ def keypoint_errors(
         for person in np.flatnonzero(~people.is_crowd & ~people.is_other).tolist():
             parts.append(_judge(people, person, found, matched.get(person), keypoints, constants))
     table = pd.concat(parts, ignore_index=True)
-    kind = pd.Categorical.from_codes(table["kind"], KINDS)
-    return table.assign(kind=kind, hit=np.isin(table["kind"], [KINDS.index(name) for name in HITS]))
+    return table.assign(kind=pd.Categorical(table["kind"], KINDS), hit=table["kind"].isin(HITS))
 
 
 _DTYPES = {"image_id": int, "annotation_id": int, "keypoint": int, "visibility": float, "score": float,
-           "term": float, "kind": int}  # fmt: skip
+           "term": float, "kind": object}  # fmt: skip
 
 
 def _judge(
@@ -94,37 +93,24 @@ def _judge(
 ) -> pd.DataFrame:  # fmt: skip
     """A person's labelled keypoints, by what detection `row` makes of them."""
     labelled = people.visibility[person, keypoints] > 0
-    at, n = keypoints[labelled], int(labelled.sum())
-    score, term, kind = np.full(n, np.nan), np.zeros(n), np.full(n, KINDS.index("not found"))
+    at, other_side = keypoints[labelled], _OTHER_SIDE[keypoints[labelled]]
+    points_px, scores = np.full((len(at), 2), np.nan), np.full(len(at), np.nan)
     if row is not None:
-        points = found.keypoints_px[row, at]
-        given = np.isfinite(points).all(axis=-1)
-        term, other_side, others = _similarities(people, person, points, at, sigmas[labelled])
-        score = np.where(given, found.scores[row, at], np.nan)
-        kind = np.where(given, _kinds(term, other_side, others), KINDS.index("not given"))
-    ids = {"image_id": int(people.image_ids[person]), "annotation_id": int(people.ids[person])}
+        points_px, scores = found.keypoints_px[row, at], found.scores[row, at]
+    given = np.isfinite(points_px).all(axis=-1)
+    sides_px = np.where((other_side != at)[:, None], people.keypoints_px[:, other_side], np.nan)
+    places_px = people.keypoints_px[:, at], sides_px
+    # Similarity (n, k) to everybody's own points, and to those of their other side.
+    own, other = (oks_terms(points_px - of, people.areas_px2, sigmas[labelled]) for of in places_px)
+    others = np.maximum(own, other)[np.arange(len(people)) != person].max(axis=0, initial=0.0)
+    term, is_inverted = own[person], (other[person] >= NEAR_TERM) & (other[person] >= others)
+    cases = [~given, term >= GOOD_TERM, term >= NEAR_TERM, is_inverted, others >= NEAR_TERM]
+    missing = "not found" if row is None else "not given"
+    kind = np.select(cases, [missing, *KINDS[:4]], "miss")
     columns = {"keypoint": at, "visibility": people.visibility[person, at]}
-    return pd.DataFrame({**ids, **columns, "score": score, "term": term, "kind": kind})
-
-
-def _similarities(
-    people: Annotations, person: int, points: np.ndarray, keypoints: np.ndarray, sigmas: np.ndarray
-) -> Iterator[np.ndarray]:
-    """Similarity (k,) of points to the truth, to its other side, and to either of anybody else."""
-    other_side = _OTHER_SIDE[keypoints]
-    sides = np.where((other_side != keypoints)[:, None], people.keypoints_px[:, other_side], np.nan)
-    places = people.keypoints_px[:, keypoints], sides
-    terms = [oks_terms(points - at_px, people.areas_px2, sigmas) for at_px in places]
-    yield from (term[person] for term in terms)
-    others = np.arange(len(people)) != person
-    yield np.maximum(*terms)[others].max(axis=0, initial=0.0)
-
-
-def _kinds(truth: np.ndarray, other_side: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Indices into `KINDS` by similarities (k,)."""
-    near = [truth >= GOOD_TERM, truth >= NEAR_TERM]
-    confused = [(other_side >= NEAR_TERM) & (other_side >= others), others >= NEAR_TERM]
-    return np.select([*near, *confused], range(4), KINDS.index("miss"))
+    columns |= {"score": np.where(given, scores, np.nan), "term": term, "kind": kind.astype(object)}
+    ids = {"image_id": int(people.image_ids[person]), "annotation_id": int(people.ids[person])}
+    return pd.DataFrame(ids | columns)
 
 
 def kind_proportions(errors: pd.DataFrame, by: str) -> pd.DataFrame:

@@ -16,6 +16,8 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import read_json
 from hicp_lib.core.keypoints import INDEX, LEFT_HAND, RIGHT_HAND
 from hicp_lib.evaluation.cases import Found, Truth, groups_of
 from hicp_lib.evaluation.failures.placed_keypoints import landed
@@ -31,15 +33,7 @@ _FIRST_BELOW_HEAD = INDEX["left_shoulder"]
 _NOTHING = (np.nan, np.nan, np.nan, 0)  # value, interval and number of rows where there are none
 
 # Measure: the system that the paper says it of.
-MEASURES = {
-    "outside the picture: given": "mmpose",
-    "outside the picture: of those given, put at the border or beyond": "mmpose",
-    "outside the picture: mean score, less that of visible keypoints": "mmpose",
-    f"labelled keypoints given with a score of at least {SURE}": "alphapose",
-    f"of keypoints with a score of at least {SURE}: right": "alphapose",
-    "mean score of shoulders, less that of the other joints": "detectron2",
-    "hands given without their wrist": "openpose",
-}
+MEASURES = {said.format(sure=SURE): of for said, of in read_json(DATA_DIR / "paper.json")["remarks"].items()}
 
 
 def scores_by_state(placed: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:

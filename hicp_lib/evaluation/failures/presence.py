@@ -10,10 +10,8 @@ data.
 `false_presence` counts parts of people that are outside the picture, and are given inside it all the same.
 """
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -39,68 +37,44 @@ PARTS = tuple(dict.fromkeys(PART_OF))
 MEASURES = ("OKS", "extended OKS, all given", "extended OKS, decided", "gained by deciding")
 
 
-@dataclass(frozen=True)
-class Presence:
-    """What scores say of whether a keypoint is in the picture.
+Presence = Callable[[str, object, np.ndarray], np.ndarray]
+"""How probably what a detector placed in a picture is in it, by its source image and scores (..., 17)."""
 
-    Attributes
+
+def fit_presence(placed: pd.DataFrame, seed: int = 0) -> Presence:
+    """What scores say of whether a keypoint is in the picture, by the half that its source image is not in.
+
+    Parameters
     ----------
-    first_half : frozenset
-        The source images of one half.
-    curves : dict of (str, str, bool) to Calibration
-        By detector, part (of `PARTS`) and whether it was fitted to the first half.
+    placed : DataFrame
+        `placed_keypoints.placed_keypoints`.
+    seed : int, optional
+        Of the split of the source images.
+
+    Returns
+    -------
+    callable
+        As `Presence` says; the scores of a part without a curve are kept.
     """
+    in_picture = placed["given"] & (landed(placed) != "outside")
+    rows = placed[in_picture & (placed["state"] != "unknown")]
+    half, part = split_half(rows["source_image"], seed), PART_OF[rows["keypoint"]]
+    rows = rows.assign(half=half, part=part, present=rows["state"] != "outside")
+    curves = {
+        (detector, part, bool(half)): Calibration.fit(of["score"].to_numpy(), of["present"].to_numpy())
+        for (detector, part, half), of in rows.groupby(["detector", "part", "half"])
+    }
+    first_half = frozenset(rows.loc[half, "source_image"])
 
-    first_half: frozenset
-    curves: Mapping[tuple[str, str, bool], Calibration]
-
-    @classmethod
-    def fit(cls, placed: pd.DataFrame, seed: int = 0) -> Presence:
-        """Curves for both halves of the source images.
-
-        Parameters
-        ----------
-        placed : DataFrame
-            `placed_keypoints.placed_keypoints`.
-        seed : int, optional
-            Of the split.
-
-        Returns
-        -------
-        Presence
-        """
-        in_picture = placed["given"] & (landed(placed) != "outside")
-        rows = placed[in_picture & (placed["state"] != "unknown")]
-        half, part = split_half(rows["source_image"], seed), PART_OF[rows["keypoint"]]
-        rows = rows.assign(half=half, part=part, present=rows["state"] != "outside")
-        curves = {
-            (detector, part, bool(half)): Calibration.fit(of["score"].to_numpy(), of["present"].to_numpy())
-            for (detector, part, half), of in rows.groupby(["detector", "part", "half"])
-        }
-        return cls(frozenset(rows.loc[half, "source_image"]), curves)
-
-    def __call__(self, detector: str, source_image: object, scores: np.ndarray) -> np.ndarray:
-        """How probably keypoints that were placed in the picture are in it, by the half the image is not in.
-
-        Parameters
-        ----------
-        detector : str
-            Whose.
-        source_image : object
-            What the picture was cut from.
-        scores : array, shape (..., 17)
-            As the detector gives them; kept for a part without a curve.
-
-        Returns
-        -------
-        array, shape (..., 17)
-        """
+    def presence(detector: str, source_image: object, scores: np.ndarray) -> np.ndarray:
         worth = np.array(scores, dtype=float)
         for part in PARTS:
-            curve = self.curves.get((detector, part, source_image not in self.first_half))
+            curve = curves.get((detector, part, source_image not in first_half))
             if curve is not None:
                 worth[..., PART_OF == part] = curve(worth[..., PART_OF == part])
         return worth
+
+    return presence
 
 
 def declared(truth: Truth, found: Found, presence: Presence | None = None) -> Found:
@@ -112,8 +86,9 @@ def declared(truth: Truth, found: Found, presence: Presence | None = None) -> Fo
         Of crops, by subset.
     found : Found
         By image id, of every subset and detector.
-    presence : Presence, optional
-        What scores are worth; when left out, whatever is given is declared present, with score 1.
+    presence : callable, optional
+        As `Presence` says: what scores are worth; when left out, whatever is given is declared present,
+        with score 1.
 
     Returns
     -------
@@ -157,7 +132,7 @@ def extended_table(
         Columns `subset, detector, measure` (of `MEASURES`), `value, low, high, n_people`; the last measure is
         the third less the second, on the same draws.
     """
-    presence = Presence.fit(placed_keypoints(truth, found, source), draws.seed)
+    presence = fit_presence(placed_keypoints(truth, found, source), draws.seed)
     ways = {"given": declared(truth, found), "decided": declared(truth, found, presence)}
     runs = {(s, f"{d}, {way}"): run for way, its in ways.items() for (s, d), run in its.items()}
     known = {subset: with_outside(people, source) for subset, people in truth.items()}
@@ -208,7 +183,7 @@ def false_presence(
         parts outside), `low, high` (95 %, over source images), `n` (parts outside), `n_images, n_found`
         (those of people whom a detection fits; of the others none is given).
     """
-    calibrated = declared(truth, found, Presence.fit(placed, draws.seed))
+    calibrated = declared(truth, found, fit_presence(placed, draws.seed))
     kinds = {SURE: placed, PRESENCE_CUT: placed_keypoints(truth, calibrated, source)}
     missing = {subset: _missing(with_outside(people, source)) for subset, people in truth.items()}
     keys = ["subset", "detector", "image_id", "unit"]
@@ -232,8 +207,7 @@ def _missing(people: Annotations) -> pd.DataFrame:
     people = people.take(~people.is_crowd)
     flags, sources = people.visibility[:, COCO_17], source_images(people)
     n = _FIRST_OF_PAIRS
-    paired = (np.column_stack([of[:, :n].any(axis=1), of[:, n:]]) for of in (flags > 0, flags < 0))
-    seen, gone = paired
+    seen, gone = (np.column_stack([of[:, :n].any(axis=1), of[:, n:]]) for of in (flags > 0, flags < 0))
     who, unit = np.nonzero(gone & ~seen)
     image_ids = people.image_ids[who].tolist()
     of_image = {"image_id": image_ids, "source_image": [sources[i] for i in image_ids]}

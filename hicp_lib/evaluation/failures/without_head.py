@@ -10,6 +10,24 @@ from hicp_lib.evaluation.statistics.resampling import Draws
 HEAD_POINTS = range(5)  # nose, eyes, ears
 
 
+def with_and_without_head(errors: pd.DataFrame) -> pd.DataFrame:
+    """The same body keypoints of the same people with the head, and without it as columns `..._headless`.
+
+    Parameters
+    ----------
+    errors : DataFrame
+        `error_kinds.all_errors` with the subsets "basic" and "headless".
+
+    Returns
+    -------
+    DataFrame
+    """
+    body = errors[errors["group"] == "body"]
+    basic, headless = (body[body["subset"] == subset] for subset in ("basic", "headless"))
+    same = ["detector", "keypoint", "annotation_id", "source_image"]
+    return basic.merge(headless, on=same, suffixes=("", "_headless"))
+
+
 def change_per_keypoint(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.DataFrame:
     """Hit rate of each body keypoint with and without the head, on the same keypoints of the same people.
 
@@ -27,15 +45,12 @@ def change_per_keypoint(errors: pd.DataFrame, draws: Draws = Draws()) -> pd.Data
         interval is the change's, over source images.
     """
     by = ["detector", "keypoint"]
-    body = errors[errors["group"] == "body"]
-    basic, headless = (body[body["subset"] == subset] for subset in ("basic", "headless"))
-    same = [*by, "annotation_id", "source_image"]
-    both = basic.merge(headless, on=same, suffixes=("_basic", "_headless")).sort_values(by)
-    both["change"] = both["hit_headless"].astype(float) - both["hit_basic"]
-    rates = both.groupby(by)[["hit_basic", "hit_headless"]].mean().reset_index()
+    both = with_and_without_head(errors).sort_values(by)
+    both["change"] = both["hit_headless"].astype(float) - both["hit"]
+    rates = both.groupby(by)[["hit", "hit_headless"]].mean().reset_index()
     table = proportions(both, by, "change", draws).merge(rates, on=by)
     table["keypoint"] = [NAMES[k] for k in table["keypoint"]]
-    table = table.rename(columns={"value": "change", "hit_basic": "basic", "hit_headless": "headless"})
+    table = table.rename(columns={"value": "change", "hit": "basic", "hit_headless": "headless"})
     return table[[*by, "basic", "headless", "change", "low", "high", "n", "n_images"]]
 
 

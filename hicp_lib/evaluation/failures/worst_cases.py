@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.keypoints import NAMES
+from hicp_lib.evaluation.failures.without_head import with_and_without_head
 
 WRONG = ("inversion", "swap", "miss")
 KINDS_OF_CASE = ("surest mistakes", "overlooked")
@@ -65,9 +66,7 @@ def lost_points(errors: pd.DataFrame) -> pd.DataFrame:
         Columns `detector, case` (what is lost, and how), `subset, image_id, annotation_id, keypoint` (Halpe
         index).
     """
-    body = errors[errors["group"] == "body"]
-    basic, headless = (body[body["subset"] == subset] for subset in ("basic", "headless"))
-    both = basic.merge(headless, on=["detector", "annotation_id", "keypoint"], suffixes=("", "_headless"))
+    both = with_and_without_head(errors)
     is_lost = (both["kind"] == "good") & ~both["hit_headless"] & (both["kind_headless"] != "not found")
     lost = both[is_lost].sort_values("score", ascending=False, kind="stable").drop_duplicates("detector")
     points = [NAMES[keypoint].replace("_", " ") for keypoint in lost["keypoint"]]

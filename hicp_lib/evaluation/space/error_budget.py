@@ -24,7 +24,7 @@ from hicp_lib.evaluation.cases import labelled
 from hicp_lib.evaluation.space import error_sources as s
 from hicp_lib.evaluation.space.mocap_error import JOINTS
 from hicp_lib.evaluation.space.stability import MIN_SCORE, counted, position_array
-from hicp_lib.evaluation.statistics.design import smallest_difference
+from hicp_lib.evaluation.statistics.proportions import smallest_difference
 from hicp_lib.evaluation.statistics.resampling import Draws, draw_counts, with_interval
 from hicp_lib.lifting.robust import METHODS
 from hicp_lib.lifting.table import lift_found
@@ -39,9 +39,8 @@ TOTALS = {
 }
 """Sources that come together: all, those of the paper's comparison, and those the robot lives with."""
 _ALONE, _WITHOUT = "{}, alone", "without {}"
-_ALL_BUT = {source: {*s.SOURCES} - {source} for source in s.SOURCES}
 STATES: dict[str, set[str]] = TOTALS | {_ALONE.format(source): {source} for source in s.SOURCES}
-STATES |= {_WITHOUT.format(source): others for source, others in _ALL_BUT.items()}
+STATES |= {_WITHOUT.format(source): {*s.SOURCES} - {source} for source in s.SOURCES}
 """What is switched on, by the column that has the error then."""
 
 _FINGERS = tuple(NAMES[k] for hand in (LEFT_HAND, RIGHT_HAND) for k in hand[1:])

@@ -16,16 +16,10 @@ import pandas as pd
 
 from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
-from hicp_lib.evaluation.cases import labelled
 from hicp_lib.evaluation.space.stability import POSITION, THRESHOLDS_M
-from hicp_lib.evaluation.statistics.design import smallest_difference
-from hicp_lib.evaluation.statistics.resampling import (
-    Draws,
-    block_length,
-    draw_counts,
-    weighted_median,
-    with_interval,
-)
+from hicp_lib.evaluation.statistics import resampling as boot
+from hicp_lib.evaluation.statistics.proportions import smallest_difference
+from hicp_lib.evaluation.statistics.resampling import Draws, weighted_median, with_interval
 from hicp_lib.mocap.synchronisation import interpolate_mocap
 from hicp_lib.recordings.qualisys import MotionCapture
 
@@ -106,15 +100,13 @@ def mocap_errors(
     centres = pd.DataFrame(columns=[*keys, *POSITION]) if truth is None else truth[[*keys, *POSITION]]
     at = reference.rename(columns={name: f"reference_{name}" for name in POSITION})
     at = at.merge(centres.rename(columns={name: f"centre_{name}" for name in POSITION}), on=keys, how="left")
-    tables = []
-    for (detector, method), rows in points[points["person"] == 0].groupby(["detector", "method"], sort=False):
-        table = at.merge(rows[[*keys, *POSITION, "score"]], on=keys, how="left").fillna({"score": 0.0})
-        for name, column in (("reference", "error_m"), ("centre", "centre_error_m")):
-            other = table[[f"{name}_{axis}" for axis in POSITION]].to_numpy(float)
-            table[column] = np.linalg.norm(table[POSITION].to_numpy(float) - other, axis=1)
-        table = table.drop(columns=[f"centre_{axis}" for axis in POSITION])
-        tables.append(labelled(table, detector=detector, method=method))
-    return pd.concat(tables, ignore_index=True)
+    best = points.loc[points["person"] == 0, [*_CASE[:2], *keys, *POSITION, "score"]]
+    cases = best[_CASE[:2]].drop_duplicates().merge(at, how="cross")
+    table = cases.merge(best, on=[*_CASE[:2], *keys], how="left").fillna({"score": 0.0})
+    for name, column in (("reference", "error_m"), ("centre", "centre_error_m")):
+        other = table[[f"{name}_{axis}" for axis in POSITION]].to_numpy(float)
+        table[column] = np.linalg.norm(table[POSITION].to_numpy(float) - other, axis=1)
+    return table.drop(columns=[f"centre_{axis}" for axis in POSITION])
 
 
 def median_errors(
@@ -239,7 +231,7 @@ def _cases(
 ) -> Iterator[tuple[tuple, pd.DataFrame, np.ndarray, np.ndarray]]:
     """Labels, rows, errors of what was found (n_frames,) and weights of frames, the same for all cases."""
     whose, length = _subjects(errors.drop_duplicates("frame").sort_values("frame")), _block_length(errors)
-    weights = draw_counts(whose, draws, length)
+    weights = boot.draw_counts(whose, draws, length)
     for case, part in errors.groupby(_CASE, sort=False):
         part = part.sort_values("frame")
         for min_score in min_scores:
@@ -262,4 +254,4 @@ def _block_length(errors: pd.DataFrame) -> int:
     """One length for the whole table, so that its rows are comparable."""
     frames = errors.drop_duplicates("frame").sort_values("frame")
     series = errors.pivot_table(index="frame", columns=_CASE, values="error_m", dropna=False)
-    return block_length(series.to_numpy(float), _subjects(frames))
+    return boot.block_length(series.to_numpy(float), _subjects(frames))

@@ -5,12 +5,12 @@ Both come from motion capture and the depth image, so any recording has them.
 
 import numpy as np
 import pandas as pd
+from numpy.lib.stride_tricks import sliding_window_view
 
 from hicp_lib.core.camera import project, transform
 from hicp_lib.evaluation.space.stability import POSITION
 from hicp_lib.recordings.recording import Recording, read_depth_m
 
-OCCLUSIONS = ("clear", "hidden", "outside", "no depth", "unknown")
 # How far in front of the middle between two markers something must be to hide the joint: more than half
 # the limb and its sleeve.
 IN_FRONT_M = {"wrist": 0.06, "elbow": 0.09, "shoulder": 0.13}
@@ -43,19 +43,12 @@ def joint_occlusion(recording: Recording, positions: pd.DataFrame) -> pd.DataFra
     known = np.isfinite(points_m).all(axis=1)
     occlusions = np.where(known, "outside", "unknown").astype(object)
     for frame in np.unique(frames[in_image]):
-        depth_m = read_depth_m(recording, int(frame))
-        for row in np.flatnonzero(in_image & (frames == frame)):
-            near_m = _median_depth_m(depth_m, pixels_px[row])
-            hidden = near_m < points_m[row, 2] - margins_m[row]
-            occlusions[row] = "no depth" if np.isnan(near_m) else "hidden" if hidden else "clear"
+        here = in_image & (frames == frame)
+        u, v = pixels_px[here].round().astype(int).T
+        padded_m = np.pad(read_depth_m(recording, int(frame)), _HALF_WINDOW_PX, constant_values=np.nan)
+        windows_m = sliding_window_view(padded_m, (2 * _HALF_WINDOW_PX + 1,) * 2)[v, u]
+        near_m = pd.DataFrame(windows_m.reshape(len(u), -1)).median(axis=1)  # of those that were measured
+        is_hidden = near_m < points_m[here, 2] - margins_m[here]
+        occlusions[here] = np.select([near_m.isna(), is_hidden], ["no depth", "hidden"], "clear")
     distances_m = np.linalg.norm(points_m, axis=1)
     return positions[["frame", "keypoint"]].assign(distance_m=distances_m, sight=occlusions)
-
-
-def _median_depth_m(depth_m: np.ndarray, pixel_px: np.ndarray) -> float:
-    """Of the measured pixels around one; NaN where none is."""
-    column, row = (round(place) for place in pixel_px)
-    low = [max(place - _HALF_WINDOW_PX, 0) for place in (row, column)]
-    window = depth_m[low[0] : row + _HALF_WINDOW_PX + 1, low[1] : column + _HALF_WINDOW_PX + 1]
-    measured = window[np.isfinite(window)]
-    return float(np.median(measured)) if measured.size else np.nan

@@ -92,9 +92,8 @@ def _tilt_rad(shoulders_m: np.ndarray) -> np.ndarray:
     return np.arctan2(np.abs(line_m[:, 2]), np.linalg.norm(line_m[:, :2], axis=1))
 
 
-_Measure = tuple[Callable[[np.ndarray], np.ndarray], Parts, Sequence[str]]
 _TRUNKS = {f"{side} hip": (f"{side}_shoulder", f"{side}_hip") for side in ("left", "right")}
-_MEASURES: dict[str, _Measure] = {
+_MEASURES: dict[str, tuple[Callable[[np.ndarray], np.ndarray], Parts, Sequence[str]]] = {
     "hips in the abdomen": (_short, _TRUNKS, POSITION),
     "broken fingers": (backwards, {part: PARTS[part] for part in ("left hand", "right hand")}, PIXEL),
     "shoulder line tilt [rad]": (_tilt_rad, {"shoulders": ("left_shoulder", "right_shoulder")}, POSITION),

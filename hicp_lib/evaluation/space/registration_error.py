@@ -86,9 +86,9 @@ def marker_pixels(
     measured_m = interpolate_mocap(mocap.times_s, mocap.points_m, recording.times_s[frames] - offset_s)
     tables = []
     for one in registrations:
-        for frame, points_m in zip(frames, measured_m, strict=True):
-            T_cam_mocap = np.linalg.inv(recording.T_base_cam[frame]) @ one.T_base_mocap
-            pixels_px = project(recording.intrinsics, transform(T_cam_mocap, points_m))
-            table = pd.DataFrame(pixels_px, columns=["u_px", "v_px"])
-            tables.append(table.assign(method=one.method, frame=frame, marker=mocap.names))
-    return pd.concat(tables, ignore_index=True)[["method", "frame", "marker", "u_px", "v_px"]]
+        T_cam_mocap = np.linalg.inv(recording.T_base_cam[frames]) @ one.T_base_mocap
+        pixels_px = project(recording.intrinsics, transform(T_cam_mocap, measured_m)).reshape(-1, 2)
+        labels = {"method": [one.method], "frame": frames, "marker": mocap.names}
+        index = pd.MultiIndex.from_product(labels.values(), names=labels)
+        tables.append(pd.DataFrame(pixels_px, index, ["u_px", "v_px"]).reset_index())
+    return pd.concat(tables, ignore_index=True)

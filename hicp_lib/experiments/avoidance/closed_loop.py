@@ -6,8 +6,8 @@ reaches the loop after a stated latency. The person, too, sees the robot, and fo
 """
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 import pandas as pd
@@ -100,53 +100,25 @@ class Trial:
     joint_noise_rad: float = 0.0
 
 
-class Perceiver(Protocol):
-    """What the robot perceives people with."""
-
-    @property
-    def latency(self) -> Latency:
-        """From the image to when the loop knows."""
-        ...
-
-    def perceive(self, moment: Moment, posture: Posture, read: Posture) -> Perception:
-        """Who is there, as seen from a posture.
-
-        Parameters
-        ----------
-        moment : Moment
-        posture : Posture
-            The robot's.
-        read : Posture
-            The same as the robot knows it.
-
-        Returns
-        -------
-        Perception
-        """
-        ...
+Perceive = Callable[[Moment, Posture, Posture], Perception]
+"""Who is there at a moment, as seen from the robot's posture, the same again as the robot knows it."""
 
 
-@dataclass(frozen=True)
-class TrueKeypoints:
-    """The upper bound: every keypoint where it is, hidden or not, known at once or after a latency."""
+def true_keypoints(moment: Moment, posture: Posture, read: Posture) -> Perception:
+    """The upper bound: every keypoint where it is, hidden or not.
 
-    latency: Latency = Latency()
+    Parameters
+    ----------
+    moment : Moment
+    posture, read : Posture
+        Not used.
 
-    def perceive(self, moment: Moment, posture: Posture, read: Posture) -> Perception:
-        """Where every keypoint is.
-
-        Parameters
-        ----------
-        moment : Moment
-        posture, read : Posture
-            Not used.
-
-        Returns
-        -------
-        Perception
-        """
-        points_m = in_root(moment.person.keypoints_m)[None]
-        return Perception(moment.time_s, points_m, np.ones(points_m.shape[:2]))
+    Returns
+    -------
+    Perception
+    """
+    points_m = in_root(moment.person.keypoints_m)[None]
+    return Perception(moment.time_s, points_m, np.ones(points_m.shape[:2]))
 
 
 class Follower:
@@ -200,14 +172,21 @@ def start_posture() -> Posture:
 
 
 def simulate(
-    trial: Trial, perceiver: Perceiver, avoids: bool = True, settings: Settings | None = None
+    trial: Trial,
+    perceive: Perceive,
+    latency: Latency = Latency(),
+    avoids: bool = True,
+    settings: Settings | None = None,
 ) -> pd.DataFrame:
     """One run of a trial, from shortly before what the robot sees begins to matter.
 
     Parameters
     ----------
     trial : Trial
-    perceiver : Perceiver
+    perceive : callable
+        As `Perceive` says.
+    latency : Latency, optional
+        From the image to when the loop knows.
     avoids : bool, optional
         Whether the robot gives way at all.
     settings : Settings, optional
@@ -222,7 +201,7 @@ def simulate(
         newest image that the loop knows was taken (NaN: none yet).
     """
     icub, posture, person = load_icub(), start_posture(), Follower(trial)
-    latency, rng = perceiver.latency, trial.subject.stream(trial.script, "joints")
+    rng = trial.subject.stream(trial.script, "joints")
     loop = _loop(icub, posture, latency.total_s + between_s(trial, latency), avoids, settings or Settings())
     period_s, under_way, free_s, rows = loop.controller.settings.period_s, deque[Perception](), 0.0, []
     for k in range(round(STARTS_S / period_s), round(trial.duration_s / period_s)):
@@ -230,7 +209,7 @@ def simulate(
         person.see(now_s, icub.chains["left"].T_root_link("hand", q)[:3, 3])
         read = posture.moved("left", q + rng.normal(0.0, trial.joint_noise_rad, len(q)))
         if now_s >= free_s - 1e-9:
-            under_way.append(perceiver.perceive(person.moment(now_s), posture, read))
+            under_way.append(perceive(person.moment(now_s), posture, read))
             free_s = now_s + between_s(trial, latency)
         arrived = None
         if under_way and now_s >= under_way[0].time_s + latency.total_s - 1e-9:
@@ -269,7 +248,7 @@ def _row(
     hand_m = icub.chains["left"].T_root_link("hand", q)[:3, 3]
     row = {
         "t_s": now_s,
-        "distance_m": skin_distance_m(robot_spheres(icub, loop.skin, posture), person.skin_m(now_s)),
+        "distance_m": skin_distance_m(robot_spheres(icub, posture), person.skin_m(now_s)),
         "activation": float(threat.activations.max()),
         "activations": threat.activations.round(3).tolist(),
         "status": command.status,

@@ -7,21 +7,20 @@ changes from image to image. All of it is estimated per group, in the robot's ro
 than `ELSEWHERE_M` away from the person's own is not modelled: it counts as lost.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
 from hicp_lib.core.camera import transform
 from hicp_lib.core.keypoints import FACE, HEAD, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND, mirror
-from hicp_lib.experiments.avoidance.closed_loop import MOUNT, Latency, Perceiver
+from hicp_lib.experiments.avoidance.closed_loop import MOUNT, Perceive
 from hicp_lib.experiments.avoidance.reaching import Moment
 from hicp_lib.experiments.avoidance.skin_distance import robot_spheres
 from hicp_lib.experiments.laboratory import COLOUR, in_root
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.loop import Perception
 from hicp_lib.robot.posture import Posture
-from hicp_lib.robot.skin import read_skin
 
 GROUPS = {
     "head": np.setdiff1d(HEAD, FACE), "face": FACE, "trunk": np.array([5, 6, 11, 12, 18, 19]),
@@ -48,7 +47,7 @@ def in_sight(moment: Moment, posture: Posture) -> np.ndarray:
     array of bool, shape (n_groups,)
     """
     icub, person = load_icub(), moment.person
-    places, radii = robot_spheres(icub, read_skin(), posture)
+    places, _ = robot_spheres(icub, posture)
     points = [in_root(person.keypoints_m), in_root(person.vertices_m), places]
     T_camera_root = np.linalg.inv(icub.T_root_camera(posture.angles("head"), MOUNT))
     x, y, depth_m = transform(T_camera_root, np.concatenate(points)).T
@@ -154,101 +153,66 @@ def _covariance(offsets_m: pd.DataFrame) -> np.ndarray:
     return np.cov(offsets_m.to_numpy(), rowvar=False) if len(offsets_m) > 1 else np.zeros((3, 3))
 
 
-@dataclass(eq=False)
-class Modelled:
+def modelled(model: ErrorModel, rng: np.random.Generator) -> Perceive:
     """Perceives what a detector with a model's errors would find.
 
-    Attributes
+    How well the robot knows its joints is part of the errors.
+
+    Parameters
     ----------
     model : ErrorModel
-    latency : Latency
     rng : numpy.random.Generator
         Of everything that is drawn.
+
+    Returns
+    -------
+    callable
     """
 
-    model: ErrorModel
-    latency: Latency
-    rng: np.random.Generator
-    _found: np.ndarray = field(init=False)
-    _lasting_m: np.ndarray = field(init=False)
+    def draw_m(covariances_m2: np.ndarray) -> np.ndarray:
+        return np.array([rng.multivariate_normal(np.zeros(3), c) for c in covariances_m2])
 
-    def __post_init__(self) -> None:
-        self._found = np.zeros(len(GROUPS), bool)
-        self._lasting_m = self.model.bias_m + self._draw_m(self.model.lasting_m2)
+    is_found, lasting_m = np.zeros(len(GROUPS), bool), model.bias_m + draw_m(model.lasting_m2)
 
-    def perceive(self, moment: Moment, posture: Posture, read: Posture) -> Perception:
-        """What is found of the person.
-
-        Parameters
-        ----------
-        moment : Moment
-        posture : Posture
-            The robot's.
-        read : Posture
-            Not used: how well the robot knows its joints is part of the errors.
-
-        Returns
-        -------
-        Perception
-        """
+    def perceive(moment: Moment, posture: Posture, read: Posture) -> Perception:
+        nonlocal is_found
         seen, rows = in_sight(moment, posture).astype(int), np.arange(len(GROUPS))
-        share = self.model.found_share[rows, seen, self._found.astype(int)]
-        self._found = self.rng.random(len(GROUPS)) < share
-        off_m = self._lasting_m + self._draw_m(self.model.passing_m2)
+        is_found = rng.random(len(GROUPS)) < model.found_share[rows, seen, is_found.astype(int)]
+        off_m = lasting_m + draw_m(model.passing_m2)
         truth_m = in_root(moment.person.keypoints_m)
         points_m, scores = np.full((1, N_KEYPOINTS, 3), np.nan), np.zeros((1, N_KEYPOINTS))
-        for row in np.flatnonzero(self._found):
+        for row in np.flatnonzero(is_found):
             group = [*GROUPS.values()][row]
             points_m[0, group], scores[0, group] = truth_m[group] + off_m[row], 1.0
         return Perception(moment.time_s, points_m, scores)
 
-    def _draw_m(self, covariances_m2: np.ndarray) -> np.ndarray:
-        return np.array([self.rng.multivariate_normal(np.zeros(3), c) for c in covariances_m2])
+    return perceive
 
 
-@dataclass(eq=False)
-class Lossy:
-    """Loses images of another perceiver in bursts: in those nobody is found.
+def lossy(whole: Perceive, lost_share: float, burst_images: float, rng: np.random.Generator) -> Perceive:
+    """Loses images of another way to perceive in bursts: in those nobody is found.
 
-    Attributes
+    Parameters
     ----------
-    perceiver : Perceiver
+    whole : callable
+        The other way.
     lost_share : float
         Of all images, below 1.
     burst_images : float
         How many in a row on average; more where the share asks for it.
     rng : numpy.random.Generator
+
+    Returns
+    -------
+    callable
     """
+    odds = lost_share / (1 - lost_share)
+    ends, will_lose = 1 / max(burst_images, odds, 1.0), rng.random() < lost_share
 
-    perceiver: Perceiver
-    lost_share: float
-    burst_images: float
-    rng: np.random.Generator
+    def perceive(moment: Moment, posture: Posture, read: Posture) -> Perception:
+        nonlocal will_lose
+        seen = whole(moment, posture, read)
+        is_lost, will_lose = will_lose, rng.random() < (1 - ends if will_lose else odds * ends)
+        return Perception(moment.time_s, seen.keypoints_m[:0], seen.scores[:0]) if is_lost else seen
 
-    def __post_init__(self) -> None:
-        odds = self.lost_share / (1 - self.lost_share)
-        self._ends = 1 / max(self.burst_images, odds, 1.0)
-        self._begins = odds * self._ends
-        self._lost = self.rng.random() < self.lost_share
-
-    @property
-    def latency(self) -> Latency:
-        """The perceiver's."""
-        return self.perceiver.latency
-
-    def perceive(self, moment: Moment, posture: Posture, read: Posture) -> Perception:
-        """What the perceiver perceives, or nobody.
-
-        Parameters
-        ----------
-        moment : Moment
-        posture, read : Posture
-            The robot's, and as it knows it.
-
-        Returns
-        -------
-        Perception
-        """
-        seen = self.perceiver.perceive(moment, posture, read)
-        lost, self._lost = self._lost, self.rng.random() < (1 - self._ends if self._lost else self._begins)
-        return Perception(moment.time_s, seen.keypoints_m[:0], seen.scores[:0]) if lost else seen
+    return perceive

@@ -1,28 +1,33 @@
-"""The camera on the robot's head: an image and a depth image, a detector, the lifting.
+"""The camera on the robot's head: image and depth image, a detector, the lifting; and an onlooker's view.
 
 The camera sits on the moving robot and sees the robot's own arms; keypoints on them are left out, since
-where the robot is, is known.
+where the robot is, is known. An onlooker sees all of the robot.
 """
 
 import time
 from collections.abc import MutableMapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from hicp_lib.core.camera import transform
 from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.keypoints import N_KEYPOINTS
-from hicp_lib.experiments.avoidance.closed_loop import MOUNT, Latency, start_posture
+from hicp_lib.experiments.avoidance.closed_loop import MOUNT, start_posture
 from hicp_lib.experiments.avoidance.reaching import LOOKED_AT_S, Moment
-from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
-from hicp_lib.experiments.laboratory import COLOUR, colour_and_depth, robot_camera
-from hicp_lib.lifting.robust import METHODS, lift_in_steps
-from hicp_lib.robot.kinematics import load_icub
+from hicp_lib.experiments.laboratory import COLOUR, T_WORLD_ROOT, colour_and_depth, robot_camera
+from hicp_lib.lifting.robust import METHODS, lift_robust
+from hicp_lib.robot.kinematics import ICub, load_icub
 from hicp_lib.robot.loop import Perception
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.segments import filter_self
-from hicp_lib.simulation.rendering.render import render
+from hicp_lib.robot.shape import robot_shape
+from hicp_lib.simulation.appearance.materials import plain
+from hicp_lib.simulation.rendering.camera import PlacedCamera, look_at
+from hicp_lib.simulation.rendering.colour_sensor import Sensor, expose
+from hicp_lib.simulation.rendering.mesh import Mesh, quad, vertex_normals
+from hicp_lib.simulation.rendering.render import World, render
+from hicp_lib.simulation.rendering.surfaces import Look, Surface
 
 RgbdImage = tuple[np.ndarray, np.ndarray]
 """Image (480, 640, 3), RGB uint8, and depth in metres (480, 640)."""
@@ -63,8 +68,6 @@ class HeadCamera:
     ----------
     detector : Detector
         Looks at the images.
-    latency : Latency
-        From image to keypoints in the loop.
     lifting : str
         One of `hicp_lib.lifting.robust.METHODS`.
     images : mapping
@@ -74,7 +77,6 @@ class HeadCamera:
     """
 
     detector: Detector
-    latency: Latency
     lifting: str = "robust"
     images: ImageCache = field(default_factory=dict)
     observations: list[Observation] = field(default_factory=list)
@@ -158,7 +160,69 @@ def lifted(
     Perception
     """
     icub = load_icub()
-    (in_camera,) = lift_in_steps(found.keypoints_px, depth_m, COLOUR, [METHODS[method]])
+    in_camera = lift_robust(found.keypoints_px, depth_m, COLOUR, METHODS[method])
     T_root_camera = icub.T_root_camera(posture.angles("head"), MOUNT)
     points_m = filter_self(icub, posture, transform(T_root_camera, in_camera.points_m))
     return Perception(time_s, points_m, found.scores)
+
+
+_GLOSS, _ROUGHNESS = 0.04, 0.35  # of painted covers
+
+
+def robot_surfaces(icub: ICub, posture: Posture, whole: bool = False) -> list[Surface]:
+    """The robot in the world.
+
+    Parameters
+    ----------
+    icub : ICub
+    posture : Posture
+    whole : bool, optional
+        With what the camera on its own head does not see.
+
+    Returns
+    -------
+    list of Surface
+    """
+    shape = robot_shape(icub, posture)
+    vertices_m = transform(T_WORLD_ROOT, shape.vertices_m).astype(np.float32)
+    triangles = shape.triangles if whole else shape.triangles[~shape.unseen]
+    normals = vertex_normals(vertices_m, triangles)
+    return [Surface(Mesh(vertices_m, triangles, normals, shape.colours), _painted)]
+
+
+def _painted(coords: np.ndarray, footprint_m: np.ndarray) -> Look:
+    return Look(coords, gloss=_GLOSS, roughness=_ROUGHNESS)
+
+
+_EYE_M, _TARGET_M = (-2.0, 0.42, 1.35), (0.0, 0.45, 0.85)  # world: from the robot's left, a little from above
+CAMERA = PlacedCamera(480, 384, 490.0, 490.0, 239.5, 191.5, look_at(_EYE_M, _TARGET_M))
+_SENSOR = Sensor(np.ones(3), exposure=1.15, blur_px=0.35, vignette=0.0, shot_noise=0.0, read_noise=0.0)
+_FLOOR = Surface(quad([-6, -6, 0], [12, 0, 0], [0, 12, 0]), plain(np.full(3, 0.62), 0.9, 0.0))
+_BACKDROP = np.full(3, 0.75)
+_SHARP = 1  # an owner: what belongs to somebody is drawn at every pixel
+_MARGIN_M = 0.35  # what lies within this of the person belongs to the scene, such as their chair
+
+
+def onlooker_view(world: World, robot: list[Surface]) -> np.ndarray:
+    """Robot and person without the room around them.
+
+    Parameters
+    ----------
+    world : World
+        With the person, without the robot.
+    robot : list of Surface
+
+    Returns
+    -------
+    array, shape (384, 480, 3), dtype uint8
+        RGB, as `CAMERA` takes it.
+    """
+    people = [surface for surface in world.surfaces if surface.person >= 0]
+    places_m = np.concatenate([surface.mesh.vertices_m for surface in people])
+    low, high = places_m.min(axis=0) - _MARGIN_M, places_m.max(axis=0) + _MARGIN_M
+    others = [surface for surface in world.surfaces if surface.person < 0]
+    near = [s for s in others if (s.mesh.vertices_m > low).all() and (s.mesh.vertices_m < high).all()]
+    sharp = [replace(surface, person=_SHARP) for surface in [*robot, *near]]
+    rng = np.random.default_rng(0)
+    frame = render(replace(world, surfaces=[_FLOOR, *people, *sharp], backdrop=_BACKDROP), CAMERA, rng)
+    return expose(frame.radiance, _SENSOR, rng, frame.person >= 0)

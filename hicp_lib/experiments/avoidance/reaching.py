@@ -20,7 +20,6 @@ from hicp_lib.experiments.avoidance.skin_distance import robot_spheres, skin_dis
 from hicp_lib.experiments.minimum_jerk import Posture, between, minimum_jerk
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
-from hicp_lib.robot.skin import read_skin
 from hicp_lib.simulation.appearance.people import Appearance, appearance_of, dress
 from hicp_lib.simulation.body.hands import sample_hand
 from hicp_lib.simulation.body.identities import Subject
@@ -43,9 +42,7 @@ CONTACT_M, BYSTAND_M = 0.01, 0.36
 REACTION_S = 0.2
 """How old what the person acts on is: eyes to arm (150 to 200 ms to a target that jumps)."""
 
-_SITTING_DEG = {"hip_flexion": 86.0, "knee_flexion": 86.0, "hip_abduction": 12.0}
-_HANGING_DEG = {"left_shoulder_abduction": 6.0, "right_shoulder_abduction": 6.0, "left_elbow_flexion": 12.0}
-_HAND_DEG = {"forearm_supination": -15.0, "wrist_flexion": 0.0, "wrist_deviation": 0.0}
+_DEG = lab.MOVEMENTS["reaching_deg"]
 _LEANS_DEG = np.arange(0.0, 100.1, 5.0)  # how far the trunk bends in all; the neck no further
 _FINE_DEG = np.arange(0.0, 100.1, 0.25)
 _LEAN_SHARES = {lab.PELVIS_LEAN: 0.35, "spine_flexion": 0.65, "neck_flexion": -0.45}  # the eyes look ahead
@@ -84,15 +81,10 @@ class Staging:
     by: str
 
 
-BYSTANDERS = {
-    "sitting, gesture": Staging(True, (0.26, 1.02), "gesture"),
-    "standing, passing": Staging(False, (0.26, 1.5), "passing"),
-}
-SCRIPTS = {
-    "sitting, hand": Staging(True, (0.26, 1.02), "hand"),
-    "standing, hand": Staging(False, (0.26, 0.92), "hand"),
-    "sitting, head": Staging(True, (-0.14, 1.0), "head"),
-}
+BYSTANDERS, SCRIPTS = (
+    {name: Staging(sits, (x_m, y_m), by) for name, (sits, x_m, y_m, by) in lab.MOVEMENTS[kind].items()}
+    for kind in ("bystanders", "scripts")
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,16 +259,16 @@ def _distance_m(shape: str, posture: Posture) -> float:
 @memoised()
 def _robot_at_post() -> tuple[np.ndarray, np.ndarray]:
     icub = load_icub()
-    return robot_spheres(icub, read_skin(), home_posture(icub))
+    return robot_spheres(icub, home_posture(icub))
 
 
 def _rest(rng, shape: str, staging: Staging) -> Posture:
     """Upright; arms hang, or lie in the lap."""
-    joints = radians(_HANGING_DEG)
+    joints = radians(_DEG["hanging"])
     if staging.sits:
-        joints |= radians(_SITTING_DEG, "left_") | radians(_SITTING_DEG, "right_")
+        joints |= radians(_DEG["sitting"], "left_") | radians(_DEG["sitting"], "right_")
     for side in ("left", "right"):
-        joints |= sample_hand(rng, "open", f"{side}_") | radians(_HAND_DEG, f"{side}_")
+        joints |= sample_hand(rng, "open", f"{side}_") | radians(_DEG["hand"], f"{side}_")
         if staging.sits:
             wrist_m = _REST_M * [1, 1 if side == "left" else -1, 1]
             joints = reach(load_body(), shape, joints, side, wrist_m, _ELBOW_AT_REST) or joints

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.cache import code_identity, key
+from hicp_lib.core.children import safe_start
 from hicp_lib.core.detections import Detections, Detector
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.executor import resolved, run_jobs
@@ -30,7 +31,7 @@ from hicp_lib.experiments.avoidance.error_model import in_sight
 from hicp_lib.experiments.avoidance.head_camera import HeadCamera, ImageCache, Observation
 from hicp_lib.experiments.avoidance.reaching import Moment
 from hicp_lib.experiments.laboratory import COLOUR, in_root
-from hicp_lib.robot.controller import PUBLISHED, Settings
+from hicp_lib.robot.controller import PUBLISHED
 
 NO_AVOIDANCE, TRUE_KEYPOINTS = "no avoidance", "ground truth"
 IDEAL = (NO_AVOIDANCE, TRUE_KEYPOINTS)
@@ -107,7 +108,9 @@ def run_all(jobs: Iterable[Job]) -> list[Run]:
     missing.sort(key=lambda job: (job.detector in IDEAL, job.latency.inference_s))
     workers = resolved(None)
     is_shared = isinstance(workers, int) and len(missing) > 1
-    with multiprocessing.get_context("spawn").Manager() if is_shared else nullcontext() as manager:
+    with safe_start():
+        shared = multiprocessing.get_context("spawn").Manager() if is_shared else nullcontext()
+    with shared as manager:
         images = manager.dict() if manager else {}  # shared by the processes of this machine
         todo = {job: partial(_simulate, run=folders[job].name, job=job, images=images) for job in missing}
         named = [(f"{folders[job].name}/{_TABLES[0]}", call) for job, call in todo.items()]
@@ -165,21 +168,13 @@ def moment_at(run: Run, time_s: float) -> Moment:
     return Moment(run.job.trial.script, run.job.trial.subject, float(time_s), hand_m)
 
 
-def settings_of(gains: str) -> Settings:
-    """The controller's settings by `Job.gains`."""
-    return PUBLISHED if gains == "published" else Settings()
-
-
 def _simulate(out: Path, run: str, job: Job, images: ImageCache) -> None:
     """Simulate a run and write its tables; it counts as finished when the first of them is there."""
-    observations: list[Observation] = []
-    avoids, settings = job.detector != NO_AVOIDANCE, settings_of(job.gains)
-    if job.detector in IDEAL:
-        cycles = loop.simulate(job.trial, loop.TrueKeypoints(job.latency), avoids, settings)
-    else:
-        camera = HeadCamera(_detector(job), job.latency, job.lifting, images)
-        cycles, observations = loop.simulate(job.trial, camera, settings=settings), camera.observations
-    frames = pd.DataFrame(list(map(_frame, observations)))
+    camera = None if job.detector in IDEAL else HeadCamera(_detector(job), job.lifting, images)
+    perceive, avoids = camera.perceive if camera else loop.true_keypoints, job.detector != NO_AVOIDANCE
+    settings = PUBLISHED if job.gains == "published" else None
+    cycles = loop.simulate(job.trial, perceive, job.latency, avoids, settings)
+    frames = pd.DataFrame([_frame(seen) for seen in camera.observations] if camera else [])
     for name, table in zip(reversed(_TABLES), (frames, cycles), strict=True):
         write_table(out / run / name, table)
 

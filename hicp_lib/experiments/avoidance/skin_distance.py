@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from hicp_lib.robot.kinematics import ICub
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.segments import body_segments
-from hicp_lib.robot.skin import Skin
+from hicp_lib.robot.skin import read_skin
 
 FAR_M = 0.6
 """Distances are not told apart beyond this."""
@@ -18,13 +18,12 @@ _STEP_M = 0.01
 _SOME = 32  # of so many vertices one is looked at first
 
 
-def robot_spheres(icub: ICub, skin: Skin, posture: Posture) -> tuple[np.ndarray, np.ndarray]:
+def robot_spheres(icub: ICub, posture: Posture) -> tuple[np.ndarray, np.ndarray]:
     """The robot as spheres: taxels are points; upper arms, forearms and hands are rows a centimetre apart.
 
     Parameters
     ----------
     icub : ICub
-    skin : Skin
     posture : Posture
 
     Returns
@@ -33,7 +32,7 @@ def robot_spheres(icub: ICub, skin: Skin, posture: Posture) -> tuple[np.ndarray,
         In the root frame.
     radii_m : array, shape (n,)
     """
-    taxels, _ = skin.in_root(icub, posture)
+    taxels, _ = read_skin().in_root(icub, posture)
     places, radii = [taxels], [np.zeros(len(taxels))]
     for segment in body_segments(icub, posture):
         if segment.part.endswith(("arm", "hand")):

@@ -11,11 +11,10 @@ from itertools import product
 import pandas as pd
 
 from hicp_lib.core.executor import run_jobs
-from hicp_lib.experiments.avoidance.closed_loop import Latency, Trial, TrueKeypoints, simulate
-from hicp_lib.experiments.avoidance.error_model import ErrorModel, Lossy, Modelled
+from hicp_lib.experiments.avoidance.closed_loop import Latency, Trial, simulate, true_keypoints
+from hicp_lib.experiments.avoidance.error_model import ErrorModel, lossy, modelled
 from hicp_lib.experiments.avoidance.reaching import LEAVES_S, NEAR_S
-from hicp_lib.experiments.avoidance.runs import TRUE_KEYPOINTS, settings_of
-from hicp_lib.simulation.body.identities import Subject
+from hicp_lib.experiments.avoidance.runs import TRUE_KEYPOINTS
 
 
 @dataclass(frozen=True)
@@ -27,8 +26,6 @@ class Variant:
     trial : Trial
     detector : str
         `TRUE_KEYPOINTS`, or whose errors the keypoints have.
-    gains : str
-        "ours" or "published".
     latency : Latency
     lost_share : float
         Of the images, those in which nobody is found, beyond the detector's own losses.
@@ -38,7 +35,6 @@ class Variant:
 
     trial: Trial
     detector: str
-    gains: str = "ours"
     latency: Latency = Latency()
     lost_share: float = 0.0
     burst_images: float = 1.0
@@ -103,13 +99,10 @@ def sweep(variants: Sequence[Variant], models: Mapping[str, ErrorModel]) -> pd.D
         A row per variant, in their order: `script, subject, follow_m_s, detector, gains, latency_s,
         lost_share, reach_m, min_distance_m`.
     """
-    by_person: dict[tuple[str, Subject], list[int]] = {}
-    for row, variant in enumerate(variants):
-        by_person.setdefault((variant.trial.script, variant.trial.subject), []).append(row)
-    runs = {person: [variants[row] for row in rows] for person, rows in by_person.items()}
-    jobs = [(person, partial(_of_person, own, models)) for person, own in runs.items()]
-    parts = [part.set_axis(by_person[person]) for person, part in run_jobs(jobs)]
-    return pd.concat(parts).sort_index()
+    people = pd.Series([(of.trial.script, of.trial.subject.number) for of in variants])
+    own = [rows.index for _, rows in people.groupby(people, sort=False)]
+    jobs = [(k, partial(_of_person, [variants[row] for row in rows], models)) for k, rows in enumerate(own)]
+    return pd.concat([part.set_axis(own[k]) for k, part in run_jobs(jobs)]).sort_index()
 
 
 def _of_person(variants: Sequence[Variant], models: Mapping[str, ErrorModel]) -> pd.DataFrame:
@@ -120,10 +113,9 @@ def _run(variant: Variant, model: ErrorModel | None) -> dict:
     trial = replace(variant.trial, duration_s=LEAVES_S[0])  # what comes after is not asked for
     # The same errors and losses at every latency, as far as images are the same.
     drawn = partial(trial.subject.stream, trial.script)
-    true = TrueKeypoints(variant.latency)
-    whole = Modelled(model, variant.latency, drawn(variant.detector)) if model else true
-    eyes = Lossy(whole, variant.lost_share, variant.burst_images, drawn("losses"))
-    cycles = simulate(trial, eyes, settings=settings_of(variant.gains))
+    whole = modelled(model, drawn(variant.detector)) if model else true_keypoints
+    perceive = lossy(whole, variant.lost_share, variant.burst_images, drawn("losses"))
+    cycles = simulate(trial, perceive, variant.latency)
     row = {"script": trial.script, "subject": trial.subject.number, "follow_m_s": trial.follow_m_s}
-    row |= {"detector": variant.detector, "gains": variant.gains, "latency_s": variant.latency.total_s}
+    row |= {"detector": variant.detector, "gains": "ours", "latency_s": variant.latency.total_s}
     return row | {"lost_share": variant.lost_share} | least_distances(cycles)

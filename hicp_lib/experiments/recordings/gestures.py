@@ -10,7 +10,7 @@ from operator import or_
 import numpy as np
 
 from hicp_lib.core.keypoints import LEFT_HAND, RIGHT_HAND
-from hicp_lib.experiments.laboratory import posed
+from hicp_lib.experiments.laboratory import MOVEMENTS, posed
 from hicp_lib.experiments.minimum_jerk import Move, Posture, between
 from hicp_lib.simulation.body.arms import Ranges, uniform
 from hicp_lib.simulation.body.joints import Joints, pose_from_joints, radians, within_limits
@@ -26,19 +26,10 @@ TABLE_HEIGHT_M = 0.72
 TABLE_M = ((-0.6, 0.75), (0.6, 1.3))  # two corners of its top, (x, y)
 _LEGS = ("hip_flexion", "hip_abduction", "hip_rotation", "knee_flexion", "ankle_flexion")
 _HANDS, _HALF_FINGER_M = {"left": LEFT_HAND, "right": RIGHT_HAND}, 0.02
-_LEANING_DEG = {"spine_flexion": 40.0, "neck_flexion": 0.0}
-_PALM_DOWN_DEG = {"forearm_supination": -70.0, "wrist_flexion": -15.0}
-_HIGH_DEG: Ranges = {
-    "shoulder_flexion": (150, 178), "shoulder_abduction": (0, 15), "shoulder_rotation": (-10, 20),
-    "elbow_flexion": (0, 25), "forearm_supination": (-60, 60),
-}  # fmt: skip
-_BENT_DEG: Ranges = {"spine_flexion": (60, 78), "neck_flexion": (-10, 30)}
-_HANGING_DOWN_DEG: Ranges = {"shoulder_flexion": (55, 85), "elbow_flexion": (0, 25)}  # of whoever bends down
-_AROUND_DEG = {"shoulder_flexion": -25.0, "shoulder_abduction": 35.0, "elbow_flexion": 25.0}
+_DEG = MOVEMENTS["gestures_deg"]
 _ASIDE_M = ((0.5, DISTANCE_M), (0.8, DISTANCE_M + 0.2))  # half out of the image; two corners, (x, y)
 _CLOSE_M = ((-0.15, 0.75), (0.15, 1.05))  # torso and arms are in it
 _STEP_M = 0.5  # the longest
-_LIFTED_DEG = {"hip_flexion": 15.0, "knee_flexion": 26.0, "hip_abduction": 7.0}
 _PENETRATION_M = 0.03  # skin and clothes give way this far on the way from one posture to the next
 _N_TRIES = 12
 
@@ -105,7 +96,7 @@ class Gestures:
         yield Move(0.4, above)
 
     def _over_table(self) -> Joints:
-        joints = self.at_ease().joints | radians(_LEANING_DEG)
+        joints = self.at_ease().joints | radians(_DEG["leaning"])
         pelvis_m = posed(self.shape, self._standing(joints)).heads_m[0]
         for side in self.rng.permutation(["left", "right"])[: self.rng.integers(1, 3)]:
             joints = self._with_hand_on_table(joints, str(side), pelvis_m)
@@ -118,7 +109,7 @@ class Gestures:
         wrist_m = np.array([ahead_m, left_m, TABLE_HEIGHT_M + 0.07 - pelvis_m[2]])
         for _ in range(3):
             joints = reach(self.body, self.shape, joints, side, wrist_m, (-0.2, 0.7, -0.7)) or joints
-            joints = joints | radians(_PALM_DOWN_DEG, f"{side}_")
+            joints = joints | radians(_DEG["palm_down"], f"{side}_")
             hand_m = posed(self.shape, self._standing(joints)).keypoints_m[_HANDS[side]]
             wrist_m[2] += TABLE_HEIGHT_M + _HALF_FINGER_M - hand_m[:, 2].min()
         return joints
@@ -126,7 +117,7 @@ class Gestures:
     def _raise_high(self) -> Iterator[Move]:
         """One arm or both, beyond the upper edge of the image."""
         sides = self.rng.permutation(["left", "right"])[: self.rng.integers(1, 3)]
-        yield from self._go(self._free(lambda: self._at_ease_but(_HIGH_DEG, sides)))
+        yield from self._go(self._free(lambda: self._at_ease_but(_DEG["high"], sides)))
 
     def _at_ease_but(self, arms: Ranges, sides: Iterable[str] = ("left", "right")) -> Joints:
         drawn = (uniform(self.rng, arms, f"{side}_") for side in sides)
@@ -141,14 +132,14 @@ class Gestures:
             joints = joints and reach(self.body, self.shape, joints, side, behind_m, (-0.2, 1, 0.3))
         if joints is None:
             return
-        around = joints | radians(_AROUND_DEG, "left_") | radians(_AROUND_DEG, "right_")
+        around = joints | radians(_DEG["around"], "left_") | radians(_DEG["around"], "right_")
         for angles in (around, joints, around):
             if self._is_free(self._standing(angles)):
                 yield from self._go(self._standing(angles))
 
     def _bend(self) -> Iterator[Move]:
         """Bend down, the hands beyond the lower edge of the image."""
-        down = self._free(lambda: self._at_ease_but(_HANGING_DOWN_DEG) | uniform(self.rng, _BENT_DEG))
+        down = self._free(lambda: self._at_ease_but(_DEG["hanging_down"]) | uniform(self.rng, _DEG["bent"]))
         yield from self._go(down)
         yield from self._go(self.at_ease())
 
@@ -170,7 +161,7 @@ class Gestures:
         first = int(to_m[0] >= start_m[0])  # the person faces the robot: their left is -x
         for k in range(n_steps):
             side = ("left", "right")[(first + k) % 2]
-            lifted = radians(_LIFTED_DEG, f"{side}_")
+            lifted = radians(_DEG["lifted"], f"{side}_")
             middle_m, end_m = (start_m + (k + part) / n_steps * (to_m - start_m) for part in (0.5, 1))
             yield Move(
                 0.45, Posture(self.now.joints | self.legs | lifted, (float(middle_m[0]), float(middle_m[1])))

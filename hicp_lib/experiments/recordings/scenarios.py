@@ -9,8 +9,7 @@ import pandas as pd
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.memo import memoised
-from hicp_lib.experiments.recordings.capture import capture
-from hicp_lib.experiments.recordings.moving_person import HEAD_RAD, moving_person
+from hicp_lib.experiments.recordings.moving_person import HEAD_RAD, capture, moving_person
 from hicp_lib.experiments.recordings.seated_person import VIEWS, seated_person
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.robot.kinematics import HEAD_JOINTS
@@ -18,7 +17,6 @@ from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.body.model import PosedBody
 from hicp_lib.simulation.rendering.render import World
 from hicp_lib.simulation.sensors.depth_camera import DepthCamera
-from hicp_lib.simulation.sensors.markers import marker_vertices
 from hicp_lib.simulation.sensors.stereo_camera import D435
 from hicp_lib.simulation.sensors.time_of_flight import AZURE_KINECT
 
@@ -118,15 +116,6 @@ def _relative(view: str) -> Scenario:
     )
 
 
-def _capture_moving(
-    subject: Subject, duration_s: float, T_world_camera: np.ndarray
-) -> tuple[MotionCapture, np.ndarray, float]:
-    scene = moving_person(subject)
-    vertices = marker_vertices(scene.appearance.shape)
-    obstacles = (scene.table.mesh,) if scene.table else ()
-    return capture(scene.person_at, vertices, T_world_camera, obstacles, duration_s, subject)
-
-
 SCENARIOS = {f"relative-{view}": _relative(view) for view in VIEWS} | {
     "mocap": Scenario(
         n_frames=48,
@@ -135,6 +124,6 @@ SCENARIOS = {f"relative-{view}": _relative(view) for view in VIEWS} | {
         mount="level",
         head_rad=lambda n: np.tile(HEAD_RAD, (n, 1)),
         stage=lambda subject, time_s: moving_person(subject).at(time_s),
-        capture=_capture_moving,
+        capture=capture,
     )
 }

@@ -6,7 +6,7 @@ The person sits at one place in one posture for the whole recording; only the ro
 import numpy as np
 
 from hicp_lib.core.memo import memoised
-from hicp_lib.experiments.laboratory import chair, furnished, posed, table
+from hicp_lib.experiments.laboratory import MOVEMENTS, chair, furnished, posed, table
 from hicp_lib.experiments.minimum_jerk import Posture
 from hicp_lib.simulation.appearance.people import appearance_of, dress
 from hicp_lib.simulation.body.hands import sample_hand
@@ -26,14 +26,7 @@ _TABLE_DEPTH_M = 0.55
 _WRISTS_M = {"left": (0.40, 0.12), "right": (0.36, -0.18)}  # before the pelvis, to the person's left
 _WRISTS_APART_M = 0.05  # at most, a person's from these in either direction
 _POSTURE_SD_DEG = 4.0  # of how people hold spine and neck
-_POSTURE_DEG = {
-    "spine_flexion": 9.0, "spine_turn": 2.0, "neck_flexion": -2.0, "neck_turn": 3.0,
-    "left_hip_flexion": 86.0, "right_hip_flexion": 87.0,
-    "left_knee_flexion": 88.0, "right_knee_flexion": 92.0,
-    "left_hip_abduction": 6.0, "right_hip_abduction": 8.0,
-    "left_ankle_flexion": -2.0, "right_ankle_flexion": -5.0,
-}  # fmt: skip
-_HAND_DEG = {"forearm_supination": -76.0, "wrist_flexion": 15.0, "wrist_deviation": -4.0}
+_DEG = MOVEMENTS["seated_deg"]
 _CONTACT_M = 0.003  # between the lowest point of hand or forearm and the table
 _N_ROUNDS = 6
 
@@ -54,13 +47,13 @@ def seated_person(subject: Subject) -> tuple[World, PosedBody]:
 
 def _sit_down(body: Body, shape: str, rng: np.random.Generator) -> PosedBody:
     """The posture, with the arms brought down until the hands lie on the table."""
-    upright = [name for name in _POSTURE_DEG if name.startswith(("spine", "neck"))]
-    held = {name: rng.normal(_POSTURE_DEG[name], _POSTURE_SD_DEG) for name in upright}
-    joints = radians(_POSTURE_DEG | held)
+    upright = [name for name in _DEG["posture"] if name.startswith(("spine", "neck"))]
+    held = {name: rng.normal(_DEG["posture"][name], _POSTURE_SD_DEG) for name in upright}
+    joints = radians(_DEG["posture"] | held)
     apart_m = _WRISTS_APART_M
     wrists_m = {side: rng.uniform(-apart_m, apart_m, 2) + at for side, at in _WRISTS_M.items()}
     for side in _WRISTS_M:
-        joints |= sample_hand(rng, "open", f"{side}_") | radians(_HAND_DEG, f"{side}_")
+        joints |= sample_hand(rng, "open", f"{side}_") | radians(_DEG["hand"], f"{side}_")
     wrist_heights_m = dict.fromkeys(_WRISTS_M, TABLE_HEIGHT_M + 0.05)
     for _ in range(_N_ROUNDS):
         pelvis_m = posed(shape, Posture(joints, _PLACE_M)).heads_m[0, 2]

@@ -1,14 +1,15 @@
 """Fabrics: patterns that follow the cloth, weave, folds and seams."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.simulation.appearance.materials import Rng, any_colour, hsv, linear
+from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
+from hicp_lib.simulation.rendering.surfaces import Look, Material, column
 
 Panels = tuple[np.ndarray, np.ndarray]
 """How a person's garments are laid out flat, at rest in the body frame: origins in metres, (5, 3), and
@@ -113,20 +114,14 @@ def random_fabric(rng: Rng, plain: float) -> Fabric:
     )
 
 
-# How often a pattern is worn, between what its period lies (m), which it is and of what numbers.
-_PATTERNS: dict[str, tuple[float, tuple[float, float], textures.Pattern, Sequence[float]]] = {
-    "stripes": (0.3, (0.02, 0.12), textures.stripes, (0.2, 0.35, 0.5)),
-    "uprights": (0.12, (0.01, 0.05), textures.stripes, (0.12, 0.3)),
-    "checks": (0.28, (0.03, 0.16), textures.checks, range(3)),
-    "dots": (0.12, (0.015, 0.06), textures.dots, (0.16,)),
-    "blobs": (0.18, (0.2, 0.6), textures.blobs, range(6)),
-}
+# How often a pattern is worn, between what its period lies (m), which texture it is and of what numbers.
+_PATTERNS = PEOPLE["patterns"]
 
 
 def _random_pattern(rng: Rng) -> Weights:
     kind = str(rng.choice(list(_PATTERNS), p=[often for often, *_ in _PATTERNS.values()]))
-    _, period, pattern, numbers = _PATTERNS[kind]
-    number, period_m = rng.choice(numbers), rng.uniform(*period)
+    _, period, texture, numbers = _PATTERNS[kind]
+    number, period_m, pattern = rng.choice(numbers), rng.uniform(*period), getattr(textures, texture)
 
     def weights(uv: np.ndarray, footprint: np.ndarray) -> np.ndarray:
         turned = uv[::-1] if kind == "uprights" else uv
@@ -212,19 +207,19 @@ def cloth_material(fabric: Fabric, panels: Panels, limbs: str, trim: Trim) -> Ma
     colours: np.ndarray = fabric.colours.astype(np.float32)
     base, extra = colours[:1].T, (colours[1:] - colours[:1]).T
 
-    def look(hits: Hits) -> Look:
-        rest, distance = hits.coords[:3], hits.coords[6]
-        uv, panel = panel_coordinates(panels, hits.coords, limbs)
+    def look(coords: np.ndarray, footprint_m: np.ndarray) -> Look:
+        rest, distance = coords[:3], coords[6]
+        uv, panel = panel_coordinates(panels, coords, limbs)
         albedo = np.repeat(base, uv.shape[1], axis=1)
         if fabric.pattern is not None:
-            weights = fabric.pattern(uv, hits.footprint_m)
+            weights = fabric.pattern(uv, footprint_m)
             albedo += extra[:, : len(weights)] @ weights
-        weave = textures.sample(textures.weave, uv, hits.footprint_m)[0]
-        soft, creased = textures.sample(textures.wrinkles, uv, hits.footprint_m)
+        weave = textures.sample(textures.weave, uv, footprint_m)[0]
+        soft, creased = textures.sample(textures.wrinkles, uv, footprint_m)
         height = fabric.crease_m * (0.55 * soft + 0.30 * creased)
         albedo *= 1 + 0.10 * weave * (fabric.weave_m > 0) + 0.04 * soft
         height, albedo = _sew(trim, distance, rest, panel, height, albedo)
-        height += np.float32(fabric.weave_m) * weave * (hits.footprint_m < 0.002)
+        height += np.float32(fabric.weave_m) * weave * (footprint_m < 0.002)
         return Look(np.clip(albedo, 0.002, 0.95), height, fabric.gloss, fabric.roughness, fabric.fuzz)
 
     return look

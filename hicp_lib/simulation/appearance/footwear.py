@@ -9,7 +9,7 @@ from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.body.model import PosedBody, load_body
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
+from hicp_lib.simulation.rendering.surfaces import Look, Material, column
 
 
 @dataclass(frozen=True)
@@ -121,9 +121,9 @@ def shoe_material(shoes: Shoes) -> Material:
     """Upper, sole, a seam over the toes and laces."""
     upper, sole = column(shoes.upper), column(shoes.sole)
 
-    def look(hits: Hits) -> Look:
-        along, across, height = hits.coords
-        noise = textures.sample(textures.cloud, np.stack([along * 0.4, across]), hits.footprint_m)[0]
+    def look(coords: np.ndarray, footprint_m: np.ndarray) -> Look:
+        along, across, height = coords
+        noise = textures.sample(textures.cloud, np.stack([along * 0.4, across]), footprint_m)[0]
         is_sole = height < SOLE_M * (0.75 + 0.35 * (along < 0.3))
         albedo = np.where(is_sole, sole, upper * (1 + 0.06 * noise))
         seam = (np.abs(along - 0.76 - 4 * across**2) < 0.006) & ~is_sole

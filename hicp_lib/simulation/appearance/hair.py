@@ -14,7 +14,7 @@ from hicp_lib.simulation.appearance.hair_styles import Style
 from hicp_lib.simulation.body.model import Body, PosedBody
 from hicp_lib.simulation.rendering import mesh as g
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
+from hicp_lib.simulation.rendering.surfaces import Look, Material, column
 
 Rng = np.random.Generator
 
@@ -331,10 +331,10 @@ def hair_material(colour: np.ndarray) -> Material:
     """Hair: locks of slightly different colour, single strands, darker at the roots."""
     colour = column(colour)
 
-    def look(hits: Hits) -> Look:
-        across, along, lock, t = hits.coords
+    def look(coords: np.ndarray, footprint_m: np.ndarray) -> Look:
+        across, along, lock, t = coords
         uv = np.stack([across * 0.007 + lock * 7.3, along + lock * 3.1])
-        strand = textures.sample(textures.strands, uv, hits.footprint_m * 0.5)[0]
+        strand = textures.sample(textures.strands, uv, footprint_m * 0.5)[0]
         shade = (0.8 + 0.35 * lock) * (1 + 0.35 * strand) * (0.7 + 0.35 * np.minimum(3 * t, 1))
         albedo = colour * np.clip(shade, 0.15, 2) + 0.004
         return Look(np.minimum(albedo, 0.9), gloss=0.022 + 0.015 * strand, roughness=0.42, softness=0.5)

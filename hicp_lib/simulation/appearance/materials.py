@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
+from hicp_lib.simulation.rendering.surfaces import Look, Material, column
 
 Rng = np.random.Generator
 
@@ -95,8 +95,8 @@ def mixed(
     """
     base, extra = column(colours[0]), (colours[1:].astype(np.float32) - colours[0].astype(np.float32)).T
 
-    def look(hits: Hits) -> Look:
-        weights = textures.sample(pattern, hits.coords[:2], hits.footprint_m)[: extra.shape[1]]
+    def look(coords: np.ndarray, footprint_m: np.ndarray) -> Look:
+        weights = textures.sample(pattern, coords[:2], footprint_m)[: extra.shape[1]]
         height = height_m * weights[0] if height_m else 0.0
         return Look(base + extra @ weights, height_m=height, roughness=roughness, gloss=gloss)
 
@@ -151,8 +151,8 @@ def random_wall(rng: Rng) -> Material:
 def pictured(number: int) -> Material:
     """A picture behind glass."""
 
-    def look(hits: Hits) -> Look:
-        seen = textures.sample(textures.picture, hits.coords[:2], hits.footprint_m, number)
+    def look(coords: np.ndarray, footprint_m: np.ndarray) -> Look:
+        seen = textures.sample(textures.picture, coords[:2], footprint_m, number)
         return Look(seen**2, roughness=0.3)
 
     return look
@@ -162,8 +162,8 @@ def foliage(rng: Rng) -> Material:
     """Leaves, each a little different."""
     colour = hsv(rng.uniform(0.22, 0.36), rng.uniform(0.4, 0.7), rng.uniform(0.3, 0.55))
 
-    def look(hits: Hits) -> Look:
-        return Look(column(colour) * (0.6 + 0.8 * hits.coords[0]), roughness=0.4, softness=0.4)
+    def look(coords: np.ndarray, footprint_m: np.ndarray) -> Look:
+        return Look(column(colour) * (0.6 + 0.8 * coords[0]), roughness=0.4, softness=0.4)
 
     return look
 
@@ -175,9 +175,9 @@ def outside(rng: Rng) -> Material:
     sky, green = column(sky), column(green)
     horizon, rough = rng.uniform(0.2, 0.7), rng.uniform(0.1, 0.3)
 
-    def look(hits: Hits) -> Look:
-        cloud = textures.sample(textures.cloud, hits.coords[:2] * 0.4, 0.05)
-        mix = np.clip((hits.coords[1] - horizon + rough * cloud[0]) * 4 + 0.5, 0, 1)
+    def look(coords: np.ndarray, footprint_m: np.ndarray) -> Look:
+        cloud = textures.sample(textures.cloud, coords[:2] * 0.4, 0.05)
+        mix = np.clip((coords[1] - horizon + rough * cloud[0]) * 4 + 0.5, 0, 1)
         glow = (green + (sky - green) * mix) * (1 + 0.08 * cloud[1])
         return Look(np.zeros((3, 1), np.float32), glow=glow, roughness=0.1)
 

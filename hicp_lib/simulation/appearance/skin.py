@@ -11,7 +11,7 @@ from hicp_lib.simulation.appearance.materials import hsv, linear
 from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.body.model import Body
 from hicp_lib.simulation.rendering import textures
-from hicp_lib.simulation.rendering.surfaces import Hits, Look, Material, column
+from hicp_lib.simulation.rendering.surfaces import Look, Material, column
 
 _TONES, _IRISES = (linear(PEOPLE[name]) for name in ("skin_srgb", "irises_srgb"))
 _HAIR = PEOPLE["hair_hsv"]
@@ -153,10 +153,10 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
     tone = _tone(complexion)
     red = tone * np.array([1.02, 0.72, 0.68])
 
-    def look(hits: Hits) -> Look:
-        c = dict(zip(COORDS, hits.coords, strict=True))
+    def look(coords: np.ndarray, footprint_m: np.ndarray) -> Look:
+        c = dict(zip(COORDS, coords, strict=True))
         uv = np.stack([c["y"] + 0.5 * c["x"], c["z"] + 0.3 * c["x"]])
-        blotches, pores, freckles = textures.sample(textures.skin, uv, hits.footprint_m)
+        blotches, pores, freckles = textures.sample(textures.skin, uv, footprint_m)
         flush = np.clip(c["flush"] * (1 + 0.25 * blotches) + 0.07 * blotches, -0.2, 1)
         flush *= 1 - 0.4 * complexion.tone
         albedo = column(tone) + (column(red) - column(tone)) * flush
@@ -166,7 +166,7 @@ def skin_material(complexion: Complexion, scalp: float) -> Material:
         gloss, softness = 0.035 + 0.01 * pores, np.ones(len(uv[0]), np.float32)
         roughness: np.ndarray = np.full(len(uv[0]), 0.46, np.float32)
         albedo, roughness = _paint_lips(complexion, tone, albedo, roughness, c)
-        albedo = _paint_hair(complexion, scalp, albedo, c, uv, hits.footprint_m)
+        albedo = _paint_hair(complexion, scalp, albedo, c, uv, footprint_m)
         nail = 0.7 * _step(c["nail"], 0.3, 0.7)
         albedo = albedo * (1 - nail) + nail * column(tone * np.array([1.08, 0.92, 0.90]))
         roughness = roughness * (1 - 0.4 * nail)

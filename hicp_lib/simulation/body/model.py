@@ -26,20 +26,15 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.core.memo import memoised
 from hicp_lib.core.rotations import rotations_from_vectors
+from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.rendering.mesh import vertex_normals
 
 BODY_FILE = DATA_DIR / "body.npz"
 
-REGIONS = (
-    "hips", "torso", "neck", "upper_arm", "forearm", "hand", "thigh", "shin", "foot",
-    "face", "scalp", "eyebrow", "lips", "mouth", "eye", "nail",
-)  # fmt: skip
+REGIONS: tuple[str, ...] = tuple(PEOPLE["regions"])
 """Names of the integer labels in `Body.regions`; "mouth" is its inside."""
 
-FIELDS = (
-    "arm", "leg", "torso", "hairline_m", "beard_m", "brow_m", "lash_m", "iris_rad",
-    "lips", "eyelid", "mouth", "ear", "nail",
-)  # fmt: skip
+FIELDS: tuple[str, ...] = tuple(PEOPLE["fields"])
 """Smooth quantities per vertex, columns of `Body.fields`, to be interpolated and then thresholded.
 
 arm : 0 at the shoulder, 1 elbow, 2 wrist, 3 tip of the middle finger; 0 off the arms
@@ -280,15 +275,10 @@ def rotation_matrices(body: Body, pose: Pose) -> np.ndarray:
         For a bone the model does not have.
     """
     number = body.bone_numbers
-    vectors: dict[int, np.ndarray] = {}
-    matrices: dict[int, np.ndarray] = {}
-    for name, rotation in pose.items():
-        (matrices if np.ndim(rotation) == 2 else vectors)[number[name]] = rotation
     result = np.tile(np.eye(3), (len(number), 1, 1))
-    if vectors:
-        result[list(vectors)] = rotations_from_vectors(np.array(list(vectors.values()), float))
-    if matrices:
-        result[list(matrices)] = list(matrices.values())
+    for name, turn in pose.items():
+        is_matrix = np.ndim(turn) == 2
+        result[number[name]] = turn if is_matrix else rotations_from_vectors(np.array([turn], float))[0]
     return result
 
 

@@ -10,17 +10,16 @@ import numpy as np
 
 from hicp_lib.core.datafiles import DATA_DIR, read_arrays
 from hicp_lib.core.memo import memoised
+from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.body.model import Body, Pose, Shape, pose_bones, shape_number
 
 Spheres = tuple[np.ndarray, np.ndarray]  # centres (n, 3) and radii (n,)
 
-# Limbs as spheres: region, first and last bone head, fractions of the way between them. Most of the
-# upper arm may touch the trunk; a bit more than the whole way to the last knuckle is a fingertip.
-_UPPER_ARM = ("upper_arm", "upperarm01", "lowerarm01", (0.85,))
-_FOREARM = ("forearm", "lowerarm01", "wrist", (0.0, 0.2, 0.4, 0.6, 0.8, 1.0))
-_HAND = ("hand", "wrist", "finger3-3", (0.35, 0.7, 1.05))
-_THIGH = ("thigh", "upperleg01", "lowerleg01", (0.25, 0.4, 0.55, 0.7, 0.85))
-LIMBS = (_UPPER_ARM, _FOREARM, _HAND, _THIGH)
+LIMBS = PEOPLE["limb_spheres"]
+"""Limbs as spheres, those of the arm first: region, first and last bone head, fractions of the way between.
+
+Most of the upper arm may touch the trunk; a bit more than the whole way to the last knuckle is a fingertip.
+"""
 _SIZES = {"bones": (-1, 13), "centres_m": (-1, 13, 3), "half_axes_m": (-1, 13, 3), "radii_m": (-1, 4)}
 
 
@@ -103,10 +102,10 @@ def self_collision_distance_m(body: Body, model: CollisionModel, pose: Pose) -> 
     True
     """
     rotations, heads = pose_bones(body, model.shape, pose)
-    left, right = (_spheres(body, model, heads, (_UPPER_ARM, _FOREARM, _HAND), side) for side in "LR")
+    left, right = (_spheres(body, model, heads, LIMBS[:3], side) for side in "LR")
     arms = np.concatenate([left[0], right[0]]), np.concatenate([left[1], right[1]])
     gaps = [_gap_to_trunk(model, rotations, heads, *arms).min(), _gap(left, right)]
-    gaps += [_gap(arms, _spheres(body, model, heads, (_THIGH,), side)) for side in "LR"]
+    gaps += [_gap(arms, _spheres(body, model, heads, LIMBS[3:], side)) for side in "LR"]
     return float(min(gaps))
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from hicp_lib.simulation.rendering.raycast import RayScene, Trace, dot, interpolate, pick, place
-from hicp_lib.simulation.rendering.surfaces import Hits, Look
+from hicp_lib.simulation.rendering.surfaces import Look
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def evaluate_materials(scene: RayScene, gbuffer: GBuffer, pixel_rad: float) -> S
             local = pick(corners, rows) - scene.first_vertex[number]
             coords = np.ascontiguousarray(scene.surfaces[number].mesh.coords.T, np.float32)
             seen = interpolate(coords, local, pick(weights, rows))
-            material = material(Hits(footprint_m.take(rows), seen))
+            material = material(seen, footprint_m.take(rows))
         shading.put(rows, material)
     return shading
 

@@ -1,4 +1,4 @@
-"""What a renderer needs to know of things: surfaces, the hits of rays on them, their looks."""
+"""What a renderer needs to know of things: surfaces and their looks."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,25 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hicp_lib.simulation.rendering.mesh import Mesh
-
-
-@dataclass
-class Hits:
-    """Where rays met one surface: n places.
-
-    Components come first, (3, n): numpy works several times faster on whole components
-    than on rows of three.
-
-    Attributes
-    ----------
-    footprint_m : array, shape (n,)
-        How wide one pixel is at the hit.
-    coords : array, shape (n_coords, n)
-        The mesh's, interpolated.
-    """
-
-    footprint_m: np.ndarray
-    coords: np.ndarray
 
 
 @dataclass
@@ -57,8 +38,11 @@ class Look:
     glow: Any = 0.0
 
 
-Material = Look | Callable[[Hits], Look]
-"""One look all over, or what tells it from where the surface was hit."""
+Material = Look | Callable[[np.ndarray, np.ndarray], Look]
+"""One look all over, or what tells it of n places where rays met the surface: by the mesh's coords there,
+interpolated, (n_coords, n), and by how wide one pixel is in metres, (n,).
+
+Components come first, (3, n): numpy works several times faster on whole components than on rows of three."""
 
 
 def column(colour: ArrayLike) -> np.ndarray:

@@ -5,7 +5,6 @@ tile serves every paint, wood and cloth. Tiles are made once per process from fi
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -15,22 +14,6 @@ from hicp_lib.core.memo import memoised
 from hicp_lib.simulation.rendering.raycast import place
 
 _REMAP_COLUMNS = 8192  # OpenCV's remap takes no array longer than 32767
-
-
-@dataclass(frozen=True)
-class Texture:
-    """A periodic tile with its mip levels.
-
-    Attributes
-    ----------
-    levels : list of array, shape (size + 1, size + 1, channels), dtype float32
-        Each half as large as the one before; the last row and column repeat the first.
-    width_m : float
-        How wide the tile is on a surface.
-    """
-
-    levels: list[np.ndarray]
-    width_m: float
 
 
 Tile = tuple[np.ndarray, float]
@@ -63,27 +46,26 @@ def sample(
     >>> sample(stripes, where, 0.001, 0.5)
     array([[1., 0.]], dtype=float32)
     """
-    texture = _texture(pattern, *numbers)
-    texel_m = texture.width_m / (texture.levels[0].shape[0] - 1)
+    levels, width_m = _texture(pattern, *numbers)
+    texel_m = width_m / (levels[0].shape[0] - 1)
     level = np.log2(np.maximum(np.asarray(footprint_m, np.float32) / texel_m, 1e-6))
-    level = np.clip(np.rint(level), 0, len(texture.levels) - 1).astype(np.int8)
+    level = np.clip(np.rint(level), 0, len(levels) - 1).astype(np.int8)
     if level.ndim == 0 or level.min() == level.max():
-        return _lookup(texture, int(level.flat[0]), uv_m)
-    result = np.empty((texture.levels[0].shape[2], uv_m.shape[1]), np.float32)
+        return _lookup(levels[int(level.flat[0])], width_m, uv_m)
+    result = np.empty((levels[0].shape[2], uv_m.shape[1]), np.float32)
     for number in np.flatnonzero(np.bincount(level)).tolist():
         rows = np.flatnonzero(level == number)
-        place(result, rows, _lookup(texture, number, uv_m.take(rows, axis=1)))
+        place(result, rows, _lookup(levels[number], width_m, uv_m.take(rows, axis=1)))
     return result
 
 
-def _lookup(texture: Texture, number: int, uv_m: np.ndarray) -> np.ndarray:
-    tile = texture.levels[number]
+def _lookup(tile: np.ndarray, width_m: float, uv_m: np.ndarray) -> np.ndarray:
     size, channels = tile.shape[0] - 1, tile.shape[2]
     n = uv_m.shape[1]
     rows = -(-n // _REMAP_COLUMNS)
     columns = -(-n // rows)
     xy = np.zeros((2, rows * columns), np.float32)
-    scaled = uv_m * np.float32(1 / texture.width_m)
+    scaled = uv_m * np.float32(1 / width_m)
     xy[:, :n] = (scaled - np.floor(scaled)) * np.float32(size)
     maps = xy.reshape(2, rows, columns)
     found = cv2.remap(tile, maps[0], maps[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
@@ -91,14 +73,18 @@ def _lookup(texture: Texture, number: int, uv_m: np.ndarray) -> np.ndarray:
 
 
 @memoised()
-def _texture(pattern: Pattern, *numbers: float) -> Texture:
+def _texture(pattern: Pattern, *numbers: float) -> tuple[list[np.ndarray], float]:
+    """A pattern's mip levels, (size + 1, size + 1, channels) float32, and its width in metres.
+
+    Each level is half as large as the one before; its last row and column repeat the first.
+    """
     period, width_m = pattern(*numbers)
     tile: np.ndarray = np.atleast_3d(period).astype(np.float32)
     levels = []
     while True:
         levels.append(np.ascontiguousarray(np.pad(tile, ((0, 1), (0, 1), (0, 0)), mode="wrap")))
         if tile.shape[0] <= 2:
-            return Texture(levels, width_m)
+            return levels, width_m
         tile = (tile[::2, ::2] + tile[1::2, ::2] + tile[::2, 1::2] + tile[1::2, 1::2]) / 4
 
 

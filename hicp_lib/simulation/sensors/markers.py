@@ -9,17 +9,13 @@ import numpy as np
 
 from hicp_lib.core.datafiles import DATA_DIR, read_arrays
 from hicp_lib.core.memo import memoised
+from hicp_lib.simulation.body.identities import PEOPLE
 from hicp_lib.simulation.body.model import PosedBody, Shape, load_body, shape_number
 from hicp_lib.simulation.rendering.mesh import Mesh
 from hicp_lib.simulation.rendering.raycast import RayScene
 from hicp_lib.simulation.rendering.surfaces import Look, Surface
 
-JOINT_MARKERS: tuple[str, ...] = tuple(
-    f"{joint}_{side}_{number}"
-    for joint in ("shoulder", "elbow", "wrist")
-    for side in ("left", "right")
-    for number in (1, 2)
-)
+JOINT_MARKERS: tuple[str, ...] = tuple(PEOPLE["markers"])
 """Names of the twelve markers on a person, in the order used throughout."""
 
 CAMERA_MARKER = "camera"

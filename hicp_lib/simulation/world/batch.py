@@ -67,8 +67,7 @@ def keep_parts(
     before = kept_beside(out, stamp_name, stamp=dict, n=int, once=list)
     (out / index).unlink(missing_ok=True)
     is_same, n_before = before["stamp"] == stamp, before["n"]
-    dropped = range(n if is_same else 0, n_before)
-    for path in chain.from_iterable(map(made, dropped)):
+    for path in chain.from_iterable(map(made, range(n if is_same else 0, n_before))):
         path.unlink(missing_ok=True)
     remove_inside(out, [] if is_same else before["once"])
     for path in chain.from_iterable(map(made, range(n_before, n))):

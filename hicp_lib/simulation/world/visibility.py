@@ -10,10 +10,7 @@ from hicp_lib.simulation.rendering.camera import PlacedCamera, pixel_rays, proje
 from hicp_lib.simulation.rendering.raycast import RayScene
 
 _TOUCHING_M = 0.002  # a keypoint that lies no further behind what is seen is on the surface
-_HEAD = ("face", "eyebrow", "lips", "mouth", "eye", "neck")
-_FACE_RULE = (_HEAD, 0.03)
-_HAND_RULE = (("hand", "nail", "forearm"), 0.025)
-_SIDED = ("upper_arm", "forearm", "hand", "thigh", "shin", "foot", "nail")
+_RULES = PEOPLE["seen_through"]
 
 
 def _tables() -> tuple[np.ndarray, np.ndarray]:
@@ -21,11 +18,11 @@ def _tables() -> tuple[np.ndarray, np.ndarray]:
     allowed = np.zeros((N_KEYPOINTS, 2 * RIGHT + 1), bool)
     depth_m = np.zeros(N_KEYPOINTS)
     for name, index in INDEX.items():
-        otherwise = _HAND_RULE if index in HANDS else _FACE_RULE
-        rules = (rule for ending, rule in PEOPLE["seen_through"].items() if name.endswith(ending))
+        otherwise = _RULES["any of a hand" if index in HANDS else "any of the face"]
+        rules = (rule for ending, rule in _RULES.items() if name.endswith(ending))
         parts, depth_m[index] = next(rules, otherwise)
         for part in parts:
-            number, sided = REGIONS.index(part), part in _SIDED
+            number, sided = REGIONS.index(part), part in PEOPLE["on_each_side"]
             allowed[index, number] = not (sided and name.startswith("right_"))
             allowed[index, number + RIGHT] = not (sided and name.startswith("left_"))
     return allowed, depth_m

@@ -121,11 +121,9 @@ def judge_claims(claims: list[Claim], results: Path) -> list[Verdict]:
     InputError
         If a claim asks for a column that its table does not have.
     """
-    verdicts = []
-    for claim in claims:
-        of_class = _judge(replace(claim, tests=claim.class_tests), results) if claim.class_tests else None
-        verdicts.append(replace(_judge(claim, results), of_class=of_class))
-    return verdicts
+    beyond = [_judge(replace(of, tests=of.class_tests), results) if of.class_tests else None for of in claims]
+    own = (_judge(claim, results) for claim in claims)
+    return [replace(said, of_class=of_class) for said, of_class in zip(own, beyond, strict=True)]
 
 
 def _judge(claim: Claim, results: Path) -> Verdict:

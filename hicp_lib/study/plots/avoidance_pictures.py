@@ -16,8 +16,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.experiments.avoidance.closed_loop import start_posture
+from hicp_lib.experiments.avoidance.head_camera import CAMERA, onlooker_view, robot_surfaces
 from hicp_lib.experiments.avoidance.reaching import LEAVES_S, NEAR_S
-from hicp_lib.experiments.avoidance.robot_surfaces import CAMERA, onlooker_view, robot_surfaces
 from hicp_lib.experiments.avoidance.runs import Run, image, moment_at
 from hicp_lib.experiments.laboratory import T_WORLD_ROOT
 from hicp_lib.inspection.skeletons import draw_people
@@ -27,7 +27,7 @@ from hicp_lib.simulation.rendering.camera import project_world
 from hicp_lib.study.avoidance import SURE, sure_keypoints
 from hicp_lib.study.plots.avoidance import condition_colour
 from hicp_lib.study.plots.people import picture_grid
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
+from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
 
 _THREATENED = 0.05  # activation from which a taxel is drawn
 _MOST = 0.5  # activation of the darkest
@@ -49,14 +49,8 @@ def filmstrip(run: Run, times_s: Sequence[float], note: str) -> Figure:
     figure, axes = new_figure(2, len(times_s), 3.0 * len(times_s), 4.9, squeeze=False)
     for (above, below), time_s in zip(axes.T, times_s, strict=True):
         _draw_moment(above, below, run, time_s)
-    nearest = 100 * run.cycles["distance_m"].min()
-    return Figure(
-        figure,
-        f"{run.job.trial.script}, {run.job.condition}: the image the robot last took with what was found in "
-        f"it, and what an onlooker sees: threatened taxels red, keypoints as dots. Data: {note}.",
-        f"{len(times_s)} moments: the person comes near and the robot's arm gives way; never nearer than "
-        f"{nearest:.1f} cm.",
-    )
+    told = {"script": run.job.trial.script, "condition": run.job.condition, "n": len(times_s), "note": note}
+    return Figure(figure, *texts("filmstrip", **told, nearest_cm=100 * run.cycles["distance_m"].min()))
 
 
 def nearest_views(runs: Sequence[Run], note: str) -> Figure:
@@ -77,11 +71,9 @@ def nearest_views(runs: Sequence[Run], note: str) -> Figure:
     detectors = list(dict.fromkeys(name for pictures in shown.values() for name in pictures))
     return picture_grid(
         [[pictures.get(name) for name in detectors] for pictures in shown.values()],
+        *texts("nearest_views", scripts=list(shown), detectors=detectors, min_score=SURE, note=note),
         row_titles=list(shown),
         titles=detectors,
-        caption="Through the robot's eyes when the person is near: the last image each detector had taken by "
-        f"then, with keypoints of a score of at least {SURE}. Data: {note}.",
-        alt=f"Pictures from above of {in_words(shown)}, with what {in_words(detectors)} found.",
         cell_in=min(3.2, 11 / max(len(detectors), 1)),
     )
 
@@ -135,16 +127,12 @@ def _draw_moment(camera, space, run: Run, time_s: float) -> None:
     cycle = run.cycles.iloc[int(np.argmin(np.abs(run.cycles["t_s"] - time_s)))]
     past = run.frames[run.frames["t_s"] <= time_s + 1e-9]
     frame = past.iloc[-1] if len(past) else None
-    _draw_image(camera, run, frame, time_s)
+    camera.axis("off")
+    camera.set_title(f"{time_s:.1f} s")
+    if frame is not None:
+        camera.imshow(_drawn(run, frame))
     _draw_space(space, run, cycle, frame)
     space.set_title(f"{100 * cycle['distance_m']:.0f} cm, activation {cycle['activation']:.2f}")
-
-
-def _draw_image(axis, run: Run, frame: pd.Series | None, time_s: float) -> None:
-    axis.axis("off")
-    axis.set_title(f"{time_s:.1f} s")
-    if frame is not None:
-        axis.imshow(_drawn(run, frame))
 
 
 def _drawn(run: Run, frame: pd.Series) -> np.ndarray:

@@ -5,7 +5,7 @@ import pandas as pd
 from hicp_lib.core.errors import InputError
 from hicp_lib.study.claims.verdicts import VERDICTS
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
+from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
 
 # By `VERDICTS`: Okabe and Ito's palette; the hatch says the same without colour.
 _COLOURS = ("#009E73", "#56B4E9", "#D55E00", "#F0E442", "#CC79A7", "#D9D9D9")
@@ -38,7 +38,5 @@ def _by_section(table: pd.DataFrame) -> Figure:
     axis.invert_yaxis()
     axis.set(xlabel="claims", ylabel="section of the paper", xticks=range(int(counts.sum(axis=1).max()) + 1))
     figure.legend(loc="outside upper center", ncols=3)
-    said = [f"{counts[verdict].sum()} {verdict}" for verdict in VERDICTS]
-    caption = f"The paper's claims by section and verdict: {in_words(said)}."
     numbers = counts.reset_index().melt("section", var_name="verdict", value_name="claims")
-    return Figure(figure, caption, f"Stacked bars of claims per section. {caption}", numbers)
+    return Figure(figure, *texts("verdicts", counts=counts.sum()), numbers)

@@ -5,12 +5,12 @@ import pandas as pd
 from hicp_lib.evaluation.calibration.curves import N_BINS
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import SUBSET_COLOURS, detector_colour
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
 
 _MEASURES = {
     "AP": "average precision of hands", "step": "gain over the row above", "share": "share of hands found"
 }  # fmt: skip
-_GROUPS = {"body": "body", "hand": "hands"}
+_GROUPS = {"hand": "hands"}
 
 
 @in_style
@@ -42,13 +42,7 @@ def ingredients(table: pd.DataFrame, note: str) -> Figure:
     marks.name_rows(axes[0, 0], variants)
     marks.legend_below(figure, axes[0, 0])
     ends = table[table["variant"].isin([variants[0], variants[-1]])]
-    said = series_text(ends.set_index(["body", "variant", "subset"])["AP"], "{0}, {1}: {3:.2f} on {2}")
-    caption = (
-        "What each step buys: average precision of hands, what the step adds, hands found; panels by whose "
-        f"the bodies are; 95 % bootstrap intervals over source images: {note}."
-    )
-    alt = f"Dots with whiskers per step, for the bodies of {in_words(bodies)}. Average precision, {said}."
-    return Figure(figure, caption, alt, table)
+    return Figure(figure, *texts("ingredients", note=note, bodies=bodies, said=ends), table)
 
 
 @in_style
@@ -78,17 +72,8 @@ def reliability_curves(curves: pd.DataFrame, errors: pd.DataFrame, min_term: flo
     axes[0, 0].set(ylabel="share of hits", ylim=(-0.02, 1.02))
     axes[1, 0].set(ylabel="keypoints")
     marks.legend_below(figure, axes[0, 0])
-    said = [
-        f"{row.detector} {_GROUPS.get(row.group, row.group)} {row.raw:.2f} to {row.calibrated:.2f}"
-        for row in errors.itertuples()
-    ]
-    caption = (
-        f"Reliability of keypoint scores: share of hits (OKS term of at least {min_term:g}) per bin, and "
-        "how many keypoints have it; dashed: a score that says what it is worth. Raw scores, and scores "
-        f"calibrated on other images, with 95 % bootstrap intervals over source images: {note}."
-    )
-    alt = f"Curves of hits against score per detector. Expected calibration error: {in_words(said)}."
-    return Figure(figure, caption, alt, curves)
+    said = errors.replace({"group": _GROUPS})
+    return Figure(figure, *texts("reliability_curves", min_term=min_term, note=note, said=said), curves)
 
 
 def _draw_curves(upper, lower, rows: pd.DataFrame, colour: str) -> None:

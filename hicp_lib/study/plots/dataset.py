@@ -16,10 +16,9 @@ from hicp_lib.formats.annotations import Annotations
 from hicp_lib.simulation.body.joints import pose_from_joints, radians
 from hicp_lib.simulation.body.model import load_body, pose_body
 from hicp_lib.study.plots import marks
-from hicp_lib.study.plots.marks import legend_below
 from hicp_lib.study.plots.palette import BODY_COLOUR, HEAD_COLOUR, SUBSET_COLOURS
 from hicp_lib.study.plots.people import draw_truth, picture_grid
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
 
 _TRUTH_COLOUR = "#F0E442"
 _EDGES = ("left", "top", "right", "bottom")
@@ -59,14 +58,9 @@ def scenes(annotations: Annotations, images_dir: str | Path, image_ids: Sequence
     """
     plain = [read_image(Path(images_dir) / annotations.images[i].file_name) for i in image_ids]
     marked = [with_truth(annotations, images_dir, i) for i in image_ids]
-    n_people = [int((annotations.image_ids == i).sum()) for i in image_ids]
-    return picture_grid(
-        [plain, marked],
-        row_titles=["image", "annotated"],
-        caption=f"Whole images and their annotated keypoints: {note}.",
-        alt=f"{len(plain)} images with {in_words([str(n) for n in n_people])} people, their keypoints below.",
-        cell_in=10 / len(plain),
-    )
+    n_people = [str((annotations.image_ids == i).sum()) for i in image_ids]
+    said = texts("scenes", note=note, n=len(plain), n_people=n_people)
+    return picture_grid([plain, marked], *said, row_titles=["image", "annotated"], cell_in=10 / len(plain))
 
 
 @in_style
@@ -95,12 +89,8 @@ def head_cuts(table: pd.DataFrame, images_dir: str | Path, note: str) -> Figure:
         axis.set(xticks=[], yticks=[], xlim=(left - 0.5, right - 0.5), ylim=(bottom - 0.5, top - 0.5))
         axis.set_title(f"person {row['annotation_id']}", fontsize=9)
         axis.grid(False)
-    caption = f"How Headless is made: the head (red), the body below it (green), the cut (dashed). {note}"
-    alt = (
-        f"{len(table)} people with a red box around the head, a green box around the body and a dashed cut "
-        f"between them; the removed sides are {in_words(map(str, table['cut_side']))}."
-    )
-    return Figure(figure, caption, alt, table)
+    sides = table["cut_side"].astype(str).tolist()
+    return Figure(figure, *texts("head_cuts", note=note, n=len(table), sides=sides), table)
 
 
 def _draw_box(axis, row: pd.Series, part: str, colour: str) -> None:
@@ -133,13 +123,8 @@ def pairs(subsets: Mapping[str, tuple[Annotations, Path]], image_ids: Sequence[i
         [with_truth(annotations, images_dir, i) if i in annotations.images else None for i in image_ids]
         for annotations, images_dir in subsets.values()
     ]
-    return picture_grid(
-        rows,
-        row_titles=list(subsets),
-        caption=f"The same people in {in_words(list(subsets))}, with their keypoints: {note}.",
-        alt=f"{len(image_ids)} people, in the upper row with and in the lower row without their heads.",
-        cell_in=10 / len(image_ids),
-    )
+    said = texts("pairs", subsets=list(subsets), note=note, n=len(image_ids))
+    return picture_grid(rows, *said, row_titles=list(subsets), cell_in=10 / len(image_ids))
 
 
 @in_style
@@ -162,9 +147,7 @@ def labelled_share(subsets: Mapping[str, Annotations], note: str) -> Figure:
     axis.set(ylabel="share of people", ylim=(0, 1))
     axis.grid(axis="x", visible=False)
     axis.legend(loc="upper right", ncols=2, bbox_to_anchor=(1, 1.16))
-    said = series_text(wide.mean(), "{} {:.0%}")
-    caption = f"Share of people in whom a keypoint is labelled (occluded ones included): {note}."
-    return Figure(figure, caption, f"Bars per body part for each subset; mean over parts: {said}.", table)
+    return Figure(figure, *texts("labelled_share", note=note, said=wide.mean()), table)
 
 
 @in_style
@@ -190,11 +173,9 @@ def crop_sizes(table: pd.DataFrame, min_pixels: int, note: str) -> Figure:
     axis.axvline(min_pixels, color="black", lw=1.2, ls="--")
     axis.set(xscale="log", xlabel="pixels of the crop", ylabel="people")
     axis.legend(loc="best")
-    share = float((sizes >= min_pixels).mean())
-    caption = f"Sizes of the crops and the limit of {min_pixels:,} pixels (dashed): {note}."
-    said = f"{share:.0%} reach the limit, the median is {np.median(sizes):,.0f} pixels"
-    alt = f"Histogram of crop sizes; {said}."
-    return Figure(figure, caption, alt, pd.DataFrame({"pixels": sizes}))
+    told = {"share": (sizes >= min_pixels).mean(), "median": np.median(sizes)}
+    said = texts("crop_sizes", min_pixels=min_pixels, note=note, **told)
+    return Figure(figure, *said, pd.DataFrame({"pixels": sizes}))
 
 
 _DRAWN_PARTS = {
@@ -218,14 +199,9 @@ def layouts() -> Figure:
         rows.append((name.replace("\n", " "), len(given), int((given >= 0).sum())))
         _draw_layout(axis, points_m, given, f"{name}, {len(given)}")
     _draw_layout(axes.flat[-1], points_m, LEFT_HAND, "a left hand, the same\nof all that give it")
-    legend_below(figure, axes.flat[3], ncols=2)
+    marks.legend_below(figure, axes.flat[3], ncols=2)
     table = pd.DataFrame(rows, columns=["layout", "points", "drawn"])
-    caption = (
-        "Layouts of keypoints, how many, and those of them that are among the 136 all are brought to here. "
-        "OpenPose's pupils are not, nor are MediaPipe's mouth, corners of the eyes and knuckles of the body."
-    )
-    said = series_text(table.set_index("layout")["points"], "{} {}")
-    return Figure(figure, caption, f"Five people with the points of a layout each: {said}.", table)
+    return Figure(figure, *texts("layouts", said=table), table)
 
 
 def _draw_layout(axis, points_m: np.ndarray, given: np.ndarray, title: str) -> None:

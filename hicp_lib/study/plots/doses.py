@@ -10,19 +10,8 @@ from hicp_lib.formats.annotations import Annotations
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
 from hicp_lib.study.plots.people import picture_grid
-from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.style import TEXTS, Figure, in_lines, in_style, new_figure, texts
 
-_LABELS = {
-    "distance": "distance [m]",
-    "light": "share of the light",
-    "hidden": "share of the height hidden, from below",
-    "resolution": "height of the picture [px]",
-    "upper part": "share of the height seen, from above",
-    "lower part": "share of the height seen, from below",
-    "picture": "size of the picture [px, square root of its area]",
-    "distance to the border": "distance to the border [of the shorter side]",
-    "brightness": "mean brightness [of 255]",
-}
 _UNITS = {"distance": " m", "resolution": " px"}
 _LOGARITHMIC = ("light", "resolution", "distance")
 _SUBSET_STYLES = {"basic": "-", "headless": "--", "close": ":"}
@@ -44,12 +33,9 @@ def dose_pictures(annotations: Annotations, folder: Path, person: int = 0) -> Fi
         if extra["source_image_id"] == person:
             image = read_image(Path(folder) / "images" / annotations.images[image_id].file_name)
             rows.setdefault(extra["dose"], []).append((extra["level"], image))
-    figure = picture_grid(
-        [[image for _, image in pictures] for pictures in rows.values()],
-        row_titles=list(rows), cell_in=1.5,
-        caption="The pictures of one person, rendered: one thing varied in each row, the rest the same.",
-        alt=f"Rows of pictures of one person: {in_words(list(rows))}.",
-    )  # fmt: skip
+    drawn = [[image for _, image in pictures] for pictures in rows.values()]
+    said = texts("dose_pictures", doses=list(rows))
+    figure = picture_grid(drawn, *said, row_titles=list(rows), cell_in=1.5)
     columns = max(len(pictures) for pictures in rows.values())
     for i, (dose, pictures) in enumerate(rows.items()):
         for j, (level, _) in enumerate(pictures):
@@ -76,10 +62,8 @@ def dose_curves(table: pd.DataFrame, group: str) -> Figure:
             axis.set_xscale("log")
             axis.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axis.minorticks_off()
-    caption = "AP (solid) and visible keypoints hit (dotted), with 95 % intervals over rendered people."
     lows = rows[rows["measure"] == "AP"].groupby(["detector", "dose"], sort=False)["value"].min()
-    said = series_text(lows, "{0} {2:.2f} for {1}")
-    return Figure(figure, caption, f"Curves per dose. Lowest average precision: {said}.", table)
+    return Figure(figure, *texts("dose_curves", said=lows), table)
 
 
 @in_style
@@ -90,10 +74,8 @@ def observed_curves(table: pd.DataFrame, note: str) -> Figure:
     labels = {subset: f", {subset}" for subset in subsets}
     figure, axes = _dose_panels(table, "subset", styles, labels, "share of hits")
     marks.legend_below(figure, axes[0, 0], ncols=3)
-    caption = f"Share of body keypoints hit by fifths of each dose; 95 % intervals over images: {note}."
     spread = table.groupby(["detector", "dose"], sort=False)["value"].agg(np.ptp)
-    said = series_text(spread, "{0} {2:.2f} for {1}")
-    return Figure(figure, caption, f"Curves per dose. Range of the hit rate: {said}.", table)
+    return Figure(figure, *texts("observed_curves", note=note, said=spread), table)
 
 
 def _dose_panels(table: pd.DataFrame, by: str, styles: dict, labels: dict, ylabel: str):
@@ -109,8 +91,8 @@ def _dose_panels(table: pd.DataFrame, by: str, styles: dict, labels: dict, ylabe
             pen = {"color": colour, "ls": styles[value], "label": f"{detector}{labels[value]}"}
             axis.plot(part["level"], part["value"], marker=detector_marker(detector), ms=4, **pen)
             bounds = part[["low", "high"]].astype(float)  # objects where there is no interval at all
-        axis.fill_between(part["level"], bounds["low"], bounds["high"], color=colour, alpha=0.13, lw=0)
-        axis.set(xlabel=_LABELS.get(dose, dose), ylim=(-0.02, 1.02))
+            axis.fill_between(part["level"], bounds["low"], bounds["high"], color=colour, alpha=0.13, lw=0)
+        axis.set(xlabel=TEXTS["doses"].get(dose, dose), ylim=(-0.02, 1.02))
     for axis in axes.flat[len(doses) :]:
         axis.set_axis_off()
     for axis in axes[:, 0]:
@@ -132,10 +114,5 @@ def flicker_rates(table: pd.DataFrame, note: str) -> Figure:
         axis.set(xlabel=measure, xlim=(0, None), ylim=(-0.5, len(detectors) - 0.5))
     axes[0].set(yticks=range(len(detectors)), yticklabels=list(map(in_lines, detectors)))
     lag_ms = 1000 * cases["filtered", "latency [s]"]["value"]
-    caption = (
-        "Keypoints that come and go between consecutive frames, and how far they jump, as detected "
-        f"(filled) and through a causal filter (open), with 95 % bootstrap intervals over seconds: {note}. "
-        f"Delay of the filter: {series_text(lag_ms, '{} {:.0f} ms')}."
-    )
-    said = series_text(cases["as detected", "flicker rate"]["value"], "{} {:.3f}")
-    return Figure(figure, caption, f"Dots with whiskers. Flicker rate as detected: {said}.", table)
+    rates = cases["as detected", "flicker rate"]["value"]
+    return Figure(figure, *texts("flicker_rates", note=note, lags=lag_ms, said=rates), table)

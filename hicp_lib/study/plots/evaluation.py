@@ -8,15 +8,20 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.images import read_image
 from hicp_lib.evaluation.ap.found_and_placed import FOUND, OKS_OF_FOUND
+from hicp_lib.study.photographs import PHOTOGRAPHED, RENDERED
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import THRESHOLD_MARKERS, detector_colour
 from hicp_lib.study.plots.people import detections_grid
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
 
 GROUP_TITLES = {"body": "Body (17 points)", "hand": "Hands (42 points)"}
 WIDTH_IN = 5.5  # what can be read on a telephone, and fills a page
 _THRESHOLDS = {".5": ("AP50", "AR50"), ".75": ("AP75", "AR75"), ".5:.95": ("AP", "AR")}
 _SUBSETS = {"basic": 0, "headless": 1}  # in a row: above filled, below open
+_PENS = {
+    RENDERED: {"color": "#0072B2", "fmt": "o", "label": RENDERED},
+    PHOTOGRAPHED: {"color": "#D55E00", "fmt": "s", "label": PHOTOGRAPHED},
+}
 
 
 @in_style
@@ -31,8 +36,8 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
     data_note : str
         On what data, e.g. "rendered people"; becomes part of the caption.
     """
-    figure, axes = _panels(table, 2.7, "average recall", "average precision")
-    for axis, rows, _, _ in marks.facets(axes, table, "group", "subset"):
+    figure, axes, panels = _panels(table, 2.7, "average recall", "average precision")
+    for axis, rows, _, _ in panels:
         for detector, of_detector in rows.groupby("detector", sort=False):
             _scatter_detector(axis, of_detector, detector)
         axis.set(aspect="equal")
@@ -45,26 +50,22 @@ def precision_recall(table: pd.DataFrame, data_note: str) -> Figure:
     shapes = {f"OKS {name}": {"marker": marker, "ls": ""} for name, marker in THRESHOLD_MARKERS.items()}
     marks.add_keys(axes[0, 0], detectors, shapes)
     marks.legend_below(figure, axes[0, 0], ncols=_legend_columns(detectors))
-    caption = (
-        f"Average precision against average recall per detector, on {data_note}. The shape is the OKS "
-        "threshold (square .5, circle .75, triangle the mean over .5:.05:.95), as in Fig. 4 of the paper; "
-        "whiskers are 95 % bootstrap intervals over images."
-    )
-    return Figure(figure, caption, _describe_best(table), table)
+    rows = table[(table["metric"] == "AP") & table["value"].notna()]
+    best = rows.loc[rows.groupby(["subset", "group"], sort=False)["value"].idxmax()]
+    return Figure(figure, *texts("precision_recall", note=data_note, said=best), table)
 
 
 def _panels(table: pd.DataFrame, height_in: float, x_label: str, y_label: str):
-    """A figure with a panel for each group of keypoints (down) and subset (across), and its axes."""
-    shape = table["group"].nunique(), table["subset"].nunique()
-    size = WIDTH_IN, height_in * shape[0] + 0.6
-    figure, axes = new_figure(*shape, *size, sharex="row", sharey="row", squeeze=False)
-    for axis, _, group, subset in marks.facets(axes, table, "group", "subset"):
+    """`marks.panels` for each group of keypoints (down) and subset (across)."""
+    size = WIDTH_IN, height_in * table["group"].nunique() + 0.6
+    figure, axes, panels = marks.panels(table, ["group", "subset"], *size, sharex="row", sharey="row")
+    for axis, _, group, subset in panels:
         axis.set_title(f"{subset.capitalize()}, {_short_title(group)}")
     for axis in axes[-1]:
         axis.set_xlabel(x_label)
     for axis in axes[:, 0]:
         axis.set_ylabel(y_label)
-    return figure, axes
+    return figure, axes, panels
 
 
 def _short_title(group: str) -> str:
@@ -88,14 +89,6 @@ def _scatter_detector(axis, rows: pd.DataFrame, detector: str) -> None:
         axis.errorbar(x["value"], y["value"], fmt=THRESHOLD_MARKERS[threshold], **reach, **pen)
 
 
-def _describe_best(table: pd.DataFrame) -> str:
-    rows = table[(table["metric"] == "AP") & table["value"].notna()]
-    best = rows.loc[rows.groupby(["subset", "group"], sort=False)["value"].idxmax()]
-    values = best.set_index(["detector", "subset", "group"])["value"]
-    said = series_text(values, "{0} with {3:.2f} on {1} {2}")
-    return f"Scatter of average precision against average recall. Highest average precision: {said}."
-
-
 @in_style
 def loss_without_head(table: pd.DataFrame, data_note: str) -> Figure:
     """Average precision on Basic and on Headless, joined per detector and group.
@@ -106,10 +99,7 @@ def loss_without_head(table: pd.DataFrame, data_note: str) -> Figure:
     figure = _with_and_without(rows, {"AP": "average precision (.5:.95)"}, "metric")
     drops = rows.pivot_table(index=["detector", "group"], columns="subset", values="value", sort=False)
     change = drops.get("headless", np.nan) - drops.get("basic", np.nan)
-    said = series_text(change.dropna(), "{} {} {:+.2f}")
-    caption = f"Average precision on Basic (filled) and Headless (open), 95 % intervals, on {data_note}."
-    alt = f"Average precision with and without the head. Change per detector: {said}."
-    return Figure(figure, caption, alt, rows)
+    return Figure(figure, *texts("loss_without_head", note=data_note, said=change.dropna()), rows)
 
 
 @in_style
@@ -122,14 +112,8 @@ def found_and_placed(table: pd.DataFrame, data_note: str) -> Figure:
     rows = table[table["what"].isin(labels)]
     figure = _with_and_without(rows, labels, "what")
     shares = rows[(rows["what"] == FOUND) & (rows["group"] == rows["group"].iloc[0])]
-    said = series_text(shares.set_index(["detector", "subset"])["value"], "{0} {2:.2f} on {1}")
-    caption = (
-        "Found, apart from placed: the share of people of whom some detection has an OKS of at least .1, and "
-        "the mean OKS of those people's best detections; Basic filled, Headless open, with 95 % bootstrap "
-        f"intervals over source images, on {data_note}."
-    )
     group = _short_title(rows["group"].iloc[0])
-    return Figure(figure, caption, f"Dots per detector. Share found, {group}: {said}.", table)
+    return Figure(figure, *texts("found_and_placed", note=data_note, group=group, said=shares), table)
 
 
 def _with_and_without(rows: pd.DataFrame, labels: dict[str, str], across: str):
@@ -140,11 +124,9 @@ def _with_and_without(rows: pd.DataFrame, labels: dict[str, str], across: str):
     groups = rows["group"].unique()
     names = {group: list(rows.loc[rows["group"] == group, "detector"].unique()) for group in groups}
     heights = [len(of_group) + 0.8 for of_group in names.values()]
-    figure, axes = new_figure(
-        len(groups), len(labels), WIDTH_IN, 0.5 * sum(heights) + 0.9, squeeze=False, height_ratios=heights,
-        sharex="col", sharey="row",
-    )  # fmt: skip
-    for axis, part, group, what in marks.facets(axes, rows, "group", across):
+    size, shared = (WIDTH_IN, 0.5 * sum(heights) + 0.9), {"sharex": "col", "sharey": "row"}
+    figure, axes, panels = marks.panels(rows, ["group", across], *size, height_ratios=heights, **shared)
+    for axis, part, group, what in panels:
         for detector, pair in part.dropna(subset="value").groupby("detector", sort=False):
             y = names[group].index(detector) + 0.24 * (pair["subset"].map(_SUBSETS).fillna(0.5) - 0.5)
             colour = detector_colour(detector)
@@ -169,9 +151,9 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
 
     `table` has one row per person: columns `subset, group, detector, oks` (0 when nobody was found).
     """
-    figure, axes = _panels(table, 2.2, "OKS of the best detection", "share at least as good")
+    figure, axes, panels = _panels(table, 2.2, "OKS of the best detection", "share at least as good")
     medians = []
-    for axis, rows, group, subset in marks.facets(axes, table, "group", "subset"):
+    for axis, rows, group, subset in panels:
         for detector, people in rows.groupby("detector", sort=False):
             oks = np.sort(people["oks"].to_numpy())
             share = 1 - np.arange(len(oks)) / len(oks)
@@ -180,8 +162,7 @@ def oks_curves(table: pd.DataFrame, data_note: str) -> Figure:
             medians.append(f"{detector} {np.median(oks):.2f} ({subset} {group})")
         axis.set(xlim=(0, 1), ylim=(0, 1.02))
     marks.legend_below(figure, axes, ncols=_legend_columns(table["detector"].unique()))
-    caption = f"Share of people whose best detection reaches an OKS, 0 where there is none, on {data_note}."
-    return Figure(figure, caption, f"Curves per detector. Median OKS: {in_words(medians)}.", table)
+    return Figure(figure, *texts("oks_curves", note=data_note, medians=medians), table)
 
 
 def examples(folders, truth, found, n_people: int, note: str) -> Figure:
@@ -223,7 +204,21 @@ def time_per_image(table: pd.DataFrame, machine_note: str) -> Figure:
     marks.draw_boxes(axis, samples, map(detector_colour, detectors))
     axis.set(yticks=range(1, len(detectors) + 1), yticklabels=detectors)
     axis.set(xlabel="time per image [ms]", xlim=(0, None))
-    pairs = zip(detectors, samples, strict=True)
-    medians = [f"{name} {np.median(times):.0f} ms" for name, times in pairs if len(times)]
-    caption = f"Time per image, {machine_note}: box 25–75 %, whiskers 5–95 %, line the median."
-    return Figure(figure, caption, f"Box plot of detection times; medians: {in_words(medians)}.", table)
+    medians = pd.Series([times.median() for times in samples], detectors).dropna()
+    return Figure(figure, *texts("time_per_image", note=machine_note, medians=medians), table)
+
+
+@in_style
+def precisions(table: pd.DataFrame, note: str) -> Figure:
+    """AP of bodies in a run and on photographs; `table` as from `hicp_lib.study.photographs.beside`."""
+    names = list(table["detector"].unique())
+    size = WIDTH_IN, 1.4 + 0.5 * len(names)
+    figure, axes, panels = marks.panels(table, ["subset"], *size, sharex=True, sharey=True)
+    for axis, rows, subset in panels:
+        marks.dots_in_rows(axis, rows, "detector", "where", names, _PENS)
+        axis.set(xlabel="average precision", xlim=(0, 1))
+        axis.set_title(subset.capitalize(), fontsize=9)
+    marks.name_rows(axes[0, 0], names)
+    marks.legend_below(figure, axes[0, 0], ncols=2)
+    best = table.loc[table.groupby(["where", "subset"], sort=False)["value"].idxmax()]
+    return Figure(figure, *texts("precisions", note=note, said=best), table)

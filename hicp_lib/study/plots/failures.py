@@ -16,7 +16,7 @@ from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.evaluation import GROUP_TITLES
 from hicp_lib.study.plots.palette import detector_colour
 from hicp_lib.study.plots.people import draw_detections, draw_truth, picture_grid
-from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.style import Figure, in_lines, in_style, new_figure, texts
 
 _TRUTH_COLOUR = "#39D353"
 _ONE_CROP = ["subset", "image_id", "annotation_id"]
@@ -50,13 +50,7 @@ def class_examples(
         pictures.append(draw_truth(people, images_dir, image_id, people.ids == annotation_id, _TRUTH_COLOUR))
     columns = -(-len(names) // 2)
     rows = [pictures[start : start + columns] for start in range(0, len(pictures), columns)]
-    return picture_grid(
-        rows,
-        titles=names,
-        caption=f"An example of each class, with its labelled keypoints: the first crop of it. {note}.",
-        alt=f"One picture for each class: {in_words(names)}.",
-        cell_in=2.1,
-    )
+    return picture_grid(rows, *texts("class_examples", note=note, names=names), titles=names, cell_in=2.1)
 
 
 @in_style
@@ -66,26 +60,23 @@ def class_precision(table: pd.DataFrame, note: str) -> Figure:
     groups, detectors = (list(rows[name].unique()) for name in ("group", "detector"))
     names = [name for name in CLASSES if name in set(rows["class"])]
     size = 4.8 * len(groups) + 1, 1.3 + (0.1 + 0.16 * len(detectors)) * len(names)
-    figure, axes = new_figure(1, len(groups), *size, sharey=True, squeeze=False)
     pens = {
         f"{name}, {metric}": pen | fill | {"label": f"{name}, {metric}"}
         for name, pen in marks.detector_dots(detectors).items()
         for metric, fill in (("AP", {}), ("AR", {"mfc": "white"}))
     }
     cases = rows.assign(case=rows["detector"] + ", " + rows["metric"])
-    for axis, of_group, group in marks.facets(axes, cases, "group"):
+    figure, axes, panels = marks.panels(cases, ["group"], *size, sharey=True)
+    for axis, of_group, group in panels:
         marks.dots_in_rows(axis, of_group, "class", "case", names, pens)
         _say_too_few(axis, names, set(of_group.loc[of_group["value"].isna(), "class"]))
         axis.set(xlabel="AP (filled), AR (open)", xlim=(-0.02, 1.02), title=GROUP_TITLES.get(group, group))
     counts = rows[rows["group"] == groups[0]].drop_duplicates("class").set_index("class")["n_people"]
     marks.name_rows(axes[0, 0], [f"{name} ({counts.get(name, 0)})" for name in names])
     marks.legend_below(figure, axes, ncols=2)
-    caption = f"AP, AR by what is seen (people in brackets), all subsets, 95 % intervals over images: {note}."
     best = rows.query("group == 'body' and metric == 'AP'").dropna(subset="value")
     best = best.sort_values("value", ascending=False).groupby("class").head(1)
-    said = series_text(best.set_index(["detector", "class"])["value"], "{0} {2:.2f} for {1}")
-    alt = f"Dots per class and detector. Best average precision for bodies: {said}."
-    return Figure(figure, caption, alt, rows)
+    return Figure(figure, *texts("class_precision", note=note, said=best), rows)
 
 
 def _say_too_few(axis, names: list[str], few: set[str]) -> None:
@@ -98,12 +89,11 @@ def _say_too_few(axis, names: list[str], few: set[str]) -> None:
 
 def _detector_panels(table: pd.DataFrame, width_in: float, height_in: float, **shared):
     """The figure, its axes, and for each detector of a table its axis with its rows."""
-    by_detector = dict(list(table.groupby("detector", sort=False))) or {"none given": table}
-    size = width_in * len(by_detector) + 0.8, height_in
-    figure, axes = new_figure(1, len(by_detector), *size, sharey=True, squeeze=False, **shared)
-    for axis, detector in zip(axes[0], by_detector, strict=True):
+    size = width_in * table["detector"].nunique() + 0.8, height_in
+    figure, (axes,), panels = marks.panels(table, ["detector"], *size, sharey=True, **shared)
+    for axis, _, detector in panels:
         axis.set_title(in_lines(detector))
-    return figure, axes[0], [(axis, *case) for axis, case in zip(axes[0], by_detector.items(), strict=True)]
+    return figure, axes, panels
 
 
 @in_style
@@ -121,7 +111,7 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
     """
     order = [name for name in CLASSES if name in set(table[by])] or list(dict.fromkeys(table[by]))
     figure, axes, panels = _detector_panels(table, 4.2, 1.5 + 0.36 * len(order))
-    for axis, _, rows in panels:
+    for axis, rows, _ in panels:
         part = rows.pivot(index=by, columns="kind", values="share").reindex(order)
         marks.stacked_bars(axis, part, _KIND_STYLES)
         _say_too_few(axis, order, set(part.index[part.isna().all(axis=1)]))
@@ -129,9 +119,8 @@ def error_kinds(table: pd.DataFrame, by: str, note: str) -> Figure:
     marks.name_rows(axes[0], order)
     marks.legend_below(figure, axes)
     worst = table[(table["kind"] == "miss") & table["share"].notna()]
-    said = series_text(worst.set_index(["detector", by])["share"], "{0} {2:.2f} on {1}")
-    caption = f"What becomes of labelled keypoints, by the kinds of error of Ronchi and Perona: {note}."
-    return Figure(figure, caption, f"Stacked bars per {by}. Shares of misses: {said}.", table)
+    misses = worst.set_index(["detector", by])["share"]
+    return Figure(figure, *texts("error_kinds", note=note, by=by, said=misses), table)
 
 
 @in_style
@@ -145,16 +134,15 @@ def head_change(table: pd.DataFrame, note: str) -> Figure:
     marks.name_rows(axis, [name.replace("_", " ") for name in names])
     axis.set(xlabel="change of the share of keypoints hit, without the head")
     marks.legend_below(figure, axis, ncols=2)
-    said = series_text(table.groupby("detector", sort=False)["change"].mean(), "{} {:+.2f}")
-    caption = f"Share of hits without the head less that with it, 95 % intervals over source images: {note}."
-    return Figure(figure, caption, f"Dots per keypoint and detector. Mean change: {said}.", table)
+    changes = table.groupby("detector", sort=False)["change"].mean()
+    return Figure(figure, *texts("head_change", note=note, said=changes), table)
 
 
 @in_style
 def hallucinated_heads(table: pd.DataFrame, note: str) -> Figure:
     """Where keypoints of a head are given that was cut off; `table` from `hallucinated_heads`."""
     figure, axes, panels = _detector_panels(table, 4.0, 4.4, sharex=True)
-    for axis, detector, rows in panels:
+    for axis, rows, detector in panels:
         dots = axis.scatter(rows["along"], rows["below"], c=rows["score"], s=14, vmin=0, vmax=1, alpha=0.8)
         axis.plot([0, 1, 1, 0, 0], [0, 0, 1, 1, 0], color="#444444", lw=1)
         axis.plot([0, 1], [0, 0], color="#D5272D", lw=2.5, label="where the head was cut off")
@@ -163,9 +151,8 @@ def hallucinated_heads(table: pd.DataFrame, note: str) -> Figure:
     axes[0].set(ylabel="below the cut [of the picture]")
     figure.colorbar(dots, ax=axes, label="score", shrink=0.8)
     marks.legend_below(figure, axes)
-    said = series_text((table["below"] < 0).groupby(table["detector"], sort=False).mean())
-    caption = f"Noses, eyes, ears given where the head was cut off (square: the picture, cut above): {note}."
-    return Figure(figure, caption, f"Scatter of places. Share put beyond the cut: {said}.", table)
+    shares = (table["below"] < 0).groupby(table["detector"], sort=False).mean()
+    return Figure(figure, *texts("hallucinated_heads", note=note, said=shares), table)
 
 
 @in_style
@@ -175,27 +162,22 @@ def false_presence(table: pd.DataFrame, note: str) -> Figure:
     rows = table if rows.empty else rows
     rows = rows.assign(row=rows["part"] + ", " + rows["subset"] + " (" + rows["n"].astype(str) + ")")
     names, detectors, decisions = (list(rows[name].unique()) for name in ("row", "detector", "decision"))
-    size = 4.4 * max(len(decisions), 1) + 1, 1.5 + (0.1 + 0.13 * len(detectors)) * len(names)
-    figure, axes = new_figure(1, max(len(decisions), 1), *size, sharey=True, squeeze=False)
-    for axis, of_panel, decision in marks.facets(axes, rows, "decision"):
+    size = 4.4 * len(decisions) + 1, 1.5 + (0.1 + 0.13 * len(detectors)) * len(names)
+    figure, axes, panels = marks.panels(rows, ["decision"], *size, sharey=True)
+    for axis, of_panel, decision in panels:
         marks.dots_in_rows(axis, of_panel, "row", "detector", names, marks.detector_dots(detectors))
         axis.set(xlim=(-0.02, 1.02), xlabel="share that is given all the same", title=decision)
     marks.name_rows(axes[0, 0], names)
     marks.legend_below(figure, axes, ncols=2)
     heads = rows[(rows["part"] == "head") & (rows["subset"] == "headless")]
-    said = series_text(heads.set_index(["detector", "decision"])["value"], "{0} {2:.2f} ({1})")
-    caption = (
-        "Share of parts outside the picture (how many: in brackets) that are given inside it, by what counts "
-        f"as given, with 95 % intervals over source images; a head by any of its five keypoints: {note}."
-    )
-    return Figure(figure, caption, f"Dots per part and detector. Heads that were cut off: {said}.", table)
+    return Figure(figure, *texts("false_presence", note=note, said=heads), table)
 
 
 @in_style
 def scores_by_state(table: pd.DataFrame, note: str) -> Figure:
     """Hit rate against score for visible, hidden and outside keypoints; from `scores_by_state`."""
     figure, axes, panels = _detector_panels(table, 4.2, 4.2)
-    for axis, detector, of_detector in panels:
+    for axis, of_detector, detector in panels:
         for state, (line, marker) in _STATE_STYLES.items():
             rows = of_detector[of_detector["state"] == state]
             if rows.empty:
@@ -207,13 +189,7 @@ def scores_by_state(table: pd.DataFrame, note: str) -> Figure:
     axes[0].set(ylabel="share of hits")
     marks.legend_below(figure, axes)
     top = table[table["state"] == "outside"].groupby("detector", sort=False).tail(1)
-    said = series_text(top.set_index(["detector", "score"])["value"], "{0} {2:.2f} at {1:.2f}")
-    caption = (
-        "Share of hits per fifth of the score, for keypoints visible, hidden and outside the picture, with "
-        f"95 % bootstrap intervals over source images: {note}."
-    )
-    alt = f"Curves of hits against score. Highest scores outside the picture: {said}."
-    return Figure(figure, caption, alt, table)
+    return Figure(figure, *texts("scores_by_state", note=note, said=top), table)
 
 
 def gallery(
@@ -254,9 +230,6 @@ def gallery(
             pictures.append(draw_rings(draw_detections(image, found_in, detector), ringed_px, 20))
         rows.append(pictures)
         titles.append(f"{in_lines(detector)}\n{case}")
-    return picture_grid(
-        rows, row_titles=titles, cell_in=2.3,
-        caption=f"{what}. Green: the truth (bodies); the detector's colour: what it found. {note}.",
-        alt=f"Pictures of {len(cases)} cases with skeletons of truth and detection, in rows: "
-        f"{in_words(' '.join(title.split()) for title in titles)}.",
-    )  # fmt: skip
+    said = [" ".join(title.split()) for title in titles]
+    told = texts("gallery", what=what, note=note, n=len(cases), rows=said)
+    return picture_grid(rows, *told, row_titles=titles, cell_in=2.3)

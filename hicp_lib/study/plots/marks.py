@@ -1,14 +1,14 @@
 """What charts of the study are put together from: panels, names of rows, whiskers, boxes, legends."""
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from hicp_lib.study.plots.palette import detector_colour, detector_marker
-from hicp_lib.study.plots.style import in_lines
+from hicp_lib.study.plots.style import in_lines, new_figure
 
 _BOUNDS = ("value", "low", "high")
 _NO_DETECTOR = "#444444"  # what stands in a legend for all detectors
@@ -49,27 +49,33 @@ def add_keys(axis, detectors: Iterable[str], others: Mapping[str, dict[str, Any]
         axis.plot([], [], **{"color": _NO_DETECTOR, "label": name} | style)
 
 
-def facets(axes, table: pd.DataFrame, *by: str) -> Iterator[tuple]:
-    """Each axis with its rows of a table, which may be none, and the values they have in some columns.
+def panels(table: pd.DataFrame, by: Sequence[str], width_in: float, height_in: float, **shared: Any):
+    """A figure with a panel for each value of a column (across), or of two (down, across).
 
     Parameters
     ----------
-    axes : array of matplotlib.axes.Axes
-        One for each combination of values.
     table : pd.DataFrame
-    *by : str
-        Columns of the table; their values in the order they come in, those of the last one first.
+    by : sequence of str
+        Columns of the table; their values in the order they come in.
+    width_in, height_in : float
+        The figure's size in inches.
+    **shared : any
+        Further options of `new_figure`.
 
-    Yields
-    ------
-    matplotlib.axes.Axes
-    pd.DataFrame
-    object
-        The value of each column.
+    Returns
+    -------
+    matplotlib.figure.Figure
+    array of matplotlib.axes.Axes
+        Two-dimensional.
+    list of tuple
+        Of each panel its axis, its rows of the table, which may be none, and the value of each column.
     """
-    cases = itertools.product(*(table[name].unique() for name in by))
-    for axis, case in zip(np.ravel(axes), cases, strict=True):
-        yield axis, table[(table[list(by)] == list(case)).all(axis=1)], *case
+    values = [table[name].unique() for name in by]
+    shape = [1, *(max(len(of), 1) for of in values)][-2:]
+    figure, axes = new_figure(*shape, width_in, height_in, squeeze=False, **shared)
+    cases = zip(axes.flat, itertools.product(*values), strict=False)
+    found = [(axis, table[(table[list(by)] == list(case)).all(axis=1)], *case) for axis, case in cases]
+    return figure, axes, found
 
 
 def name_rows(axis, labels: Sequence[str]) -> None:

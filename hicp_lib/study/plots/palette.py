@@ -1,28 +1,16 @@
 """Colours and markers: a fixed pair per detector, on every page."""
 
+from hicp_lib.core.datafiles import DATA_DIR
+from hicp_lib.core.files import read_json
+
 TRUTH_COLOUR = "#111111"
 PERFECT = "perfect detector"  # what finds the true keypoints, where they are known
 
 # Each detector's colour and marker, the same on every page. Those of the default study stay apart for readers
 # who are blind to red or green, too; the others do so by their markers.
 DETECTOR_STYLES: dict[str, tuple[str, str]] = {
-    "mediapipe": ("#0072B2", "o"),
-    "mediapipe-pose": ("#56B4E9", "p"),
-    "mediapipe-hands": ("#CC79A7", "h"),
-    "movenet-thunder": ("#22AA99", "s"),
-    "movenet-lightning": ("#2E4600", "v"),
-    "movenet-multipose": ("#C77CFF", "^"),
-    "posenet": ("#A0522D", "D"),
-    "openpose-mobilenet": ("#E69F00", "X"),
-    "openpose": ("#D55E00", "*"),
-    "mmpose": ("#009E73", "<"),
-    "alphapose": ("#7F5FA8", ">"),
-    "detectron2": ("#8C6D31", "d"),
-    "one-stage": ("#B59B00", "8"),
-    "combined": ("#4B0055", "H"),
-    "combined:movenet-thunder": ("#A0105A", "P"),
-    PERFECT: (TRUTH_COLOUR, "x"),
-}
+    name: (colour, marker) for name, (colour, marker) in read_json(DATA_DIR / "detector_styles.json").items()
+} | {PERFECT: (TRUTH_COLOUR, "x")}
 OTHER_COLOUR, _OTHER_MARKER = "#595959", "."
 
 # The two subsets of HiCP, and the two boxes of the paper's figure of how they are made.

@@ -11,7 +11,7 @@ from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations
 from hicp_lib.inspection.skeletons import draw_people
 from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.style import Figure, in_lines, in_style, in_words, new_figure
+from hicp_lib.study.plots.style import Figure, in_lines, in_style, new_figure, texts
 
 _CELL_RATIOS = (0.4, 1.7)  # height over width of a cell: at least, at most
 
@@ -74,11 +74,10 @@ def draw_truth(
 @in_style
 def picture_grid(
     rows: Sequence[Sequence[np.ndarray | None]],
-    *,
-    row_titles: Sequence[str] = (),
-    titles: Sequence[str] = (),
     caption: str,
     alt: str,
+    row_titles: Sequence[str] = (),
+    titles: Sequence[str] = (),
     cell_in: float = 2.2,
 ) -> Figure:
     """Pictures in rows and columns, each scaled into an equal cell.
@@ -87,10 +86,10 @@ def picture_grid(
     ----------
     rows : sequence of sequence of array, shape (height, width, 3)
         RGB, uint8; None leaves a cell empty.
+    caption, alt : str
     row_titles : sequence of str
     titles : sequence of str
         Of the cells, row by row; as many as there are columns name these.
-    caption, alt : str
     cell_in : float
         Width of a cell in inches.
 
@@ -141,11 +140,11 @@ def detections_grid(
     shown = [(image, found[d], d) for image, found in pictures.values() for d in detectors]
     drawn = [draw_detections(*one, min_score) for one in shown]
     seen = [f"{d} {sum(len(found[d]) > 0 for _, found in pictures.values())}" for d in detectors]
+    said = {"min_score": min_score, "note": note and f" {note}", "pictures": list(pictures), "seen": seen}
     return picture_grid(
         [drawn[start : start + columns] for start in range(0, len(drawn), columns)],
+        *texts("detections_grid", **said),
         row_titles=list(pictures) if len(pictures) > 1 else (),
         titles=detectors,
-        caption=f"Keypoints with a score of at least {min_score}, per detector.{' ' if note else ''}{note}",
-        alt=f"Skeletons on {in_words(pictures)}; pictures with somebody found: {in_words(seen)}.",
         cell_in=min(3.2, 11 / columns),
     )

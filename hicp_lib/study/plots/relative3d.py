@@ -14,7 +14,7 @@ from hicp_lib.recordings.recording import Recording, read_rgb
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import TRUTH_COLOUR, detector_colour
 from hicp_lib.study.plots.people import detections_grid
-from hicp_lib.study.plots.style import Figure, in_style, new_figure, series_text
+from hicp_lib.study.plots.style import Figure, in_style, new_figure, texts
 from hicp_lib.study.table_format import intervals_over
 
 _AXES = ("x_m", "y_m", "z_m")
@@ -94,14 +94,10 @@ def median_skeletons(medians: pd.DataFrame, truth: Mapping[str, pd.DataFrame] | 
             axis.set(xlabel=f"{across[0]} [m]", ylabel=f"{up[0]} [m]", xlim=limits[across], ylim=limits[up])
             axis.yaxis.set_inverted(up == "x_m")  # forward is up
     marks.legend_below(figure, axes)
-    caption = (
-        "Median skeletons: coordinate-wise median over the images of every keypoint that was found in at "
-        f"least {fewest}, in the robot's base frame (x backward, y to its right, z up)"
-        f"{'; dashed: the true skeleton' if truth is not None else ''}: {note}."
-    )
     counts = medians.groupby(["detector", "view"], sort=False).size()
-    alt = f"Skeletons from three directions. Keypoints with a median: {series_text(counts, '{0} {2} ({1})')}."
-    return Figure(figure, caption, alt, medians)
+    dashed = "; dashed: the true skeleton" * bool(truth)
+    told = texts("median_skeletons", fewest=fewest, dashed=dashed, note=note, said=counts)
+    return Figure(figure, *told, medians)
 
 
 def _draw_skeleton(axis, rows: pd.DataFrame, columns: tuple[str, str], colour, style, label) -> None:
@@ -117,7 +113,7 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
     Parameters
     ----------
     table : pd.DataFrame
-        As from `hicp_lib.evaluation.space.spread.spread_and_bias`, with truth.
+        As from `hicp_lib.evaluation.space.sightings.spread_and_bias`, with truth.
     method : str
         The lifting that is drawn.
     note : str
@@ -125,10 +121,9 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
     """
     table = table[table["method"] == method]
     table = table[(table["n_images"] >= min(MIN_IMAGES, table["n_images"].max())) & table["spread_m"].notna()]
-    n_views = table["view"].nunique()
-    size = max(4.6 * n_views, 6), 4.9
-    figure, axes = new_figure(1, n_views, *size, sharex=True, sharey=True, squeeze=False)
-    for axis, (view, rows) in zip(axes[0], table.groupby("view", sort=False), strict=True):
+    size = max(4.6 * table["view"].nunique(), 6), 4.9
+    figure, axes, panels = marks.panels(table, ["view"], *size, sharex=True, sharey=True)
+    for axis, rows, view in panels:
         for _, row in rows.groupby(["part", "detector"], sort=False):
             _draw_spread_and_bias(axis, row)
         axis.set(xscale="log", yscale="log", title=view, xlabel=_SPREAD)
@@ -144,12 +139,8 @@ def spread_against_bias(table: pd.DataFrame, method: str, note: str) -> Figure:
     marks.legend_below(figure, axes[0, 0], ncols=5)
     worse = table.assign(mostly=np.where(table["bias_m"] > table["spread_m"], "bias", "spread"))
     counts = worse.groupby(["detector", "mostly"], sort=False).size()
-    said = series_text(counts, "{0} {2} with more {1}")
-    caption = (
-        "Median distance of the images to their median position, and of that to the truth; above the dashed "
-        f"line a keypoint is more off than unsteady. Whiskers: {intervals_over(table)}: {note}."
-    )
-    return Figure(figure, caption, f"Scatter of spread and bias on logarithmic axes. Parts: {said}.", table)
+    told = texts("spread_against_bias", intervals=intervals_over(table), note=note, said=counts)
+    return Figure(figure, *told, table)
 
 
 def _draw_spread_and_bias(axis, row: pd.DataFrame) -> None:

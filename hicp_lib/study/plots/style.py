@@ -2,6 +2,7 @@
 
 import functools
 import re
+import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -10,24 +11,11 @@ import matplotlib.figure
 import matplotlib.pyplot as plt
 import pandas as pd
 
-_RC: dict[Any, Any] = {
-    "figure.dpi": 110,
-    "savefig.dpi": 160,
-    "figure.constrained_layout.use": True,
-    "font.size": 10,
-    "axes.titlesize": 11,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "grid.color": "#E3E3E3",
-    "grid.linewidth": 0.8,
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "hicp",
-    "svg.fonttype": "none",
-}
+from hicp_lib.core.datafiles import DATA_DIR
+
+_STYLE = DATA_DIR / "report.mplstyle"
+TEXTS = tomllib.loads((DATA_DIR / "captions.toml").read_text("utf-8"))
+"""Captions and alternative texts of figures by name (`texts`), and labels of axes."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +50,7 @@ def in_style(draw: Callable[..., Figure]) -> Callable[..., Figure]:
 
     @functools.wraps(draw)
     def styled(*args, **kwargs) -> Figure:
-        with plt.rc_context(_RC):
+        with plt.style.context(_STYLE):
             data = [given for given in args if isinstance(given, pd.DataFrame | list | dict)]
             if not all(map(len, data)):
                 figure = new_figure(1, 1, 6.0, 0.5, subplot_kw={"visible": False})[0]
@@ -91,6 +79,31 @@ def new_figure(n_rows: int = 1, n_columns: int = 1, width_in: float = 8.0, heigh
     figure, axes = plt.subplots(n_rows, n_columns, figsize=(width_in, height_in), **kwargs)
     plt.close(figure)
     return figure, axes
+
+
+def texts(name: str, /, **values: Any) -> tuple[str, str]:
+    """Caption and alternative text of a figure: those of `data/captions.toml`, filled in.
+
+    Parameters
+    ----------
+    name : str
+        Of the function that draws the figure.
+    **values : any
+        What stands in the texts, by name. A list is enumerated, as are rows of a table and values of series,
+        each put into the pattern that has the value's name (`series_text`).
+
+    Returns
+    -------
+    tuple of str
+    """
+    patterns, said = TEXTS[name], {}
+    for key, value in values.items():
+        if isinstance(value, pd.DataFrame):
+            value = [patterns[key].format(**row) for row in value.to_dict("records")]
+        elif isinstance(value, pd.Series):
+            value = series_text(value, patterns[key])
+        said[key] = in_words(value) if isinstance(value, list) else value
+    return patterns["caption"].format(**said), patterns["alt"].format(**said)
 
 
 def in_words(items: Iterable[str]) -> str:

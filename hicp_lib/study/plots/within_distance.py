@@ -4,19 +4,15 @@ Tables are those of `hicp_lib.evaluation.space.stability.within_distance`, with 
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import pandas as pd
 
 from hicp_lib.study.plots import marks
 from hicp_lib.study.plots.palette import detector_colour
-from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure, series_text
+from hicp_lib.study.plots.style import TEXTS, Figure, in_style, texts
 from hicp_lib.study.table_format import intervals_over
 
-_REFERENCES = {
-    "median": "its median position",
-    "truth": "its true position",
-    "markers": "the mean of its two markers",
-}
 _METHOD_LINES = {"robust": "-", "paper": ":"}
 # Darker is closer.
 _FADES = (1.0, 0.62, 0.34)
@@ -36,10 +32,9 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
         What the data are, for the caption.
     """
     table = table.assign(kind=table["part"].str.split().str[1])
-    shape = table["view"].nunique(), table["kind"].nunique()
-    size = {"width_in": max(2.6 * shape[1], 6), "height_in": 0.7 + 2.4 * shape[0]}
-    figure, axes = new_figure(*shape, sharex=True, sharey=True, squeeze=False, **size)
-    for axis, rows, view, kind in marks.facets(axes, table, "view", "kind"):
+    size = max(2.6 * table["kind"].nunique(), 6), 0.7 + 2.4 * table["view"].nunique()
+    figure, axes, panels = marks.panels(table, ["view", "kind"], *size, sharex=True, sharey=True)
+    for axis, rows, view, kind in panels:
         curves = rows.groupby(["detector", "method", "threshold_m"], sort=False)["value"].mean()
         for (detector, method), curve in curves.groupby(level=[0, 1], sort=False):
             pen = {"color": detector_colour(detector), "lw": 1.8, "label": f"{detector}, {method}"}
@@ -50,23 +45,17 @@ def within_curves(table: pd.DataFrame, marked_m: Sequence[float], note: str) -> 
         axis.set(xlabel="distance [cm]", ylabel="share of images")
         axis.label_outer()
     marks.legend_below(figure, axes, ncols=3)
-    caption = (
-        "Share of images in which a keypoint was found within a distance of "
-        f"{_REFERENCES[table['reference'].iloc[0]]}, left and right together (solid: robust lifting, dotted: "
-        f"the paper's; grey: {_in_cm(marked_m)}): {note}."
-    )
-    return Figure(figure, caption, f"Rising curves per detector. {_shares_text(table, marked_m)}", table)
+    return Figure(figure, *texts("within_curves", **_told(table, marked_m), note=note), table)
 
 
 @in_style
 def within_bars(table: pd.DataFrame, note: str) -> Figure:
     """Share of images per view, keypoint and detector, the darker the closer; `table` of one method."""
     parts, detectors = (list(table[column].unique()) for column in ("part", "detector"))
-    n_views, limits_m = table["view"].nunique(), sorted(set(table["threshold_m"]))
-    size = {"width_in": 10.5, "height_in": 0.9 + 2.5 * n_views}
-    figure, axes = new_figure(n_views, 1, sharex=True, sharey=True, squeeze=False, **size)
-    width = 0.84 / len(detectors)
-    for axis, (view, of_view) in zip(axes[:, 0], table.groupby("view", sort=False), strict=True):
+    width, limits_m = 0.84 / len(detectors), sorted(set(table["threshold_m"]))
+    size = 10.5, 0.9 + 2.5 * table["view"].nunique()
+    figure, axes, panels = marks.panels(table, ["view", "reference"], *size, sharex=True, sharey=True)
+    for axis, of_view, view, _ in panels:
         for detector, rows in of_view.groupby("detector", sort=False):
             k = detectors.index(detector)
             x = rows["part"].map(parts.index) + marks.offset(k, len(detectors), width)
@@ -78,12 +67,8 @@ def within_bars(table: pd.DataFrame, note: str) -> Figure:
     shades = {f"within {100 * limit_m:g} cm": {"lw": 8, "alpha": fade} for limit_m, fade in fades}
     marks.add_keys(axes[0, 0], detectors, shades | {"found at all": {"ls": ":"}})
     marks.legend_below(figure, axes[0, 0])
-    caption = (
-        f"Share of images in which a keypoint was found within {_in_cm(limits_m)} of "
-        f"{_REFERENCES[table['reference'].iloc[0]]} (a hand: mean over its 21 keypoints; lifting: "
-        f"{in_words(table['method'].unique())}); whiskers: {intervals_over(table)}: {note}."
-    )
-    return Figure(figure, caption, f"Bars per keypoint and detector. {_shares_text(table, limits_m)}", table)
+    told = {"methods": list(table["method"].unique()), "intervals": intervals_over(table), "note": note}
+    return Figure(figure, *texts("within_bars", **_told(table, limits_m), **told), table)
 
 
 def _draw_bars(axis, rows: pd.DataFrame, width: float, colour: str) -> None:
@@ -97,14 +82,15 @@ def _draw_bars(axis, rows: pd.DataFrame, width: float, colour: str) -> None:
         axis.errorbar(level["x"], level["value"], marks.whiskers(level), **pen)
 
 
-def _in_cm(distances_m: Sequence[float]) -> str:
-    return f"{in_words([f'{100 * distance:g}' for distance in distances_m])} cm"
-
-
-def _shares_text(table: pd.DataFrame, marked_m: Sequence[float]) -> str:
-    """Mean share over the parts of every case, at the middle one of the marked distances."""
+def _told(table: pd.DataFrame, marked_m: Sequence[float]) -> dict[str, Any]:
+    """The reference, the marked distances, and mean shares over the parts of every case at the middle one."""
     middle_m = marked_m[len(marked_m) // 2]
     nearest_m = min(table["threshold_m"], key=lambda threshold: abs(threshold - middle_m))
     rows = table[table["threshold_m"] == nearest_m]
     means = rows.groupby(["detector", "view", "method"], sort=False)["value"].mean()
-    return f"Within {100 * nearest_m:.3g} cm, mean over parts: {series_text(means, '{} {} {} {:.0%}')}."
+    return {
+        "reference": TEXTS["references"][table["reference"].iloc[0]],
+        "distances": [f"{100 * distance_m:g}" for distance_m in marked_m],
+        "nearest_cm": 100 * nearest_m,
+        "said": means,
+    }

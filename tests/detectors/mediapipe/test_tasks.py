@@ -2,6 +2,7 @@
 
 import io
 import os
+import resource
 import subprocess
 import sys
 import zipfile
@@ -16,7 +17,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX, LEFT_HAND, N_KEYPOINTS, RIGHT_HAND
 from hicp_lib.detectors.registry import make_detector
 from hicp_lib.detectors.runtime.cached_parts import Runner
-from hicp_lib.detectors.runtime.isolation import child_environment
+from hicp_lib.detectors.runtime.isolation import offline_environment
 from tests.detectors.conftest import N_PEOPLE
 
 
@@ -216,21 +217,65 @@ def test_damaged_members_are_told_at_once(weights, tmp_path):
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w") as file:
         for member in ("hand_detector.tflite", "hand_landmarks_detector.tflite"):
-            file.writestr(member, b"TFL3" + bytes(1000))
+            file.writestr(member, bytes(4) + b"TFL3" + bytes(1000))
     path.write_bytes(content.getvalue())
     with pytest.raises(InputError, match=r"hand\.task: cannot be used by .*; give another \.task") as told:
         make_detector("mediapipe-hands", model=path)
     assert "\n" not in str(told.value)
 
 
-@pytest.mark.parametrize(
-    "options", [{"num_hands": 0}, {"min_score": 1.1}, {"min_score": float("nan")}, {"tracking_hz": -1.0}]
-)
-def test_options_out_of_bounds_are_refused_before_the_first_image(weights, options):
-    with pytest.raises(
-        InputError, match="^mediapipe-hands: .*expected 1 or more, a score from 0 to 1, and a rate or 0$"
+@pytest.mark.parametrize("damage", ["compressed", "cut", "overwritten", "no end"])
+def test_a_bundle_whose_members_are_not_there_whole_is_refused_before_a_process_starts(
+    weights, tmp_path, damage, monkeypatch
+):
+    from hicp_lib.detectors.mediapipe import bundles
+
+    path, content = tmp_path / "pose.task", bytearray(bundles.assemble("pose"))
+    if damage == "compressed":
+        packed = io.BytesIO()
+        with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as bundle:
+            for member in bundles.BUNDLES["pose"]:
+                bundle.writestr(member, bytes(10_000_000))
+        content = packed.getvalue()
+    elif damage == "cut":
+        content = content[: len(content) // 2]
+    elif damage == "overwritten":
+        content[5000:5010] = bytes(10)
+    else:
+        content[-200:-100] = b"\xff" * 100
+    path.write_bytes(content)
+    monkeypatch.setattr(subprocess, "Popen", None)
+    with pytest.raises(InputError, match=r"pose\.task: (is not a|has no).*; give") as told:
+        make_detector("mediapipe-pose", model=path)
+    assert "\n" not in str(told.value)
+
+
+def test_a_model_that_asks_for_all_memory_is_refused(weights, tmp_path, monkeypatch):
+    """Its images ten times as wide and high as they are: 18 GB, were there no limit."""
+    from hicp_lib.detectors.mediapipe import bundles
+
+    schema = bundles._of_mediapipe("tasks/metadata/schema_py_generated.py")
+    path, utilities = (
+        tmp_path / "pose.task",
+        "tasks/python/metadata/metadata_writers/model_asset_bundle_utils.py",
+    )
+    with (
+        zipfile.ZipFile(io.BytesIO(bundles.assemble("pose"))) as bundle,
+        bundles._of_mediapipe(utilities).AlignZipFile(path, mode="w", alignment=4) as changed,
     ):
-        make_detector("mediapipe-hands", **options)
+        for member in bundle.namelist():
+            model = schema.ModelT.InitFromPackedBuf(bundle.read(member), 0)
+            for tensor in model.subgraphs[0].tensors:
+                is_constant = np.size(model.buffers[tensor.buffer].data) > 1
+                if tensor.shape is not None and len(tensor.shape) == 4 and not is_constant:
+                    sides = [10 * int(side) for side in tensor.shape[1:3]]
+                    tensor.shape = [int(tensor.shape[0]), *sides, int(tensor.shape[3])]
+            changed.writestr(zipfile.ZipInfo(member), bundles._pack(model, b"TFL3"))
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    with pytest.raises(InputError, match=r"pose\.task: cannot be used by mediapipe-pose: .*; give another"):
+        make_detector("mediapipe-pose", model=path)
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert spent.ru_utime - before.ru_utime < 5
 
 
 @pytest.mark.parametrize(
@@ -310,7 +355,7 @@ def test_it_would_send_metrics_but_for_its_process_environment(weights, behind):
     assert run_script(_CLOSE).returncode == 0
     assert any(request.startswith("CONNECT") for request in behind.requests)
     behind.requests.clear()
-    assert run_script(_CLOSE, child_environment()).returncode == 0
+    assert run_script(_CLOSE, offline_environment()).returncode == 0
     assert behind.requests == []
 
 
@@ -319,7 +364,7 @@ def test_no_exception_from_the_proxy_lets_it_out(monkeypatch):
 
     for name, value in {"https_proxy": "http://gate:3128", "no_proxy": "*", "NO_PROXY": "*"}.items():
         monkeypatch.setenv(name, value)
-    environment = child_environment()
+    environment = offline_environment()
     assert os.environ["https_proxy"] == "http://gate:3128"
     for name, value in environment.items():
         monkeypatch.setenv(name, value)

@@ -140,6 +140,20 @@ def test_files_are_kept_by_their_whole_path_however_they_were_named(model, tmp_p
     assert user_options("openpose") == {"model": model, "hand_model": model, "threads": 1}
 
 
+def test_an_option_that_is_a_name_is_no_path_though_a_file_is_called_so(capsys, model, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("cpu", "gt"):
+        (tmp_path / name).write_text("not meant")
+    options = ["-o", "provider", "cpu", "--boxes", "gt", "-o", "person_model", "null"]
+    assert cli.run(["models", "use", "--detector", "mmpose", "--model", "m.onnx", *options]) == 0
+    assert user_options("mmpose") == {"model": model, "provider": "cpu", "boxes": "gt", "person_model": None}
+    kept = weights_sha256()
+    (tmp_path / "cpu").write_text("still not meant")
+    assert weights_sha256() == kept
+    (tmp_path / "m.onnx").write_bytes((tmp_path / "m.onnx").read_bytes() + b" ")
+    assert weights_sha256() != kept
+
+
 def test_detectors_with_weights_of_their_own_take_no_others(capsys, model):
     assert "takes none of yours" in mistake(capsys, "models", "use", "--detector", "mediapipe")
     combined = ["--detector", "combined:mmpose+mmpose", "--model", model]

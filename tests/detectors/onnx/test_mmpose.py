@@ -329,6 +329,13 @@ def test_sets_of_keypoints_without_a_place_are_refused_by_name(tmp_path, n_keypo
     assert "Known are mmpose" in message and "one-stage" in message and "\n" not in message
 
 
+@pytest.mark.parametrize("fill", [0.0, -1.0, -np.inf])
+def test_a_box_without_a_keypoint_is_nobody(tmp_path, fill):
+    maps = {"maps": np.full((1, 17, 16, 12), fill, np.float32)}
+    detector = MMPose(constant_model(tmp_path / "m.onnx", (1, 3, 64, 48), maps))
+    assert len(detector.detect(np.zeros((30, 20, 3), np.uint8))) == 0
+
+
 @given(data=st.data())
 @settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 def test_outputs_of_any_shape_are_used_or_refused_in_one_line(data, tmp_path):

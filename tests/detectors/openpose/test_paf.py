@@ -206,7 +206,7 @@ def test_people_with_a_part_each_are_not_merged():
     paf._join(people, (0, 0), (2, 0), 1.0, False)
     assert [person.peaks for person in people] == [{0: 0, 1: 0}, {2: 0, 1: 1}]
     paf._join(people, (1, 0), (3, 0), 0.5, False)
-    assert people[0].peaks == {0: 0, 1: 0, 3: 0} and people[0].limb_score == 1.5
+    assert people[0].peaks == {0: 0, 1: 0, 3: 0} and people[0].score == 1.5
 
 
 def test_points_on_top_of_each_other_just_pass_without_a_field():

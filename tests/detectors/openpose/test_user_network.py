@@ -167,7 +167,13 @@ def test_other_outputs_are_refused_in_one_line(tmp_path, shape):
     assert str(model) in str(caught.value) and "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("fill", [np.nan, np.inf, -1.0, 1.0])
+def test_maps_that_are_no_numbers_are_refused(tmp_path):
+    maps = np.full((1, 57, 46, 54), np.nan, np.float32)
+    with pytest.raises(InputError, match="output maps is NaN in places"):
+        OpenPose(constant_model(tmp_path / "m.onnx", (1, 3, 368, 432), {"maps": maps}))
+
+
+@pytest.mark.parametrize("fill", [np.inf, -1.0, 1.0])
 def test_maps_of_nonsense_are_nobody_or_finite(tmp_path, fill):
     maps = np.full((1, 57, 46, 54), fill, np.float32)
     found = OpenPose(constant_model(tmp_path / "m.onnx", (1, 3, 368, 432), {"maps": maps})).detect(IMAGE)

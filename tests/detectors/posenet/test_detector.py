@@ -46,7 +46,7 @@ def drawn_maps(seed: int, side: int) -> Maps:
     heat = heat**8 if seed == 3 else heat
     offsets = rng.uniform(-8, 8, (17, side, side, 2)).astype(np.float32)
     to_child, to_parent = (rng.uniform(-60, 60, (16, side, side, 2)).astype(np.float32) for _ in range(2))
-    return Maps(heat, offsets, to_child, to_parent, STRIDE_PX)
+    return Maps(heat, offsets, to_child, to_parent)
 
 
 def maps_of(*people: np.ndarray) -> Maps:
@@ -63,7 +63,7 @@ def maps_of(*people: np.ndarray) -> Maps:
     parents, children = np.array(EDGES).T
     to_child = target_of(people, nearest, children, parents) - target_of(people, nearest, parents, parents)
     to_parent = target_of(people, nearest, parents, children) - target_of(people, nearest, children, children)
-    return Maps(heat, target - cells, to_child, to_parent, STRIDE_PX)
+    return Maps(heat, target - cells, to_child, to_parent)
 
 
 def target_of(people, nearest, parts, at):

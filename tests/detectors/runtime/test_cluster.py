@@ -3,11 +3,13 @@
 import importlib
 import json
 import os
+import socketserver
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -256,14 +258,61 @@ def test_the_command_line_tells_of_a_lost_scheduler_in_one_line(slow):
 def test_who_is_not_there_is_said(slow, registered, monkeypatch):
     for nonsense in ("", "nonsense", "nonsense://127.0.0.1:1", "tcp://127.0.0.1:no"):
         assert refusal(nonsense, registered).startswith(f"{nonsense}: no Dask scheduler answers")
-    monkeypatch.setattr(cluster, "PATIENCE_S", 0.5)
+    monkeypatch.setattr(cluster, "SOON_S", 0.5)
     assert refusal("tcp://127.0.0.1:9", registered).startswith("tcp://127.0.0.1:9: no Dask scheduler answers")
     with dask_cluster(slow, ()) as (address, _):
-        monkeypatch.setattr(cluster, "PATIENCE_S", 3.0)
+        monkeypatch.setattr(cluster, "SOON_S", 3.0)
         assert refusal(address, registered) == f"{address}: the Dask cluster has no workers; start some"
     monkeypatch.setitem(sys.modules, "distributed", None)
     told = refusal("tcp://127.0.0.1:9", registered)
     assert told.startswith("distributed is not installed") and told.endswith("pip install '.[dask]'")
+
+
+def speaks(said: bytes, again: bool, hears: bool = False) -> socketserver.BaseRequestHandler:
+    """What a server that is no scheduler does: says something, once or every tenth of a second."""
+
+    class Handler(socketserver.BaseRequestHandler):
+        def handle(self) -> None:
+            if hears:
+                self.request.recv(4096)
+            with suppress(OSError):
+                self.request.sendall(said)
+                while not hears:
+                    time.sleep(0.1)
+                    self.request.sendall(said if again else b"")
+
+    return Handler
+
+
+@pytest.mark.parametrize(
+    "handler",
+    [
+        speaks(b"HTTP/1.0 400 Bad Request\r\n\r\n", again=False, hears=True),
+        speaks(b"SSH-2.0-OpenSSH_9.6\r\n", again=False),
+        speaks(b"", again=False),
+        speaks(b"", again=False, hears=True),
+        speaks(b"\x01", again=True),
+        speaks(bytes(4096), again=True),
+    ],
+    ids=["http", "ssh", "silent", "hangs up", "drips", "floods"],
+)
+def test_a_server_that_is_no_scheduler_is_left_in_time(registered, monkeypatch, handler):
+    monkeypatch.setattr(cluster, "SOON_S", 1.0)
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), handler) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}).start()
+        address, begin = f"tcp://127.0.0.1:{server.server_address[1]}", time.monotonic()
+        try:
+            assert refusal(address, registered).startswith(f"{address}: no Dask scheduler answers (")
+        finally:
+            server.shutdown()
+    assert time.monotonic() < begin + 20  # it was 280
+
+
+def test_a_worker_is_no_scheduler(slow, registered):
+    with dask_cluster(slow, ({},)) as (address, _), Client(address, set_as_default=False) as client:
+        (worker,) = client.nthreads()
+        assert "it is a Worker" in refusal(worker, registered)
 
 
 def test_a_missing_dask_is_told_before_the_cluster_is_asked(monkeypatch, tmp_path):

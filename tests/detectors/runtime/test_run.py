@@ -148,8 +148,8 @@ def test_an_image_that_cannot_be_read_is_named(counting, images, tmp_path):
 
 
 def test_a_file_is_read_once_so_that_the_key_is_of_what_was_decoded(counting, images, monkeypatch):
-    known, read = run.image_bytes, []
-    monkeypatch.setattr(run, "image_bytes", lambda path: read.append(path) or known(path))
+    known, read = run.read_bytes, []
+    monkeypatch.setattr(run, "read_bytes", lambda path, expected: read.append(path) or known(path, expected))
     run.detect_images("counting", images)
     assert sorted(read) == sorted(images.values())
 

@@ -9,9 +9,12 @@ import io
 import json
 import os
 import re
+import socketserver
 import stat
 import threading
+import time
 import zipfile
+from contextlib import suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
@@ -20,7 +23,7 @@ from hicp_lib.cli import main as cli
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import sha256_bytes
 from hicp_lib.detectors.onnx.session import open_model
-from hicp_lib.detectors.weights import published
+from hicp_lib.detectors.weights import published, url_download
 from hicp_lib.detectors.weights.default import weights_dir
 
 CONTENT = b"\x00network\xff" * 1000
@@ -205,9 +208,52 @@ def test_an_unexpected_size_is_refused(server):
 @pytest.mark.parametrize("announce", [1, 1000, None])
 def test_a_download_that_breaks_off_leaves_nothing_and_is_fetched_again(server, announce):
     server.announce = announce
-    refused("plain", r"could not be downloaded \((broke off after|size announced)")
+    refused("plain", r"could not be downloaded \((ended after \d+ bytes, \d+ were|size announced)")
     server.announce = 0
     assert published.fetch_published("plain").path.read_bytes() == CONTENT
+
+
+class Slow(socketserver.BaseRequestHandler):
+    """Says the same again and again, a byte every tenth of a second, or as fast as it can."""
+
+    head, again, pause_s = b"", b"", 0.1
+
+    def handle(self) -> None:
+        self.request.recv(4096)
+        with suppress(OSError):
+            self.request.sendall(self.head)
+            while True:
+                self.request.sendall(self.again)
+                time.sleep(self.pause_s)
+
+
+HEAD = b"HTTP/1.1 200 OK\r\nContent-Length: 9000\r\n"
+SLOW = {
+    "nothing": ("timed out|TimeoutError", b"", b"", 0.1),
+    "its head": ("TimeoutError", b"HTTP/1.1 200 OK\r\nX: ", b"x", 0.1),
+    "its body": (r"too slow: \d+ bytes in 1 s", HEAD + b"\r\n", b"x", 0.1),
+    "more than it announced": (
+        r"ended after \d+ bytes, 9000 were announced", HEAD + b"Transfer-Encoding: chunked\r\n\r\n",
+        b"400\r\n" + bytes(1024) + b"\r\n", 0.0,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", SLOW)
+def test_a_server_that_never_ends_is_left(tmp_path, monkeypatch, kind):
+    match, *says = SLOW[kind]
+    monkeypatch.setattr(url_download, "TIMEOUT_S", 0.5)
+    handler = type("Handler", (Slow,), dict(zip(("head", "again", "pause_s"), says, strict=True)))
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), handler) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01}).start()
+        begin_s, url = time.monotonic(), f"http://127.0.0.1:{server.server_address[1]}/net"
+        try:
+            problem = url_download.download(url, tmp_path / "net", 10_000)
+        finally:
+            server.shutdown()
+    assert problem and re.fullmatch(match, problem)
+    assert time.monotonic() < begin_s + 10
 
 
 def test_more_than_a_model_can_be_is_not_downloaded(server, monkeypatch):
@@ -311,6 +357,17 @@ def test_a_broken_record_is_told_and_kept(server, content):
 def test_a_broken_registry_is_told(server, change):
     register(server, **change)
     refused("net", "restore the committed file")
+
+
+def test_a_file_that_cannot_be_read_does_not_hide_the_others(server, capsys, monkeypatch):
+    published.fetch_published("plain")
+    path = published.published()["net"].path
+    path.mkdir()
+    assert (the_status("net"), the_status("plain")) == ("unreadable", "present")
+    (weights_dir() / "pose_detection.tflite").mkdir()
+    assert cli.run(["models", "list"]) == 0
+    rows = {row.split()[0]: row.split()[1] for row in capsys.readouterr().out.splitlines()}
+    assert rows["net"] == rows["pose_detection.tflite"] == "unreadable" and rows["plain"] == "present"
 
 
 def test_unknown_names_are_refused(server):

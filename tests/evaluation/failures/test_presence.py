@@ -9,16 +9,15 @@ import pytest
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import COCO_17, HEAD, N_KEYPOINTS
 from hicp_lib.evaluation.ap.metric_table import draw_cases
-from hicp_lib.evaluation.calibration.curves import Calibration
+from hicp_lib.evaluation.calibration.curves import split_half
 from hicp_lib.evaluation.failures.placed_keypoints import placed_keypoints
 from hicp_lib.evaluation.failures.presence import (
     DECISIONS,
     MEASURES,
-    PART_OF,
-    Presence,
     declared,
     extended_table,
     false_presence,
+    fit_presence,
 )
 from hicp_lib.evaluation.statistics.resampling import Draws
 from tests.evaluation.made_people import CROP, POINTS, make_annotations
@@ -55,21 +54,21 @@ def study(head_score, invents):
 def test_nobody_is_judged_by_a_curve_fitted_to_them():
     rows = pd.DataFrame({"source_image": range(N_PEOPLE), "detector": "a", "keypoint": 9, "score": 0.5})
     rows = rows.assign(given=True, x=0.5, y=0.5, state="visible")
-    mine = Presence.fit(rows)
-    state = np.where(rows["source_image"].isin(mine.first_half), "visible", "outside")
-    presence = Presence.fit(rows.assign(state=state))
-    assert presence.first_half == mine.first_half and len(mine.first_half) == N_PEOPLE / 2
+    in_first_half = split_half(rows["source_image"])
+    presence = fit_presence(rows.assign(state=np.where(in_first_half, "visible", "outside")))
+    assert in_first_half.sum() == N_PEOPLE / 2
     for image in range(N_PEOPLE):
         worth = presence("a", image, np.full(17, 0.5))
-        assert worth[9] == (image not in presence.first_half)
+        assert worth[9] == (not in_first_half[image])
         assert (np.delete(worth, [9, 10]) == 0.5).all()  # no curve: as it was
 
 
 def test_a_keypoint_outside_the_picture_declares_itself_absent():
     truth, found, _ = study(0.8, lambda i: i == 0)
-    curve = Calibration(np.array([0.0, 1.0]), np.array([0.7, 0.7]))
-    curves = {(NAME, part, half): curve for part in set(PART_OF) for half in (False, True)}
-    raw, sure = (declared(truth, found, p)["headless", NAME] for p in (None, Presence(frozenset(), curves)))
+    raw, sure = (
+        declared(truth, found, presence)["headless", NAME]
+        for presence in (None, lambda detector, source, scores: np.full_like(scores, 0.7))
+    )
     assert raw[0].scores[0, :6].tolist() == [1] * 6 and (raw[1].scores[0, :5] == 0).all()
     assert sure[0].scores[0, COCO_17].tolist() == [0.7] * 17 and (sure[1].scores[0, :5] == 0).all()
     assert (found["headless", NAME][1].scores[0, :5] == 0.9).all()  # what was found stays

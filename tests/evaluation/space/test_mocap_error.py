@@ -9,7 +9,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import NAMES
 from hicp_lib.evaluation.cases import over_people
 from hicp_lib.evaluation.space import mocap_error as me
-from hicp_lib.evaluation.statistics.design import smallest_difference
+from hicp_lib.evaluation.statistics.proportions import smallest_difference
 from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.recordings.qualisys import MotionCapture
 

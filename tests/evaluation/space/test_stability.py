@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hicp_lib.evaluation.space.spread import spread_and_bias
+from hicp_lib.evaluation.space.sightings import spread_and_bias
 from hicp_lib.evaluation.space.stability import (
     PARTS,
     LiftedViews,

@@ -1,7 +1,5 @@
 """The loop closed in simulation, with keypoints that are true: no images are rendered."""
 
-from dataclasses import dataclass, field
-
 import numpy as np
 import pytest
 
@@ -11,10 +9,11 @@ from hicp_lib.experiments.avoidance.closed_loop import (
     Follower,
     Latency,
     Trial,
-    TrueKeypoints,
     between_s,
     simulate,
+    true_keypoints,
 )
+from hicp_lib.experiments.avoidance.head_camera import robot_surfaces
 from hicp_lib.experiments.avoidance.reaching import (
     BYSTAND_M,
     BYSTANDERS,
@@ -26,12 +25,10 @@ from hicp_lib.experiments.avoidance.reaching import (
     Moment,
     script,
 )
-from hicp_lib.experiments.avoidance.robot_surfaces import robot_surfaces
 from hicp_lib.experiments.avoidance.skin_distance import FAR_M, robot_spheres, skin_distance_m
 from hicp_lib.experiments.laboratory import in_root
 from hicp_lib.robot.home import HOME_M, home_posture
 from hicp_lib.robot.kinematics import load_icub
-from hicp_lib.robot.loop import Perception
 from hicp_lib.robot.skin import read_skin
 from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.body.joints import within_limits
@@ -42,7 +39,7 @@ HOME = np.array(HOME_M["left"])
 @pytest.fixture(scope="module")
 def spheres():
     icub = load_icub()
-    return robot_spheres(icub, read_skin(), home_posture(icub))
+    return robot_spheres(icub, home_posture(icub))
 
 
 def distance_m(spheres, name: str, time_s: float, hand_m=HOME) -> float:
@@ -129,24 +126,17 @@ def test_the_robot_is_drawn_where_it_is():
     assert vertices[:, 2].max() < icub.chains["head"].T_root_link("torso", posture.angles("head"))[2, 3]
 
 
-@dataclass
-class SlowPerceiver:
-    """True keypoints that come late; remembers when it looked."""
-
-    latency: Latency
-    looked_s: list[float] = field(default_factory=list)
-
-    def perceive(self, moment, posture, read) -> Perception:
-        self.looked_s.append(moment.time_s)
-        return TrueKeypoints().perceive(moment, posture, read)
-
-
 @pytest.mark.parametrize("latency", [Latency(inference_s=0.2), Latency(transport_s=0.25, inference_s=0.15)])
 def test_images_wait_for_the_detector_only_and_none_is_lost(monkeypatch, latency):
     monkeypatch.setattr(Follower, "skin_m", lambda self, time_s: np.full((1, 3), 9.0))
-    perceiver = SlowPerceiver(latency)
-    run = simulate(Trial("sitting, hand", STARTS_S + 1.2, camera_hz=10.0), perceiver)
-    np.testing.assert_allclose(perceiver.looked_s, STARTS_S + np.arange(0, 1.2, 0.2), atol=1e-9)
+    looked_s = []
+
+    def perceive(moment, posture, read):
+        looked_s.append(moment.time_s)
+        return true_keypoints(moment, posture, read)
+
+    run = simulate(Trial("sitting, hand", STARTS_S + 1.2, camera_hz=10.0), perceive, latency)
+    np.testing.assert_allclose(looked_s, STARTS_S + np.arange(0, 1.2, 0.2), atol=1e-9)
     heard = run.dropna().drop_duplicates("seen_s")
     np.testing.assert_allclose(heard["t_s"] - heard["seen_s"], latency.total_s, atol=0.02)
     assert len(heard) == (5 if latency.total_s < 0.4 - 1e-9 else 4)
@@ -161,7 +151,7 @@ def test_a_latency_that_is_none_is_refused(value_s):
 
 def test_with_true_keypoints_the_hand_gives_way_and_without_avoidance_it_stays():
     trial = Trial("standing, hand", 2.8, follow_m_s=0.0)
-    stays, gives_way = (simulate(trial, TrueKeypoints(), avoids) for avoids in (False, True))
+    stays, gives_way = (simulate(trial, true_keypoints, avoids=avoids) for avoids in (False, True))
     assert stays["hand_error_m"].max() < 0.002 and stays["distance_m"].min() < 0.02
     assert gives_way["distance_m"].min() > 0.03
     assert gives_way["activation"].max() < stays["activation"].max()
@@ -169,7 +159,7 @@ def test_with_true_keypoints_the_hand_gives_way_and_without_avoidance_it_stays()
 
 def test_noisy_joints_make_the_hand_tremble_and_not_wander():
     runs = [
-        simulate(Trial("standing, hand", STARTS_S + 0.2, joint_noise_rad=n), TrueKeypoints())
+        simulate(Trial("standing, hand", STARTS_S + 0.2, joint_noise_rad=n), true_keypoints)
         for n in (0, 0.01)
     ]
     still, trembling = (run["hand_error_m"] for run in runs)

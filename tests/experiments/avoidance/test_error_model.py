@@ -5,16 +5,16 @@ import pandas as pd
 import pytest
 
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, RIGHT_HAND
-from hicp_lib.experiments.avoidance.closed_loop import Latency, TrueKeypoints, start_posture
+from hicp_lib.experiments.avoidance.closed_loop import start_posture, true_keypoints
 from hicp_lib.experiments.avoidance.error_model import (
     ELSEWHERE_M,
     GROUPS,
     ErrorModel,
-    Lossy,
-    Modelled,
     fit,
     found_groups,
     in_sight,
+    lossy,
+    modelled,
 )
 from hicp_lib.experiments.avoidance.reaching import NEAR_S, Moment
 from hicp_lib.experiments.laboratory import in_root
@@ -80,8 +80,8 @@ def test_keypoints_are_drawn_with_the_model_s_errors():
     shares[HAND, 1] = 0.6
     flat[HAND] = 0.03, 0, 0
     model = ErrorModel(shares, flat, np.zeros((len(GROUPS), 3, 3)), np.zeros((len(GROUPS), 3, 3)), 1.0)
-    perceiver = Modelled(model, Latency(), np.random.default_rng(0))
-    seen = [perceiver.perceive(MOMENT, start_posture(), start_posture()) for _ in range(200)]
+    perceive = modelled(model, np.random.default_rng(0))
+    seen = [perceive(MOMENT, start_posture(), start_posture()) for _ in range(200)]
     truth_m = in_root(MOMENT.person.keypoints_m)
     found = [s for s in seen if s.scores.any()]
     assert len(found) / len(seen) == pytest.approx(0.6, abs=0.1)
@@ -92,8 +92,8 @@ def test_keypoints_are_drawn_with_the_model_s_errors():
 
 @pytest.mark.parametrize(("share", "burst"), [(0.0, 3.0), (0.3, 2.0), (0.9, 3.0)])
 def test_losses_have_their_share_and_come_in_bursts(share, burst):
-    lossy = Lossy(TrueKeypoints(), share, burst, np.random.default_rng(2))
-    lost = np.array([not len(lossy.perceive(MOMENT, None, None).scores) for _ in range(3000)])
+    perceive = lossy(true_keypoints, share, burst, np.random.default_rng(2))
+    lost = np.array([not len(perceive(MOMENT, None, None).scores) for _ in range(3000)])
     assert lost.mean() == pytest.approx(share, abs=0.05)
     if share:
         starts = (lost[1:] & ~lost[:-1]).sum()

@@ -8,7 +8,7 @@ import pytest
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.experiments.avoidance import head_camera
-from hicp_lib.experiments.avoidance.closed_loop import MOUNT, Latency, start_posture
+from hicp_lib.experiments.avoidance.closed_loop import MOUNT, start_posture
 from hicp_lib.experiments.avoidance.head_camera import HeadCamera
 from hicp_lib.experiments.avoidance.reaching import LOOKED_AT_S
 from hicp_lib.experiments.laboratory import COLOUR, ROOT_HEIGHT_M, furnished
@@ -59,7 +59,7 @@ def test_points_of_a_table_are_found_where_they_are_and_the_robots_hand_is_none(
     posture = start_posture()
     palm_m = load_icub().chains["left"].T_root_link("hand", posture.angles("left"))[:3, 3]
     assert len(points_m) + 1 == N_KEYPOINTS
-    camera = HeadCamera(Pointing(seen_at_px(np.r_[points_m, palm_m[None]])), Latency(), "paper")
+    camera = HeadCamera(Pointing(seen_at_px(np.r_[points_m, palm_m[None]])), "paper")
     found_m = camera.perceive(Table(), posture, posture).keypoints_m[0]
     assert np.isnan(found_m[-1]).all()
     assert np.isfinite(found_m[:-1]).mean() > 0.9
@@ -84,7 +84,7 @@ def taken(monkeypatch):
 
 def test_detectors_share_pictures_until_the_robot_gives_way(taken):
     images, pixels = {}, np.full((N_KEYPOINTS, 2), np.nan)  # nothing to lift
-    first, second = (HeadCamera(Pointing(pixels), Latency(), images=images) for _ in range(2))
+    first, second = (HeadCamera(Pointing(pixels), images=images) for _ in range(2))
     post = start_posture()
     trembles, away = (post.moved("left", post.angles("left") + turn) for turn in (1e-3, 0.01))
     for camera, posture in ((first, post), (second, trembles)):
@@ -100,6 +100,6 @@ def test_detectors_share_pictures_until_the_robot_gives_way(taken):
 
 @pytest.mark.parametrize("time_s", [LOOKED_AT_S[0] - 0.01, LOOKED_AT_S[1] + 0.01])
 def test_nobody_is_found_where_no_picture_is_taken(taken, time_s):
-    camera = HeadCamera(Pointing(np.full((N_KEYPOINTS, 2), np.nan)), Latency())
+    camera = HeadCamera(Pointing(np.full((N_KEYPOINTS, 2), np.nan)))
     assert not len(camera.perceive(Table(time_s=time_s), start_posture(), start_posture()).scores)
     assert not taken

@@ -14,7 +14,7 @@ from hicp_lib.evaluation.ap.found_and_placed import found_and_placed
 from hicp_lib.evaluation.statistics.resampling import Draws
 from hicp_lib.study.plots import evaluation, people
 from hicp_lib.study.plots.palette import DETECTOR_STYLES, detector_colour
-from hicp_lib.study.plots.style import Figure, in_words
+from hicp_lib.study.plots.style import Figure, in_style, in_words, new_figure
 from tests.evaluation.made_people import make_annotations
 
 METRICS = ("AP", "AP50", "AP75", "AR", "AR50", "AR75")
@@ -115,7 +115,7 @@ def test_grids_have_a_picture_per_detector_and_room_for_missing_ones():
         1,
         0,
     ]
-    sparse = people.picture_grid([[image, None]], caption="c", alt="a")
+    sparse = people.picture_grid([[image, None]], "c", "a")
     assert [len(axis.images) for axis in sparse.figure.axes] == [1, 0]
 
 
@@ -160,3 +160,15 @@ def test_the_default_detectors_stay_apart_for_the_colour_blind(eyes):
 @pytest.mark.parametrize(("items", "text"), [([], "nothing"), (["a"], "a"), (["a", "b", "c"], "a, b and c")])
 def test_words(items, text):
     assert in_words(items) == text
+
+
+def test_a_name_with_dollars_is_drawn_as_it_is(tmp_path):
+    @in_style
+    def draw() -> Figure:
+        figure, axes = new_figure(1, 1, 2.0, 2.0)
+        axes.set_title("$\\nothing{$")
+        figure.savefig(tmp_path / "a.svg")
+        return Figure(figure, "", "")
+
+    draw()
+    assert "$\\nothing{$" in (tmp_path / "a.svg").read_text()

@@ -11,13 +11,20 @@ from hicp_lib.study.plots.style import in_words, new_figure, series_text
 
 def test_each_axis_gets_its_rows_and_says_whose_they_are():
     table = pd.DataFrame({"group": ["hand", "body", "hand"], "subset": ["b", "a", "a"], "value": [1, 2, 3]})
-    _, axes = new_figure(2, 2)
-    found = {(down, across): (axis, rows["value"].tolist())
-             for axis, rows, down, across in marks.facets(axes, table, "group", "subset")}  # fmt: skip
+    _, axes, panels = marks.panels(table, ["group", "subset"], 4.0, 3.0)
+    found = {(down, across): (axis, rows["value"].tolist()) for axis, rows, down, across in panels}
     assert {case: values for case, (_, values) in found.items()} == {
         ("hand", "b"): [1], ("hand", "a"): [3], ("body", "b"): [], ("body", "a"): [2],
     }  # fmt: skip
     assert found["hand", "a"][0] is axes[0, 1] and found["body", "b"][0] is axes[1, 0]
+
+
+def test_panels_of_one_column_stand_side_by_side_and_there_is_one_without_rows():
+    table = pd.DataFrame({"view": ["b", "a", "b"]})
+    _, axes, panels = marks.panels(table, ["view"], 4.0, 3.0)
+    assert axes.shape == (1, 2) and [(view, len(rows)) for _, rows, view in panels] == [("b", 2), ("a", 1)]
+    _, axes, panels = marks.panels(table[:0], ["view"], 4.0, 3.0)
+    assert axes.shape == (1, 1) and panels == []
 
 
 def test_whiskers_reach_to_the_interval_and_never_the_wrong_way():

@@ -5,8 +5,8 @@ import pytest
 
 from hicp_lib.core.camera import transform
 from hicp_lib.experiments.avoidance.closed_loop import start_posture
+from hicp_lib.experiments.avoidance.head_camera import CAMERA, onlooker_view, robot_surfaces
 from hicp_lib.experiments.avoidance.reaching import NEAR_S, Moment
-from hicp_lib.experiments.avoidance.robot_surfaces import CAMERA, onlooker_view, robot_surfaces
 from hicp_lib.experiments.laboratory import T_WORLD_ROOT
 from hicp_lib.robot.home import HOME_M
 from hicp_lib.robot.kinematics import load_icub

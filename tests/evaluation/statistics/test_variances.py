@@ -5,7 +5,11 @@ import pandas as pd
 import pytest
 from scipy.stats import ttest_1samp
 
-from hicp_lib.evaluation.statistics.design import component_table, smallest_difference, variance_components
+from hicp_lib.evaluation.statistics.proportions import (
+    component_table,
+    smallest_difference,
+    variance_components,
+)
 
 
 @pytest.mark.parametrize("between, within", [(2.0, 1.0), (0.5, 3.0), (0.0, 1.0)])
