@@ -2,13 +2,13 @@
 
 import json
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 
 import click
 
-from hicp_lib.cli.options import PATH, FiniteRange
+from hicp_lib.cli.options import PATH, FiniteRange, say
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import locked_folder
 
 
 @click.command("inspect")
@@ -30,7 +30,7 @@ def inspect_(path: Path, as_json: bool) -> int:
 @click.option("--detections", type=PATH, required=True, help="What `hicp detect` or `hicp import` wrote.")
 @click.option("--images", type=PATH, required=True, help="Folder of the pictures.")
 @click.option("--annotations", type=PATH, help="The truth: drawn beside, and pictures sorted by it.")
-@click.option("--out", type=PATH, required=True, help="An .html page, or a folder for PNG files.")
+@click.option("--out", type=PATH, required=True, help="An .html page, or a new folder for PNG files.")
 @click.option("--limit", default=100, show_default=True, type=click.IntRange(min=1),
               help="At most so many pictures, worst first.")  # fmt: skip
 @click.option("--min-score", default=0.1, show_default=True, type=FiniteRange(0, 1),
@@ -41,16 +41,19 @@ def draw(
     """Draw detections over their pictures, worst first: an HTML page, or PNG files."""
     from hicp_lib.formats.annotations import read_annotations, read_detections
     from hicp_lib.inspection.gallery import image_paths, pictures, write_page, write_pngs
+    from hicp_lib.recordings.writer import refuse_used_folder
 
     if out.suffix not in ("", ".html"):
         raise InputError(f"{out}: expected a name that ends in .html, or a folder for PNG files")
     people = None if annotations is None else read_annotations(annotations)
     found = read_detections(detections, people)
     chosen = pictures(image_paths(detections, images, found, people), found, people)
-    first, note = chosen[:limit], partial(click.echo, err=True)
+    first = chosen[:limit]
     if out.suffix:
-        write_page(first, out, f"{detections.name} over {images.name}", note)
+        write_page(first, out, f"{detections.name} over {images.name}", say)
     else:
-        write_pngs(first, out, min_score, note)
+        with locked_folder(out):
+            refuse_used_folder(out)
+            write_pngs(first, out, min_score, say)
     rest = f" of {len(chosen)}, worst first; --limit N for more" if len(chosen) > limit else ""
     click.echo(f"{out}: {len(first)} pictures{rest}")

@@ -12,6 +12,7 @@ import shlex
 import signal
 import sys
 import warnings
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -29,13 +30,15 @@ from hicp_lib.cli.options import (
     detector_options,
     given,
     people_option,
+    say,
     tell_assumed,
     text_table,
     worker_options,
 )
 from hicp_lib.cli.recordings import lift, record
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, one_line, printable
 
+_MOST_SHOWN = 1000  # characters of a message: a file may hold a name of megabytes
 _keypoint_map_option = click.option(
     "--keypoint-map", type=PATH, metavar="FILE.json",
     help="What keypoint names of the annotations mean: their names to ours, or null to leave one out.",
@@ -49,7 +52,12 @@ def main() -> NoReturn:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     warnings.filterwarnings("ignore", module="PIL")
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))  # tidied up as at an error
-    sys.exit(run(sys.argv[1:]))
+    code = run(sys.argv[1:])
+    try:
+        sys.stdout.flush()
+    except OSError:  # whoever read it has gone, or the disk is full: nothing more can be told there
+        sys.stdout, code = None, code or 2
+    sys.exit(code)
 
 
 def run(arguments: list[str]) -> int:
@@ -70,6 +78,25 @@ def run(arguments: list[str]) -> int:
     >>> run(["no-such-command"])
     2
     """
+    with redirect_stdout(_Shown(sys.stdout)), redirect_stderr(_Shown(sys.stderr)):
+        return _run(arguments)
+
+
+class _Shown:
+    """A stream that shows what a terminal would obey: names and messages come from outside."""
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        self._stream.write(printable(text, kept="\n\r\t"))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def _run(arguments: list[str]) -> int:
     try:
         return hicp(arguments, prog_name="hicp", standalone_mode=False) or 0
     except click.exceptions.NoArgsIsHelpError as error:
@@ -84,21 +111,22 @@ def run(arguments: list[str]) -> int:
     except InputError as error:
         return _fail(error, 2)
     except OSError as error:
-        if error.filename is None:
-            raise
         name = error.filename2 or error.filename  # of two, the one to be written
-        return _fail(f"{name}: {error.strerror}; check the path, the rights and the disk space", 2)
+        what = one_line(error) if name is None else f"{name}: {error.strerror}"
+        return _fail(f"{what}; check the path, the rights and the disk space", 2)
+    except MemoryError:
+        return _fail("the memory is not enough; give less at once, or fewer --workers", 2)
 
 
 def _tell_notes(path: Path, notes: dict[str, str], area: str = "segment") -> None:
     """Say what a reader of figures must know of a file; of areas, if they are used."""
     for about, note in notes.items():
         if about != "area" or area == "segment":
-            click.echo(f"{path}: {note}", err=True)
+            say(f"{path}: {note}")
 
 
 def _fail(message: object, code: int) -> int:
-    click.echo(f"hicp: {message}", err=True)
+    say(f"hicp: {message}"[:_MOST_SHOWN])
     return code
 
 
@@ -150,7 +178,8 @@ def dataset_create(out: Path, annotations: Path, images: Path, **options) -> Non
     counts = create_hicp(annotations, images, out, progress=sys.stderr.isatty(), **options)
     _tell_notes(annotations, counts.get("notes", {}))
     click.echo(json.dumps(counts, indent=2))
-    click.echo("".join(f"{note}\n" for note in notes(counts)), nl=False, err=True)
+    for note in notes(counts):
+        say(note)
 
 
 @hicp.command()
@@ -183,10 +212,8 @@ def detect(
     made = make_detector(detector, **given(**chosen)) if needs_model else None
     pictures = open_pictures(source) if dataset_dir is None else open_dataset(source)
     options = {"workers": workers, "strict": strict} | given(**chosen)
-    lines = click.echo if by_image else None
-    n_people, n_images, n_broken = detect_to_file(
-        detector, pictures, out, partial(click.echo, err=True), lines, **options
-    )
+    lines = partial(say, err=False) if by_image else None
+    n_people, n_images, n_broken = detect_to_file(detector, pictures, out, say, lines, **options)
     passed_over = f"; {n_broken} could not be read" * bool(n_broken)
     click.echo(f"{out}: {n_people} people in {n_images} images{passed_over}")
     if source.is_dir():

@@ -4,6 +4,7 @@ import click
 
 from hicp_lib.cli.options import detector_options, given, tell_assumed, text_table
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import locked_folder
 
 
 @click.group()
@@ -45,18 +46,19 @@ def models_fetch(names: tuple[str, ...]) -> None:
     and no published model. MediaPipe itself comes with its detectors' weights.
     """
     from hicp_lib.detectors.mediapipe.program import fetch_program, is_wanted
-    from hicp_lib.detectors.weights.default import fetch
+    from hicp_lib.detectors.weights.default import fetch, weights_dir
     from hicp_lib.detectors.weights.published import fetch_published, published
 
     by_name = [name for name in names if name in published()]
     others = [name for name in names if name not in by_name]
-    if others or not names:
-        for name in fetch(others or None):
-            click.echo(f"fetched {name}")
-        if is_wanted(others) and fetch_program():
-            click.echo("fetched MediaPipe")
-    for name in by_name:
-        model = fetch_published(name)
+    with locked_folder(weights_dir()):
+        if others or not names:
+            for name in fetch(others or None):
+                click.echo(f"fetched {name}")
+            if is_wanted(others) and fetch_program():
+                click.echo("fetched MediaPipe")
+        fetched = [(name, fetch_published(name)) for name in by_name]
+    for name, model in fetched:
         how = f"hicp detect --detector {model.use} {model.path} ..." if model.use else model.note
         click.echo(f"fetched {name}: {model.path} ({how})")
 

@@ -8,9 +8,26 @@ from typing import Any
 
 import click
 
+from hicp_lib.core.errors import InputError, printable
 from hicp_lib.core.files import json_or_text
 
-PATH = click.Path(path_type=Path)
+_READ_OF_FOLDERS = ("annotations.json", "truth.parquet", "joints.parquet", "clicks.csv")
+
+
+class _Path(click.Path):
+    """A path; what a command reads is not what it writes, its `out`."""
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Path:
+        path = Path(str(super().convert(value, param, ctx)))
+        paths = {name: of for name, of in (ctx.params | {param.name: path}).items() if isinstance(of, Path)}
+        out, given = paths.pop("out", None), [*paths.values()]
+        read = given + [of / name for of in given for name in _READ_OF_FOLDERS]
+        if out and out.exists() and any(of.exists() and of.samefile(out) for of in read):
+            raise InputError(f"{out}: is read by this command; give another name to write to")
+        return path
+
+
+PATH = _Path()
 
 
 class FiniteRange(click.FloatRange):
@@ -92,6 +109,11 @@ def text_table(rows: Sequence[Sequence[str]]) -> str:
     return "\n".join("  ".join(cells).rstrip() for cells in padded)
 
 
+def say(message: object, err: bool = True) -> None:
+    """Print one line, whatever the names in it hold; on the error stream unless `err` is false."""
+    click.echo(printable(str(message)), err=err)
+
+
 def tell_assumed(facts: list[tuple[str, str, str]]) -> None:
     """Say on the error stream what is assumed about a detector's model and could be otherwise.
 
@@ -102,7 +124,7 @@ def tell_assumed(facts: list[tuple[str, str, str]]) -> None:
     """
     for what, value, why in facts:
         if why.startswith("ASSUMED"):
-            click.echo(f"{what}: {value} ({why})", err=True)
+            say(f"{what}: {value} ({why})")
 
 
 def given(model: Path | None, person_model: Path | None, boxes: str | None, pairs) -> dict[str, Any]:

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import click
 
+from hicp_lib.cli import options
 from hicp_lib.cli.options import PATH, FiniteRange, detector_options, given, people_option, worker_options
+from hicp_lib.core.files import locked_folder, write_table
 
 
 @click.group()
@@ -98,19 +100,20 @@ def import_(
         message = "Give one of --poses, --base-frame and --joint-states."
         raise click.UsageError(message, click.get_current_context())
     source = read_pose_source(poses, mount)
-    if bag is not None:
-        from hicp_lib.recordings.bags import import_bag
+    with locked_folder(out):
+        if bag is not None:
+            from hicp_lib.recordings.bags import import_bag
 
-        topics, joints_mount = (color_topic, depth_topic), mount if joint_states else None
-        n, notes = import_bag(bag, out, source, topics, base_frame, joints_mount)
-    else:
-        n, notes = import_open3d(folder, out, source, rate, depth_scale)
+            topics, joints_mount = (color_topic, depth_topic), mount if joint_states else None
+            n, notes = import_bag(bag, out, source, topics, base_frame, joints_mount)
+        else:
+            n, notes = import_open3d(folder, out, source, rate, depth_scale)
     _tell(out, n, notes)
 
 
 def _tell(out: Path, n_frames: int, notes: list[str]) -> None:
     for note in notes:
-        click.echo(note, err=True)
+        options.say(note)
     click.echo(f"{out}: {n_frames} frames; check them with: hicp record check {out}")
 
 
@@ -129,7 +132,9 @@ def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> Non
 
     if joints and poses:
         raise click.UsageError("Give either --poses FILE or --joints FILE.", click.get_current_context())
-    _tell(out, *record_camera(out, read_pose_source(poses, mount), joints, mount, **settings))
+    with locked_folder(out):
+        n, notes = record_camera(out, read_pose_source(poses, mount), joints, mount, **settings)
+    _tell(out, n, notes)
 
 
 @click.command()
@@ -140,7 +145,6 @@ def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> Non
 @worker_options("Threads")
 def lift(folder: Path, detector: str, method: str, out: Path, workers: int | str | None, **chosen) -> None:
     """Find people in a recording and where their keypoints are in the robot's base frame."""
-    from hicp_lib.core.files import write_table
     from hicp_lib.detectors.runtime.results import detections_of
     from hicp_lib.detectors.runtime.run import detect_images
     from hicp_lib.formats.detection_files import refuse_other_suffix

@@ -7,7 +7,6 @@ process has.
 import inspect
 import io
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -20,8 +19,8 @@ def cached(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> 
     """The table ``make(*arguments, **named)``, made only if it is not there.
 
     The key is all it depends on (`hicp_lib.core.cache.key`): the function and what it imports, and its
-    inputs. A damaged file is never an answer: the table is made again. What is returned was read from the
-    file, the first time too.
+    inputs. A damaged file is never an answer: the table is made again. What is returned was read from what
+    the file holds, the first time too.
 
     Parameters
     ----------
@@ -43,14 +42,8 @@ def cached(make: Callable[..., pd.DataFrame], *arguments: Any, **named: Any) -> 
     given.apply_defaults()
     result_key = key([make, cached], function=make.__qualname__, arguments=given.arguments)
     path = cache_dir() / "tables" / make.__name__ / f"{result_key[:32]}.bin"
-    table = _read(path)
-    if table is None:
-        write_checked(path, make(*arguments, **named).to_parquet())
-        table = _read(path)
-    return table
-
-
-def _read(path: Path) -> pd.DataFrame | None:
-    """The table of a file of Parquet; None if it is absent or damaged."""
     payload = read_checked(path)
-    return None if payload is None else pd.read_parquet(io.BytesIO(payload))
+    if payload is None:
+        payload = make(*arguments, **named).to_parquet()
+        write_checked(path, payload)
+    return pd.read_parquet(io.BytesIO(payload))

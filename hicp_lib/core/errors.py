@@ -39,3 +39,17 @@ def refuse_unknown(what: str, value: str, known: Iterable[str]) -> None:
 def one_line(error: BaseException) -> str:
     """What another library's exception says, in one line of at most 300 characters; its type if nothing."""
     return " ".join(str(error).split())[:300] or type(error).__name__
+
+
+def printable(text: str, kept: str = "") -> str:
+    """Text without characters that a terminal obeys, or shows as nothing: their escapes stand in their place.
+
+    Examples
+    --------
+    >>> print(printable("a\x1b[2J\nb"))
+    a\\x1b[2J\\nb
+    """
+    if text.isprintable():
+        return text
+    shown = (c if c.isprintable() or c in kept else c.encode("unicode_escape").decode() for c in text)
+    return "".join(shown)

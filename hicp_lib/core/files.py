@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import re
 import secrets
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+import stat
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +19,13 @@ import orjson
 import platformdirs
 
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.limited import raised
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+MAX_BYTES = 2e9  # of a file that is read whole
+_OLD_S = 3600.0  # a temporary file that nobody wrote to for so long was left behind
 
 
 def cache_dir() -> Path:
@@ -27,32 +34,62 @@ def cache_dir() -> Path:
 
 
 @contextmanager
-def atomic_path(path: str | Path) -> Iterator[Path]:
+def atomic_path(path: str | Path, sync: bool = True) -> Iterator[Path]:
     """Yield a temporary name beside `path`; rename it to `path` when the block succeeds.
 
     A reader sees the old file, the new one, or none: never a half-written one. The
     temporary file keeps the suffix, since image writers choose the format by it.
+
+    Parameters
+    ----------
+    path : str or Path
+        Nothing, or a regular file that may be written. Of a link its target is replaced; the link stays.
+    sync : bool, optional
+        False where the content is checked when it is taken up: a power cut may leave it empty.
+
+    Yields
+    ------
+    Path
+
+    Raises
+    ------
+    InputError
+        If `path` is a folder, a device, a link to nothing or the like, or a file that is write-protected.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
+    named, path = path, Path(os.path.realpath(path))
+    if os.path.lexists(named):
+        mode = os.stat(path).st_mode if path.exists() else stat.S_IFLNK
+        if not stat.S_ISREG(mode):
+            raise InputError(f"{named}: is {_kind(mode)}; give the name of a file to write")
+        if not (mode & stat.S_IWUSR and os.access(path, os.W_OK)):
+            raise InputError(f"{named}: is write-protected; give another name, or make it writable")
     temporary = path.parent / f".partial-{secrets.token_hex(8)}{path.suffix}"
-    os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # less the caller's mask
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # less the caller's mask
         yield temporary
+        if sync:
+            with open(temporary, "rb+") as file:
+                os.fsync(file.fileno())
         os.replace(temporary, path)
+    except OSError as error:
+        if str(error.filename) in ("None", str(temporary)):  # tell the name that was asked for
+            error.filename = str(named)
+        raise
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink()
 
 
-def write_bytes(path: str | Path, content: bytes) -> None:
-    """Write `content` to `path`, whole or not at all."""
-    with atomic_path(path) as temporary:
+def write_bytes(path: str | Path, content: bytes, sync: bool = True) -> None:
+    """Write `content` to `path`, whole or not at all; `sync` as of `atomic_path`."""
+    with atomic_path(path, sync) as temporary:
         temporary.write_bytes(content)
 
 
 def write_checked(path: str | Path, payload: bytes) -> None:
     """Write `payload` after its SHA-256, so that `read_checked` knows it again; whole or not at all."""
-    write_bytes(path, hashlib.sha256(payload).digest() + payload)
+    write_bytes(path, hashlib.sha256(payload).digest() + payload, sync=False)
 
 
 def read_checked(path: str | Path) -> bytes | None:
@@ -67,16 +104,53 @@ def read_checked(path: str | Path) -> bytes | None:
     (b'kept', None)
     """
     try:
-        with open(path, "rb") as file:  # pathlib takes as long again
-            content = file.read()
-    except OSError:
+        content = read_bytes(path, "")
+    except InputError:
         return None
     stated, payload = content[:32], content[32:]
     return payload if hashlib.sha256(payload).digest() == stated else None
 
 
+def regular_file(path: str | Path, expected: str, max_bytes: float = math.inf) -> Path:
+    """The path, if it is that of a regular file: what else there is may never end, or never begin.
+
+    Parameters
+    ----------
+    path : str or Path
+    expected : str
+        What the file should have been, or what to do, for the message.
+    max_bytes : float, optional
+        The largest size.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        If it is not there, not a regular file, or larger.
+    """
+    try:
+        state = os.stat(path)
+    except (OSError, ValueError) as error:  # a name that no file can have
+        why = getattr(error, "strerror", "no file has such a name")
+        raise InputError(f"{path}: cannot be read ({why}); {expected}") from None
+    if not stat.S_ISREG(state.st_mode):
+        raise InputError(f"{path}: is {_kind(state.st_mode)}; {expected}")
+    if state.st_size > max_bytes:
+        sizes = f"has {state.st_size / 1e9:.3g} GB, more than {max_bytes / 1e9:.3g}"
+        raise InputError(f"{path}: {sizes}; HICP_LIMITS=4 in the environment allows four times as much")
+    return Path(path)
+
+
+def _kind(mode: int) -> str:
+    kinds = {"d": "a folder", "p": "a named pipe", "s": "a socket", "l": "a link to nothing"}
+    return kinds.get(stat.filemode(mode)[0], "a device")
+
+
 def read_bytes(path: str | Path, expected: str) -> bytes:
-    """The content of a file that was named.
+    """The content of a file that was named: the door for all that is read whole.
 
     Parameters
     ----------
@@ -91,13 +165,123 @@ def read_bytes(path: str | Path, expected: str) -> bytes:
     Raises
     ------
     InputError
-        If it cannot be read.
+        If it cannot be read, is no regular file, or has more than `MAX_BYTES`.
     """
     try:
-        with open(path, "rb") as file:
+        with open(regular_file(path, expected, raised(MAX_BYTES)), "rb") as file:
             return file.read()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); {expected}") from None
+
+
+def listed(folder: str | Path, suffixes: str | tuple[str, ...] = "", what: str = "a folder") -> list[str]:
+    """Names in a folder, the numbers in them in their order, without hidden ones.
+
+    Parameters
+    ----------
+    folder : str or Path
+    suffixes : str or tuple of str, optional
+        In lower case; names that end otherwise are left out.
+    what : str, optional
+        Which folder to give, for the message.
+
+    Returns
+    -------
+    list of str
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, or it cannot be read.
+    """
+    try:
+        names = os.listdir(folder)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read ({error.strerror}); give {what}") from None
+    return sorted((n for n in names if n[0] != "." and n.lower().endswith(suffixes)), key=natural_order)
+
+
+def kept_beside(folder: Path, name: str, **kinds: type) -> dict[str, Any]:
+    """What a command kept about the files it made in a folder; empty values where the folder is empty.
+
+    Parameters
+    ----------
+    folder : Path
+    name : str
+        Of the file of JSON in it that holds this.
+    **kinds : type
+        Of the values.
+
+    Returns
+    -------
+    dict of str to object
+
+    Raises
+    ------
+    InputError
+        If the folder holds something else.
+    """
+    kept: Any = {of: kind() for of, kind in kinds.items()}
+    if (folder / name).exists():
+        kept = read_json(folder / name)
+    elif listed(folder):
+        raise InputError(f"{folder}: holds files not made by this command; give an empty or new folder")
+    if not (isinstance(kept, dict) and all(isinstance(kept.get(of), kind) for of, kind in kinds.items())):
+        raise InputError(f"{folder / name}: is of another version or tool; give another folder")
+    return kept
+
+
+def remove_inside(folder: Path, names: Iterable[str]) -> None:
+    """Remove files that a list found in a folder calls its own; names that lead out of it are passed over."""
+    for name in names:
+        if isinstance(name, str) and ".." not in Path(name).parts and not Path(name).is_absolute():
+            (folder / name).unlink(missing_ok=True)
+
+
+@contextmanager
+def locked_folder(folder: str | Path) -> Iterator[None]:
+    """Let one process at a time fill a folder, which is made if it is not there.
+
+    The folder itself is locked, and the system frees it however the process ends; nothing is locked where the
+    system has no such locks. What was left half-written there an hour ago or earlier is removed.
+
+    Parameters
+    ----------
+    folder : str or Path
+        One in the cache is waited for: whoever fills it makes the same.
+
+    Raises
+    ------
+    InputError
+        If another process fills it, or it is a file.
+    """
+    folder, is_new = Path(folder), not os.path.lexists(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise InputError(f"{folder}: is a file, or lies in one; give a folder") from None
+    with ExitStack() as stack:
+        with suppress(ImportError):
+            import fcntl
+
+            stack.callback(os.close, descriptor := os.open(folder, os.O_RDONLY))
+            waits = folder.resolve().is_relative_to(cache_dir().resolve())
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
+            except BlockingIOError:
+                raise InputError(f"{folder}: another command writes there; wait for it to end") from None
+            except OSError:
+                pass  # of a file system without locks
+        for left in folder.rglob(f".partial-{'[0-9a-f]' * 16}*"):
+            with suppress(OSError):
+                if time.time() - left.stat().st_mtime > _OLD_S:
+                    left.unlink()
+        try:
+            yield
+        except BaseException:
+            if is_new and not os.listdir(folder):
+                folder.rmdir()
+            raise
 
 
 def write_json(path: str | Path, value: Any, *, indent: int | None = None) -> None:
@@ -200,6 +384,6 @@ def sha256_bytes(content: bytes) -> str:
 
 
 def sha256_file(path: str | Path) -> str:
-    """SHA-256 of a file's content in hexadecimal."""
-    with open(path, "rb") as file:
+    """SHA-256 of a regular file's content in hexadecimal."""
+    with open(regular_file(path, "give a file"), "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -17,7 +17,7 @@ import numpy as np
 from PIL import ExifTags, Image
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_bytes, write_bytes
+from hicp_lib.core.files import read_bytes, regular_file, write_bytes
 from hicp_lib.core.limited import LIMITS_VARIABLE, raised
 
 MAX_PIXELS = 100e6
@@ -128,7 +128,7 @@ def image_header(path: str | Path | BytesIO) -> tuple[int, int, int]:
         2 to 8 for pictures that viewers turn (see `as_seen`), 1 for all others.
     """
     try:
-        with path if isinstance(path, BytesIO) else open(path, "rb") as file:
+        with path if isinstance(path, BytesIO) else open(regular_file(path, ""), "rb") as file:
             Image.init()
             start, readers = file.read(16), (Image.OPEN[kind] for kind in _FORMATS)
             file.seek(0)
@@ -198,6 +198,14 @@ def write_png(path: str | Path, image: np.ndarray) -> None:
     options = [cv2.IMWRITE_PNG_COMPRESSION, 1, cv2.IMWRITE_PNG_FILTER, cv2.IMWRITE_PNG_FILTER_UP]
     _, encoded = cv2.imencode(".png", pixels, options)
     write_bytes(path, encoded.tobytes())
+
+
+def is_whole_png(path: str | Path) -> bool:
+    """Whether a file is a PNG whose checksums are right, up to its end."""
+    with suppress(Exception), Image.open(path, formats=["PNG"]) as image:  # Pillow raises many kinds
+        image.verify()
+        return True
+    return False
 
 
 def inside(pixels_px: np.ndarray, box_px: Box) -> np.ndarray:

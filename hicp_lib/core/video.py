@@ -7,6 +7,8 @@ import cv2
 import numpy as np
 
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import regular_file
+from hicp_lib.core.images import refuse_too_large
 
 SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".webm")
 
@@ -28,11 +30,14 @@ def open_video(path: str | Path) -> tuple[int, Iterator[tuple[float, np.ndarray]
     Raises
     ------
     InputError
-        If it cannot be read.
+        If it cannot be read, or its frames have too many pixels.
     """
-    capture = cv2.VideoCapture(str(path))
+    capture = cv2.VideoCapture(str(regular_file(path, "give a video")))
     if not capture.isOpened():
         raise InputError(f"{path}: is no video that OpenCV can read; give .mp4, .avi or .mov, or images")
+
+    sides_px = [int(capture.get(of)) for of in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)]
+    refuse_too_large(path, *sides_px)
 
     def frames() -> Iterator[tuple[float, np.ndarray]]:
         while capture.grab():

@@ -16,7 +16,6 @@ A crop's image id, and its person's annotation id, are the person's annotation i
 the same person is found in both datasets, whatever the rules select.
 """
 
-import shutil
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
@@ -30,8 +29,8 @@ from hicp_lib.core.cache import content, digest
 from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.executor import run_jobs
-from hicp_lib.core.files import read_json, write_json
-from hicp_lib.core.images import Box, as_seen, inside, read_image, write_png
+from hicp_lib.core.files import kept_beside, locked_folder, regular_file, remove_inside, write_json
+from hicp_lib.core.images import Box, as_seen, inside, is_whole_png, read_image, write_png
 from hicp_lib.core.keypoints import HEAD
 from hicp_lib.datasets.crops import crop_people, image_name, n_pixels, on_pixels, person_crops
 from hicp_lib.datasets.frames import in_frame, outside_image
@@ -239,53 +238,53 @@ def create_hicp(
     ------
     InputError
         For malformed annotations, missing or wrongly sized images, a rotation flag nobody decided on, or an
-        `out` in use for something else.
+        `out` that is being filled, holds what is read, or is in use for something else.
     """
     out, images_dir = Path(out), Path(images_dir)
     annotations, flags = in_frame(read_annotations(annotations_path, keypoint_map), images_dir, orientation)
     turned = flags if orientation == "seen" else {}
     table = plan(annotations, min_pixels, headless_min_pixels)
     boxes = {subset: crop_boxes(table, subset) for subset in SUBSETS}
-    _claim(out, _digest(table, boxes, images_dir, turned))
-    write = partial(_write_crops, images_dir, turned)
-    todo = [(image, partial(write, image, crops)) for image, crops in _jobs(annotations, boxes, out).items()]
-    done = run_jobs(todo, usable_cores(), "threads")
-    for _ in tqdm(done, total=len(todo), desc="HiCP crops", unit="image", disable=not progress):
-        pass
-    for subset in SUBSETS:
-        write_annotations(out / subset / "annotations.json", crop_annotations(annotations, table, subset))
-    counts = summary(table) | {"outside_image": outside_image(annotations), "rotation_flags": flags}
-    counts |= {"notes": annotations.notes} if annotations.notes else {}
-    write_json(out / "summary.json", counts, indent=2)
+    jobs = _jobs(annotations, boxes, out)
+    for given in (Path(annotations_path), images_dir):
+        if given.resolve().is_relative_to(out.resolve()):
+            raise InputError(f"{out}: holds {given}, which is read; give another folder to write to")
+    with locked_folder(out):
+        _claim(out, _digest(table, boxes, images_dir, turned), sum(jobs.values(), []))
+        write = partial(_write_crops, images_dir, turned)
+        todo = [(image, partial(write, image, crops)) for image, crops in jobs.items()]
+        done = run_jobs(todo, usable_cores(), "threads")
+        for _ in tqdm(done, total=len(todo), desc="HiCP crops", unit="image", disable=not progress):
+            pass
+        for subset in SUBSETS:
+            write_annotations(out / subset / "annotations.json", crop_annotations(annotations, table, subset))
+        counts = summary(table) | {"outside_image": outside_image(annotations), "rotation_flags": flags}
+        counts |= {"notes": annotations.notes} if annotations.notes else {}
+        write_json(out / "summary.json", counts, indent=2)
     return counts
 
 
 def _digest(table: pd.DataFrame, boxes: dict, images_dir: Path, turned: dict[str, int]) -> str:
     """What the pixels of the crops depend on."""
     names = sorted({table["file_name"].iloc[row] for kept in boxes.values() for row in kept})
-    try:
-        files = [(name, content(images_dir / name)) for name in names]
-    except OSError as error:
-        raise InputError(
-            f"{error.filename}: an annotated image cannot be read; give the folder that holds the images"
-        ) from None
+    files = [(name, content(regular_file(images_dir / name, "give the images' folder"))) for name in names]
     ids = table["annotation_id"].tolist()
     crops = {subset: [(ids[row], box) for row, box in kept.items()] for subset, kept in boxes.items()}
     return digest([files, crops, str(images_dir.resolve()), turned])
 
 
-def _claim(out: Path, digest: str) -> None:
-    """Make `out` ours: crops of another digest are removed, a stranger's folder is refused."""
-    marker = out / "crops.json"
-    if marker.exists():
-        if read_json(marker) == {"digest": digest}:
-            return
-    elif any((out / subset).exists() for subset in SUBSETS):
-        raise InputError(f"{out}: holds folders that were not made by this command; choose another folder")
-    for subset in SUBSETS:
-        (out / subset / "annotations.json").unlink(missing_ok=True)
-        shutil.rmtree(out / subset, ignore_errors=True)
-    write_json(marker, {"digest": digest})
+def _claim(out: Path, digest: str, crops: Iterable[_Crop]) -> None:
+    """Make `out` ours: crops of another digest are removed, what is a stranger's is refused."""
+    marker, names = out / "crops.json", ["summary.json", *(f"{name}/annotations.json" for name in SUBSETS)]
+    before = kept_beside(out, marker.name, digest=str, names=list)
+    names += [path.relative_to(out).as_posix() for path, _ in crops]
+    if before["digest"] == digest:
+        return
+    remove_inside(out, before["names"])
+    for name in names:
+        if (out / name).exists():
+            raise InputError(f"{out / name}: was not made by this command; choose another folder")
+    write_json(marker, {"digest": digest, "names": names})
 
 
 def _jobs(annotations: Annotations, boxes: dict[str, dict], out: Path) -> dict[ImageInfo, list[_Crop]]:
@@ -299,7 +298,7 @@ def _jobs(annotations: Annotations, boxes: dict[str, dict], out: Path) -> dict[I
 
 
 def _write_crops(images_dir: Path, turned: dict[str, int], image: ImageInfo, crops: list[_Crop]) -> None:
-    missing = [(path, box) for path, box in crops if not path.exists()]
+    missing = [(path, box) for path, box in crops if not is_whole_png(path)]
     if not missing:
         return
     pixels = as_seen(read_image(images_dir / image.file_name), turned.get(image.file_name, 1))

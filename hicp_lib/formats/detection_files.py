@@ -8,6 +8,7 @@
 The bytes follow from the detections and their order alone.
 """
 
+import io
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -21,7 +22,7 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.extras import require
-from hicp_lib.core.files import atomic_path, read_json
+from hicp_lib.core.files import atomic_path, read_bytes, read_json
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
 from hicp_lib.formats.layouts import PERSON_CATEGORY
 
@@ -213,7 +214,8 @@ def read_rows(path: Path) -> Any:
         return read_json(path)
     refuse_other_suffix(path)
     try:
-        table = _read_csv(path) if path.suffix == ".csv" else pd.read_parquet(path)
+        content = io.BytesIO(read_bytes(path, "give a table"))
+        table = _read_csv(content) if path.suffix == ".csv" else pd.read_parquet(content)
         keypoints = [INDEX[name] for name in table["keypoint"]]
         values = table[["u_px", "v_px", "score"]].to_numpy(float)
         if table.duplicated(["image_id", "person", "keypoint"]).any():
@@ -230,5 +232,5 @@ def read_rows(path: Path) -> Any:
     return [row | {"keypoints": keypoints} for row, keypoints in zip(rows, flat, strict=True)]
 
 
-def _read_csv(path: Path) -> pd.DataFrame:
-    return pd.read_csv(path, float_precision="round_trip", dtype={"file_name": str})
+def _read_csv(content: io.BytesIO) -> pd.DataFrame:
+    return pd.read_csv(content, float_precision="round_trip", dtype={"file_name": str})

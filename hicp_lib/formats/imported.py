@@ -6,6 +6,7 @@ from pathlib import Path
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import listed
 from hicp_lib.formats.annotations import Annotations, read_detections
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,39}")
@@ -39,10 +40,7 @@ def read_imported(
     """
     if not folder:
         return {}
-    try:
-        detectors = sorted(path for path in Path(folder).iterdir() if path.is_dir() and path.name[0] != ".")
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be read ({error.strerror}); expected a folder") from None
+    detectors = [path for name in sorted(listed(folder)) if (path := Path(folder, name)).is_dir()]
     if not detectors:
         raise InputError(f"{folder}: holds no folder; expected one per detector, such as mmpose/basic.json")
     for path in detectors:

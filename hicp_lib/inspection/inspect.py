@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from hicp_lib.core.errors import InputError, one_line
-from hicp_lib.core.files import read_json
+from hicp_lib.core.files import listed, read_json
 from hicp_lib.detectors.runtime.to_file import IMAGE_SUFFIXES
 from hicp_lib.inspection import people, pixels, recorded
 from hicp_lib.inspection.facts import Facts, tables, under_name
@@ -95,7 +95,7 @@ def _marks_of_text(path: Path, head: str) -> set[str]:
 
 
 def _folder(folder: Path) -> tuple[Kind, Path]:
-    names = {path.name for path in folder.iterdir()}
+    names = set(listed(folder))
     images = {"an image" for name in names if name.lower().endswith(IMAGE_SUFFIXES)}
     files = [folder / n for n in sorted(names) if n.endswith(".json") and not n.endswith(".images.json")]
     try:

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_bytes, read_json
+from hicp_lib.core.files import listed, read_bytes, read_json
 from hicp_lib.core.images import image_header
 from hicp_lib.core.video import open_video
 from hicp_lib.detectors.mediapipe.bundles import BUNDLES
@@ -50,7 +50,7 @@ def describe_video(path: Path) -> Facts:
 
 def describe_images(folder: Path) -> Facts:
     """Say what images a folder holds; pixels are not read."""
-    paths = [path for path in sorted(folder.iterdir()) if path.suffix.lower() in IMAGE_SUFFIXES]
+    paths = [folder / name for name in listed(folder, IMAGE_SUFFIXES)]
     headers = [image_header(path) for path in paths[:_MOST_HEADERS]]
     sizes = Counter(f"{width} x {height}" for width, height, _ in headers if width)
     shown = ", ".join(f"{size} ({n})" for size, n in sizes.most_common(3)) + ", ..." * (len(sizes) > 3)

@@ -8,7 +8,7 @@ import pandas as pd
 
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_json
+from hicp_lib.core.files import listed, read_json
 from hicp_lib.inspection.facts import ORIGIN, Facts, about_times
 from hicp_lib.mocap.registration import read_registration
 from hicp_lib.recordings.bag_file import open_bag
@@ -60,7 +60,7 @@ def describe_recording(folder: Path) -> Facts:
 
 def describe_open3d(folder: Path) -> Facts:
     """Say what a folder with `color/` and `depth/` holds."""
-    n_color, n_depth = (len(list((folder / name).iterdir())) for name in ("color", "depth"))
+    n_color, n_depth = (len(listed(folder / name)) for name in ("color", "depth"))
     path = next((path for path in map(folder.joinpath, METADATA) if path.is_file()), None)
     if path is None or n_color != n_depth:
         raise InputError(f"{n_color} and {n_depth} images; expected as many, and one of {METADATA}")

@@ -13,7 +13,7 @@ import pandas as pd
 
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import natural_order, read_bytes, read_json, write_bytes
+from hicp_lib.core.files import listed, read_bytes, read_json, write_bytes
 from hicp_lib.formats.json_validation import is_number, shown
 from hicp_lib.recordings.camera_file import read_distorted_camera
 from hicp_lib.recordings.recording import check_size, read_csv
@@ -145,10 +145,10 @@ def _images(folder: Path) -> list[Path]:
     """Sorted by the numbers in their names."""
     if not folder.is_dir():
         raise InputError(f"{folder}: is not a folder; expected color/, depth/ and intrinsic.json")
-    paths = [path for path in folder.iterdir() if path.suffix.lower() in _IMAGE_KINDS]
-    if not paths:
+    names = listed(folder, _IMAGE_KINDS)
+    if not names:
         raise InputError(f"{folder}: holds no images; expected files such as 00000.png")
-    return sorted(paths, key=lambda path: natural_order(path.stem))
+    return [folder / name for name in names]
 
 
 def _frame_numbers(paths: list[Path], notes: list[str]) -> np.ndarray:

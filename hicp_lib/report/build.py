@@ -5,15 +5,14 @@ one that is about the detector alone is left out, and its page says why. What a 
 dropped: its notebook fails, and says what is missing.
 """
 
-import fcntl
 import time
-from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from hicp_lib.core.errors import InputError, refuse_unknown
+from hicp_lib.core.files import locked_folder
 from hicp_lib.detectors.registry import COMBINED, DETECTORS
 from hicp_lib.detectors.weights.default import registry
 from hicp_lib.report.book import build_book
@@ -65,7 +64,7 @@ def make_report(
     if only in left_out:
         raise InputError(f"--only {only}: {left_out[only]}")
     folders = Folders(sources, root.resolve(), profile)
-    with _alone(folders):
+    with locked_folder(folders.executed):
         run_all(runs, folders, log, only)
         page, is_new = build_book(folders, left_out) if only is None else (None, False)
     took = f"({time.perf_counter() - start_s:.0f} s)"
@@ -115,20 +114,6 @@ def _without_absent(
         else:
             left_out[run.notebook.name] = said
     return able, left_out
-
-
-@contextmanager
-def _alone(folders: Folders) -> Iterator[None]:
-    """Let one process at a time work on a profile; the system frees the lock however it ends."""
-    folders.executed.mkdir(parents=True, exist_ok=True)
-    with open(folders.executed / ".lock", "w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(
-                f"{lock.name}: another report of this profile is being made; wait for it to end"
-            ) from None
-        yield
 
 
 def absent_weights(detector: str) -> list[str]:

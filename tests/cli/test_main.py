@@ -79,14 +79,55 @@ def test_an_unknown_detector_lists_those_there_are(capsys, tmp_path):
     assert "mediapipe" in mistake(capsys, *arguments)
 
 
-def test_what_cannot_be_written_is_told_in_one_line(capsys, monkeypatch):
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (OSError(28, "No space left on device", "/results/x"), "/results/x: No space left on device; check"),
+        (OSError(28, "No space left on device"), "No space left on device; check the path"),
+        (MemoryError(), "the memory is not enough"),
+    ],
+)
+def test_what_there_is_no_room_for_is_told_in_one_line(capsys, monkeypatch, error, told):
     import hicp_lib.report.build
 
     def full(*arguments, **keywords):
-        raise OSError(28, "No space left on device", "/results/x")
+        raise error
 
     monkeypatch.setattr(hicp_lib.report.build, "make_report", full)
-    assert "/results/x: No space left on device; check" in mistake(capsys, "report")
+    assert told in mistake(capsys, "report")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no device that is always full")
+def test_a_full_output_is_told_in_one_line():
+    command = [sys.executable, "-c", "from hicp_lib.cli.main import main; main()", "--version"]
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 2 and done.stderr.count("\n") == 1 and "No space left" in done.stderr
+
+
+@pytest.mark.parametrize("name", ["a\x1b[2J", "a\nhicp: well", "a\rb", "a\u202eb", "\x9b31m", "\udcff"])
+def test_what_a_terminal_obeys_is_shown(capsys, name):
+    told = mistake(capsys, "evaluate", "--annotations", f"/no/{name}", "--detections", "x")
+    assert told[:-1].isprintable() and name.encode("unicode_escape").decode() in told
+
+
+def test_what_a_terminal_obeys_is_shown_in_results_too(capsys, tmp_path):
+    (tmp_path / "a\x07b").mkdir()
+    assert cli.run(["record", "check", str(tmp_path / "a\x07b")]) == 2
+    printed = capsys.readouterr().out
+    assert "a\\x07b" in printed and "\x07" not in printed
+
+
+def test_what_a_command_reads_is_not_written_over(capsys, tmp_path, two_images):
+    _, _, truth, _, found = two_images
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    export = ["export", "--format", "fiftyone", "--annotations", truth, "--detections", found]
+    for out in (truth, found, str(tmp_path / "." / "annotations.json")):
+        for arguments in ([*export, "--out", out], ["export", "--out", out, *export[1:]]):
+            assert "is read by this command; give another name" in mistake(capsys, *arguments)
+    detect = ["detect", "--detector", "posenet", "--dataset", str(tmp_path), "--out", truth]
+    assert "is read by this command" in mistake(capsys, *detect)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
 def test_a_failed_notebook_is_another_exit_code(capsys, monkeypatch):

@@ -397,7 +397,7 @@ def test_what_is_wrong_with_the_images_is_said(source, tmp_path):
     with pytest.raises(InputError, match="5.jpg: is not an image"):
         create(source, tmp_path / "hicp")
     image.unlink()
-    with pytest.raises(InputError, match="5.jpg: an annotated image cannot be read"):
+    with pytest.raises(InputError, match="5.jpg: cannot be read .*images' folder"):
         create(source, tmp_path / "hicp")
     assert not list((tmp_path / "hicp").rglob("annotations.json"))
 
@@ -406,9 +406,45 @@ def test_a_folder_of_something_else_is_left_alone(source, tmp_path):
     mine = tmp_path / "hicp" / "basic" / "thesis.txt"
     mine.parent.mkdir(parents=True)
     mine.write_text("precious")
-    with pytest.raises(InputError, match="not made by this command"):
+    with pytest.raises(InputError, match="holds files not made by this command"):
         create(source, tmp_path / "hicp")
-    assert mine.read_text() == "precious"
+    assert mine.read_text() == "precious" and len(list((tmp_path / "hicp").rglob("*"))) == 2
+
+
+def test_files_of_others_stay_beside_the_crops(source, tmp_path):
+    out = tmp_path / "hicp"
+    create(source, out)
+    mine = out / "basic" / "images" / "mine.png"
+    mine.write_text("precious")
+    marker = json.loads((out / "crops.json").read_text())
+    (out / "crops.json").write_text(json.dumps({**marker, "names": ["../stays.txt", *marker["names"]]}))
+    (tmp_path / "stays.txt").write_text("precious")
+    n_before = len(list((out / "basic" / "images").iterdir()))
+    create(source, out, min_pixels=45_000)
+    assert mine.exists() and (tmp_path / "stays.txt").exists()
+    assert len(list((out / "basic" / "images").iterdir())) == 3 < n_before
+    gone = next(name for name in marker["names"] if "basic/images" in name and not (out / name).exists())
+    (out / gone).write_text("precious")
+    with pytest.raises(InputError, match="was not made by this command"):
+        create(source, out)
+
+
+@pytest.mark.parametrize("n_bytes", [0, 100])
+def test_crops_that_are_not_whole_are_cut_again(source, tmp_path, n_bytes):
+    create(source, tmp_path / "hicp")
+    crop = tmp_path / "hicp" / "basic" / "images" / "000000000013.png"
+    whole = crop.read_bytes()
+    crop.write_bytes(whole[:n_bytes])
+    create(source, tmp_path / "hicp")
+    assert crop.read_bytes() == whole
+
+
+@pytest.mark.parametrize("out", [".", "images", "images/.."])
+def test_a_folder_that_holds_what_is_read_is_not_written_to(source, out):
+    before = {path: path.read_bytes() for path in source.rglob("*") if path.is_file()}
+    with pytest.raises(InputError, match="which is read; give another folder"):
+        create(source, source / out)
+    assert {path: path.read_bytes() for path in source.rglob("*") if path.is_file()} == before
 
 
 def test_nobody_annotated_gives_empty_datasets(source, tmp_path):

@@ -93,6 +93,14 @@ def test_another_suffix_is_refused(folder, capsys):
     assert "ends in .html" in capsys.readouterr().err
 
 
+def test_png_files_go_into_a_new_folder(folder, capsys):
+    (folder / "out").mkdir()
+    (folder / "out" / "mine.txt").write_text("precious")
+    assert draw(folder, "--annotations", folder / "annotations.json", "--out", folder / "out") == 2
+    assert "is there already; give a new or empty folder" in capsys.readouterr().err
+    assert [path.name for path in (folder / "out").iterdir()] == ["mine.txt"]
+
+
 def test_large_pictures_are_made_smaller_and_keep_their_coordinates(tmp_path):
     write_png(tmp_path / "1.png", np.zeros((20, 3 * MAX_SIDE_PX, 3), np.uint8))
     point = np.full((1, 136, 2), np.nan)

@@ -12,6 +12,7 @@ import matplotlib
 import pytest
 
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import locked_folder
 from hicp_lib.report import book
 from hicp_lib.report.build import make_report
 from hicp_lib.report.run import Folders, RunError
@@ -126,13 +127,8 @@ def test_mistakes_are_told_before_anything_runs(study, profile, pairs, expected)
 
 
 def test_two_reports_of_one_profile_do_not_mix(study):
-    import fcntl
-
-    folder = Folders(study, study, "quick").executed
-    folder.mkdir(parents=True)
-    with open(folder / ".lock", "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        with pytest.raises(InputError, match="another report of this profile is being made"):
+    with locked_folder(Folders(study, study, "quick").executed):
+        with pytest.raises(InputError, match="another command writes there"):
             make_report("quick", [], print, sources=study, root=study)
 
 

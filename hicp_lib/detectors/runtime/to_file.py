@@ -11,7 +11,7 @@ import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import atomic_path, natural_order
+from hicp_lib.core.files import atomic_path, listed
 from hicp_lib.core.images import rotation_note
 from hicp_lib.core.video import SUFFIXES as VIDEO_SUFFIXES
 from hicp_lib.core.video import open_video
@@ -64,10 +64,9 @@ def open_pictures(source: Path) -> Pictures:
         return Pictures(source, images, n_frames or None)
     if not source.is_dir():
         raise InputError(f"{source}: is not a folder; give the folder that holds the images, or a video")
-    names = [entry.name for entry in os.scandir(source) if entry.name.lower().endswith(IMAGE_SUFFIXES)]
+    names = listed(source, IMAGE_SUFFIXES)
     if not names:
         raise InputError(f"{source}: holds no images; expected files such as 000001.jpg or photo.png")
-    names.sort(key=natural_order)
     stems = [os.path.splitext(name)[0] for name in names]
     numbers = {int(stem) for stem in stems if stem.isascii() and stem.isdigit()}
     ids = map(int, stems) if len(numbers) == len(names) else range(1, len(names) + 1)

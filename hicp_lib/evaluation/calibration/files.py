@@ -4,6 +4,7 @@ The table is the one the report saves: columns `detector, group, score, rate`, a
 (`calibration.calibration_table`), as Parquet there and as CSV here.
 """
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import pandas as pd
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, one_line
-from hicp_lib.core.files import read_json, write_bytes
+from hicp_lib.core.files import read_bytes, read_json, write_bytes
 from hicp_lib.core.keypoints import GROUPS
 from hicp_lib.evaluation.calibration.curves import Calibration, calibration_table, calibrations_of
 from hicp_lib.evaluation.calibration.keypoint_hits import keypoint_hits
@@ -90,7 +91,8 @@ def read_calibrations(path: str | Path, detector: str = "") -> dict[str, Calibra
     """
     path = Path(path)
     try:
-        table = pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
+        content = io.BytesIO(read_bytes(path, "give a table"))
+        table = pd.read_parquet(content) if path.suffix == ".parquet" else pd.read_csv(content)
     except (OSError, ValueError) as error:
         problem = getattr(error, "strerror", None) or one_line(error)
         raise InputError(f"{path}: cannot be read as a table ({problem}); give calibrations") from None

@@ -12,7 +12,7 @@ from hicp_lib.core.keypoints import NAMES
 from hicp_lib.experiments.laboratory import COLOUR, colour_and_depth, in_root, robot_camera
 from hicp_lib.experiments.recordings.scenarios import Scenario, scenario
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, JOINTS_FILE, SIMULATION_FILE, TRUTH_FILE
-from hicp_lib.recordings.writer import write_index
+from hicp_lib.recordings.writer import depth_name, rgb_name, write_index
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
 from hicp_lib.simulation.body.identities import Subject
 from hicp_lib.simulation.rendering.camera import PlacedCamera
@@ -66,13 +66,14 @@ DEPTH_UNITS_PER_M = 1000.0
 START_S = 100.0  # what the camera's clock shows at the first frame: clocks seldom start together
 
 
-def part_path(out: Path, k: int) -> Path:
-    """File of the truth of frame `k`; written last, so a frame with it is finished."""
-    return out / PARTS_DIR / f"{k:06d}.json"
+def files_of(out: Path, k: int) -> list[Path]:
+    """All files of frame `k`: that of its truth, written last, then images."""
+    depth = out / depth_name(k)
+    return [out / PARTS_DIR / f"{k:06d}.json", out / rgb_name(k), depth, out / EXACT_DEPTH_DIR / depth.name]
 
 
 def finish_recording(out: Path, plan: Scenario, n: int, stamp: dict) -> None:
-    """Write all but the frames of a recording, and drop frames beyond.
+    """Write all but the frames of a recording.
 
     Parameters
     ----------
@@ -85,23 +86,19 @@ def finish_recording(out: Path, plan: Scenario, n: int, stamp: dict) -> None:
         What the frames were made with.
     """
     times_s, T_base_cam = START_S + plan.times_s(n), camera_poses(plan, n)
-    for folder in ("rgb", "depth", EXACT_DEPTH_DIR):
-        for path in (out / folder).iterdir():
-            if path.stem.isdigit() and int(path.stem) >= n:
-                part_path(out, int(path.stem)).unlink(missing_ok=True)
-                path.unlink()
     write_table(out / TRUTH_FILE, _truth(out, times_s, T_base_cam))
     write_table(out / JOINTS_FILE, _joints(plan, times_s))
     settings = {"n_frames": n, "rate_hz": plan.rate_hz, "mount": plan.mount}
     settings["depth_camera"] = asdict(plan.depth_camera)
     mocap = out / PARTS_DIR / MOCAP_PART
-    settings |= read_json(mocap) if mocap.exists() else {}
+    known = read_json(mocap) if mocap.exists() else {}
+    settings |= {name: value for name, value in known.items() if name != "sha256"}
     write_json(out / SIMULATION_FILE, stamp | settings, indent=1)
     write_index(out, COLOUR, DEPTH_UNITS_PER_M, times_s, (times_s, T_base_cam))
 
 
 def _truth(out: Path, times_s: np.ndarray, T_base_cam: np.ndarray) -> pd.DataFrame:
-    parts = [read_json(part_path(out, k)) for k in range(len(times_s))]
+    parts = [read_json(files_of(out, k)[0]) for k in range(len(times_s))]
     points_m = np.array([part["keypoints_m"] for part in parts])
     pixels_px = project(COLOUR, transform(np.linalg.inv(T_base_cam), points_m))
     frame = np.repeat(np.arange(len(parts)), len(NAMES))

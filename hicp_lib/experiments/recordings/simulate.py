@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from hicp_lib.core.cache import key
 from hicp_lib.core.executor import Workers, resolved, run_jobs
-from hicp_lib.core.files import read_json, write_json
+from hicp_lib.core.files import locked_folder
 from hicp_lib.experiments.laboratory import T_WORLD_ROOT
 from hicp_lib.experiments.recordings import frames
 from hicp_lib.experiments.recordings.frames import camera_poses, record_frame
@@ -24,9 +24,7 @@ from hicp_lib.recordings.qualisys import write_c3d, write_tsv
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, MOCAP_FILE, RGB_LIST, Recording, open_recording
 from hicp_lib.recordings.writer import depth_name, write_depth, write_frame
 from hicp_lib.simulation.body.identities import Subject
-from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts
-
-_MOCAP_FILES = (MOCAP_FILE, str(Path(MOCAP_FILE).with_suffix(".c3d")))
+from hicp_lib.simulation.world.batch import check_numbers, keep_parts, read_part, write_part
 
 
 def simulate_recording(
@@ -60,28 +58,29 @@ def simulate_recording(
     Raises
     ------
     InputError
-        For an unknown scenario, numbers out of range, or a folder that holds something else.
+        For an unknown scenario, numbers out of range, or a folder that holds something else or is being
+        filled.
     """
     out, plan = Path(out), scenario(name, subject.number)
     n = plan.n_frames if n_frames is None else n_frames
     workers = resolved(workers)
     check_numbers(n_frames=(n, 1, plan.max_frames))
-    check_output(out, frames.PARTS_DIR, "for the recording", "simulated")
-    (out / RGB_LIST).unlink(missing_ok=True)  # it is no recording until it is finished
-    who = {"subject": asdict(subject), "identity": asdict(subject.identity)}
-    stamp = {"scenario": name, **who, "version": key([simulate_recording])}
-    keep_parts(out, frames.PARTS_DIR, stamp, ["rgb/*", "depth/*", f"{EXACT_DEPTH_DIR}/*", *_MOCAP_FILES])
-    missing = [k for k in range(n) if not frames.part_path(out, k).exists()]
-    one = partial(record_one, name=name, subject=subject)
-    todo: list[tuple[str, Callable]]
-    todo = [(str(frames.part_path(Path(), k)), partial(one, k=k)) for k in missing]
-    if plan.capture is not None and not _is_captured(out, n):  # the longest first
-        capture = partial(_capture_all, name=name, subject=subject, n=int(n))
-        todo.insert(0, (str(Path(frames.PARTS_DIR, frames.MOCAP_PART)), capture))
-    done = run_jobs(todo, workers, folder=out)
-    for _ in tqdm(done, name, len(todo), unit="frame", disable=not progress or None):
-        pass
-    frames.finish_recording(out, plan, int(n), stamp)
+    with locked_folder(out):
+        who = {"subject": asdict(subject), "identity": asdict(subject.identity)}
+        stamp = {"scenario": name, **who, "version": key([simulate_recording])}
+        once = [] if plan.capture is None else list(map(str, _mocap_files(Path())))
+        keep_parts(out, frames.PARTS_DIR, RGB_LIST, stamp, int(n), partial(frames.files_of, out), once)
+        missing = [k for k in range(n) if read_part(*frames.files_of(out, k)) is None]
+        one = partial(record_one, name=name, subject=subject)
+        todo: list[tuple[str, Callable]]
+        todo = [(str(frames.files_of(Path(), k)[0]), partial(one, k=k)) for k in missing]
+        if plan.capture is not None and not _is_captured(out, n):  # the longest first
+            capture = partial(_capture_all, name=name, subject=subject, n=int(n))
+            todo.insert(0, (str(_mocap_files(Path())[0]), capture))
+        done = run_jobs(todo, workers, folder=out)
+        for _ in tqdm(done, name, len(todo), unit="frame", disable=not progress or None):
+            pass
+        frames.finish_recording(out, plan, int(n), stamp)
     return open_recording(out)
 
 
@@ -101,24 +100,30 @@ def record_one(out: Path, name: str, subject: Subject, k: int) -> None:
     rgb, depth_m, exact_m, truth = record_frame(name, subject, k)
     write_frame(out, k, rgb, depth_m, frames.DEPTH_UNITS_PER_M)
     write_depth(out / EXACT_DEPTH_DIR / Path(depth_name(k)).name, exact_m, frames.DEPTH_UNITS_PER_M)
-    write_json(frames.part_path(out, k), truth)
+    write_part(truth, *frames.files_of(out, k))
+
+
+def _mocap_files(out: Path) -> list[Path]:
+    """What says that motion capture is finished, and the files of it."""
+    c3d = Path(MOCAP_FILE).with_suffix(".c3d")
+    return [out / frames.PARTS_DIR / frames.MOCAP_PART, out / MOCAP_FILE, out / c3d]
 
 
 def _is_captured(out: Path, n: int) -> bool:
-    part = out / frames.PARTS_DIR / frames.MOCAP_PART
-    return part.exists() and read_json(part)["n_frames"] == n
+    part = read_part(*_mocap_files(out)[:2])
+    return part is not None and part["n_frames"] == n
 
 
 def _capture_all(out: Path, name: str, subject: Subject, n: int) -> None:
     """Write motion capture of `n` frames."""
-    part, plan = out / frames.PARTS_DIR / frames.MOCAP_PART, scenario(name)
+    (part, tsv, c3d), plan = _mocap_files(out), scenario(name)
     if plan.capture is None:
         return
     T_world_camera = T_WORLD_ROOT @ camera_poses(plan, 1)[0]
     exported, T_mocap_world, lead_s = plan.capture(subject, float(plan.times_s(n)[-1]), T_world_camera)
-    tsv, c3d = (out / name for name in _MOCAP_FILES)
     write_tsv(tsv, exported)
     if len(exported.times_s) < MAX_C3D_FRAMES:  # a longer one is in the TSV file alone
         write_c3d(c3d, exported)
     T_base_mocap = np.linalg.inv(T_mocap_world @ T_WORLD_ROOT).tolist()
-    write_json(part, {"n_frames": n, "T_base_mocap": T_base_mocap, "mocap_offset_s": frames.START_S - lead_s})
+    known = {"n_frames": n, "T_base_mocap": T_base_mocap, "mocap_offset_s": frames.START_S - lead_s}
+    write_part(known, part, tsv)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import natural_order
+from hicp_lib.core.files import listed
 from hicp_lib.formats.importers.matching import NamedBy
 from hicp_lib.formats.json_validation import Rows
 
@@ -123,12 +122,9 @@ def json_files(folder: Path, endings: tuple[str, ...], what: str) -> dict[str, P
     InputError
         If it is no folder, or holds no such file.
     """
-    try:
-        names = sorted((entry.name for entry in os.scandir(folder)), key=natural_order)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be read ({error.strerror}); give {what}") from None
+    names = [name for name in listed(folder, what=what) if name[0] != "_"]
     for ending in endings:
-        files = {n.removesuffix(ending): folder / n for n in names if n.endswith(ending) and n[0] not in "._"}
+        files = {n.removesuffix(ending): folder / n for n in names if n.endswith(ending)}
         if files:
             return files
     raise InputError(f"{folder}: holds no file *{endings[0]}; give {what}")

@@ -1,12 +1,13 @@
 """Folders that many results at once are written to."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_json, write_json
+from hicp_lib.core.files import kept_beside, read_json, remove_inside, sha256_file, write_json
 
 
 def check_numbers(**limits: tuple[object, int, int]) -> None:
@@ -31,8 +32,14 @@ def check_numbers(**limits: tuple[object, int, int]) -> None:
             raise InputError(f"{name} is {value!r}; expected a whole number from {low} to {high}")
 
 
-def keep_parts(out: Path, parts_dir: str, stamp: dict, made: Iterable[str]) -> None:
-    """Keep what an interrupted run finished; drop what was made with something else.
+def keep_parts(
+    out: Path, parts_dir: str, index: str, stamp: dict, n: int, made: Callable[[int], Iterable[Path]],
+    once: Iterable[str],
+) -> None:  # fmt: skip
+    """Keep what an interrupted run finished; drop what was made with something else, or is beyond `n`.
+
+    What was made is known by what is kept beside the stamp: how many, and the names in `once`. All other
+    files, whoever's they are, stay.
 
     Parameters
     ----------
@@ -40,37 +47,44 @@ def keep_parts(out: Path, parts_dir: str, stamp: dict, made: Iterable[str]) -> N
         Folder that is written to.
     parts_dir : str
         Name of the folder in it that says what is finished.
+    index : str
+        Name of the file in it without which it is nothing finished; it is removed.
     stamp : dict
         What results depend on, JSON-able; kept there.
-    made : iterable of str
-        Patterns of the files that are made, relative to `out`.
-    """
-    stamp_file = out / parts_dir / "stamp.json"
-    if stamp_file.exists() and read_json(stamp_file) == stamp:
-        return
-    for pattern in (f"{parts_dir}/*.json", *made):
-        for path in out.glob(pattern):
-            path.unlink()
-    write_json(stamp_file, stamp)
-
-
-def check_output(out: Path, marker: str, purpose: str, made: str) -> None:
-    """Refuse a folder that holds something else.
-
-    Parameters
-    ----------
-    out : Path
-    marker : str
-        Name of a folder that is only in what was made here.
-    purpose, made : str
-        What the folder is for and what is done to files there, in the words of the message.
+    n : int
+        How many there will be.
+    made : callable
+        Files of each.
+    once : iterable of str
+        Names of files, relative to `out`, that are made for all together.
 
     Raises
     ------
     InputError
-        If `out` is a file, or holds files and no `marker`.
+        If the folder holds something else, or a file where one would be written.
     """
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: is a file; give a folder {purpose}")
-    if out.is_dir() and any(out.iterdir()) and not (out / marker).is_dir():
-        raise InputError(f"{out}: holds files that were not {made}; give an empty or new folder")
+    stamp_name = f"{parts_dir}/stamp.json"
+    before = kept_beside(out, stamp_name, stamp=dict, n=int, once=list)
+    (out / index).unlink(missing_ok=True)
+    is_same, n_before = before["stamp"] == stamp, before["n"]
+    for path in chain.from_iterable(map(made, range(n if is_same else 0, n_before))):
+        path.unlink(missing_ok=True)
+    remove_inside(out, [] if is_same else before["once"])
+    for path in chain.from_iterable(map(made, range(n_before, n))):
+        if path.exists():
+            raise InputError(f"{path}: was not made by this command; take it away, or give another folder")
+    write_json(out / stamp_name, {"stamp": stamp, "n": n, "once": list(once)})
+
+
+def write_part(content: dict, part: Path, *files: Path) -> None:
+    """Say in the file `part` that it is finished, its files being there; with JSON-able content."""
+    write_json(part, content | {"sha256": [sha256_file(path) for path in files]})
+
+
+def read_part(part: Path, *files: Path) -> dict | None:
+    """What `write_part` wrote; None where it, or a file, is not there or not whole."""
+    try:
+        content = read_json(part)
+        return content if content["sha256"] == [sha256_file(path) for path in files] else None
+    except (InputError, KeyError, TypeError):
+        return None

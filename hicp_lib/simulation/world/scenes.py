@@ -15,7 +15,7 @@ from tqdm import tqdm
 
 from hicp_lib.core.cache import key
 from hicp_lib.core.executor import Workers, resolved, run_jobs
-from hicp_lib.core.files import read_json, write_json
+from hicp_lib.core.files import locked_folder, read_json
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.recordings.writer import write_rgb
@@ -23,7 +23,7 @@ from hicp_lib.simulation.body.identities import HELD_OUT, split_members, stream
 from hicp_lib.simulation.rendering.camera import project_world
 from hicp_lib.simulation.rendering.colour_sensor import expose
 from hicp_lib.simulation.rendering.render import Frame, render
-from hicp_lib.simulation.world.batch import check_numbers, check_output, keep_parts
+from hicp_lib.simulation.world.batch import check_numbers, keep_parts, read_part, write_part
 from hicp_lib.simulation.world.staging import Stage, random_stage
 from hicp_lib.simulation.world.visibility import keypoint_visibility
 
@@ -69,43 +69,35 @@ def render_dataset(
     Raises
     ------
     InputError
-        For an unknown split, numbers out of range, or a folder that holds something else.
+        For an unknown split, numbers out of range, or a folder that holds something else or is being filled.
     """
     out, workers = Path(out), resolved(workers)
     check_numbers(n=(n, 1, MAX_SCENES), seed=(seed, 0, _MAX_NUMBER))
     split_members(split)  # a wrong name is told before anything is written
-    check_output(out, _PARTS_DIR, "to render into", "rendered")
-    (out / "annotations.json").unlink(missing_ok=True)
-    stamp = {"renderer": key([render_dataset]), "seed": int(seed), "people": split}
-    keep_parts(out, _PARTS_DIR, stamp, ["images/*.jpg"])
-    # The people are written after the image.
-    missing = [k for k in range(n) if not (_people_path(out, k).exists() and _image_path(out, k).exists())]
-    one = partial(_render_one, seed=seed, split=split)
-    jobs = [(str(_people_path(Path(), k)), partial(one, index=k)) for k in missing]
-    done = run_jobs(jobs, workers, folder=out)
-    for _ in tqdm(done, "rendering", n, initial=n - len(missing), unit="image", disable=not progress or None):
-        pass
-    annotations = _collect(out, n)
-    for path in (out / "images").glob("*.jpg"):
-        if int(path.stem) not in annotations.images:
-            path.unlink()
-    write_annotations(out / "annotations.json", annotations)
+    with locked_folder(out):
+        stamp = {"renderer": key([render_dataset]), "seed": int(seed), "people": split}
+        keep_parts(out, _PARTS_DIR, "annotations.json", stamp, int(n), partial(_files, out), [])
+        missing = [k for k in range(n) if read_part(*_files(out, k)) is None]
+        one = partial(_render_one, seed=seed, split=split)
+        jobs = [(str(_files(Path(), k)[0]), partial(one, index=k)) for k in missing]
+        done, shown = run_jobs(jobs, workers, folder=out), {"unit": "image", "disable": not progress or None}
+        for _ in tqdm(done, "rendering", n, initial=n - len(missing), **shown):
+            pass
+        annotations = _collect(out, n)
+        write_annotations(out / "annotations.json", annotations)
     return annotations
 
 
-def _image_path(out: Path, index: int) -> Path:
-    return out / "images" / f"{index:06d}.jpg"
-
-
-def _people_path(out: Path, index: int) -> Path:
-    return out / _PARTS_DIR / f"{index:06d}.json"
+def _files(out: Path, index: int) -> list[Path]:
+    """What is known of an image, and the image."""
+    return [out / _PARTS_DIR / f"{index:06d}.json", out / "images" / f"{index:06d}.jpg"]
 
 
 def _render_one(out: Path, seed: int, index: int, split: str) -> None:
     image, people = render_scene(seed, index, split)
-    write_rgb(_image_path(out, index), image)
+    write_rgb(_files(out, index)[1], image)
     height, width = image.shape[:2]
-    write_json(_people_path(out, index), {"width": width, "height": height, "people": people})
+    write_part({"width": width, "height": height, "people": people}, *_files(out, index))
 
 
 def render_scene(seed: int, index: int, split: str = HELD_OUT) -> tuple[np.ndarray, list[dict]]:
@@ -160,9 +152,9 @@ def annotate(stage: Stage, frame: Frame) -> list[dict]:
 
 
 def _collect(out: Path, n: int) -> Annotations:
-    scenes = [read_json(_people_path(out, index)) for index in range(n)]
+    scenes = [read_json(_files(out, index)[0]) for index in range(n)]
     images = {
-        k: ImageInfo(k, _image_path(out, k).name, scene["width"], scene["height"])
+        k: ImageInfo(k, _files(out, k)[1].name, scene["width"], scene["height"])
         for k, scene in enumerate(scenes)
     }
     people = [person for scene in scenes for person in scene["people"]]

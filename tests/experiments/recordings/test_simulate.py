@@ -133,10 +133,15 @@ def test_what_was_made_of_somebody_else_is_dropped(lower, tmp_path, monkeypatch)
     truth = json.loads((out / ".frames" / "000000.json").read_text())
     fake = blank, np.ones((480, 640)), np.ones((480, 640)), truth
     (out / "mocap.tsv").write_text("of another scenario")
+    stamp = json.loads((out / ".frames" / "stamp.json").read_text())
+    (out / ".frames" / "stamp.json").write_text(json.dumps(stamp | {"once": ["mocap.tsv", "../mine.txt"]}))
+    (tmp_path / "mine.txt").write_text("precious")
+    (out / "rgb" / "mine.jpg").write_text("precious")
     monkeypatch.setattr(simulate, "record_frame", lambda *job: fake)
     simulate_recording(out, "relative-lower", n_frames=1, subject=Subject(5), workers=1, progress=False)
     assert read_image(out / "rgb" / "000000.jpg").max() == 0
     assert not (out / "rgb" / "000001.jpg").exists() and not (out / "mocap.tsv").exists()
+    assert (tmp_path / "mine.txt").exists() and (out / "rgb" / "mine.jpg").exists()
 
 
 @pytest.mark.parametrize(
@@ -156,7 +161,7 @@ def test_what_cannot_be_simulated_is_refused(tmp_path, arguments, expected):
 
 def test_a_folder_with_other_things_is_refused(tmp_path):
     (tmp_path / "thesis.tex").write_text("precious")
-    with pytest.raises(InputError, match="holds files that were not simulated"):
+    with pytest.raises(InputError, match="holds files not made by this command"):
         simulate_recording(tmp_path, "relative-lower", n_frames=1)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import locked_folder
 from hicp_lib.core.images import read_image
 from hicp_lib.formats.annotations import read_annotations
 from hicp_lib.simulation.body.identities import HELD_OUT, KINDS, SPLITS, split_members
@@ -104,6 +105,63 @@ def test_another_seed_reuses_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(scenes, "key", lambda *_, **__: "of another renderer")
     render_dataset(out, 1, 2, workers=1, progress=False)
     assert calls[4:] == [(2, 0, HELD_OUT)]
+
+
+@pytest.fixture
+def quick(monkeypatch) -> list[int]:
+    """Scenes of four pixels and one person; the numbers of those that were rendered."""
+    rendered = []
+    fake = {"bbox": [0, 0, 2, 2], "area": 4, "keypoints": np.zeros((136, 3)).tolist()}
+
+    def scene(seed, index, split):
+        rendered.append(index)
+        return np.full((4, 4, 3), seed, np.uint8), [fake | {"distance_m": 1.0, "identity": {}}]
+
+    monkeypatch.setattr(scenes, "render_scene", scene)
+    return rendered
+
+
+def render_quickly(out: Path, n: int = 2, seed: int = 1) -> None:
+    render_dataset(out, n, seed, workers=1, progress=False)
+
+
+def test_files_of_others_stay_where_images_go(quick, tmp_path):
+    render_quickly(tmp_path)
+    mine = [tmp_path / "images" / name for name in ("cat.jpg", "000007.jpg", ".partial-0123456789abcdef.jpg")]
+    for path in mine:
+        path.write_bytes(b"precious")
+    render_quickly(tmp_path, seed=2)
+    render_quickly(tmp_path, n=1, seed=2)
+    assert all(path.read_bytes() == b"precious" for path in mine)
+    assert not (tmp_path / "images" / "000001.jpg").exists()
+    with pytest.raises(InputError, match="000007.jpg: was not made by this command"):
+        render_quickly(tmp_path, n=8, seed=2)
+    assert mine[1].read_bytes() == b"precious"
+
+
+@pytest.mark.parametrize("left", [b"", b"half"])
+@pytest.mark.parametrize("name", ["images/000001.jpg", ".scenes/000001.json"])
+def test_what_a_power_cut_left_is_rendered_again(quick, tmp_path, name, left):
+    render_quickly(tmp_path)
+    before = (tmp_path / "images" / "000001.jpg").read_bytes()
+    (tmp_path / name).write_bytes(left)
+    render_quickly(tmp_path)
+    assert quick == [0, 1, 1] and (tmp_path / "images" / "000001.jpg").read_bytes() == before
+
+
+@pytest.mark.parametrize("stamp", ["[]", "{}", '{"n": "2", "once": [], "stamp": {}}', ""])
+def test_a_stamp_of_something_else_is_refused(quick, tmp_path, stamp):
+    render_quickly(tmp_path)
+    (tmp_path / ".scenes" / "stamp.json").write_text(stamp)
+    with pytest.raises(InputError, match="stamp.json: "):
+        render_quickly(tmp_path)
+    assert quick == [0, 1]
+
+
+def test_two_do_not_render_into_one_folder(quick, tmp_path):
+    with locked_folder(tmp_path), pytest.raises(InputError, match="another command writes there"):
+        render_quickly(tmp_path)
+    assert quick == []
 
 
 @pytest.mark.parametrize("split", SPLITS)
