@@ -19,10 +19,9 @@ Both are checked where they enter. Conventions of this module, where formats in 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,6 +30,7 @@ from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_json
 from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS, NAMES
+from hicp_lib.core.names import is_inside
 from hicp_lib.formats.cropcoco import FLAG_OUTSIDE, OUTSIDE, outside_from_flags
 from hicp_lib.formats.detection_files import open_detections, read_rows
 from hicp_lib.formats.importers.matching import match_images
@@ -42,7 +42,6 @@ SEGMENT_OF_BOX = 0.53  # area of a person's segment over that of the box, as too
 _LEAST_AREA, _MOST_AREA = 0.01, 2.0  # of a person, as a share of their box; another one stands for none
 PERSON = {"id": PERSON_CATEGORY, "name": "person", "supercategory": "person"}
 MAX_SIDE_PX = 100_000
-_UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")  # control characters, halves of characters
 _KNOWN_KEYS = {
     "id", "image_id", "category_id", "bbox", "area", "iscrowd", "keypoints", "num_keypoints", *PART_KEYS,
 }  # fmt: skip
@@ -233,7 +232,7 @@ def _of_people(rows: Rows, people: PersonCategory, allowed: set[int]) -> Rows:
 
 def _read_images(rows: Rows) -> dict[int, ImageInfo]:
     ids = rows.unique_integers("id").tolist()
-    names = rows.column("file_name", _is_inside, "a name inside the folder of images")
+    names = rows.column("file_name", is_inside, "a name inside the folder of images")
     widths, heights = (_sides(rows, key) for key in ("width", "height"))
     return {i: ImageInfo(i, *rest) for i, *rest in zip(ids, names, widths, heights, strict=True)}
 
@@ -241,14 +240,6 @@ def _read_images(rows: Rows) -> dict[int, ImageInfo]:
 def _sides(rows: Rows, key: str) -> list[int]:
     rows.integers(key)
     return rows.column(key, lambda side: 1 <= side <= MAX_SIDE_PX, f"1 to {MAX_SIDE_PX} pixels")
-
-
-def _is_inside(name: object) -> bool:
-    """Whether a file name cannot lead out of its folder, on any system."""
-    if not isinstance(name, str) or _UNWRITABLE.search(name):
-        return False
-    path = PureWindowsPath(name)  # splits at both kinds of slash and knows drives
-    return bool(path.name) and not path.anchor and ".." not in path.parts
 
 
 def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> Annotations:

@@ -8,7 +8,6 @@
 The bytes follow from the detections and their order alone.
 """
 
-import io
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -22,8 +21,9 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.extras import require
-from hicp_lib.core.files import atomic_path, read_bytes, read_json
+from hicp_lib.core.files import atomic_path, read_json
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
+from hicp_lib.core.tables import read_table
 from hicp_lib.formats.layouts import PERSON_CATEGORY
 
 SUFFIXES = (".json", ".csv", ".parquet")
@@ -213,9 +213,9 @@ def read_rows(path: Path) -> Any:
     if path.suffix not in (".csv", ".parquet"):
         return read_json(path)
     refuse_other_suffix(path)
+    columns = ("image_id", "person", "person_score", "keypoint", "u_px", "v_px", "score")
+    table = read_table(path, columns, float_precision="round_trip", dtype={"file_name": str})
     try:
-        content = io.BytesIO(read_bytes(path, "give a table"))
-        table = _read_csv(content) if path.suffix == ".csv" else pd.read_parquet(content)
         keypoints = [INDEX[name] for name in table["keypoint"]]
         values = table[["u_px", "v_px", "score"]].to_numpy(float)
         if table.duplicated(["image_id", "person", "keypoint"]).any():
@@ -230,7 +230,3 @@ def read_rows(path: Path) -> Any:
     rows = first.rename(columns={"person_score": "score"}).reset_index().to_dict("records")
     flat = triples.reshape(len(rows), 3 * N_KEYPOINTS).tolist()
     return [row | {"keypoints": keypoints} for row, keypoints in zip(rows, flat, strict=True)]
-
-
-def _read_csv(content: io.BytesIO) -> pd.DataFrame:
-    return pd.read_csv(content, float_precision="round_trip", dtype={"file_name": str})
