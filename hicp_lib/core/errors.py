@@ -42,12 +42,12 @@ def one_line(error: BaseException) -> str:
 
 
 def printable(text: str, kept: str = "") -> str:
-    """Text without characters that a terminal obeys, or shows as nothing: their escapes stand in their place.
+    r"""Text without characters that a terminal obeys, or shows as nothing: their escapes stand in their place.
 
     Examples
     --------
     >>> print(printable("a\x1b[2J\nb"))
-    a\\x1b[2J\\nb
+    a\x1b[2J\nb
     """
     if text.isprintable():
         return text

@@ -82,7 +82,15 @@ def atomic_path(path: str | Path, sync: bool = True) -> Iterator[Path]:
 
 
 def write_bytes(path: str | Path, content: bytes, sync: bool = True) -> None:
-    """Write `content` to `path`, whole or not at all; `sync` as of `atomic_path`."""
+    """Write a file, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+    content : bytes
+    sync : bool, optional
+        As of `atomic_path`.
+    """
     with atomic_path(path, sync) as temporary:
         temporary.write_bytes(content)
 

@@ -77,7 +77,17 @@ def keep_parts(
 
 
 def write_part(content: dict, part: Path, *files: Path) -> None:
-    """Say in the file `part` that it is finished, its files being there; with JSON-able content."""
+    """Say that a part is finished, once its files are there.
+
+    Parameters
+    ----------
+    content : dict
+        What else there is to say, JSON-able.
+    part : Path
+        The file that says it.
+    *files : Path
+        Hashed with it.
+    """
     write_json(part, content | {"sha256": [sha256_file(path) for path in files]})
 
 
