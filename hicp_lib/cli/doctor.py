@@ -84,8 +84,8 @@ class Check:
 
 def run_checks() -> list[Check]:
     """Every check; none of them raises, and none contacts a network."""
-    checks = [check_python, check_system_libraries, check_locked_versions, check_opencv, check_weights]
-    checks += [check_probes, check_folders]
+    checks: list[Callable[[], Check | list[Check]]] = [check_python, check_system_libraries]
+    checks += [check_locked_versions, check_opencv, check_weights, check_probes, check_folders]
     return [line for check in checks for line in _lines(check)]
 
 
