@@ -22,9 +22,10 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.extras import require
-from hicp_lib.core.files import atomic_path, read_bytes, read_json
+from hicp_lib.core.files import atomic_path, read_bytes
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
 from hicp_lib.formats.layouts import PERSON_CATEGORY
+from hicp_lib.formats.number_lists import read_people
 
 SUFFIXES = (".json", ".csv", ".parquet")
 _PEOPLE_AT_ONCE = 1000  # of a table; a group of rows of Parquet
@@ -211,7 +212,7 @@ def read_rows(path: Path) -> Any:
         If it cannot be read, or is a table without the columns that `open_detections` writes.
     """
     if path.suffix not in (".csv", ".parquet"):
-        return read_json(path)
+        return read_people(path)
     refuse_other_suffix(path)
     try:
         content = io.BytesIO(read_bytes(path, "give a table"))
@@ -228,7 +229,7 @@ def read_rows(path: Path) -> Any:
     triples = np.zeros((people.ngroups, N_KEYPOINTS, 3))
     triples[people.ngroup(), keypoints] = values
     rows = first.rename(columns={"person_score": "score"}).reset_index().to_dict("records")
-    flat = triples.reshape(len(rows), 3 * N_KEYPOINTS).tolist()
+    flat = triples.reshape(len(rows), 3 * N_KEYPOINTS)
     return [row | {"keypoints": keypoints} for row, keypoints in zip(rows, flat, strict=True)]
 
 

@@ -15,6 +15,9 @@ from hicp_lib.evaluation.ap.extended_oks import PRESENCE_CUT, extended_oks, know
 from hicp_lib.evaluation.ap.options import VISIBLE, Options, choose
 from hicp_lib.formats.annotations import SEGMENT_OF_BOX, Annotations
 
+_AT_ONCE = 2**12  # images whose detections are checked at a time
+_NOTHING = np.zeros((0, 0), dtype=int)  # of no objects
+
 
 @dataclass(frozen=True)
 class Evaluation:
@@ -96,11 +99,13 @@ def evaluate(
         groups and options, and for area "source" where people have none.
     """
     objects, chosen = choose(group, options)
-    image_ids, stacked = check_detections(detections, annotations)
+    image_ids, points_px, of_keypoints, of_person = check_detections(detections, annotations, objects)
     images = np.array(sorted(annotations.images), dtype=np.int64)
     people = people_seen(annotations, objects, chosen)
     image_rows, person_rows = (np.searchsorted(images, of) for of in (image_ids, people.image_ids))
-    slots, found_px, present, scores = _detections_seen(image_rows, stacked, objects, chosen)
+    slots, found_px, present, scores = _detections_seen(
+        _slots(image_rows, objects), points_px, of_keypoints, of_person, chosen
+    )
     truth_px, flags = _flat(people.keypoints_px, objects), _flat(people.visibility, objects)
     boxes_px, areas_px2, is_crowd = (
         np.repeat(of, len(objects), axis=0) for of in (people.boxes_px, people.areas_px2, people.is_crowd)
@@ -134,7 +139,7 @@ def evaluate(
 
 def _flat(values: np.ndarray, objects: np.ndarray) -> np.ndarray:
     """Values of people, (n, 136, ...), as those of their objects, (n * n_objects, k, ...)."""
-    return values[:, objects].reshape(-1, objects.shape[1], *values.shape[2:])
+    return values[:, objects].reshape(len(values) * len(objects), objects.shape[1], *values.shape[2:])
 
 
 def _slots(image_rows: np.ndarray, objects: np.ndarray) -> np.ndarray:
@@ -143,16 +148,28 @@ def _slots(image_rows: np.ndarray, objects: np.ndarray) -> np.ndarray:
 
 
 def check_detections(
-    detections: Mapping[int, Detections], annotations: Annotations
-) -> tuple[np.ndarray, Detections]:
-    """Refuse what an evaluator would swallow or stumble over, and put the rest one after the other.
+    detections: Mapping[int, Detections], annotations: Annotations, objects: np.ndarray = _NOTHING
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Refuse what an evaluator would swallow or stumble over, and put some of it one after the other.
+
+    Parameters
+    ----------
+    detections : mapping of int to Detections
+        By image id.
+    annotations : Annotations
+        Of the images.
+    objects : array of int, shape (n_objects, k), optional
+        Keypoints; none if left out.
 
     Returns
     -------
     image_ids : array of int, shape (n,)
         Of the people found.
-    found : Detections
-        All n of them.
+    points_px : array, shape (n * n_objects, k, 2)
+        Of their objects, all of a person one after the other.
+    scores : array, shape (n * n_objects, k)
+        Of these points.
+    person_scores : array, shape (n * n_objects,)
 
     Raises
     ------
@@ -167,10 +184,24 @@ def check_detections(
         if shapes != ((n, N_KEYPOINTS, 2), (n, N_KEYPOINTS)):
             expected = f"expected (n, {N_KEYPOINTS}, 2) and (n, {N_KEYPOINTS})"
             raise InputError(f"detections of image {image_id}: shapes {shapes}; {expected}")
-    everybody = Detections.none(), *detections.values()
-    parts = [(of.keypoints_px, of.scores, of.person_scores) for of in everybody]
-    stacked = Detections(*map(np.concatenate, zip(*parts, strict=True)))
-    image_ids = np.repeat(np.array(list(detections), dtype=np.int64), list(map(len, detections.values())))
+    images, people = np.array(list(detections), dtype=np.int64), list(detections.values())
+    image_ids = np.repeat(images, list(map(len, people)))
+    n_objects, k = objects.shape
+    n = n_objects * len(image_ids)
+    points_px, scores, person_scores = np.empty((n, k, 2)), np.empty((n, k)), np.empty(n)
+    first = 0
+    for i in range(0, len(people), _AT_ONCE):  # of hundreds of thousands, 136 keypoints are not held twice
+        parts = [(of.keypoints_px, of.scores, of.person_scores) for of in people[i : i + _AT_ONCE]]
+        stacked = Detections(*map(np.concatenate, zip(*parts, strict=True)))
+        last = first + len(stacked)
+        _refuse_unsound(stacked, image_ids[first:last])
+        of = slice(first * n_objects, last * n_objects)
+        points_px[of], scores[of] = _flat(stacked.keypoints_px, objects), _flat(stacked.scores, objects)
+        person_scores[of], first = np.repeat(stacked.person_scores, n_objects), last
+    return image_ids, points_px, scores, person_scores
+
+
+def _refuse_unsound(stacked: Detections, image_ids: np.ndarray) -> None:
     sound = _sound(stacked)
     for i in np.flatnonzero(~(np.isfinite(stacked.person_scores) & sound.all(axis=1)))[:1].tolist():
         where = f"detections of image {image_ids[i]}"
@@ -181,7 +212,6 @@ def check_detections(
             score = stacked.person_scores[i]
             raise InputError(f"{where}: score of {person} is {score}; expected a finite number")
         raise InputError(f"{where}: {NAMES[k]} of {person} is {value}; expected finite numbers")
-    return image_ids, stacked
 
 
 def _sound(found: Detections) -> np.ndarray:
@@ -215,7 +245,8 @@ def people_seen(annotations: Annotations, objects: np.ndarray, options: Options)
     seen = labelled | annotations.is_crowd | (options.unlabelled == "ignore")
     if options.others == "count":
         seen &= ~annotations.is_other
-    people = replace(annotations, visibility=flags).take(seen)
+    people = replace(annotations, visibility=flags)
+    people = people if seen.all() else people.take(seen)
     return replace(people, areas_px2=_areas(people, options.area))
 
 
@@ -238,13 +269,16 @@ def _source_area(people: Annotations, i: int) -> float:
 
 
 def _detections_seen(
-    image_rows: np.ndarray, found: Detections, objects: np.ndarray, options: Options
+    slots: np.ndarray,
+    points_px: np.ndarray,
+    of_keypoints: np.ndarray,
+    of_person: np.ndarray,
+    options: Options,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Slots, keypoints, which of them are declared present, and scores of the objects that take part."""
-    points, of_keypoints = _flat(found.keypoints_px, objects), _flat(found.scores, objects)
-    of_group = of_keypoints.mean(axis=-1)
-    given = np.isfinite(points[..., 0])
+    given = np.isfinite(points_px[..., 0])
     present = given & (of_keypoints >= PRESENCE_CUT)
-    scores = np.repeat(found.person_scores, len(objects)) if options.score == "person" else of_group
+    scores = of_person if options.score == "person" else of_keypoints.mean(axis=-1)
     seen = given.any(axis=-1) | (options.absent == "count")
-    return _slots(image_rows, objects)[seen], points[seen], present[seen], scores[seen]
+    rows = slice(None) if seen.all() else seen  # not copied
+    return slots[rows], points_px[rows], present[rows], scores[rows]

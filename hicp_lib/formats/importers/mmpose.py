@@ -12,7 +12,6 @@
 Sources: MMPose's inferencer, `split_instances`, and `CocoMetric` ("bbox_keypoint").
 """
 
-from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,7 +20,7 @@ import numpy as np
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
 from hicp_lib.formats.importers.people import FileRows, People, json_files, split
-from hicp_lib.formats.json_validation import CONVENTIONS, Rows, shown
+from hicp_lib.formats.json_validation import Rows, shown
 from hicp_lib.formats.layouts import layouts_of
 
 _KNOWN_KEYS = {"keypoints", "keypoint_scores", "bbox"}
@@ -59,8 +58,7 @@ def read_mmpose(path: Path) -> People:
     for key in ("keypoint_scores", "keypoints"):
         joined.column(key)
     rows = replace(joined, rows=[row | {"keypoints": _flat(joined, i)} for i, row in enumerate(joined.rows)])
-    triples = rows.keypoints(layouts)
-    conventions = Counter(CONVENTIONS.get(len(row["keypoints"]) // 3, "by their names") for row in rows.rows)
+    triples, conventions = rows.keypoints(layouts)
     keypoints, scores = split(triples, triples[..., 2] > 0)
     counted = scores > _COUNTED_FROM
     means = np.where(counted, scores, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)

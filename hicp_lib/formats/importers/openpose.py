@@ -91,7 +91,7 @@ def _triples(rows: FileRows, of_openpose: np.ndarray) -> tuple[np.ndarray, Count
     for key, by_length in _PARTS.items():
         lists = _lists(rows, key, by_length)
         by_number = {length // 3: convention for length, convention in by_length.items()}
-        points, found = rows.points(key, lists, by_number)
+        points, found = rows.points(key, dict(lists), by_number)
         if key == _BODY:
             for i, values in lists.items():
                 convention = by_length[len(values)]
