@@ -354,9 +354,10 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     _of_people(rows, replace(category, others=set()), {category.id, PERSON_CATEGORY} - category.others)
     image_ids = rows.integers("image_id") if annotations is None else _images_of(rows, annotations.images)
     triples, _ = rows.keypoints()
-    keypoints = triples[..., :2]  # hundreds of thousands of people are held once
-    keypoints[~triples.any(axis=-1)] = np.nan
-    refuse_fractions(rows.path, keypoints)
+    del rows  # hundreds of thousands of people are held once
+    keypoints = triples[..., :2]
+    np.copyto(keypoints, np.nan, where=~triples.any(axis=-1, keepdims=True))
+    refuse_fractions(path, keypoints)
     found = {} if annotations is None else dict.fromkeys(annotations.images, Detections.none())
     for image_id, chosen in rows_by_image(image_ids).items():
         together = chosen[-1] - chosen[0] == len(chosen) - 1

@@ -28,6 +28,7 @@ from hicp_lib.formats.layouts import PERSON_CATEGORY
 from hicp_lib.formats.number_lists import read_people
 
 SUFFIXES = (".json", ".csv", ".parquet")
+_BUFFER_BYTES = 2**20
 _PEOPLE_AT_ONCE = 1000  # of a table; a group of rows of Parquet
 _Append = Callable[..., None]
 
@@ -94,7 +95,7 @@ def json_list(path: Path) -> Iterator[_Append]:
     callable
         Takes the next items, JSON-able, or with arrays.
     """
-    with open(path, "wb") as file:
+    with open(path, "wb", _BUFFER_BYTES) as file:
         file.write(b"[")
         between = b""
 
@@ -138,12 +139,13 @@ def result_rows(
     ValueError
         For a score that is no number.
     """
-    points = found.keypoints_px[:, keypoints]
-    triples = np.concatenate([points, found.scores[:, keypoints, None]], axis=-1)
-    triples[~np.isfinite(points).all(axis=-1)] = 0.0
-    if not (np.isfinite(triples).all() and np.isfinite(found.person_scores).all()):
+    triples = np.concatenate([found.keypoints_px[:, keypoints], found.scores[:, keypoints, None]], axis=-1)
+    u, v, scored = np.moveaxis(np.isfinite(triples), -1, 0)
+    absent = ~(u & v)
+    triples[absent] = 0.0
+    if not ((scored | absent).all() and np.isfinite(found.person_scores).all()):
         raise ValueError(f"image {image_id}: a score is not a finite number")
-    flat = triples.reshape(len(found), 3 * points.shape[1])
+    flat = triples.reshape(len(found), 3 * triples.shape[1])
     for of, score, extra in zip(flat, found.person_scores.tolist(), extras or [{}] * len(found), strict=True):
         yield {
             **extra,

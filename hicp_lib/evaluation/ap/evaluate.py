@@ -1,6 +1,6 @@
 """Average precision and recall of keypoint detections: COCO's protocol, its open choices in `options`."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -16,7 +16,6 @@ from hicp_lib.evaluation.ap.options import VISIBLE, Options, choose
 from hicp_lib.formats.annotations import SEGMENT_OF_BOX, Annotations
 
 _AT_ONCE = 2**12  # images whose detections are checked at a time
-_NOTHING = np.zeros((0, 0), dtype=int)  # of no objects
 
 
 @dataclass(frozen=True)
@@ -99,13 +98,9 @@ def evaluate(
         groups and options, and for area "source" where people have none.
     """
     objects, chosen = choose(group, options)
-    image_ids, points_px, of_keypoints, of_person = check_detections(detections, annotations, objects)
     images = np.array(sorted(annotations.images), dtype=np.int64)
+    slots, found_px, present, scores = _detections_seen(detections, annotations, images, objects, chosen)
     people = people_seen(annotations, objects, chosen)
-    image_rows, person_rows = (np.searchsorted(images, of) for of in (image_ids, people.image_ids))
-    slots, found_px, present, scores = _detections_seen(
-        _slots(image_rows, objects), points_px, of_keypoints, of_person, chosen
-    )
     truth_px, flags = _flat(people.keypoints_px, objects), _flat(people.visibility, objects)
     boxes_px, areas_px2, is_crowd = (
         np.repeat(of, len(objects), axis=0) for of in (people.boxes_px, people.areas_px2, people.is_crowd)
@@ -119,7 +114,8 @@ def evaluate(
         return oks(truth_px[who], flags[who] > 0, *person, found, sigmas)
 
     counts = (flags != 0).any(axis=1) & ~is_crowd
-    truth = cocoeval.People(_slots(person_rows, objects), counts, is_crowd)
+    person_slots = _slots(np.searchsorted(images, people.image_ids), objects)
+    truth = cocoeval.People(person_slots, counts, is_crowd)
     matches = cocoeval.match(images, truth, cocoeval.Found(slots, scores), similarity, len(objects))
     precision, recall = cocoeval.precision_recall(matches)
     n_people = int(matches.n_people.sum())
@@ -147,35 +143,22 @@ def _slots(image_rows: np.ndarray, objects: np.ndarray) -> np.ndarray:
     return (image_rows[:, None] * len(objects) + np.arange(len(objects))).ravel()
 
 
-def check_detections(
-    detections: Mapping[int, Detections], annotations: Annotations, objects: np.ndarray = _NOTHING
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Refuse what an evaluator would swallow or stumble over, and put some of it one after the other.
-
-    Parameters
-    ----------
-    detections : mapping of int to Detections
-        By image id.
-    annotations : Annotations
-        Of the images.
-    objects : array of int, shape (n_objects, k), optional
-        Keypoints; none if left out.
-
-    Returns
-    -------
-    image_ids : array of int, shape (n,)
-        Of the people found.
-    points_px : array, shape (n * n_objects, k, 2)
-        Of their objects, all of a person one after the other.
-    scores : array, shape (n * n_objects, k)
-        Of these points.
-    person_scores : array, shape (n * n_objects,)
+def check_detections(detections: Mapping[int, Detections], annotations: Annotations) -> None:
+    """Refuse what an evaluator would swallow or stumble over.
 
     Raises
     ------
     InputError
         As `evaluate`.
     """
+    for _ in _checked(detections, annotations):
+        pass
+
+
+def _checked(
+    detections: Mapping[int, Detections], annotations: Annotations
+) -> Iterator[tuple[np.ndarray, Detections]]:
+    """Image ids of people found, and these people, of some images at a time: they are not all held twice."""
     for image_id, found in detections.items():
         if image_id not in annotations.images:
             problem = "not among the annotated images; evaluate them on their own annotations"
@@ -184,21 +167,13 @@ def check_detections(
         if shapes != ((n, N_KEYPOINTS, 2), (n, N_KEYPOINTS)):
             expected = f"expected (n, {N_KEYPOINTS}, 2) and (n, {N_KEYPOINTS})"
             raise InputError(f"detections of image {image_id}: shapes {shapes}; {expected}")
-    images, people = np.array(list(detections), dtype=np.int64), list(detections.values())
-    image_ids = np.repeat(images, list(map(len, people)))
-    n_objects, k = objects.shape
-    n = n_objects * len(image_ids)
-    points_px, scores, person_scores = np.empty((n, k, 2)), np.empty((n, k)), np.empty(n)
-    first = 0
-    for i in range(0, len(people), _AT_ONCE):  # of hundreds of thousands, 136 keypoints are not held twice
-        parts = [(of.keypoints_px, of.scores, of.person_scores) for of in people[i : i + _AT_ONCE]]
+    ids, people = np.array(list(detections), dtype=np.int64), list(detections.values())
+    for some in (slice(i, i + _AT_ONCE) for i in range(0, len(ids), _AT_ONCE)):
+        parts = (vars(of).values() for of in people[some])
         stacked = Detections(*map(np.concatenate, zip(*parts, strict=True)))
-        last = first + len(stacked)
-        _refuse_unsound(stacked, image_ids[first:last])
-        of = slice(first * n_objects, last * n_objects)
-        points_px[of], scores[of] = _flat(stacked.keypoints_px, objects), _flat(stacked.scores, objects)
-        person_scores[of], first = np.repeat(stacked.person_scores, n_objects), last
-    return image_ids, points_px, scores, person_scores
+        image_ids = np.repeat(ids[some], list(map(len, people[some])))
+        _refuse_unsound(stacked, image_ids)
+        yield image_ids, stacked
 
 
 def _refuse_unsound(stacked: Detections, image_ids: np.ndarray) -> None:
@@ -269,16 +244,21 @@ def _source_area(people: Annotations, i: int) -> float:
 
 
 def _detections_seen(
-    slots: np.ndarray,
-    points_px: np.ndarray,
-    of_keypoints: np.ndarray,
-    of_person: np.ndarray,
+    detections: Mapping[int, Detections], annotations: Annotations, images: np.ndarray, objects: np.ndarray,
     options: Options,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, ...]:  # fmt: skip
     """Slots, keypoints, which of them are declared present, and scores of the objects that take part."""
-    given = np.isfinite(points_px[..., 0])
-    present = given & (of_keypoints >= PRESENCE_CUT)
-    scores = of_person if options.score == "person" else of_keypoints.mean(axis=-1)
-    seen = given.any(axis=-1) | (options.absent == "count")
-    rows = slice(None) if seen.all() else seen  # not copied
-    return slots[rows], points_px[rows], present[rows], scores[rows]
+    n, most, k = 0, len(objects) * sum(map(len, detections.values())), objects.shape[1]
+    of_all = np.empty(most, int), np.empty((most, k, 2)), np.empty((most, k), bool), np.empty(most)
+    for image_ids, found in _checked(detections, annotations):
+        points, of_keypoints = _flat(found.keypoints_px, objects), _flat(found.scores, objects)
+        given = np.isfinite(points[..., 0])
+        present = given & (of_keypoints >= PRESENCE_CUT)
+        of_person = np.repeat(found.person_scores, len(objects))
+        scores = of_person if options.score == "person" else of_keypoints.mean(axis=-1)
+        slots = _slots(np.searchsorted(images, image_ids), objects)
+        seen = given.any(axis=-1) | (options.absent == "count")
+        of, n = slice(n, n + int(seen.sum())), n + int(seen.sum())
+        for every, some in zip(of_all, (slots, points, present, scores), strict=True):
+            every[of] = some[seen]
+    return tuple(every[:n] for every in of_all)
