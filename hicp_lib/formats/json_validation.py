@@ -21,7 +21,7 @@ MAX_ABS = 1e9
 MAX_INTEGER = 2**53  # every JSON reader has them exact up to here
 CONVENTIONS = {17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"}
 Layouts = Mapping[int, str | np.ndarray]
-Numbers = list | np.ndarray
+Flat = list | np.ndarray
 _AT_ONCE = 2**12  # rows made into arrays at a time
 # COCO-WholeBody files spread their 133 keypoints over five keys, in this order.
 PART_KEYS = ("foot_kpts", "face_kpts", "lefthand_kpts", "righthand_kpts")
@@ -169,7 +169,7 @@ class Rows:
         return self.points("keypoints", lists, layouts)
 
     def points(
-        self, key: str, lists: dict[int, Numbers], layouts: Layouts, width: int = 3
+        self, key: str, lists: dict[int, Flat], layouts: Layouts, width: int = 3
     ) -> tuple[np.ndarray, Counter[str]]:
         """Flat lists of numbers of some rows, `width` for each keypoint, in the Halpe-136 order.
 
@@ -182,7 +182,7 @@ class Rows:
         layouts : Layouts
             By the number of keypoints, a key of `hicp_lib.core.keypoints.TO_HALPE`, or what that would hold.
         width : int, optional
-            Numbers per keypoint.
+            Flat per keypoint.
 
         Returns
         -------
@@ -194,11 +194,9 @@ class Rows:
         values, found = np.zeros((len(self.rows), N_KEYPOINTS, width)), Counter[str]()
         for n, layout in layouts.items():
             chosen = [i for i, numbers in lists.items() if len(numbers) == width * n]
-            name, indices = (
-                ("by their names", layout) if isinstance(layout, np.ndarray) else (layout, TO_HALPE[layout])
-            )
+            indices = TO_HALPE[layout] if isinstance(layout, str) else layout
             names = _triples_namer(key, indices) if width == 3 else lambda j: f"{key}[{j}]"
-            found += Counter({name: len(chosen)})
+            found += Counter({layout if isinstance(layout, str) else "by their names": len(chosen)})
             for some in (chosen[i : i + _AT_ONCE] for i in range(0, len(chosen), _AT_ONCE)):
                 points = self.finite([lists.pop(i) for i in some], width * n, names, some)
                 points = points.reshape(-1, n, width)[:, indices >= 0]
@@ -215,9 +213,9 @@ class Rows:
                 raise self.error(i, "a further key holds NaN, infinity or too deep a nesting") from None
         return extras
 
-    def _keypoint_lists(self, layouts: Collection[int]) -> list[Numbers]:
+    def _keypoint_lists(self, layouts: Collection[int]) -> list[Flat]:
         """Each row's keypoints in one list; its length is one of `layouts`, times 3."""
-        lists = self.column("keypoints", lambda v: isinstance(v, Numbers), "a list of x, y, v per keypoint")
+        lists = self.column("keypoints", lambda v: isinstance(v, Flat), "a list of x, y, v per keypoint")
         for i, row in enumerate(self.rows):
             spread = len(lists[i]) == 51 and 133 in layouts
             if spread and all(isinstance(row.get(key), list) for key in PART_KEYS):
@@ -229,11 +227,7 @@ class Rows:
         return lists
 
     def finite(
-        self,
-        lists: Sequence[Numbers],
-        width: int,
-        name: Callable[[int], str],
-        rows: Sequence[int] | None = None,
+        self, lists: Sequence[Flat], width: int, name: Callable[[int], str], rows: Sequence[int] | None = None
     ) -> np.ndarray:
         """Lists of finite numbers as an array.
 
@@ -254,22 +248,20 @@ class Rows:
         """
         try:
             # The types first: numpy would take True for 1 and "3" for 3.
-            if set(map(type, chain.from_iterable(of for of in lists if isinstance(of, list)))) <= {
-                int,
-                float,
-            }:
+            plain = chain.from_iterable(of for of in lists if isinstance(of, list))
+            if set(map(type, plain)) <= {int, float}:
                 array = np.array(lists, dtype=float).reshape(len(lists), width)
                 if (np.abs(array) <= MAX_ABS).all():
                     return array
         except OverflowError:  # a whole number beyond floats
             pass
-        rows_of = map(_listed, lists)
-        i, j = next((i, j) for i, row in enumerate(rows_of) for j, x in enumerate(row) if not _is_finite(x))
-        problem = f"{name(j)} is {shown(_listed(lists[i])[j])}; expected a finite number up to {MAX_ABS:g}"
+        of = list(map(_listed, lists))
+        i, j = next((i, j) for i, row in enumerate(of) for j, x in enumerate(row) if not _is_finite(x))
+        problem = f"{name(j)} is {shown(of[i][j])}; expected a finite number up to {MAX_ABS:g}"
         raise self.error(i if rows is None else rows[i], problem)
 
 
-def _listed(numbers: Numbers) -> list:
+def _listed(numbers: Flat) -> list:
     return numbers.tolist() if isinstance(numbers, np.ndarray) else numbers
 
 

@@ -39,6 +39,8 @@ def read_people(path: str | Path) -> Any:
     InputError
         As `read_json`.
     """
+    if not Path(path).is_file():
+        return read_json(path)  # tells what is amiss
     mark, parts, arrays, places = secrets.token_hex(16), list[bytes](), list[np.ndarray](), count()
     place = f'"keypoints":"{mark}%d"'.encode()
     try:
@@ -49,15 +51,13 @@ def read_people(path: str | Path) -> Any:
                 arrays += found
         data = orjson.loads(b"".join(parts))
     except (OSError, orjson.JSONDecodeError):
-        return read_json(path)  # tells what is amiss
-    rows = data.get("annotations") if isinstance(data, dict) else data
-    n_placed = 0
-    for row in rows if isinstance(rows, list) else ():
-        value = row.get("keypoints") if isinstance(row, dict) else None
-        if isinstance(value, str) and value.startswith(mark):
-            row["keypoints"] = arrays[int(value.removeprefix(mark))]
-            n_placed += 1
-    return data if n_placed == len(arrays) else read_json(path)
+        return read_json(path)
+    people = data.get("annotations") if isinstance(data, dict) else data
+    rows = [row for row in people if isinstance(row, dict)] if isinstance(people, list) else []
+    marked = [row for row in rows if isinstance(of := row.get("keypoints"), str) and of.startswith(mark)]
+    for row in marked:
+        row["keypoints"] = arrays[int(row["keypoints"].removeprefix(mark))]
+    return data if len(marked) == len(arrays) else read_json(path)
 
 
 def _blocks(file: BinaryIO) -> Iterator[bytes]:
@@ -72,11 +72,8 @@ def _blocks(file: BinaryIO) -> Iterator[bytes]:
 
 
 def _arrays(texts: list[bytes]) -> list[np.ndarray]:
-    """Lists of numbers out of their text between the brackets; none where one is no list of numbers."""
-    try:
-        lists = orjson.loads(b"[[" + b"],[".join(texts) + b"]]")
-    except orjson.JSONDecodeError:
-        return []
+    """Lists of numbers out of their text between the brackets; none where one is of other things too."""
+    lists = orjson.loads(b"[[" + b"],[".join(texts) + b"]]")
     if not set(map(type, chain.from_iterable(lists))) <= {int, float}:  # numpy would take True for 1
         return []
     ends = list(accumulate(map(len, lists)))

@@ -19,6 +19,7 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
+from hicp_lib.core.progress import with_bar
 from hicp_lib.formats.importers.people import FileRows, People, json_files, split
 from hicp_lib.formats.json_validation import Rows, shown
 from hicp_lib.formats.layouts import layouts_of
@@ -46,7 +47,7 @@ def read_mmpose(path: Path) -> People:
         For anything malformed, and for predictions of a video.
     """
     files = json_files(path, (".json",), "the folder MMPoseInferencer wrote with pred_out_dir")
-    read = {file: _instances(file) for file in files.values()}
+    read = {file: _instances(file) for file in with_bar(files.values(), "reading", "file")}
     named = (n.removeprefix(_SAVED) if read[file][1] is not None else n for n, file in files.items())
     of_models = {names for _, names in read.values() if names}
     if len(of_models) > 1:
