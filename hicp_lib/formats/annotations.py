@@ -268,11 +268,9 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> 
     refuse_fractions(rows.path, labelled)
     refuse_fractions(rows.path, boxes.reshape(-1, 2, 2), "boxes")
     shown = boxes, labelled, sizes
-    unnamed = "17 keypoints without names are taken for COCO's" * (
-        layouts is CONVENTIONS and "coco17" in found
-    )
-    checked = {"boxes": corners_note(rows.path, *shown), "pixels": doubts(*shown)}
-    notes = {"names": unnamed, "area": area_note} | checked
+    is_unnamed = layouts is CONVENTIONS and "coco17" in found
+    notes = {"names": "17 keypoints without names are taken for COCO's" * is_unnamed, "area": area_note}
+    notes |= {"boxes": corners_note(rows.path, *shown), "pixels": doubts(*shown)}
     return Annotations(
         images, ids, image_ids, boxes, areas, is_crowd, keypoints, visibility, rows.extras(_KNOWN_KEYS),
         notes=notes,

@@ -200,7 +200,7 @@ class Rows:
             for some in (chosen[i : i + _AT_ONCE] for i in range(0, len(chosen), _AT_ONCE)):
                 points = self.finite([lists.pop(i) for i in some], width * n, names, some)
                 points = points.reshape(-1, n, width)[:, indices >= 0]
-                values[np.ix_(some, indices[indices >= 0])] = points
+                values[np.ix_(np.array(some), indices[indices >= 0])] = points
         return values, found
 
     def extras(self, known: Collection[str]) -> list[dict]:
