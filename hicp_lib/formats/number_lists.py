@@ -14,11 +14,13 @@ from typing import Any, BinaryIO
 import numpy as np
 import orjson
 
-from hicp_lib.core.files import read_json
+from hicp_lib.core.files import MAX_BYTES, read_json, regular_file
+from hicp_lib.core.limited import raised
 
 _KEY = b'"keypoints"'
 _LIST = re.compile(rb'(?<=[{,\s])"keypoints"\s*:\s*\[([^][{}"]+)\]')
 _BLOCK_BYTES = 2**24
+_MAX_BYTES = 4 * MAX_BYTES  # of a file: of its numbers, arrays hold less than half
 
 
 def read_people(path: str | Path) -> Any:
@@ -37,21 +39,19 @@ def read_people(path: str | Path) -> Any:
     Raises
     ------
     InputError
-        As `read_json`.
+        As `read_json`, but of a file four times as large.
     """
-    if not Path(path).is_file():
-        return read_json(path)  # tells what is amiss
     mark, parts, arrays, places = secrets.token_hex(16), list[bytes](), list[np.ndarray](), count()
     place = f'"keypoints":"{mark}%d"'.encode()
     try:
-        with open(path, "rb") as file:
+        with open(regular_file(path, "give the path of a JSON file", raised(_MAX_BYTES)), "rb") as file:
             for block in _blocks(file):
                 found = _arrays(_LIST.findall(block))
                 parts.append(_LIST.sub(lambda _: place % next(places), block) if found else block)
                 arrays += found
         data = orjson.loads(b"".join(parts))
     except (OSError, orjson.JSONDecodeError):
-        return read_json(path)
+        return read_json(path)  # tells what is amiss
     people = data.get("annotations") if isinstance(data, dict) else data
     rows = [row for row in people if isinstance(row, dict)] if isinstance(people, list) else []
     marked = [row for row in rows if isinstance(of := row.get("keypoints"), str) and of.startswith(mark)]
