@@ -4,10 +4,23 @@ from __future__ import annotations
 
 from itertools import chain
 
-from tests.hostile import special_files
+from tests.hostile import (
+    annotations,
+    destroying,
+    images,
+    names,
+    networks,
+    options,
+    planted,
+    recordings,
+    servers,
+    special_files,
+)
 from tests.hostile.case import Case, unique
 
-MODULES = (special_files,)
+MODULES = (
+    special_files, images, annotations, recordings, networks, servers, names, options, destroying, planted,
+)  # fmt: skip
 
 
 def corpus() -> dict[str, Case]:

@@ -100,7 +100,7 @@ class Judge:
         request = outputs | {
             "folder": str(work),
             "arguments": case.arguments(port),
-            "environment": dict(case.environment),
+            "environment": {name: text.replace("PORT", str(port)) for name, text in case.environment},
             "fresh": [str(self.folder / "bin" / "hicp")] if case.fresh else [],
             "wall_s": WALL_S,
         }
@@ -127,7 +127,7 @@ class Judge:
         else:
             told += _of_the_lines(case, code, printed, errors)
         idle_s = used["wall_s"] - used["waited_s"] - used["cpu_s"]
-        if used["cpu_s"] > CPU_S or idle_s > IDLE_S:
+        if code and (used["cpu_s"] > CPU_S or idle_s > IDLE_S):
             told.append(f"takes {used['cpu_s']:.1f} s of a processor, {used['wall_s']:.1f} s in all")
         if used["most_bytes"] > MEMORY_BYTES:
             told.append(f"takes {used['most_bytes'] / 2**30:.2f} GB")
@@ -191,6 +191,8 @@ def _server(case: Case):
 
 
 def _remove(work: Path) -> None:
+    if (work / "small").is_mount():
+        subprocess.run(["umount", str(work / "small")], check=True)
     for where, folders, _ in os.walk(work):
         for name in (".", *folders):
             with suppress(OSError):
