@@ -43,6 +43,56 @@ def state(folder: Path) -> dict[str, tuple]:
     return found
 
 
+class Ready:
+    """The interpreter of `tests.hostile.ready`.
+
+    Parameters
+    ----------
+    folder : Path
+        Where what commands print is kept.
+    environment : dict
+        Variables beside those of the caller.
+    """
+
+    def __init__(self, folder: Path, environment: dict[str, str]) -> None:
+        self.folder = folder
+        (folder / "bin").mkdir()
+        (folder / "bin" / "hicp").write_text("from hicp_lib.cli.main import main; main()")
+        paths = os.pathsep.join(filter(None, (str(CHECKOUT), os.environ.get("PYTHONPATH"))))
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "tests.hostile.ready"], cwd=CHECKOUT, text=True, stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, env=os.environ | {"PYTHONPATH": paths} | environment,
+        )  # fmt: skip
+
+    def close(self) -> None:
+        """End it."""
+        assert self._process.stdin
+        self._process.stdin.close()
+        self._process.wait(30)
+
+    def run(
+        self, work: Path, arguments: list[str], environment: dict | None = None, fresh: bool = False,
+        wall_s: float = WALL_S, kill_s: float | None = None,
+    ) -> tuple[dict, str, str]:  # fmt: skip
+        """How `hicp` with these arguments ended in a folder, what it used, printed and told as errors.
+
+        `fresh` starts it as a user does; after `kill_s` it is killed.
+        """
+        outputs = {name: str(self.folder / name) for name in ("stdout", "stderr")}
+        request = outputs | {
+            "folder": str(work), "arguments": arguments, "environment": environment or {}, "wall_s": wall_s,
+            "kill_s": kill_s, "fresh": [str(self.folder / "bin" / "hicp")] if fresh else [],
+        }  # fmt: skip
+        assert self._process.stdin and self._process.stdout
+        self._process.stdin.write(json.dumps(request) + "\n")
+        self._process.stdin.flush()
+        answer = self._process.stdout.readline()
+        if not answer:
+            raise RuntimeError("the interpreter that is ready ended")
+        texts = [Path(path).read_bytes().decode(errors="surrogateescape") for path in outputs.values()]
+        return json.loads(answer), *texts
+
+
 class Judge:
     """Makes cases, runs them and says what is wrong.
 
@@ -61,22 +111,12 @@ class Judge:
         self.cache.mkdir()
         if weights is not None and weights.is_dir():
             (self.cache / "weights").symlink_to(weights)
-        launcher = "from hicp_lib.cli.main import main; main()"
-        (folder / "bin").mkdir()
-        (folder / "bin" / "hicp").write_text(launcher)
-        paths = os.pathsep.join(filter(None, (str(CHECKOUT), os.environ.get("PYTHONPATH"))))
-        self.environment = {"HICP_CACHE": str(self.cache), "PYTHONPATH": paths, "HOME": str(folder)}
-        self._ready = subprocess.Popen(
-            [sys.executable, "-m", "tests.hostile.ready"], cwd=CHECKOUT, text=True, stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE, env=os.environ | self.environment,
-        )  # fmt: skip
+        self.ready = Ready(folder, {"HICP_CACHE": str(self.cache), "HOME": str(folder)})
         self.used: dict = {}
 
     def close(self) -> None:
         """End the interpreter that is ready."""
-        assert self._ready.stdin
-        self._ready.stdin.close()
-        self._ready.wait(30)
+        self.ready.close()
 
     def faults(self, case: Case) -> list[str]:
         """What is wrong with how a case is answered; nothing where all is right."""
@@ -86,7 +126,8 @@ class Judge:
             case.make(work)
             before = state(work)
             with _server(case) as port:
-                self.used, printed, errors = self._run(case, work, port)
+                variables = {name: text.replace("PORT", str(port)) for name, text in case.environment}
+                self.used, printed, errors = self.ready.run(work, case.arguments(port), variables, case.fresh)
             told = self._of_the_run(case, printed, errors)
             told += _of_the_folder(before, state(work), was_killed=bool(self.used["stopped"]))
             if case.check is not None and not told:
@@ -94,24 +135,6 @@ class Judge:
             return told
         finally:
             _remove(work)
-
-    def _run(self, case: Case, work: Path, port: int | None) -> tuple[dict, str, str]:
-        outputs = {name: str(self.folder / name) for name in ("stdout", "stderr")}
-        request = outputs | {
-            "folder": str(work),
-            "arguments": case.arguments(port),
-            "environment": {name: text.replace("PORT", str(port)) for name, text in case.environment},
-            "fresh": [str(self.folder / "bin" / "hicp")] if case.fresh else [],
-            "wall_s": WALL_S,
-        }
-        assert self._ready.stdin and self._ready.stdout
-        self._ready.stdin.write(json.dumps(request) + "\n")
-        self._ready.stdin.flush()
-        answer = self._ready.stdout.readline()
-        if not answer:
-            raise RuntimeError("the interpreter that is ready ended")
-        texts = [Path(path).read_bytes().decode(errors="surrogateescape") for path in outputs.values()]
-        return json.loads(answer), *texts
 
     def _of_the_run(self, case: Case, printed: str, errors: str) -> list[str]:
         used, told = self.used, []

@@ -62,9 +62,12 @@ def _children(of: int) -> dict[int, int]:
     return found
 
 
-def _watch(pid: int, wall_s: float) -> dict[str, Any]:
-    """Wait for a fork; end what takes too long or too much."""
+def _watch(pid: int, wall_s: float, kill_s: float | None) -> dict[str, Any]:
+    """Wait for a fork; end what takes too long or too much, or at the moment that was asked for."""
     start_s, stopped, most_bytes, pause_s = time.monotonic(), "", 0, 0.01
+    if kill_s is not None:
+        time.sleep(kill_s)
+        os.kill(pid, signal.SIGKILL)  # alone: what it started is to end by itself
     while os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
         family = _children(os.getpid())
         most_bytes = max(most_bytes, *family.values(), 0)
@@ -116,7 +119,7 @@ def serve() -> bool:
             if not request["fresh"]:
                 return True
             os.execv(sys.executable, [sys.executable, *request["fresh"], *request["arguments"]])
-        answers.write(json.dumps(_watch(pid, request["wall_s"])) + "\n")
+        answers.write(json.dumps(_watch(pid, request["wall_s"], request["kill_s"])) + "\n")
         answers.flush()
     return False
 
