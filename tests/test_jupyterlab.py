@@ -151,7 +151,7 @@ def do(browser, lab):
 
 
 @pytest.mark.parametrize("name", NOTEBOOKS)
-def test_a_page_runs_shows_and_gives_what_the_report_does(name, browser, lab, do):
+def test_a_page_runs_shows_and_gives_what_the_report_does(name, browser, lab, do):  # noqa: F811
     path = lab.folder / "notebooks" / f"{name}.ipynb"
     before = path.read_bytes()
     do(OPEN, f"notebooks/{path.name}")

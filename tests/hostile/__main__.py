@@ -1,4 +1,4 @@
-"""Judge hostile inputs: `python -m tests.hostile [PART OF A NAME]...`; a table of what fell."""
+"""Judge hostile inputs: `python -m tests.hostile [BEGINNING OF A NAME]...`; a table of what fell."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.hostile.judge import Judge
 
 def main() -> int:
     wanted = sys.argv[1:] or [""]
-    cases = [case for name, case in corpus().items() if any(part in name for part in wanted)]
+    cases = [case for name, case in corpus().items() if name.startswith(tuple(wanted))]
     n, fell, cpu_s, start_s = Counter[str](), Counter[str](), 0.0, time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         judge = Judge(Path(folder), weights_dir())

@@ -19,7 +19,7 @@ from typing import Any
 
 WALL_S = 12.0  # after so long a command is ended
 GUARD_BYTES = 3 * 2**29  # of one process, likewise
-_PR_SET_CHILD_SUBREAPER = 36
+_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 # Open3D's threads do not survive a fork, and what imports it is left out.
 _PACKAGES = ("core", "formats", "detectors", "datasets", "recordings", "lifting", "inspection", "cli")
 
@@ -36,6 +36,7 @@ def _import_library() -> None:
 
 def _become(request: dict[str, Any]) -> None:
     """What a fork does before it runs the command."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     os.setsid()
     os.chdir(request["folder"])
     os.environ.update(request["environment"])
