@@ -29,12 +29,12 @@ from PIL import Image
 
 from hicp_lib.core.checkout import CHECKOUT
 from hicp_lib.report.notebooks import read_notebooks, read_profile
-from tests.browser import LIMIT_S, browser  # noqa: F401
 
 pytestmark = pytest.mark.browser
 
 NOTEBOOKS = sorted(path.stem for path in (CHECKOUT / "notebooks").glob("*.ipynb"))
 REPORT = CHECKOUT / "results" / "quick"
+LIMIT_S = 600
 SET_BY_A_REPORT = {"OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MPLBACKEND", "MATPLOTLIBRC", "PYTHONHASHSEED"}
 RAW_MARKUP = re.compile(r"\{[a-z:-]+\}|```|:::|\$\$|\\frac")
 ASKS = ".jp-Dialog, .Toastify__toast"
@@ -151,7 +151,7 @@ def do(browser, lab):
 
 
 @pytest.mark.parametrize("name", NOTEBOOKS)
-def test_a_page_runs_shows_and_gives_what_the_report_does(name, browser, lab, do):  # noqa: F811
+def test_a_page_runs_shows_and_gives_what_the_report_does(name, browser, lab, do):
     path = lab.folder / "notebooks" / f"{name}.ipynb"
     before = path.read_bytes()
     do(OPEN, f"notebooks/{path.name}")

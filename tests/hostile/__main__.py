@@ -29,7 +29,10 @@ def main() -> int:
         judge.close()
     for kind, of in n.items():
         print(f"{kind:<20} {of:>4} cases, {fell[kind]:>3} fell")
-    print(f"{len(cases)} cases, {fell.total()} fell; {cpu_s:.0f} s of a processor, {time.monotonic() - start_s:.0f} s")
+    print(
+        f"{len(cases)} cases, {fell.total()} fell; {cpu_s:.0f} s of a processor, "
+        f"{time.monotonic() - start_s:.0f} s in all"
+    )
     return bool(fell)
 
 

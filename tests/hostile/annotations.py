@@ -52,8 +52,22 @@ def put(*where: Any, value: Any) -> Change:
 
 
 HUGE = 10**20
-ODD_NUMBERS = {"NaN": float("nan"), "inf": float("inf"), "1e308": 1e308, "a text": "7", "null": None, "a list": [1]}
-ODD_IDS = {"of 20 digits": HUGE, "a fraction": 1.5, "a text": "one", "null": None, "an object": {}, "true": True}
+ODD_NUMBERS = {
+    "NaN": float("nan"),
+    "inf": float("inf"),
+    "1e308": 1e308,
+    "a text": "7",
+    "null": None,
+    "a list": [1],
+}
+ODD_IDS = {
+    "of 20 digits": HUGE,
+    "a fraction": 1.5,
+    "a text": "one",
+    "null": None,
+    "an object": {},
+    "true": True,
+}
 ODD_NAMES = {
     "out of the folder": "../annotations.json",
     "absolute": "/etc/passwd",
@@ -129,7 +143,9 @@ def cases() -> Iterator[Case]:
     for kind, change in annotation_changes():
         make = partial(_change, "annotations.json", change)
         for reader in ("create annotations", "evaluate annotations", "draw detections"):
-            yield Case(f"annotations: {reader}: {kind}", READERS[reader][0], make, exits=_exits(kind), notes=True)
+            yield Case(
+                f"annotations: {reader}: {kind}", READERS[reader][0], make, exits=_exits(kind), notes=True
+            )
         yield Case(f"annotations: inspect: {kind}", "inspect annotations.json", make, exits=(0, 2))
     for kind, change in result_changes():
         make = partial(_change, "results.json", change)

@@ -12,28 +12,29 @@ from pathlib import Path
 
 from hicp_lib.datasets.subsets import create_hicp
 from tests.hostile.case import Case
+from tests.hostile.good import CREATE, DETECT, DRAW, EVALUATE, FIT, IMPORT, LIFT
 from tests.hostile.special_files import listening
 
 # Commands that write one file, TARGET.
 WRITERS = {
-    "detect": "detect --detector movenet-lightning --images pictures --out TARGET.json",
-    "detect csv": "detect --detector movenet-lightning --images pictures --out TARGET.csv",
-    "import": "import --format coco --predictions results.json --annotations annotations.json --out TARGET.json",
+    "detect": f"{DETECT} --out TARGET.json",
+    "detect csv": f"{DETECT} --out TARGET.csv",
+    "import": f"{IMPORT} --out TARGET.json",
     "export": "export --detections results.json --format coco --out TARGET.json",
-    "draw": "draw --detections results.json --images pictures --out TARGET.html",
-    "evaluate": "evaluate --annotations annotations.json --detections results.json --out TARGET.json",
-    "evaluate parquet": "evaluate --annotations annotations.json --detections results.json --out TARGET.parquet",
-    "calibration fit": "calibration fit --annotations annotations.json --detections results.json --out TARGET.csv",
-    "lift": "lift --recording rec --detector movenet-lightning --out TARGET.parquet",
+    "draw": f"{DRAW} --out TARGET.html",
+    "evaluate": f"{EVALUATE} --out TARGET.json",
+    "evaluate parquet": f"{EVALUATE} --out TARGET.parquet",
+    "calibration fit": f"{FIT} --out TARGET.csv",
+    "lift": f"{LIFT} --out TARGET.parquet",
 }
 # Commands that fill a folder, TARGET.
 FILLERS = {
-    "create": "dataset create --annotations annotations.json --images pictures --out TARGET",
+    "create": f"{CREATE} --out TARGET",
     "render": "scenes render TARGET --n 1",
     "simulate": "record simulate mocap TARGET --n-frames 1",
     "import open3d": "record import TARGET --open3d open3d",
     "import bag": "record import TARGET --bag x.bag",
-    "draw PNG": "draw --detections results.json --images pictures --out TARGET",
+    "draw PNG": f"{DRAW} --out TARGET",
 }
 
 
@@ -59,6 +60,11 @@ TARGETS: dict[str, Callable[[Path], None]] = {
     "a pipe": lambda path: os.mkfifo(path), "a device": device, "a socket": listening, "read-only": read_only,
     "a folder": folder_of_mine, "a link to nothing": link_to_nothing,
 }  # fmt: skip
+
+
+# Where a user may keep something in a folder that a command fills.
+PLACES = ("mine.txt", "images/mine.jpg", "rgb/mine.jpg", "basic/images/mine.jpg", "basic/mine.txt",
+          "0001.png", "annotations.json", "rgb.txt")  # fmt: skip
 
 
 def _target(name: str, put: Callable[[Path], None], folder: Path) -> None:
@@ -115,40 +121,54 @@ def cases() -> Iterator[Case]:
         suffix = "." + command.rpartition(".")[2]
         for kind, put in TARGETS.items():
             made = partial(_target, "target" + suffix, put)
-            yield Case(f"destroying: {writer}: onto {kind}", command.replace("TARGET", "target"), made, notes=True)
+            yield Case(
+                f"destroying: {writer}: onto {kind}", command.replace("TARGET", "target"), made, notes=True
+            )
         if may_mount():
             full = command.replace("TARGET", "small/out/x")
             yield Case(f"destroying: {writer}: onto a full disk", full, _full_disk, notes=True, exits=(0, 2))
     for filler, command in FILLERS.items():
         for kind in ("a pipe", "a device", "a socket", "read-only", "a link to nothing"):
             made = partial(_target, "target", TARGETS[kind])
-            yield Case(f"destroying: {filler}: into {kind}", command.replace("TARGET", "target"), made, notes=True)
-        for place in ("target/mine.txt", "target/images/mine.jpg", "target/rgb/mine.jpg", "target/basic/images/mine.jpg",
-                      "target/basic/mine.txt", "target/0001.png", "target/annotations.json", "target/rgb.txt"):  # fmt: skip
-            yield Case(f"destroying: {filler}: beside {place}", command.replace("TARGET", "target"), partial(_mine_in, place),
-                       notes=True, exits=(0, 2))  # fmt: skip
+            yield Case(
+                f"destroying: {filler}: into {kind}", command.replace("TARGET", "target"), made, notes=True
+            )
+        for place in PLACES:
+            made = partial(_mine_in, f"target/{place}")
+            name = f"destroying: {filler}: beside {place}"
+            yield Case(name, command.replace("TARGET", "target"), made, notes=True, exits=(0, 2))
         if may_mount():
-            yield Case(f"destroying: {filler}: onto a full disk", command.replace("TARGET", "small/out/x"), _full_disk,
-                       notes=True)  # fmt: skip
+            full = command.replace("TARGET", "small/out/x")
+            yield Case(f"destroying: {filler}: onto a full disk", full, _full_disk, notes=True)
     for places in ("rec", "open3d", "pictures", "."):
         for filler in ("create", "import open3d", "import bag", "draw PNG"):
             if (places, filler) != (".", "draw PNG"):
-                yield Case(f"destroying: {filler}: into {places}", FILLERS[filler].replace("TARGET", places), notes=True)
+                yield Case(
+                    f"destroying: {filler}: into {places}",
+                    FILLERS[filler].replace("TARGET", places),
+                    notes=True,
+                )
     create = "dataset create --annotations out/annotations.json --images out/pictures --out out"
     yield Case("destroying: create: inputs within", create, _inputs_within, exits=(0, 2),
                check=_mine_stays("out/annotations.json", "out/pictures/a.png"))  # fmt: skip
     create = "dataset create --annotations out/basic/annotations.json --images out/basic/images --out out"
     yield Case("destroying: create: inputs in basic", create, _inputs_in_basic,
                check=_mine_stays("out/basic/annotations.json", "out/basic/images/a.png"))  # fmt: skip
-    create = "dataset create --annotations annotations.json --images pictures --out hicp --min-pixels 30000"
+    create = f"{CREATE} --out hicp --min-pixels 30000"
     mine = ("hicp/basic/images/mine.jpg", "hicp/basic/notes.txt", "hicp/mine.txt")
-    yield Case("destroying: create: another before", create, _after_another, exits=(0, 2), check=_mine_stays(*mine), notes=True)
+    yield Case(
+        "destroying: create: another before",
+        create,
+        _after_another,
+        exits=(0, 2),
+        check=_mine_stays(*mine),
+        notes=True,
+    )
     same = {
         "export": "export --detections results.json --format coco --out results.json",
-        "import": "import --format coco --predictions results.json --annotations annotations.json --out results.json",
-        "import over annotations": "import --format coco --predictions results.json --annotations annotations.json"
-        " --out annotations.json",
-        "evaluate": "evaluate --annotations annotations.json --detections results.json --out results.json",
+        "import": f"{IMPORT} --out results.json",
+        "import over annotations": f"{IMPORT} --out annotations.json",
+        "evaluate": f"{EVALUATE} --out results.json",
     }
     for name, command in same.items():
         yield Case(f"destroying: {name} over its input", command)

@@ -15,6 +15,17 @@ from tests.detectors.onnx.onnx_models import colour_maps_model
 from tests.recordings.conftest import write_small
 from tests.recordings.ros_bags import write_bag
 
+# Commands without their outputs.
+IMPORT = "import --format coco --predictions results.json --annotations annotations.json"
+EVALUATE = "evaluate --annotations annotations.json --detections results.json"
+FIT = "calibration fit --annotations annotations.json --detections results.json"
+DETECT = "detect --detector movenet-lightning --images pictures"
+MMPOSE = "detect --detector mmpose --model model.onnx --images pictures"
+CREATE = "dataset create --annotations annotations.json --images pictures"
+DRAW = "draw --annotations annotations.json --detections results.json --images pictures"
+LIFT = "lift --recording rec --detector movenet-lightning"
+IMPORT_OPEN3D = "record import out --open3d open3d"
+
 WIDTH, HEIGHT = 320, 400
 INTRINSIC = {"width": 64, "height": 48, "intrinsic_matrix": [60, 0, 0, 0, 61, 0, 31.5, 23.5, 1]}
 # How each file is read by some command; {} is where the file lies.
@@ -99,15 +110,18 @@ def _recordings(folder: Path) -> None:
 
 # Where each kind of file is read: the good command, and the file in it.
 READERS: dict[str, tuple[str, str]] = {
-    "pictures": ("detect --detector movenet-lightning --images pictures --out out.json", "pictures/b.jpg"),
-    "detect folder": ("detect --detector movenet-lightning --images pictures --out out.json", "pictures"),
+    "pictures": (f"{DETECT} --out out.json", "pictures/b.jpg"),
+    "detect folder": (f"{DETECT} --out out.json", "pictures"),
     "detect dataset": (
         "detect --detector movenet-lightning --dataset set --out out.json",
         "set/annotations.json",
     ),
-    "detect model": ("detect --detector mmpose --model model.onnx --images pictures --out out.json", "model.onnx"),
+    "detect model": (
+        f"{MMPOSE} --out out.json",
+        "model.onnx",
+    ),
     "detect person model": (
-        "detect --detector mmpose --model model.onnx --person-model person.onnx --images pictures --out out.json",
+        f"{MMPOSE} --person-model person.onnx --out out.json",
         "person.onnx",
     ),
     "models show": ("models show --detector mmpose --model model.onnx", "model.onnx"),
@@ -116,15 +130,15 @@ READERS: dict[str, tuple[str, str]] = {
         "x.task",
     ),
     "create annotations": (
-        "dataset create --annotations annotations.json --images pictures --out out",
+        f"{CREATE} --out out",
         "annotations.json",
     ),
     "create picture": (
-        "dataset create --annotations annotations.json --images pictures --out out",
+        f"{CREATE} --out out",
         "pictures/a.png",
     ),
     "keypoint map": (
-        "dataset create --annotations annotations.json --images pictures --keypoint-map map.json --out out",
+        f"{CREATE} --keypoint-map map.json --out out",
         "map.json",
     ),
     "import openpose": (
@@ -132,7 +146,8 @@ READERS: dict[str, tuple[str, str]] = {
         "openpose/a_keypoints.json",
     ),
     "import alphapose": (
-        "import --format alphapose --predictions alphapose.json --annotations annotations.json --out out.json",
+        "import --format alphapose --predictions alphapose.json --annotations annotations.json "
+        "--out out.json",
         "alphapose.json",
     ),
     "import mmpose": (
@@ -140,28 +155,28 @@ READERS: dict[str, tuple[str, str]] = {
         "mmpose/a.json",
     ),
     "import coco": (
-        "import --format coco --predictions results.json --annotations annotations.json --out out.json",
+        f"{IMPORT} --out out.json",
         "results.json",
     ),
     "export": ("export --detections results.json --format coco --out out.json", "results.json"),
     "evaluate annotations": (
-        "evaluate --annotations annotations.json --detections results.json --group body",
+        f"{EVALUATE} --group body",
         "annotations.json",
     ),
     "evaluate detections": (
-        "evaluate --annotations annotations.json --detections results.json --group body",
+        f"{EVALUATE} --group body",
         "results.json",
     ),
     "draw detections": (
-        "draw --annotations annotations.json --detections results.json --images pictures --out out.html",
+        f"{DRAW} --out out.html",
         "results.json",
     ),
     "draw picture": (
-        "draw --annotations annotations.json --detections results.json --images pictures --out out.html",
+        f"{DRAW} --out out.html",
         "pictures/a.png",
     ),
     "calibration fit": (
-        "calibration fit --annotations annotations.json --detections results.json --out out.csv",
+        f"{FIT} --out out.csv",
         "annotations.json",
     ),
     "calibration apply": (
@@ -171,20 +186,20 @@ READERS: dict[str, tuple[str, str]] = {
     "import ros1": ("record import out --bag x.bag", "x.bag"),
     "import mcap": ("record import out --bag mcap", "mcap/x.mcap"),
     "import sqlite": ("record import out --bag sqlite3", "sqlite3/x.db3"),
-    "import open3d": ("record import out --open3d open3d", "open3d/intrinsic.json"),
-    "import open3d picture": ("record import out --open3d open3d", "open3d/depth/00001.png"),
-    "import poses": ("record import out --open3d open3d --poses poses.txt", "poses.txt"),
+    "import open3d": (IMPORT_OPEN3D, "open3d/intrinsic.json"),
+    "import open3d picture": (IMPORT_OPEN3D, "open3d/depth/00001.png"),
+    "import poses": (f"{IMPORT_OPEN3D} --poses poses.txt", "poses.txt"),
     "check camera": ("record check rec", "rec/camera.json"),
     "check list": ("record check rec", "rec/rgb.txt"),
     "check poses": ("record check rec", "rec/groundtruth.txt"),
     "check c3d": ("record check rec", "rec/mocap.c3d"),
     "check tsv": ("record check rec", "rec/mocap.tsv"),
     "lift camera": (
-        "lift --recording rec --detector movenet-lightning --out out.parquet",
+        f"{LIFT} --out out.parquet",
         "rec/camera.json",
     ),
     "lift depth": (
-        "lift --recording rec --detector movenet-lightning --out out.parquet",
+        f"{LIFT} --out out.parquet",
         "rec/depth/000001.png",
     ),
     "inspect tsv": ("inspect mocap.tsv", "mocap.tsv"),

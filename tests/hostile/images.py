@@ -96,7 +96,9 @@ ODD = {
     "PNG with 200 MB of text": lambda: png(
         32, 32, _chunk(b"zTXt", b"k\0\0" + zlib.compress(bytes(200_000_000), 9)), kind=2
     ),
-    "PNG with a false colour profile": lambda: png(32, 32, _chunk(b"iCCP", b"x\0\0" + zlib.compress(b"no")), kind=2),
+    "PNG with a false colour profile": lambda: png(
+        32, 32, _chunk(b"iCCP", b"x\0\0" + zlib.compress(b"no")), kind=2
+    ),
     "PNG with EXIF of noise": lambda: png(32, 32, _chunk(b"eXIf", bytes(range(200))), kind=2),
     "PNG 1 x 1": lambda: png(1, 1, kind=2),
     "PNG 60000 x 1": lambda: png(60_000, 1, kind=2),
@@ -136,7 +138,9 @@ def cases() -> Iterator[Case]:
         for reader in where:
             command, target = READERS[reader]
             for kind, content in kinds.items():
-                yield Case(f"image: {reader}: {kind}", command, partial(_put, target, content), **expected(reader))
+                yield Case(
+                    f"image: {reader}: {kind}", command, partial(_put, target, content), **expected(reader)
+                )
     command, _ = READERS["pictures"]
     for kind, content in (BOMBS | DAMAGED).items():
         yield Case(f"image: none else: {kind}", command, partial(_alone, content), notes=True)

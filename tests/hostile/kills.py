@@ -16,16 +16,16 @@ from collections import Counter
 from pathlib import Path
 
 from hicp_lib.detectors.weights.default import weights_dir
-from tests.hostile.good import make_good
+from tests.hostile.good import CREATE, DETECT, DRAW, IMPORT_OPEN3D, make_good
 from tests.hostile.judge import Ready, state
 
 # What is run, and how often of 100 kills: rendering takes seconds of a processor.
 COMMANDS = {
-    "detect": ("detect --detector movenet-lightning --images pictures --out out/d.json", 26),
-    "create": ("dataset create --annotations annotations.json --images pictures --out out", 26),
+    "detect": (f"{DETECT} --out out/d.json", 26),
+    "create": (f"{CREATE} --out out", 26),
     "import bag": ("record import out --bag x.bag", 14),
-    "import open3d": ("record import out --open3d open3d", 10),
-    "draw": ("draw --annotations annotations.json --detections results.json --images pictures --out out", 10),
+    "import open3d": (IMPORT_OPEN3D, 10),
+    "draw": (f"{DRAW} --out out", 10),
     "render": ("scenes render out --n 2 --workers 2", 7),
     "simulate": ("record simulate mocap out --n-frames 2 --workers 2", 7),
 }

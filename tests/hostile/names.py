@@ -67,28 +67,50 @@ def cases() -> Iterator[Case]:
     for kind, text in TEXTS.items():
         name = text.replace("/", "|")
         common = {"exits": (0, 2), "notes": True}
-        yield Case(f"name: of a picture: {kind}", detect + " --by-image", partial(_rename, text, None), **common)
+        yield Case(
+            f"name: of a picture: {kind}", detect + " --by-image", partial(_rename, text, None), **common
+        )
         yield Case(f"name: of a broken picture: {kind}", detect, partial(_rename, text, b"no"), **common)
-        yield Case(f"name: in annotations: {kind}", READERS["create annotations"][0], partial(_name_everywhere, text), **common)
+        yield Case(
+            f"name: in annotations: {kind}",
+            READERS["create annotations"][0],
+            partial(_name_everywhere, text),
+            **common,
+        )
         yield Case(f"name: drawn: {kind}", draw, partial(_name_everywhere, text), **common)
         by_image = READERS["evaluate annotations"][0] + " --by-image"
         yield Case(f"name: evaluated: {kind}", by_image, partial(_name_everywhere, text), **common)
         yield Case(f"name: not there: {kind}", ["inspect", f"./{name}"])
-        yield Case(f"name: of a detector: {kind}", ["detect", "--detector", text, "--images", "pictures", "--out", "out.json"])
+        yield Case(
+            f"name: of a detector: {kind}",
+            ["detect", "--detector", text, "--images", "pictures", "--out", "out.json"],
+        )
         yield Case(f"name: of a parameter: {kind}", ["report", "-p", text, "1", "--results", "out"])
         yield Case(f"name: of a profile: {kind}", ["report", "--profile", text, "--results", "out"])
         yield Case(f"name: of a notebook: {kind}", ["report", "--only", text, "--results", "out"])
         yield Case(f"name: of a weight: {kind}", ["models", "fetch", f"x{text}"])
-        yield Case(f"name: of a group: {kind}", [*READERS["evaluate annotations"][0].split()[:-1], f"x{text}"])
+        yield Case(
+            f"name: of a group: {kind}", [*READERS["evaluate annotations"][0].split()[:-1], f"x{text}"]
+        )
         keypoints = partial(_changed, "annotations.json", put("categories", 0, "keypoints", 0, value=text))
         yield Case(f"name: of a keypoint: {kind}", READERS["create annotations"][0], keypoints)
         yield Case(f"name: of a keypoint, inspected: {kind}", "inspect annotations.json", keypoints)
-        yield Case(f"name: of a TSV marker: {kind}", "inspect mocap.tsv", partial(_markers, write_tsv, "mocap.tsv", text), **common)
-        yield Case(f"name: of a C3D marker: {kind}", "inspect mocap.c3d", partial(_markers, write_c3d, "mocap.c3d", text), **common)
+        yield Case(
+            f"name: of a TSV marker: {kind}",
+            "inspect mocap.tsv",
+            partial(_markers, write_tsv, "mocap.tsv", text),
+            **common,
+        )
+        yield Case(
+            f"name: of a C3D marker: {kind}",
+            "inspect mocap.c3d",
+            partial(_markers, write_c3d, "mocap.c3d", text),
+            **common,
+        )
         yield Case(f"name: of an Open3D folder: {kind}", ["record", "import", "out", "--open3d", f"./{name}"],
                    partial(_renamed_recording, text), exits=(0,), notes=True)  # fmt: skip
-        yield Case(f"name: of a recording to make: {kind}", ["record", "import", f"out/{name}", "--open3d", "open3d"],
-                   exits=(0, 2), notes=True)  # fmt: skip
+        making = ["record", "import", f"out/{name}", "--open3d", "open3d"]
+        yield Case(f"name: of a recording to make: {kind}", making, exits=(0, 2), notes=True)
     yield Case("name: of a picture: no text", detect, _undecodable, exits=(0, 2), notes=True)
     yield Case("name: drawn: no text", draw, _undecodable, exits=(0, 2), notes=True)
     yield Case("name: inspected: no text", "inspect pictures", _undecodable, exits=(0, 2))

@@ -17,22 +17,24 @@ from tests.hostile.case import Case
 from tests.hostile.good import READERS
 
 FLOAT = TensorProto.FLOAT
+node, port = helper.make_node, helper.make_tensor_value_info
 IMAGE = [1, 3, 64, 48]
 
 
-def network(nodes, constants=None, outputs=(("maps", [1, 133, 16, 12]),), opset: int = 17, image=IMAGE) -> bytes:
+def network(
+    nodes, constants=None, outputs=(("maps", [1, 133, 16, 12]),), opset: int = 17, image=IMAGE
+) -> bytes:
     """A network from an image to maps, made of these nodes."""
     graph = helper.make_graph(
         nodes, "g",
-        [helper.make_tensor_value_info("image", FLOAT, image)],
-        [helper.make_tensor_value_info(name, FLOAT, shape) for name, shape in outputs],
+        [port("image", FLOAT, image)],
+        [port(name, FLOAT, shape) for name, shape in outputs],
         [numpy_helper.from_array(np.asarray(value), name) for name, value in (constants or {}).items()],
     )  # fmt: skip
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", opset)], ir_version=8)
     return model.SerializeToString()
 
 
-node = helper.make_node
 ZERO = {"zero": np.zeros((1, 133, 16, 12), np.float32)}
 
 
@@ -45,8 +47,8 @@ def of_shape(*sizes: int) -> bytes:
 
 
 def of_input_times(scale: float) -> bytes:
-    nodes = [node("Resize", ["image", "", "scales"], ["big"], mode="nearest"), node("ReduceMax", ["big"], ["most"]),
-             node("Add", ["most", "zero"], ["maps"])]  # fmt: skip
+    nodes = [node("Resize", ["image", "", "scales"], ["big"], mode="nearest"),
+             node("ReduceMax", ["big"], ["most"]), node("Add", ["most", "zero"], ["maps"])]  # fmt: skip
     return network(nodes, ZERO | {"scales": np.array([1, 1, scale, scale], np.float32)})
 
 
@@ -67,17 +69,23 @@ def endless_loop() -> bytes:
     """A loop of 2^62 rounds."""
     body = helper.make_graph(
         [node("Identity", ["on"], ["on_then"]), node("Add", ["x", "x"], ["y"])], "body",
-        [helper.make_tensor_value_info("i", TensorProto.INT64, []), helper.make_tensor_value_info("on", TensorProto.BOOL, []),
-         helper.make_tensor_value_info("x", FLOAT, [])],
-        [helper.make_tensor_value_info("on_then", TensorProto.BOOL, []), helper.make_tensor_value_info("y", FLOAT, [])],
+        [port("i", TensorProto.INT64, []), port("on", TensorProto.BOOL, []), port("x", FLOAT, [])],
+        [port("on_then", TensorProto.BOOL, []), port("y", FLOAT, [])],
     )  # fmt: skip
-    nodes = [node("ReduceMax", ["image"], ["seen"], keepdims=0), node("Loop", ["n", "true", "seen"], ["last"], body=body),
+    nodes = [node("ReduceMax", ["image"], ["seen"], keepdims=0),
+             node("Loop", ["n", "true", "seen"], ["last"], body=body),
              node("Add", ["last", "zero"], ["maps"])]  # fmt: skip
     return network(nodes, ZERO | {"n": np.array(2**62), "true": np.array(True)})
 
 
 def cyclic() -> bytes:
-    return network([node("Add", ["image", "b"], ["a"]), node("Add", ["a", "image"], ["b"]), node("Identity", ["a"], ["maps"])])
+    return network(
+        [
+            node("Add", ["image", "b"], ["a"]),
+            node("Add", ["a", "image"], ["b"]),
+            node("Identity", ["a"], ["maps"]),
+        ]
+    )
 
 
 def many_nodes(n: int) -> bytes:
@@ -96,7 +104,9 @@ def doubled(n: int) -> bytes:
 
 
 def external(location: str) -> bytes:
-    model = onnx.ModelProto.FromString(network([node("Add", ["image", "weights"], ["maps"])], {"weights": np.zeros(3, np.float32)}))
+    model = onnx.ModelProto.FromString(
+        network([node("Add", ["image", "weights"], ["maps"])], {"weights": np.zeros(3, np.float32)})
+    )
     tensor = model.graph.initializer[0]
     tensor.ClearField("raw_data")
     tensor.data_location = TensorProto.EXTERNAL
@@ -106,14 +116,20 @@ def external(location: str) -> bytes:
 
 def of_strings() -> bytes:
     graph = helper.make_graph(
-        [node("Identity", ["text"], ["maps"])], "g", [helper.make_tensor_value_info("text", TensorProto.STRING, [1])],
-        [helper.make_tensor_value_info("maps", TensorProto.STRING, [1])],
+        [node("Identity", ["text"], ["maps"])], "g", [port("text", TensorProto.STRING, [1])],
+        [port("maps", TensorProto.STRING, [1])],
     )  # fmt: skip
-    return helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8).SerializeToString()
+    return helper.make_model(
+        graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8
+    ).SerializeToString()
 
 
 def answers(value: float) -> bytes:
-    nodes = [node("ReduceMax", ["image"], ["seen"]), node("Mul", ["seen", "value"], ["many"]), node("Add", ["many", "zero"], ["maps"])]
+    nodes = [
+        node("ReduceMax", ["image"], ["seen"]),
+        node("Mul", ["seen", "value"], ["many"]),
+        node("Add", ["many", "zero"], ["maps"]),
+    ]
     return network(nodes, ZERO | {"value": np.float32(value)})
 
 
@@ -135,7 +151,7 @@ NETWORKS: dict[str, Callable[[], bytes]] = {
     "doubled 40 times": partial(doubled, 40),
     "weights in ../x": partial(external, "../x"),
     "weights in /etc/passwd": partial(external, "/etc/passwd"),
-    "operators of another domain": lambda: network([helper.make_node("Evil", ["image"], ["maps"], domain="x.y")]),
+    "operators of another domain": lambda: network([node("Evil", ["image"], ["maps"], domain="x.y")]),
     "an operator nobody knows": lambda: network([node("Evil", ["image"], ["maps"])]),
     "opset 9999": lambda: network([node("Identity", ["image"], ["maps"])], opset=9999),
     "texts": of_strings,
@@ -143,7 +159,9 @@ NETWORKS: dict[str, Callable[[], bytes]] = {
     "input of 100,000 pixels a side": partial(big_input, 100_000),
     "input of 0 pixels": partial(big_input, 0),
     "half of it": lambda: answers(1)[: len(answers(1)) // 2],
-    "answers of another shape": lambda: network([node("ReduceMax", ["image"], ["maps"])], outputs=(("maps", [1, 1, 1, 1]),)),
+    "answers of another shape": lambda: network(
+        [node("ReduceMax", ["image"], ["maps"])], outputs=(("maps", [1, 1, 1, 1]),)
+    ),
     "maps of 7 points": lambda: network(
         [node("ReduceMax", ["image"], ["most"]), node("Add", ["most", "small"], ["maps"])],
         {"small": np.zeros((1, 7, 16, 12), np.float32)}, outputs=(("maps", [1, 7, 16, 12]),),
@@ -177,7 +195,7 @@ BUNDLES: dict[str, Callable[[], bytes]] = {
     "the same member twice": lambda: bundle((POSE[0], MODEL), (POSE[0], MODEL)),
     "members out of the folder": lambda: bundle(("../../x", MODEL), *[(name, MODEL) for name in POSE]),
     "half of it": lambda: bundle(*[(name, MODEL) for name in POSE])[:200],
-    "offsets beyond the model": lambda: bundle(*[(name, b"\xff\xff\xff\x7fTFL3" + b"\xff" * 64) for name in POSE]),
+    "offsets beyond the model": lambda: bundle(*[(name, b"\xff\xff\xff\x7fTFL3" ) for name in POSE]),
     "a wrong checksum": lambda: bundle(*[(name, MODEL) for name in POSE]).replace(b"TFL3", b"TFL4", 1),
 }  # fmt: skip
 
@@ -207,7 +225,12 @@ def cases() -> Iterator[Case]:
         yield Case(f"network: inspect: {kind}", "inspect model.onnx", put, exits=(0, 2))
     for name in ("alphapose", "openpose", "detectron2", "rtmo"):
         command = f"detect --detector {name} --model model.onnx --images pictures --out out.json"
-        for kind in ("a constant of 40 GB", "texts", "input of 100,000 pixels a side", "answers of another shape"):
+        for kind in (
+            "a constant of 40 GB",
+            "texts",
+            "input of 100,000 pixels a side",
+            "answers of another shape",
+        ):
             yield Case(f"network: {name}: {kind}", command, partial(_put, "model.onnx", NETWORKS[kind]))
     for kind, value in ANSWERS.items():
         exits = (2,) if kind == "NaN" else (0, 2)

@@ -7,21 +7,22 @@ from functools import partial
 from pathlib import Path
 
 from tests.hostile.case import Case
+from tests.hostile.good import DETECT, DRAW, MMPOSE
 from tests.hostile.judge import MARKER
 from tests.hostile.special_files import prepare
 
-MODULES = ("papermill", "jupyter_book", "multiprocessing", "ezc3d", "resource", "numpy", "random", "onnxruntime", "json",
-           "sitecustomize", "usercustomize", "cv2", "mediapipe", "absl", "rosbags", "pip", "click", "hicp_lib", "sqlite3",
-           "pandas", "open3d", "distributed", "tornado", "zipfile", "struct", "signal", "ctypes")  # fmt: skip
+MODULES = """papermill jupyter_book multiprocessing ezc3d resource numpy random onnxruntime json sitecustomize
+usercustomize cv2 mediapipe absl rosbags pip click hicp_lib sqlite3 pandas open3d distributed tornado zipfile
+struct signal ctypes psutil tempfile""".split()
 COMMANDS = {
     "check of a C3D": "record check rec",
     "inspect of a C3D": "inspect mocap.c3d",
     "import of a bag": "record import out --bag x.bag",
-    "detect": "detect --detector movenet-lightning --images pictures --out out.json --workers 2",
+    "detect": f"{DETECT} --out out.json --workers 2",
     "MediaPipe": "detect --detector mediapipe --images pictures --out out.json",
-    "a network of one's own": "detect --detector mmpose --model model.onnx --images pictures --out out.json",
+    "a network of one's own": f"{MMPOSE} --out out.json",
     "render": "scenes render out --n 2 --workers 2",
-    "draw": "draw --detections results.json --images pictures --out out.html",
+    "draw": f"{DRAW} --out out.html",
     "list of models": "models list",
     "doctor": "doctor",
 }
@@ -33,7 +34,9 @@ def plant(where: str, folder: Path) -> None:
     marker = folder.parent / MARKER
     (folder / where).mkdir(exist_ok=True)
     for name in MODULES:
-        (folder / where / f"{name}.py").write_text(f"open({str(marker)!r}, 'a').write({name!r})\nraise SystemExit(7)\n")
+        (folder / where / f"{name}.py").write_text(
+            f"open({str(marker)!r}, 'a').write({name!r})\nraise SystemExit(7)\n"
+        )
     (folder / ".git").mkdir()
     config = f"[core]\n\tfsmonitor = touch {marker}; false\n\thooksPath = .\n\trepositoryformatversion = 0\n"
     (folder / ".git" / "config").write_text(config)

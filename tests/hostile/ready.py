@@ -1,4 +1,4 @@
-"""An interpreter that has imported the library and runs commands in forks of itself: no seconds of imports each.
+"""An interpreter that has imported the library and runs commands in forks, without waiting for imports.
 
 It reads one request per line, JSON, and answers with one: how the command ended and what it used.
 """

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 
 from tests.hostile.case import Case
+from tests.hostile.good import DETECT, LIFT
 
 
 def silent(connection: socket.socket) -> None:
@@ -52,10 +53,11 @@ def echo(connection: socket.socket) -> None:
 
 SERVERS: dict[str, Callable[[socket.socket], None]] = {
     "silent": silent, "closes at once": gone, "a web server": web, "a shell server": banner,
-    "one byte a second": byte_by_byte, "without end": flood, "2^60 bytes announced": vast_frames, "an echo": echo,
+    "one byte a second": byte_by_byte, "an echo": echo, "without end": flood,
+    "2^60 bytes announced": vast_frames
 }  # fmt: skip
-DETECT = "detect --detector movenet-lightning --images pictures --out out.json --dask tcp://127.0.0.1:PORT"
-OTHERS = ("lift --recording rec --detector movenet-lightning --out out.parquet --dask tcp://127.0.0.1:PORT",
+SPREAD = f"{DETECT} --out out.json --dask tcp://127.0.0.1:PORT"
+OTHERS = (f"{LIFT} --out out.parquet --dask tcp://127.0.0.1:PORT",
           "scenes render out --n 2 --dask tcp://127.0.0.1:PORT",
           "record simulate mocap out --n-frames 2 --dask tcp://127.0.0.1:PORT",
           "report --results out --dask tcp://127.0.0.1:PORT")  # fmt: skip
@@ -66,8 +68,8 @@ ADDRESSES = ("", "tcp://127.0.0.1:9", "tcp://127.0.0.1:99999", "tcp://:1", "127.
 
 def cases() -> Iterator[Case]:
     for kind, serve in SERVERS.items():
-        yield Case(f"server: detect: {kind}", DETECT, serve=serve)
+        yield Case(f"server: detect: {kind}", SPREAD, serve=serve)
     for command in OTHERS:
         yield Case(f"server: {command.split()[0]} {command.split()[1]}: silent", command, serve=silent)
     for address in ADDRESSES:
-        yield Case(f"server: address {address!r}", [*DETECT.split()[:-1], address])
+        yield Case(f"server: address {address!r}", [*SPREAD.split()[:-1], address])

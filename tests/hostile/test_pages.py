@@ -8,7 +8,6 @@ import pytest
 
 from hicp_lib.cli import main as cli
 from hicp_lib.report.build import make_report
-from tests.browser import browser  # noqa: F401
 from tests.hostile.good import make_good
 from tests.report.conftest import library, study  # noqa: F401
 from tests.report.tiny_study import FINISH, START, write_notebook
@@ -40,14 +39,15 @@ LOOK = """
       if (attribute.name.startsWith("on") && attribute.value.includes("hacked")
           || /^\\s*javascript:/i.test(attribute.value) && attribute.value.includes("hacked"))
         bad.push(element.outerHTML.slice(0, 200));
-    if (element.tagName === "SCRIPT" && /^\\s*(window|parent).hacked/.test(element.textContent)) bad.push("script");
+    if (element.tagName === "SCRIPT" && /^\\s*(window|parent).hacked/.test(element.textContent))
+      bad.push("script");
   }
   if (window.hacked !== undefined) bad.push("executed");
   return bad;
 """
 
 
-def looked_at(browser, page) -> list:  # noqa: F811
+def looked_at(browser, page) -> list:
     """What is executed or could be on a page, and what its console says."""
     browser.get_log("browser")
     browser.get(page.as_uri())
@@ -56,7 +56,7 @@ def looked_at(browser, page) -> list:  # noqa: F811
     return found + severe
 
 
-def test_pages_of_detections_execute_no_name(browser, tmp_path):  # noqa: F811
+def test_pages_of_detections_execute_no_name(browser, tmp_path):
     make_good(tmp_path / "good")
     annotations = json.loads((tmp_path / "good" / "annotations.json").read_text())
     pictures = tmp_path / "good" / "pictures"
@@ -68,7 +68,10 @@ def test_pages_of_detections_execute_no_name(browser, tmp_path):  # noqa: F811
         (pictures / name).write_bytes((pictures / "a.png").read_bytes())
     truth, found = tmp_path / "<svg onload=window.hacked=1>.json", tmp_path / f"{names[1]}.json"
     truth.write_text(json.dumps(annotations))
-    rows = [{"image_id": i, "category_id": 1, "score": 0.5, "keypoints": person["keypoints"]} for i in range(len(names))]
+    rows = [
+        {"image_id": i, "category_id": 1, "score": 0.5, "keypoints": person["keypoints"]}
+        for i in range(len(names))
+    ]
     found.write_text(json.dumps(rows))
     out = tmp_path / "page.html"
     options = ["--detections", str(found), "--images", str(pictures), "--annotations", str(truth)]
