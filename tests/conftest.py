@@ -39,6 +39,7 @@ SLOW = (
     "tests/detectors/runtime/test_isolation.py",
     "tests/detectors/runtime/test_run.py",
     "tests/experiments/test_on_cluster.py",
+    "tests/hostile/",
     "tests/report/test_book.py",
     "tests/report/test_kills.py",
     "tests/report/test_runs.py",

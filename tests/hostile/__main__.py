@@ -1,7 +1,11 @@
-"""Judge hostile inputs: `python -m tests.hostile [BEGINNING OF A NAME]...`; a table of what fell."""
+"""Judge hostile inputs: `python -m tests.hostile [BEGINNING OF A NAME]...`; a table of what fell.
+
+`--mutated N [KIND]...` judges N files of each kind with changed bytes in place of the corpus.
+"""
 
 from __future__ import annotations
 
+import argparse
 import sys
 import tempfile
 import time
@@ -9,13 +13,23 @@ from collections import Counter
 from pathlib import Path
 
 from hicp_lib.detectors.weights.default import weights_dir
+from tests.hostile import mutated
 from tests.hostile.corpus import corpus
 from tests.hostile.judge import Judge
 
 
 def main() -> int:
-    wanted = sys.argv[1:] or [""]
-    cases = [case for name, case in corpus().items() if name.startswith(tuple(wanted))]
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("wanted", nargs="*")
+    parser.add_argument("--mutated", type=int, metavar="N")
+    parser.add_argument("--seed", type=int, default=0)
+    asked = parser.parse_args()
+    if asked.mutated is None:
+        beginnings = tuple(asked.wanted) or ("",)
+        cases = [case for name, case in corpus().items() if name.startswith(beginnings)]
+    else:
+        kinds = tuple(asked.wanted) or tuple(mutated.COMMANDS)
+        cases = list(mutated.cases(asked.mutated, asked.seed, kinds))
     n, fell, cpu_s, start_s = Counter[str](), Counter[str](), 0.0, time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         judge = Judge(Path(folder), weights_dir())
@@ -29,10 +43,8 @@ def main() -> int:
         judge.close()
     for kind, of in n.items():
         print(f"{kind:<20} {of:>4} cases, {fell[kind]:>3} fell")
-    print(
-        f"{len(cases)} cases, {fell.total()} fell; {cpu_s:.0f} s of a processor, "
-        f"{time.monotonic() - start_s:.0f} s in all"
-    )
+    took = f"{cpu_s:.0f} s of a processor, {time.monotonic() - start_s:.0f} s in all"
+    print(f"{len(cases)} cases, {fell.total()} fell; {took}")
     return bool(fell)
 
 

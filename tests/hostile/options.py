@@ -27,6 +27,8 @@ MORE = {"min_score": ("5",), "num_hands": ("0", "1.5", "1000000000"),
         "num_poses": ("0", "1.5"), "threads": ("0", "1.5", "1000000000"),
         "padding": ("0", "1e9")}  # fmt: skip
 NULL_IS_DEFAULT = ("person_min_score", "person_max_overlap", "net_height", "score_scale", "input_size_px")
+MAY_BE_MANY = ("--seed", "--limit", "--min-pixels", "--workers", "--score-scale", "--rate", "--depth-scale",
+               "--subject")  # fmt: skip
 OF_COMMANDS = {
     "--score-scale": f"{IMPORT} --out out.json",
     "--min-pixels": f"{CREATE} --out out",
@@ -108,8 +110,7 @@ def cases() -> Iterator[Case]:
             )
     for option, command in OF_COMMANDS.items():
         for number in ("nan", "inf", "-inf", "-1", "", "text", "1e400", "9" * 30, "9" * 5000):
-            many = number.startswith("9") and option in ("--seed", "--limit", "--min-pixels", "--workers", "--score-scale",
-                                                         "--rate", "--depth-scale", "--subject")  # fmt: skip
+            many = number.startswith("9") and option in MAY_BE_MANY
             shown = number if len(number) < 20 else f"{len(number)} digits"
             exits = (0, 2) if many else (2,)
             yield Case(
