@@ -42,7 +42,10 @@ COMMANDS = {
         ("rec/groundtruth.txt", "record check rec"),
         ("poses.txt", "inspect poses.txt"),
     ],
-    "network": [("model.onnx", "inspect model.onnx"), ("model.onnx", "models show --detector mmpose --model model.onnx")],
+    "network": [
+        ("model.onnx", "inspect model.onnx"),
+        ("model.onnx", "models show --detector mmpose --model model.onnx"),
+    ],
 }  # fmt: skip
 
 
