@@ -22,11 +22,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("wanted", nargs="*")
     parser.add_argument("--mutated", type=int, metavar="N")
+    parser.add_argument("--every", type=int, default=1, metavar="K", help="of the corpus, one of K")
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
     if asked.mutated is None:
         beginnings = tuple(asked.wanted) or ("",)
         cases = [case for name, case in corpus().items() if name.startswith(beginnings)]
+        cases = cases[:: asked.every]
     else:
         kinds = tuple(asked.wanted) or tuple(mutated.COMMANDS)
         cases = list(mutated.cases(asked.mutated, asked.seed, kinds))

@@ -61,7 +61,8 @@ class Ready:
         paths = os.pathsep.join(filter(None, (str(CHECKOUT), os.environ.get("PYTHONPATH"))))
         self._process = subprocess.Popen(
             [sys.executable, "-m", "tests.hostile.ready"], cwd=CHECKOUT, text=True, stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE, env=os.environ | {"PYTHONPATH": paths} | environment,
+            stdout=subprocess.PIPE,
+            env=os.environ | {"PYTHONPATH": paths, "OPENCV_LOG_LEVEL": "ERROR"} | environment,
         )  # fmt: skip
 
     def close(self) -> None:
@@ -170,7 +171,7 @@ def _of_the_lines(case: Case, code: int, printed: str, errors: str) -> list[str]
         told.append(f"no line that says what is wrong: {errors[:160]!r}")
     if len(lines) > len(mistakes) and code == 2 and not case.notes or len(mistakes) > 1:
         told.append(f"{len(lines)} lines of errors: {errors[:300]!r}")
-    if any(len(line) > 1000 for line in lines):
+    if any(len(line) > 10_000 for line in lines):
         told.append(f"a line of {max(map(len, lines))} characters")
     if found := _CONTROLS.search(printed + errors):
         told.append(f"prints {found[0]!r}")
