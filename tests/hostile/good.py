@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.keypoints import NAMES
-from hicp_lib.recordings.qualisys import MotionCapture, write_c3d, write_tsv
+from hicp_lib.recordings.c3d import write_points
+from hicp_lib.recordings.qualisys import MotionCapture, write_tsv
 from tests.detectors.onnx.onnx_models import colour_maps_model
 from tests.recordings.conftest import write_small
 from tests.recordings.ros_bags import write_bag
@@ -36,6 +37,11 @@ def picture(seed: int) -> np.ndarray:
     """A smooth picture, so that files are small."""
     noise = np.random.default_rng(seed).integers(0, 255, (10, 8, 3), np.uint8)
     return cv2.resize(noise, (WIDTH, HEIGHT), interpolation=cv2.INTER_CUBIC)
+
+
+def write_c3d(path: Path, seen: MotionCapture) -> None:
+    """A C3D file of motion capture."""
+    write_points(path, seen.points_m, seen.names, seen.rate_hz)
 
 
 def annotations() -> dict:

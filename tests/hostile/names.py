@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hicp_lib.recordings.qualisys import MotionCapture, write_c3d, write_tsv
+from hicp_lib.recordings.qualisys import MotionCapture, write_tsv
 from tests.hostile.annotations import put
 from tests.hostile.case import Case
-from tests.hostile.good import READERS
+from tests.hostile.good import READERS, write_c3d
 
 TEXTS = {
     "clears the screen": "\x1b[2J\x1b[Hok",

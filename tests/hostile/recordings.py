@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hicp_lib.recordings.qualisys import MotionCapture, write_c3d, write_tsv
+from hicp_lib.recordings.qualisys import MotionCapture, write_tsv
 from hicp_lib.robot.kinematics import HEAD_JOINTS
 from tests.hostile.annotations import put
 from tests.hostile.case import Case
-from tests.hostile.good import IMPORT_OPEN3D, LIFT, READERS
+from tests.hostile.good import IMPORT_OPEN3D, LIFT, READERS, write_c3d
 from tests.hostile.special_files import prepare
 from tests.recordings.c3d_files import make_c3d
 from tests.recordings.ros_bags import COLOR, OPTICAL, write_bag
