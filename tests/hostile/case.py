@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 OUTPUTS = "out"  # what names of files begin with that a command may write
+FULL_DISK = "out_disk"  # where a case may mount a small file system
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from hicp_lib.datasets.subsets import create_hicp
-from tests.hostile.case import Case
+from tests.hostile.case import FULL_DISK, Case
 from tests.hostile.good import CREATE, DETECT, DRAW, EVALUATE, FIT, IMPORT, LIFT
 from tests.hostile.special_files import listening
 
@@ -73,9 +73,8 @@ def _target(name: str, put: Callable[[Path], None], folder: Path) -> None:
 
 def _full_disk(folder: Path) -> None:
     """A file system of 16 kB."""
-    (folder / "small").mkdir()
-    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=16k", "tmpfs", str(folder / "small")], check=True)
-    (folder / "small" / "out").mkdir()
+    (folder / FULL_DISK).mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=16k", "tmpfs", str(folder / FULL_DISK)], check=True)
 
 
 def may_mount() -> bool:
@@ -125,7 +124,7 @@ def cases() -> Iterator[Case]:
                 f"destroying: {writer}: onto {kind}", command.replace("TARGET", "target"), made, notes=True
             )
         if may_mount():
-            full = command.replace("TARGET", "small/out/x")
+            full = command.replace("TARGET", f"{FULL_DISK}/x")
             yield Case(f"destroying: {writer}: onto a full disk", full, _full_disk, notes=True, exits=(0, 2))
     for filler, command in FILLERS.items():
         for kind in ("a pipe", "a device", "a socket", "read-only", "a link to nothing"):
@@ -138,7 +137,7 @@ def cases() -> Iterator[Case]:
             name = f"destroying: {filler}: beside {place}"
             yield Case(name, command.replace("TARGET", "target"), made, notes=True, exits=(0, 2))
         if may_mount():
-            full = command.replace("TARGET", "small/out/x")
+            full = command.replace("TARGET", f"{FULL_DISK}/x")
             yield Case(f"destroying: {filler}: onto a full disk", full, _full_disk, notes=True)
     for places in ("rec", "open3d", "pictures", "."):
         for filler in ("create", "import open3d", "import bag", "draw PNG"):

@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.keypoints import NAMES
-from hicp_lib.recordings.c3d import write_points
 from hicp_lib.recordings.qualisys import MotionCapture, write_tsv
 from tests.detectors.onnx.onnx_models import colour_maps_model
+from tests.recordings.c3d_files import make_c3d
 from tests.recordings.conftest import write_small
 from tests.recordings.ros_bags import write_bag
 
@@ -41,7 +41,7 @@ def picture(seed: int) -> np.ndarray:
 
 def write_c3d(path: Path, seen: MotionCapture) -> None:
     """A C3D file of motion capture."""
-    write_points(path, seen.points_m, seen.names, seen.rate_hz)
+    path.write_bytes(make_c3d(1000 * seen.points_m, tuple(name.encode() for name in seen.names)))
 
 
 def annotations() -> dict:

@@ -15,7 +15,7 @@ import threading
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from tests.hostile.case import OUTPUTS, Case
+from tests.hostile.case import FULL_DISK, OUTPUTS, Case
 from tests.hostile.good import make_good
 from tests.hostile.ready import WALL_S
 
@@ -215,8 +215,8 @@ def _server(case: Case):
 
 
 def _remove(work: Path) -> None:
-    if (work / "small").is_mount():
-        subprocess.run(["umount", str(work / "small")], check=True)
+    if (work / FULL_DISK).is_mount():
+        subprocess.run(["umount", str(work / FULL_DISK)], check=True)
     for where, folders, _ in os.walk(work):
         for name in (".", *folders):
             with suppress(OSError):
