@@ -108,10 +108,7 @@ class Judge:
     def __init__(self, folder: Path, weights: Path | None = None) -> None:
         self.folder = folder
         self.good = make_good(folder / "good")
-        self.cache = folder / "cache"
-        self.cache.mkdir()
-        if weights is not None and weights.is_dir():
-            (self.cache / "weights").symlink_to(weights)
+        self.cache, self.weights = folder / "cache", weights
         self.ready = Ready(folder, {"HICP_CACHE": str(self.cache), "HOME": str(folder)})
         self.used: dict = {}
 
@@ -123,6 +120,9 @@ class Judge:
         """What is wrong with how a case is answered; nothing where all is right."""
         work = self.folder / "work"
         shutil.copytree(self.good, work, symlinks=True)
+        self.cache.mkdir()  # what was found in another case is not taken up
+        if self.weights is not None and self.weights.is_dir():
+            (self.cache / "weights").symlink_to(self.weights)
         try:
             case.make(work)
             before = state(work)
@@ -136,6 +136,7 @@ class Judge:
             return told
         finally:
             _remove(work)
+            shutil.rmtree(self.cache)
 
     def _of_the_run(self, case: Case, printed: str, errors: str) -> list[str]:
         used, told = self.used, []
@@ -150,8 +151,7 @@ class Judge:
             told.append(f"traceback: {errors.strip().splitlines()[-1][:160]}")
         else:
             told += _of_the_lines(case, code, printed, errors)
-        idle_s = used["wall_s"] - used["waited_s"] - used["cpu_s"]
-        if code and (used["cpu_s"] > CPU_S or idle_s > IDLE_S):
+        if code and (used["cpu_s"] > CPU_S or used["idle_s"] > IDLE_S):
             told.append(f"takes {used['cpu_s']:.1f} s of a processor, {used['wall_s']:.1f} s in all")
         if used["most_bytes"] > MEMORY_BYTES:
             told.append(f"takes {used['most_bytes'] / 2**30:.2f} GB")

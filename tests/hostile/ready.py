@@ -17,7 +17,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-WALL_S = 12.0  # after so long a command is ended
+IDLE_S = 10.0  # a command that computes no more for so long, nor waits for a processor, is ended
+WALL_S = 120.0  # and any after so long
 GUARD_BYTES = 3 * 2**29  # of one process, likewise
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 # Open3D's threads do not survive a fork, and what imports it is left out.
@@ -63,17 +64,27 @@ def _children(of: int) -> dict[int, int]:
     return found
 
 
+def _scheduled(pid: int) -> tuple[float, float]:
+    """Seconds that a process computed and that it waited for a processor."""
+    with suppress(OSError, ValueError):
+        computed, waited, _ = Path(f"/proc/{pid}/schedstat").read_text().split()
+        return int(computed) / 1e9, int(waited) / 1e9
+    return 0.0, 0.0
+
+
 def _watch(pid: int, wall_s: float, kill_s: float | None) -> dict[str, Any]:
     """Wait for a fork; end what takes too long or too much, or at the moment that was asked for."""
-    start_s, stopped, most_bytes, pause_s = time.monotonic(), "", 0, 0.01
+    start_s, stopped, most_bytes, pause_s, spent = time.monotonic(), "", 0, 0.01, {pid: (0.0, 0.0)}
     if kill_s is not None:
         time.sleep(kill_s)
         os.kill(pid, signal.SIGKILL)  # alone: what it started is to end by itself
     while os.waitid(os.P_PID, pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
         family = _children(os.getpid())
+        spent |= {one: _scheduled(one) for one in family}
         most_bytes = max(most_bytes, *family.values(), 0)
-        if time.monotonic() - start_s > wall_s:
-            stopped = f"still runs after {wall_s:.0f} s"
+        took_s = time.monotonic() - start_s
+        if took_s > wall_s or (kill_s is None and took_s - sum(map(sum, spent.values())) > IDLE_S):
+            stopped = f"still runs after {took_s:.0f} s"
         elif most_bytes > GUARD_BYTES:
             stopped = f"took {most_bytes / 2**30:.1f} GB"
         if stopped:
@@ -82,15 +93,15 @@ def _watch(pid: int, wall_s: float, kill_s: float | None) -> dict[str, Any]:
                     os.kill(one, signal.SIGKILL)
         time.sleep(pause_s)
         pause_s = min(2 * pause_s, 0.1)
-    wall_s = time.monotonic() - start_s
-    waited_s = 0.0
-    with suppress(OSError, IndexError):
-        waited_s = int(Path(f"/proc/{pid}/schedstat").read_text().split()[1]) / 1e9
+    took_s = time.monotonic() - start_s
+    spent[pid] = _scheduled(pid)
     _, status, used = os.wait4(pid, 0)
-    most_bytes = max(most_bytes, used.ru_maxrss * 1024)
     cpu_s = used.ru_utime + used.ru_stime
-    return {"status": status, "stopped": stopped, "wall_s": wall_s, "waited_s": waited_s, "cpu_s": cpu_s,
-            "most_bytes": most_bytes, "orphans": _end_orphans()}  # fmt: skip
+    return {
+        "status": status, "stopped": stopped, "wall_s": took_s, "cpu_s": cpu_s,
+        "idle_s": took_s - max(cpu_s, sum(of for of, _ in spent.values())) - sum(of for _, of in spent.values()),
+        "most_bytes": max(most_bytes, used.ru_maxrss * 1024), "orphans": _end_orphans(),
+    }  # fmt: skip
 
 
 def _end_orphans() -> int:
