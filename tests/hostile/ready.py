@@ -97,9 +97,10 @@ def _watch(pid: int, wall_s: float, kill_s: float | None) -> dict[str, Any]:
     spent[pid] = _scheduled(pid)
     _, status, used = os.wait4(pid, 0)
     cpu_s = used.ru_utime + used.ru_stime
+    computed_s, waited_s = map(sum, zip(*spent.values(), strict=True))
     return {
         "status": status, "stopped": stopped, "wall_s": took_s, "cpu_s": cpu_s,
-        "idle_s": took_s - max(cpu_s, sum(of for of, _ in spent.values())) - sum(of for _, of in spent.values()),
+        "idle_s": took_s - max(cpu_s, computed_s) - waited_s,
         "most_bytes": max(most_bytes, used.ru_maxrss * 1024), "orphans": _end_orphans(),
     }  # fmt: skip
 
