@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import warnings
 from decimal import Decimal
 
@@ -158,7 +159,7 @@ def test_markers_beyond_ten_kilometres(tmp_path, far_m):
     assert np.allclose(read_mocap(path).points_m, 1)
     points_m[1, 1, 2] = far_m
     write_c3d(path, MotionCapture(np.arange(3) / 100, ("a", "b"), points_m, 100.0))
-    with pytest.raises(InputError, match=f"marker 'b' in frame 2 is at {far_m:.3g} m; expected at most 1000"):
+    with pytest.raises(InputError, match=re.escape(f"'b' in frame 2 is at {far_m:.6g} m; expected at most")):
         read_mocap(path)
     refused(path, read_mocap, path)
 
