@@ -9,6 +9,7 @@ from hicp_lib.core.camera import transform
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES
+from hicp_lib.core.progress import with_bar
 from hicp_lib.lifting.paper import BODY_RADIUS_M, REASONS, lift
 from hicp_lib.lifting.robust import METHODS, lift_robust
 from hicp_lib.recordings.recording import Recording, read_depth_m
@@ -76,7 +77,7 @@ def lift_found(
             counts = f"{len(recording)} frames, but detections of {len(detections)} images"
             raise InputError(f"{recording.folder}: {counts}; detect people in the frames of this recording")
     frames: dict[tuple[str, str], list] = {(detector, method): [] for detector in found for method in n_steps}
-    for k in range(len(recording)):
+    for k in with_bar(range(len(recording)), "lifting", "frame"):
         depth_m = read_depth_m(recording, k)
         for (detector, method), of_one in frames.items():
             of_one.append(_lift_frame(recording, k, depth_m, found[detector][k], n_steps[method]))

@@ -20,7 +20,7 @@ _MISSING = ("", "NULL", "null", "NaN", "nan", "NAN", "-nan")
 _TIME_CODE = re.compile(r"\d+(:\d+)+([:;.]\d+)*")  # SMPTE, IRIG
 _SAID_ONCE = ("FREQUENCY", "MARKER_NAMES", "NO_OF_FRAMES", "NO_OF_MARKERS")
 _MAX_RATE_HZ = 1e5
-MAX_MARKER_M = 1000.0  # from the origin, in any direction
+MAX_MARKER_M = 10_000.0  # from the origin, in any direction
 _SHOWN = 40  # characters of a wrong value that a message repeats
 
 
@@ -87,7 +87,7 @@ def read_mocap(path: str | Path) -> MotionCapture:
     far = np.argwhere(np.abs(mocap.points_m) > MAX_MARKER_M)
     for frame, k, axis in far[:1]:
         where = f"marker {mocap.names[k][:_SHOWN]!r} in frame {frame + 1}"
-        wrong = f"is at {mocap.points_m[frame, k, axis]:.5g} m; expected at most {MAX_MARKER_M:g}"
+        wrong = f"is at {mocap.points_m[frame, k, axis]:.6g} m; expected at most {MAX_MARKER_M:g}"
         raise InputError(f"{path}: {where} {wrong}, export missing markers as missing")
     missing = np.isnan(mocap.points_m).any(axis=2) | (mocap.points_m == 0).all(axis=2)
     mocap.points_m[missing] = np.nan

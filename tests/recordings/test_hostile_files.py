@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import warnings
 from decimal import Decimal
 
@@ -127,7 +128,7 @@ def test_joints(small, angles_rad):
     ("found", "put"),
     [
         ("1000.000", "1e30"), ("1000.000", "1e400"), ("1000.000", "inf"), ("1000.000", "abc"),
-        ("1000.000", "1000001"), ("1000.000", LONG), ("FREQUENCY\t100", f"FREQUENCY\t{LONG}"),
+        ("1000.000", "10000001"), ("1000.000", LONG), ("FREQUENCY\t100", f"FREQUENCY\t{LONG}"),
         ("NO_OF_FRAMES\t3", f"NO_OF_FRAMES\t{LONG}"), ("0.01000", "1e300"), ("0.01000", LONG),
     ],
 )  # fmt: skip
@@ -151,14 +152,14 @@ def test_rates_and_scales_of_c3d(tmp_path, changed):
     refused(path, read_mocap, path)
 
 
-@pytest.mark.parametrize("far_m", [1000.1, -1e27])
-def test_markers_beyond_a_kilometre(tmp_path, far_m):
+@pytest.mark.parametrize("far_m", [10_000.1, -1e27])
+def test_markers_beyond_ten_kilometres(tmp_path, far_m):
     path, points_m = tmp_path / "mocap.c3d", np.ones((3, 2, 3))
     write_c3d(path, MotionCapture(np.arange(3) / 100, ("a", "b"), points_m, 100.0))
     assert np.allclose(read_mocap(path).points_m, 1)
     points_m[1, 1, 2] = far_m
     write_c3d(path, MotionCapture(np.arange(3) / 100, ("a", "b"), points_m, 100.0))
-    with pytest.raises(InputError, match=f"marker 'b' in frame 2 is at {far_m:.3g} m; expected at most 1000"):
+    with pytest.raises(InputError, match=re.escape(f"'b' in frame 2 is at {far_m:.6g} m; expected at most")):
         read_mocap(path)
     refused(path, read_mocap, path)
 
