@@ -26,14 +26,17 @@ def working_folder() -> Path:
 def sources() -> Path:
     """The study to run: the library's own checkout, or if it has none the one the working folder lies in.
 
-    Notebooks are code: those that happen to lie in a folder of data are not run in the place of the study's.
-
     Raises
     ------
     InputError
-        If there is neither: an installed package brings the library, not the notebooks.
+        If there is neither, since an installed package brings the library, not the notebooks; or both: notebooks
+        are code, and those in a folder of data must not stand in for the study's.
     """
-    found = CHECKOUT or _study_around(Path.cwd())
+    around = _study_around(Path.cwd())
+    if CHECKOUT and around not in (None, CHECKOUT):
+        remedy = f"use that checkout's own environment, or go to {CHECKOUT}"
+        raise InputError(f"{around}: its notebooks are not those of the library that runs here; {remedy}")
+    found = CHECKOUT or around
     if found is None:
         raise InputError(f"{Path.cwd()}: has no {_MARK}; run the report in a checkout of the study")
     return found
