@@ -29,8 +29,8 @@ def sources() -> Path:
     Raises
     ------
     InputError
-        If there is neither, since an installed package brings the library, not the notebooks; or both: notebooks
-        are code, and those in a folder of data must not stand in for the study's.
+        If there is neither, since an installed package brings the library, not the notebooks; or both, since
+        notebooks are code, and those in a folder of data must not stand in for the study's.
     """
     around = _study_around(Path.cwd())
     if CHECKOUT and around not in (None, CHECKOUT):
