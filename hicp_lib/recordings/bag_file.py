@@ -14,6 +14,7 @@ from hicp_lib.core.extras import needs
 from hicp_lib.core.images import decode as decode_pixels
 from hicp_lib.core.limited import went_on
 
+_ROS1 = b"#ROSBAG V"
 _SURPLUS_BYTES = 4  # librealsense ends an image with the depth unit, which the message has no place for
 _RGB, _BGR = [0, 1, 2], [2, 1, 0]
 _ENCODINGS: dict[str, tuple[str, int, Any]] = {  # type, channels, and those that are taken
@@ -79,6 +80,10 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     types = get_typestore(Stores.LATEST)  # for files that do not define theirs
+    if Path(path).suffix == ".bag":  # whose reader looks for the end of the first line, however far it is
+        with open(path, "rb") as file:
+            if file.read(len(_ROS1)) != _ROS1:
+                raise InputError(f"{path}: does not begin as a bag of ROS 1 or RealSense does; get it again")
     with AnyReader([Path(path)], default_typestore=types) as reader:
         yield Bag(Path(path), reader)
 
