@@ -57,7 +57,9 @@ class Ready:
     def __init__(self, folder: Path, environment: dict[str, str]) -> None:
         self.folder = folder
         (folder / "bin").mkdir()
-        (folder / "bin" / "hicp").write_text("from hicp_lib.cli.main import main; main()")
+        # Workers of a pool import it, and must not run the command again.
+        script = "from hicp_lib.cli.main import main\nif __name__ == '__main__':\n    main()\n"
+        (folder / "bin" / "hicp").write_text(script)
         paths = os.pathsep.join(filter(None, (str(CHECKOUT), os.environ.get("PYTHONPATH"))))
         self._process = subprocess.Popen(
             [sys.executable, "-m", "tests.hostile.ready"], cwd=CHECKOUT, text=True, stdin=subprocess.PIPE,
