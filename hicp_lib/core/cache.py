@@ -27,6 +27,7 @@ LIBRARY_DIR = Path(__file__).resolve().parents[1]
 
 # Distributions whose name is not that of what is imported; of several, the one that is installed.
 _DISTRIBUTIONS = {
+    "bs4": ("beautifulsoup4",),
     "PIL": ("pillow",),
     "cv2": ("opencv-python-headless", "opencv-python", "opencv-contrib-python"),
     "google": ("protobuf",),

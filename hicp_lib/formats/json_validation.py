@@ -196,7 +196,8 @@ class Rows:
             chosen = [i for i, numbers in lists.items() if len(numbers) == width * n]
             indices = TO_HALPE[layout] if isinstance(layout, str) else layout
             names = _triples_namer(key, indices) if width == 3 else lambda j: f"{key}[{j}]"
-            found += Counter({layout if isinstance(layout, str) else "by their names": len(chosen)})
+            known = (of for of, theirs in TO_HALPE.items() if np.array_equal(theirs, indices))
+            found += Counter({next(known, "by their names"): len(chosen)})
             for some in (chosen[i : i + _AT_ONCE] for i in range(0, len(chosen), _AT_ONCE)):
                 points = self.finite([lists.pop(i) for i in some], width * n, names, some)
                 points = points.reshape(-1, n, width)[:, indices >= 0]

@@ -137,7 +137,7 @@ def refuse_implausible(where: str, camera: Camera) -> None:
     }  # fmt: skip
     for problem, holds in problems.items():
         if holds or size.min() < 1:
-            raise InputError(f"{where}: intrinsics are no camera's: {problem}")
+            raise InputError(f"{where}: intrinsic_matrix or size is no camera's: {problem}")
 
 
 def write_camera(path: str | Path, intrinsics: Camera, depth_units_per_m: float) -> None:

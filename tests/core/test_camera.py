@@ -16,10 +16,10 @@ VGA = Camera(640, 480, 615.0, 613.5, 318.2, 241.7)
 
 fast = settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
-focal = st.floats(50, 5_000)
+focal, share = st.floats(200, 5_000), st.floats(-1, 2)
 cameras = st.builds(
-    Camera, st.integers(1, 4_000), st.integers(1, 4_000), focal, focal,
-    st.floats(-100, 4_000), st.floats(-100, 4_000),
+    lambda width, height, fx, fy, u, v: Camera(width, height, fx, fy, u * width, v * height),
+    st.integers(1, 4_000), st.integers(1, 4_000), focal, focal, share, share,
 )  # fmt: skip
 units = st.floats(1, 1e5)
 
@@ -88,7 +88,7 @@ def valid() -> dict:
         ("intrinsic_matrix", [1, 2, 3], "a list of 3"),
         ("intrinsic_matrix", [615, 0, 318, 0, 613, 241, 0, 0, 1], "column by column"),
         ("intrinsic_matrix", [615, 0, 0, 2, 613, 0, 318, 241, 1], "skew"),
-        ("intrinsic_matrix", [-615, 0, 0, 0, 613, 0, 318, 241, 1], "positive focal lengths"),
+        ("intrinsic_matrix", [-615, 0, 0, 0, 613, 0, 318, 241, 1], "expected 32 to 6000 pixels"),
         ("intrinsic_matrix", [float("nan"), 0, 0, 0, 613, 0, 318, 241, 1], "finite"),
         ("depth_scale", 0.001, "1000 for millimetres"),
         ("depth_scale", None, "depth_scale"),

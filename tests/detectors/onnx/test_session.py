@@ -42,7 +42,7 @@ def test_one_session_per_process_until_the_file_changes(model):
 
 def test_files_that_are_no_models(tmp_path, model):
     refused(tmp_path / "absent.onnx", "give the path")
-    refused(tmp_path, "cannot be read")
+    refused(tmp_path, "is a folder")
     (tmp_path / "empty.onnx").write_bytes(b"")
     refused(tmp_path / "empty.onnx", "export it again")
     (tmp_path / "text.onnx").write_text("version https://git-lfs.github.com/spec/v1\n")

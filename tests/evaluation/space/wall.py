@@ -31,17 +31,18 @@ def wall_recording(folder: Path) -> Recording:
     angles_rad = np.deg2rad(rng.uniform(-4, 4, (N, len(HEAD_JOINTS))) + [0, 0, 0, -4, 0, 0])
     T_base_cam = load_icub().T_root_camera(angles_rad)
     writer, rows = RecordingWriter(folder, CAMERA, depth_units_per_m=10_000), []
-    for frame, pose in enumerate(T_base_cam):
-        depth_m = _wall_depth(pose)
+    exact_m = [_wall_depth(pose) for pose in T_base_cam]
+    for frame, (pose, depth_m) in enumerate(zip(T_base_cam, exact_m, strict=True)):
         error_m = DEPTH_ERROR_M * (1 if frame % 2 else -1)
         writer.add(frame, np.zeros((240, 320, 3), np.uint8), depth_m + error_m, pose)
-        write_depth(folder / EXACT_DEPTH_DIR / f"{frame:06d}.png", depth_m, 10_000)
         pixels = project(CAMERA, transform(np.linalg.inv(pose), np.array(list(POINTS_M.values()))))
         rows += [
             (frame, float(frame), name, *at, *pixel, 1 if name.endswith("elbow") else 2)
             for (name, at), pixel in zip(POINTS_M.items(), pixels, strict=True)
         ]
     writer.finish()
+    for frame, depth_m in enumerate(exact_m):
+        write_depth(folder / EXACT_DEPTH_DIR / f"{frame:06d}.png", depth_m, 10_000)
     columns = ["frame", "t_s", "keypoint", "x_m", "y_m", "z_m", "u_px", "v_px", "visible"]
     pd.DataFrame(rows, columns=columns).to_parquet(folder / TRUTH_FILE)
     joints = pd.DataFrame(angles_rad, columns=[f"{name}_rad" for name in HEAD_JOINTS])
