@@ -314,7 +314,10 @@ def test_damaged_bags_are_told_with_the_reason(tmp_path, capsys, kind):
         assert cli.run(["record", "import", "--bag", str(bag), str(tmp_path / "r")]) == 2
         captured = capsys.readouterr()
         assert captured.err.count("\n") == 1
-        assert f"{bag}: {'does not begin as' if kind == 'ros1' and not n else 'its reader gave up'}" in captured.err
+        assert (
+            f"{bag}: {'does not begin as' if kind == 'ros1' and not n else 'its reader gave up'}"
+            in captured.err
+        )
         assert not (tmp_path / "r/rgb.txt").exists()
 
 

@@ -27,7 +27,9 @@ def test_one_byte_of_any_file_changes_the_hash(tmp_path, monkeypatch, kind):
     monkeypatch.setattr(provenance, variable, copy)
     hash_of = getattr(provenance, f"{kind}_sha256")
     whole = hash_of()
-    files = sorted(path for path in copy.rglob("*") if path.is_file() and path.name != "py.typed")  # no source
+    files = sorted(
+        path for path in copy.rglob("*") if path.is_file() and path.name != "py.typed"
+    )  # the mark of types is no source
     for path in random.Random(0).sample(files, min(12, len(files))):
         content = path.read_bytes()
         path.write_bytes(bytes([content[0] ^ 1]) + content[1:] if content else b"\n")

@@ -53,7 +53,9 @@ def test_mistakes(capsys, tmp_path):
     wrong = ["import", "--format", "mmpose", "--predictions", EXAMPLES / "coco", *ANNOTATIONS, "--out", out]
     assert "results.json: instances[0]: has no 'keypoint_scores'" in mistake(capsys, *wrong)
     assert "format 'x' is not known" in mistake(capsys, *importing("coco", out)[:2], "x", *wrong[3:])
-    assert "'--score-scale': -1.0 is not in the range" in mistake(capsys, *importing("mmpose", out, "--score-scale", -1))
+    assert "'--score-scale': -1.0 is not in the range" in mistake(
+        capsys, *importing("mmpose", out, "--score-scale", -1)
+    )
     assert not out.exists()
     run(capsys, *importing("coco", out))
     export = ["export", "--detections", out, "--out", tmp_path / "e.json", "--format", "fiftyone"]
