@@ -68,6 +68,8 @@ LOOK = """
   for (const cell of app.shell.currentWidget.content.widgets) {
     cell.node.scrollIntoView();
     await pause(50);
+    const isShown = () => cell.node.querySelector(".jp-OutputArea-output");
+    for (let n = 0; n < 100 && cell.model.outputs?.length && !isShown(); n++) await pause(50);
     for (const shown of cell.node.querySelectorAll(".jp-MarkdownOutput, .jp-OutputArea-output"))
       seen.text += shown.innerText + "\\n";
     for (const image of cell.node.querySelectorAll("figure.hicp img")) {
