@@ -3,7 +3,8 @@
 Each against a baseline of the same run: reading annotations, checked and as arrays, against `json.load`;
 AP of all keypoints in memory, and of bodies and hands by `evaluate`, against pycocotools evaluating the
 same rows; a bootstrap from matches against pycocotools evaluating each draw anew (timed on a few draws);
-`hicp evaluate` on files against parsing the same files.
+`hicp evaluate` on files against parsing the same files; of many people its peak of memory, too, against
+the arrays of the keypoints in its files (on Linux). The project's floor of that is for `--many 200000`.
 """
 
 from __future__ import annotations
@@ -55,12 +56,13 @@ def make_people(n: int) -> tuple[Annotations, dict[int, Detections]]:
     return people, {i: Detections(found[i], np.ones((N_FOUND, 136)), scores[i]) for i in range(n)}
 
 
-def reading(people: Annotations) -> Comparison:
+def reading(people: Annotations, most_s: float | None = None) -> Comparison:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "annotations.json"
         write_annotations(path, people)
         ours, base = best_seconds(lambda: read_annotations(path), lambda: json.loads(path.read_bytes()))
-    return Comparison("read annotations", ours, "`json.loads` of the file", base)
+    what = f"read {len(people)} annotations"
+    return Comparison(what, ours, "`json.loads` of the file", base, most_s=most_s)
 
 
 def pycocotools(
@@ -137,21 +139,46 @@ def bootstrapping(people: Annotations, found: dict[int, Detections], n_draws: in
     )
 
 
+_MAIN = "from hicp_lib.cli.main import run; import sys; run(sys.argv[1:])"
+_PEAK_KB = "; print([line.split()[1] for line in open('/proc/self/status') if 'VmHWM' in line][0])"
+
+
 def command(people: Annotations, found: dict[int, Detections]) -> Comparison:
     with tempfile.TemporaryDirectory() as folder:
-        files = {"--annotations": Path(folder) / "a.json", "--detections": Path(folder) / "d.json"}
-        write_annotations(files["--annotations"], people)
-        write_detections(files["--detections"], found)
-        options = [str(word) for pair in files.items() for word in pair]
-        program = [sys.executable, "-c", "from hicp_lib.cli.main import main; main()", "evaluate", *options]
+        options = write(Path(folder), people, found)
+        program = [sys.executable, "-c", _MAIN, "evaluate", *options]
         start_s = processor_s()
         subprocess.run(program, check=True, stdout=subprocess.DEVNULL)
         ours = processor_s() - start_s
-        (base,) = best_seconds(lambda: [json.loads(path.read_bytes()) for path in files.values()], turns=1)
+        (base,) = best_seconds(lambda: [json.loads(Path(p).read_bytes()) for p in options[1::2]], turns=1)
     return Comparison("`hicp evaluate`, all of it", ours, "`json.loads` of its files", base, most_s=2.0)
 
 
+def write(folder: Path, people: Annotations, found: dict[int, Detections]) -> list[str]:
+    """The files of an evaluation, as options."""
+    write_annotations(folder / "a.json", people)
+    write_detections(folder / "d.json", found)
+    return ["--annotations", str(folder / "a.json"), "--detections", str(folder / "d.json")]
+
+
+def memory(people: Annotations, found: dict[int, Detections]) -> Iterator[Comparison]:
+    if not Path("/proc/self/status").is_file():
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        options = write(Path(folder), people, found)
+        program = [sys.executable, "-c", _MAIN + _PEAK_KB, "evaluate", *options]
+        said = subprocess.run(program, check=True, capture_output=True, text=True).stdout
+    n_bytes = people.keypoints_px.nbytes + people.visibility.nbytes
+    n_bytes += sum(of.keypoints_px.nbytes + of.scores.nbytes for of in found.values())
+    what = f"`hicp evaluate`, {len(people)} people, {N_FOUND} detections each, peak of memory"
+    peak_gb = int(said.split()[-1]) * 1024 / 1e9
+    yield Comparison(what, peak_gb, "its keypoints in arrays", n_bytes / 1e9, most_s=4.0, unit="GB")
+
+
 def measure(options) -> Iterator[Comparison]:
+    people, found = make_people(options.many)
+    yield reading(people, most_s=3.0)
+    yield from memory(people, found)
     people, found = make_people(options.images)
     yield reading(people)
     yield from scoring(people, found)
@@ -160,4 +187,4 @@ def measure(options) -> Iterator[Comparison]:
 
 
 if __name__ == "__main__":
-    run(measure, __doc__, images=(1624, 12), draws=(1, 1))
+    run(measure, __doc__, images=(1624, 12), draws=(1, 1), many=(10_000, 12))

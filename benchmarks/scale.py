@@ -1,9 +1,10 @@
 """What many images cost: an image by each detector on one core, by workers of a cluster, and when it is kept.
 
 `hicp detect`'s way, from image files to the file of results. With a detector that answers at once the rest is
-left: reading and hashing the image, keeping and writing the result. On a Dask cluster of this machine the
-client's own processor time for an image says how many images a second one client can give away and write,
-whatever the number of workers; beyond the machine's cores, workers only share them.
+left: reading and hashing the image, keeping and writing the result. On a Dask cluster of this machine, whose
+scheduler and workers are processes of their own, the client's processor time for an image says how many
+images a second one client can give away and write, whatever the number of workers; beyond the machine's
+cores, workers only share them.
 
 The page *Scale* of the book is made of `data/scale.json`: benchmarks/scale.py --json data/scale.json
 """
@@ -11,6 +12,8 @@ The page *Scale* of the book is made of `data/scale.json`: benchmarks/scale.py -
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -19,7 +22,6 @@ from pathlib import Path
 
 import numpy as np
 from detectors import make_images
-from distributed import LocalCluster
 from timing import Comparison, processor_s, run
 
 from hicp_lib.core.detections import Detections
@@ -76,13 +78,33 @@ def by_detector(
         yield Comparison(f"an image, {name}", all_s, "a detector that answers at once", instant_s)
 
 
+_CLUSTER = """
+import sys
+from distributed import LocalCluster
+if __name__ == "__main__":
+    with LocalCluster(int(sys.argv[1]), threads_per_worker=1, dashboard_address=None) as cluster:
+        print(cluster.scheduler_address, flush=True)
+        sys.stdin.read()
+"""
+
+
+@contextmanager
+def cluster_beside(n: int) -> Iterator[str]:
+    """The address of a cluster of `n` workers; its scheduler takes no time of this process."""
+    with subprocess.Popen(
+        [sys.executable, "-c", _CLUSTER, str(n)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        yield process.stdout.readline().strip()
+        process.stdin.close()  # it ends
+
+
 def by_workers(name: str, images: Path, out: Path, weights: Path, most: int) -> Iterator[Comparison]:
     first_s = None
     for n in (n for n in WORKERS if n <= most):
-        with LocalCluster(n, threads_per_worker=1, dashboard_address=None) as cluster:
+        with cluster_beside(n) as address:
             for _ in ("workers load the network", "they have it"):
                 with fresh_cache(weights):
-                    wall_s, _, own_s = detect_seconds(name, images, out, cluster.scheduler_address)
+                    wall_s, _, own_s = detect_seconds(name, images, out, address)
         first_s = first_s or wall_s
         yield Comparison(f"an image, {name}, Dask workers: {n}, wall time", wall_s, "1 worker", first_s)
         yield Comparison(

@@ -19,7 +19,10 @@ from hicp_lib.core.errors import InputError
 
 @dataclass(frozen=True)
 class Comparison:
-    """A time, its baseline's, and what the project asks for, of the ratio or of the time itself."""
+    """A time, its baseline's, and what the project asks for, of the ratio or of the time itself.
+
+    Where `unit` is GB, they are memory.
+    """
 
     what: str
     ours_s: float
@@ -27,6 +30,7 @@ class Comparison:
     baseline_s: float
     most: float | None = None
     most_s: float | None = None
+    unit: str = "s"
 
     @property
     def ratio(self) -> float:
@@ -38,7 +42,7 @@ class Comparison:
         if self.most is None and self.most_s is None:
             return ""
         text, missed = (
-            (_duration(self.most_s), self.ours_s > self.most_s)
+            (_amount(self.most_s, self.unit), self.ours_s > self.most_s)
             if self.most is None
             else (f"{self.most:.2f}", self.ratio > self.most)
         )
@@ -64,7 +68,7 @@ def run(measure: Callable[[argparse.Namespace], Iterator[Comparison]], about: st
     try:
         for row in measure(options):
             rows.append(asdict(row) | {"ratio": row.ratio})
-            times = _duration(row.ours_s), row.baseline, _duration(row.baseline_s)
+            times = _amount(row.ours_s, row.unit), row.baseline, _amount(row.baseline_s, row.unit)
             print(
                 "|",
                 " | ".join((row.what, *times, f"{row.ratio:.3g}", "" if options.smallest else row.floor)),
@@ -102,8 +106,10 @@ def _options(about: str, sizes: dict[str, tuple]) -> argparse.Namespace:
     return options
 
 
-def _duration(seconds: float) -> str:
-    return f"{seconds:.3g} s" if seconds >= 1 else f"{1e3 * seconds:.3g} ms"
+def _amount(value: float, unit: str) -> str:
+    if unit == "s" and value < 1:
+        return f"{1e3 * value:.3g} ms"
+    return f"{value:.3g} {unit}"
 
 
 def best_seconds(*works: Callable[[], object], turns: int = 3, calls: int = 1) -> list[float]:

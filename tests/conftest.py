@@ -1,6 +1,8 @@
 """Fixtures shared by the tests."""
 
 import os
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import matplotlib
@@ -14,6 +16,13 @@ from hicp_lib.detectors.weights import default as default_weights
 # The same examples on every machine and every day; a slow machine is no failure.
 settings.register_profile("hicp", derandomize=True, deadline=None)
 settings.load_profile("hicp")
+
+
+# A browser without a window that asks nobody anything.
+BROWSER_FLAGS = (
+    "--headless=new --no-sandbox --window-size=1400,1000 --use-angle=swiftshader --enable-unsafe-swiftshader "
+    "--no-first-run --disable-background-networking --disable-component-update --disable-quic --disable-sync"
+)
 
 
 # What needs the book.
@@ -30,6 +39,7 @@ SLOW = (
     "tests/detectors/runtime/test_isolation.py",
     "tests/detectors/runtime/test_run.py",
     "tests/experiments/test_on_cluster.py",
+    "tests/hostile/",
     "tests/report/test_book.py",
     "tests/report/test_kills.py",
     "tests/report/test_runs.py",
@@ -113,3 +123,23 @@ def book() -> Path:
     with open(lock, "w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         return make_report("quick", [], print, sources=CHECKOUT, root=CHECKOUT).parent
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator:
+    """A headless Chromium; without one the tests are skipped, but never in CI."""
+    absent = [name for name in ("chromium", "chromedriver") if shutil.which(name) is None]
+    if absent:
+        reason = f"no {' and no '.join(absent)}; on Debian: apt-get install chromium chromium-driver"
+        (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
+    from selenium import webdriver
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which("chromium")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    for flag in BROWSER_FLAGS.split():
+        options.add_argument(flag)
+    chromium = webdriver.Chrome(options, webdriver.ChromeService(shutil.which("chromedriver")))
+    chromium.set_script_timeout(600)
+    yield chromium
+    chromium.quit()

@@ -12,7 +12,7 @@ import numpy as np
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.datafiles import DATA_DIR
 from hicp_lib.formats.annotations import read_annotations
-from hicp_lib.recordings.writer import RecordingWriter
+from hicp_lib.recordings.writer import write_recording
 
 sys.path.append(str(Path(__file__).parents[1]))
 from tests.detectors.onnx.onnx_models import colour_maps_model  # noqa: E402
@@ -27,11 +27,10 @@ def main(out: Path) -> None:
         pixels = noise.integers(0, 256, (image.height_px, image.width_px, 3), np.uint8)
         cv2.imwrite(str(out / "images" / image.file_name), pixels)
     colour_maps_model(out / "net.onnx", (192, 256), 133)
-    recording = RecordingWriter(out / "rec", Camera(64, 48, 60.0, 60.0, 31.5, 23.5))
-    for k in range(3):
-        pixels = noise.integers(0, 256, (48, 64, 3), np.uint8)
-        recording.add(100 + k / 10, pixels, np.full((48, 64), 1.0), np.eye(4))
-    recording.finish()
+    depth_m, stands = np.full((48, 64), 1.0), (np.zeros(1), np.eye(4)[None])
+    colours = [noise.integers(0, 256, (48, 64, 3), np.uint8) for _ in range(3)]
+    frames = [(100 + k / 10, colour, depth_m) for k, colour in enumerate(colours)]
+    write_recording(out / "rec", Camera(64, 48, 60.0, 60.0, 31.5, 23.5), 1000, frames, stands)
 
 
 if __name__ == "__main__":

@@ -140,7 +140,7 @@ def camera(out: Path, joints, poses: Path | None, mount: str, **settings) -> Non
 @click.command()
 @click.option("--recording", "folder", type=PATH, required=True, help="Folder of the recording.")
 @detector_options
-@click.option("--method", default="robust", show_default=True, help="Or paper: the paper's method.")
+@click.option("--method", default="robust", show_default=True, type=click.Choice(["robust", "paper"]))
 @click.option("--out", type=PATH, required=True, help="Table to write: FILE.parquet, or FILE.csv.")
 @worker_options("Threads")
 def lift(folder: Path, detector: str, method: str, out: Path, workers: int | str | None, **chosen) -> None:
@@ -148,12 +148,11 @@ def lift(folder: Path, detector: str, method: str, out: Path, workers: int | str
     from hicp_lib.detectors.runtime.results import detections_of
     from hicp_lib.detectors.runtime.run import detect_images
     from hicp_lib.formats.detection_files import refuse_other_suffix
-    from hicp_lib.lifting.table import lift_recording, steps_of
+    from hicp_lib.lifting.table import lift_recording
     from hicp_lib.recordings.recording import open_recording
 
     refuse_other_suffix(out, (".parquet", ".csv"))
     recording = open_recording(folder)
-    steps_of(method)  # a wrong name is told before anybody is looked for
     found = detect_images(detector, dict(enumerate(recording.rgb_paths)), workers, **given(**chosen))
     table = lift_recording(recording, list(detections_of(found).values()), method)
     write_table(out, table)

@@ -179,7 +179,8 @@ def _spread(
         with warnings.catch_warnings():
             # Dask would have large arguments scattered; but scattered data is lost with its worker.
             warnings.filterwarnings("ignore", "Sending large graph", UserWarning)
-            return client.submit(_here, job, *how, pure=False)
+            # One callable: what is an argument, Dask walks through to its last key.
+            return client.submit(partial(_here, job, *how), pure=False)
 
     def first_ones(futures: Iterable) -> Iterable:
         some = list(futures)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -36,8 +36,8 @@ class Detections:
     person_scores: np.ndarray
 
     def __post_init__(self) -> None:
-        for field in fields(self):  # as files keep them, found anew or not
-            object.__setattr__(self, field.name, np.asarray(getattr(self, field.name), float))
+        for name, value in vars(self).items():  # as files keep them, found anew or not
+            object.__setattr__(self, name, np.asarray(value, float))
 
     @classmethod
     def none(cls) -> Detections:
@@ -72,8 +72,8 @@ class Detections:
 
     def concatenate(self, more: Detections) -> Detections:
         """These people, then others in the same image."""
-        names = [field.name for field in fields(self)]
-        return Detections(*(np.concatenate([getattr(self, name), getattr(more, name)]) for name in names))
+        pairs = zip(vars(self).values(), vars(more).values(), strict=True)
+        return Detections(*map(np.concatenate, pairs))
 
     def __len__(self) -> int:
         return len(self.person_scores)

@@ -42,7 +42,7 @@ def one_line(error: BaseException) -> str:
 
 
 def printable(text: str, kept: str = "") -> str:
-    r"""Text without characters that a terminal obeys, or shows as nothing: escapes stand in their place.
+    r"""Text without characters that a terminal obeys, or shows as nothing: their escapes stand for them.
 
     Examples
     --------

@@ -6,7 +6,6 @@ whoever reads pictures of others asks for the flag and says so (`rotation_note`)
 TIFF alone is turned as it is read, by OpenCV and by every viewer, and counts as without a flag.
 """
 
-import re
 from collections.abc import Mapping
 from contextlib import suppress
 from io import BytesIO
@@ -25,7 +24,7 @@ MAX_PIXELS = 100e6
 _MAX_SCANS = 15
 _FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "JPEG2000", "PPM")  # as Pillow calls them
 Box = tuple[int, int, int, int]  # left, top, right, bottom; right and bottom exclusive
-_EXIF = re.compile(b"Exif|eXIf|EXIF")  # of JPEG, PNG and WebP
+_EXIF = b"Exif", b"eXIf", b"EXIF"  # of JPEG, PNG and WebP
 
 
 def read_image(path: str | Path) -> np.ndarray:
@@ -179,7 +178,7 @@ def note_rotation(content: bytes, name: str, flagged: dict[str, int]) -> None:
     flagged : dict of str to int
         Flags by name.
     """
-    if _EXIF.search(content) and (flag := image_header(BytesIO(content))[2]) != 1:
+    if any(mark in content for mark in _EXIF) and (flag := image_header(BytesIO(content))[2]) != 1:
         flagged[name] = flag
 
 

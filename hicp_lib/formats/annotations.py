@@ -19,30 +19,30 @@ Both are checked where they enter. Conventions of this module, where formats in 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import read_json, write_json
+from hicp_lib.core.files import write_json
 from hicp_lib.core.keypoints import COCO_17, N_KEYPOINTS, NAMES
+from hicp_lib.core.names import is_inside
 from hicp_lib.formats.cropcoco import FLAG_OUTSIDE, OUTSIDE, outside_from_flags
 from hicp_lib.formats.detection_files import open_detections, read_rows
 from hicp_lib.formats.importers.matching import match_images
 from hicp_lib.formats.json_validation import CONVENTIONS, PART_KEYS, Layouts, Rows
 from hicp_lib.formats.layouts import PERSON_CATEGORY, PersonCategory, layouts_of, person_category
+from hicp_lib.formats.number_lists import read_people
 from hicp_lib.formats.units import corners_note, doubts, refuse_fractions
 
 SEGMENT_OF_BOX = 0.53  # area of a person's segment over that of the box, as tools take it
 _LEAST_AREA, _MOST_AREA = 0.01, 2.0  # of a person, as a share of their box; another one stands for none
 PERSON = {"id": PERSON_CATEGORY, "name": "person", "supercategory": "person"}
 MAX_SIDE_PX = 100_000
-_UNWRITABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")  # control characters, halves of characters
 _KNOWN_KEYS = {
     "id", "image_id", "category_id", "bbox", "area", "iscrowd", "keypoints", "num_keypoints", *PART_KEYS,
 }  # fmt: skip
@@ -201,7 +201,7 @@ def read_annotations(path: str | Path, keypoint_map: str | Path | None = None) -
         For anything malformed; the message names the file, the row, the key and what was expected.
     """
     path = Path(path)
-    data = read_json(path)
+    data = read_people(path)
     if not isinstance(data, dict):
         problem = "is not an object; expected images, annotations and categories in COCO's layout"
         raise InputError(f"{path}: {problem}; bring MPII's and other lists of people into it")
@@ -213,11 +213,9 @@ def read_annotations(path: str | Path, keypoint_map: str | Path | None = None) -
     layouts, notes = layouts_of(f"{path}: keypoints of its category", category.keypoints, keypoint_map)
     every = Rows.of(path, "annotations", data["annotations"])
     rows = _of_people(every, category, {category.id} | category.others)
-    people = _read_people(rows, images, layouts)
     if n_others := len(every.rows) - len(rows.rows):
         notes["categories"] = f"{n_others} objects of other categories left out"
-    if layouts is CONVENTIONS and any(len(p["keypoints"]) == 51 and PART_KEYS[0] not in p for p in rows.rows):
-        notes["names"] = "17 keypoints without names are taken for COCO's"
+    people = _read_people(rows, images, layouts)
     notes |= people.notes
     return replace(people, category=category, notes={about: note for about, note in notes.items() if note})
 
@@ -233,7 +231,7 @@ def _of_people(rows: Rows, people: PersonCategory, allowed: set[int]) -> Rows:
 
 def _read_images(rows: Rows) -> dict[int, ImageInfo]:
     ids = rows.unique_integers("id").tolist()
-    names = rows.column("file_name", _is_inside, "a name inside the folder of images")
+    names = rows.column("file_name", is_inside, "a name inside the folder of images")
     widths, heights = (_sides(rows, key) for key in ("width", "height"))
     return {i: ImageInfo(i, *rest) for i, *rest in zip(ids, names, widths, heights, strict=True)}
 
@@ -241,14 +239,6 @@ def _read_images(rows: Rows) -> dict[int, ImageInfo]:
 def _sides(rows: Rows, key: str) -> list[int]:
     rows.integers(key)
     return rows.column(key, lambda side: 1 <= side <= MAX_SIDE_PX, f"1 to {MAX_SIDE_PX} pixels")
-
-
-def _is_inside(name: object) -> bool:
-    """Whether a file name cannot lead out of its folder, on any system."""
-    if not isinstance(name, str) or _UNWRITABLE.search(name):
-        return False
-    path = PureWindowsPath(name)  # splits at both kinds of slash and knows drives
-    return bool(path.name) and not path.anchor and ".." not in path.parts
 
 
 def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> Annotations:
@@ -259,7 +249,7 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> 
     flags = rows.column("iscrowd", lambda f: isinstance(f, int | float) and f in (0, 1), "0 or 1", default=0)
     is_crowd = np.array(flags, dtype=bool)
     areas, area_note = _areas(rows, boxes, is_crowd)
-    triples = rows.keypoints(layouts)
+    triples, found = rows.keypoints(layouts)
     sizes = np.array([(images[i].width_px, images[i].height_px) for i in image_ids.tolist()]).reshape(-1, 2)
     outside = outside_from_flags(rows, triples, sizes)
     visibility = np.where(outside, OUTSIDE, np.maximum(triples[..., 2], 0.0))
@@ -269,7 +259,9 @@ def _read_people(rows: Rows, images: dict[int, ImageInfo], layouts: Layouts) -> 
     refuse_fractions(rows.path, labelled)
     refuse_fractions(rows.path, boxes.reshape(-1, 2, 2), "boxes")
     shown = boxes, labelled, sizes
-    notes = {"area": area_note, "boxes": corners_note(rows.path, *shown), "pixels": doubts(*shown)}
+    is_unnamed = layouts is CONVENTIONS and "coco17" in found
+    notes = {"names": "17 keypoints without names are taken for COCO's" * is_unnamed, "area": area_note}
+    notes |= {"boxes": corners_note(rows.path, *shown), "pixels": doubts(*shown)}
     return Annotations(
         images, ids, image_ids, boxes, areas, is_crowd, keypoints, visibility, rows.extras(_KNOWN_KEYS),
         notes=notes,
@@ -350,10 +342,11 @@ def read_detections(path: str | Path, annotations: Annotations | None = None) ->
     category = PersonCategory() if annotations is None else annotations.category
     _of_people(rows, replace(category, others=set()), {category.id, PERSON_CATEGORY} - category.others)
     image_ids = rows.integers("image_id") if annotations is None else _images_of(rows, annotations.images)
-    triples = rows.keypoints()
-    keypoints = triples[..., :2]  # hundreds of thousands of people are held once
-    keypoints[~triples.any(axis=-1)] = np.nan
-    refuse_fractions(rows.path, keypoints)
+    triples, _ = rows.keypoints()
+    del rows  # hundreds of thousands of people are held once
+    keypoints = triples[..., :2]
+    np.copyto(keypoints, np.nan, where=~triples.any(axis=-1, keepdims=True))
+    refuse_fractions(path, keypoints)
     found = {} if annotations is None else dict.fromkeys(annotations.images, Detections.none())
     for image_id, chosen in rows_by_image(image_ids).items():
         together = chosen[-1] - chosen[0] == len(chosen) - 1

@@ -8,7 +8,6 @@
 The bytes follow from the detections and their order alone.
 """
 
-import io
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -22,11 +21,14 @@ import pandas as pd
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.extras import require
-from hicp_lib.core.files import atomic_path, read_bytes, read_json
+from hicp_lib.core.files import atomic_path
 from hicp_lib.core.keypoints import INDEX, N_KEYPOINTS, NAMES
+from hicp_lib.core.tables import read_table
 from hicp_lib.formats.layouts import PERSON_CATEGORY
+from hicp_lib.formats.number_lists import read_people
 
 SUFFIXES = (".json", ".csv", ".parquet")
+_BUFFER_BYTES = 2**20
 _PEOPLE_AT_ONCE = 1000  # of a table; a group of rows of Parquet
 _Append = Callable[..., None]
 
@@ -93,7 +95,7 @@ def json_list(path: Path) -> Iterator[_Append]:
     callable
         Takes the next items, JSON-able, or with arrays.
     """
-    with open(path, "wb") as file:
+    with open(path, "wb", _BUFFER_BYTES) as file:
         file.write(b"[")
         between = b""
 
@@ -137,12 +139,13 @@ def result_rows(
     ValueError
         For a score that is no number.
     """
-    points = found.keypoints_px[:, keypoints]
-    triples = np.concatenate([points, found.scores[:, keypoints, None]], axis=-1)
-    triples[~np.isfinite(points).all(axis=-1)] = 0.0
-    if not (np.isfinite(triples).all() and np.isfinite(found.person_scores).all()):
+    triples = np.concatenate([found.keypoints_px[:, keypoints], found.scores[:, keypoints, None]], axis=-1)
+    u, v, scored = np.moveaxis(np.isfinite(triples), -1, 0)
+    absent = ~(u & v)
+    triples[absent] = 0.0
+    if not ((scored | absent).all() and np.isfinite(found.person_scores).all()):
         raise ValueError(f"image {image_id}: a score is not a finite number")
-    flat = triples.reshape(len(found), 3 * points.shape[1])
+    flat = triples.reshape(len(found), 3 * triples.shape[1])
     for of, score, extra in zip(flat, found.person_scores.tolist(), extras or [{}] * len(found), strict=True):
         yield {
             **extra,
@@ -211,11 +214,11 @@ def read_rows(path: Path) -> Any:
         If it cannot be read, or is a table without the columns that `open_detections` writes.
     """
     if path.suffix not in (".csv", ".parquet"):
-        return read_json(path)
+        return read_people(path)
     refuse_other_suffix(path)
+    columns = ("image_id", "person", "person_score", "keypoint", "u_px", "v_px", "score")
+    table = read_table(path, columns, float_precision="round_trip", dtype={"file_name": str})
     try:
-        content = io.BytesIO(read_bytes(path, "give a table"))
-        table = _read_csv(content) if path.suffix == ".csv" else pd.read_parquet(content)
         keypoints = [INDEX[name] for name in table["keypoint"]]
         values = table[["u_px", "v_px", "score"]].to_numpy(float)
         if table.duplicated(["image_id", "person", "keypoint"]).any():
@@ -228,9 +231,5 @@ def read_rows(path: Path) -> Any:
     triples = np.zeros((people.ngroups, N_KEYPOINTS, 3))
     triples[people.ngroup(), keypoints] = values
     rows = first.rename(columns={"person_score": "score"}).reset_index().to_dict("records")
-    flat = triples.reshape(len(rows), 3 * N_KEYPOINTS).tolist()
+    flat = triples.reshape(len(rows), 3 * N_KEYPOINTS)
     return [row | {"keypoints": keypoints} for row, keypoints in zip(rows, flat, strict=True)]
-
-
-def _read_csv(content: io.BytesIO) -> pd.DataFrame:
-    return pd.read_csv(content, float_precision="round_trip", dtype={"file_name": str})

@@ -21,6 +21,8 @@ MAX_ABS = 1e9
 MAX_INTEGER = 2**53  # every JSON reader has them exact up to here
 CONVENTIONS = {17: "coco17", 26: "halpe26", 133: "wholebody133", 136: "halpe136"}
 Layouts = Mapping[int, str | np.ndarray]
+Flat = list | np.ndarray
+_AT_ONCE = 2**12  # rows made into arrays at a time
 # COCO-WholeBody files spread their 133 keypoints over five keys, in this order.
 PART_KEYS = ("foot_kpts", "face_kpts", "lefthand_kpts", "righthand_kpts")
 _REQUIRED = object()
@@ -143,11 +145,12 @@ class Rows:
         values = self.column(key, lambda v: isinstance(v, list) and len(v) == n, f"[{', '.join(names)}]")
         return self.finite(values, n, lambda j: f"{key}[{j}] ({names[j]})")
 
-    def keypoints(self, layouts: Layouts = CONVENTIONS) -> np.ndarray:
+    def keypoints(self, layouts: Layouts = CONVENTIONS) -> tuple[np.ndarray, Counter[str]]:
         """Triples (x, y, v) in the Halpe-136 order, zeros where the file's layout has no such keypoint.
 
         Accepts 17 (COCO), 26 (Halpe body), 133 (COCO-WholeBody, also spread over its five keys) and 136
-        (Halpe) keypoints, row by row, if not told otherwise.
+        (Halpe) keypoints, row by row, if not told otherwise. The rows have no `keypoints` afterwards: those
+        of very many people are held once.
 
         Parameters
         ----------
@@ -156,13 +159,17 @@ class Rows:
 
         Returns
         -------
-        array, shape (n, 136, 3)
+        values : array, shape (n, 136, 3)
+        found : Counter
+            As of `points`.
         """
         lists = dict(enumerate(self._keypoint_lists(layouts)))
-        return self.points("keypoints", lists, layouts)[0]
+        for row in self.rows:
+            del row["keypoints"]
+        return self.points("keypoints", lists, layouts)
 
     def points(
-        self, key: str, lists: Mapping[int, list], layouts: Layouts, width: int = 3
+        self, key: str, lists: dict[int, Flat], layouts: Layouts, width: int = 3
     ) -> tuple[np.ndarray, Counter[str]]:
         """Flat lists of numbers of some rows, `width` for each keypoint, in the Halpe-136 order.
 
@@ -170,35 +177,31 @@ class Rows:
         ----------
         key : str
             For messages.
-        lists : mapping of int to list
-            By row.
+        lists : dict of int to list or array
+            By row; emptied.
         layouts : Layouts
             By the number of keypoints, a key of `hicp_lib.core.keypoints.TO_HALPE`, or what that would hold.
         width : int, optional
-            Numbers per keypoint.
+            Flat per keypoint.
 
         Returns
         -------
         values : array, shape (n, 136, width)
             0 where the layout has no such keypoint, and in rows without a list.
         found : Counter
-            Rows by the layout's name.
+            Rows by the layout's name, "by their names" where it has none.
         """
         values, found = np.zeros((len(self.rows), N_KEYPOINTS, width)), Counter[str]()
         for n, layout in layouts.items():
-            chosen = {i: numbers for i, numbers in lists.items() if len(numbers) == width * n}
-            if chosen:
-                found[str(layout)] = len(chosen)
-                indices = TO_HALPE[layout] if isinstance(layout, str) else layout
-                names = _triples_namer(key, indices) if width == 3 else lambda j: f"{key}[{j}]"
-                points = self.finite(list(chosen.values()), width * n, names, list(chosen))
+            chosen = [i for i, numbers in lists.items() if len(numbers) == width * n]
+            indices = TO_HALPE[layout] if isinstance(layout, str) else layout
+            names = _triples_namer(key, indices) if width == 3 else lambda j: f"{key}[{j}]"
+            found += Counter({layout if isinstance(layout, str) else "by their names": len(chosen)})
+            for some in (chosen[i : i + _AT_ONCE] for i in range(0, len(chosen), _AT_ONCE)):
+                points = self.finite([lists.pop(i) for i in some], width * n, names, some)
                 points = points.reshape(-1, n, width)[:, indices >= 0]
-                values[np.ix_(np.array(list(chosen)), indices[indices >= 0])] = points
+                values[np.ix_(np.array(some), indices[indices >= 0])] = points
         return values, found
-
-    def conventions(self) -> list[str]:
-        """Per row, the convention its keypoints come in, a key of `hicp_lib.core.keypoints.TO_HALPE`."""
-        return [CONVENTIONS[len(value) // 3] for value in self._keypoint_lists()]
 
     def extras(self, known: Collection[str]) -> list[dict]:
         """Per row, the keys other than `known`; refused where JSON could not be written from them again."""
@@ -210,13 +213,13 @@ class Rows:
                 raise self.error(i, "a further key holds NaN, infinity or too deep a nesting") from None
         return extras
 
-    def _keypoint_lists(self, layouts: Collection[int] = CONVENTIONS) -> list[list]:
+    def _keypoint_lists(self, layouts: Collection[int]) -> list[Flat]:
         """Each row's keypoints in one list; its length is one of `layouts`, times 3."""
-        lists = self.column("keypoints", lambda v: isinstance(v, list), "a list of x, y, v per keypoint")
+        lists = self.column("keypoints", lambda v: isinstance(v, Flat), "a list of x, y, v per keypoint")
         for i, row in enumerate(self.rows):
             spread = len(lists[i]) == 51 and 133 in layouts
             if spread and all(isinstance(row.get(key), list) for key in PART_KEYS):
-                lists[i] = list(chain(lists[i], *(row[key] for key in PART_KEYS)))
+                lists[i] = list(chain(_listed(lists[i]), *(row[key] for key in PART_KEYS)))
             n = len(lists[i])
             if n % 3 or n // 3 not in layouts:
                 counts = ", ".join(map(str, layouts))
@@ -224,13 +227,13 @@ class Rows:
         return lists
 
     def finite(
-        self, lists: list[list], width: int, name: Callable[[int], str], rows: Sequence[int] | None = None
+        self, lists: Sequence[Flat], width: int, name: Callable[[int], str], rows: Sequence[int] | None = None
     ) -> np.ndarray:
         """Lists of finite numbers as an array.
 
         Parameters
         ----------
-        lists : list of list
+        lists : sequence of list or array
             The numbers.
         width : int
             Length of each list.
@@ -245,15 +248,21 @@ class Rows:
         """
         try:
             # The types first: numpy would take True for 1 and "3" for 3.
-            if set(map(type, chain.from_iterable(lists))) <= {int, float}:
+            plain = chain.from_iterable(of for of in lists if isinstance(of, list))
+            if set(map(type, plain)) <= {int, float}:
                 array = np.array(lists, dtype=float).reshape(len(lists), width)
                 if (np.abs(array) <= MAX_ABS).all():
                     return array
         except OverflowError:  # a whole number beyond floats
             pass
-        i, j = next((i, j) for i, row in enumerate(lists) for j, x in enumerate(row) if not _is_finite(x))
-        problem = f"{name(j)} is {shown(lists[i][j])}; expected a finite number up to {MAX_ABS:g}"
+        of = list(map(_listed, lists))
+        i, j = next((i, j) for i, row in enumerate(of) for j, x in enumerate(row) if not _is_finite(x))
+        problem = f"{name(j)} is {shown(of[i][j])}; expected a finite number up to {MAX_ABS:g}"
         raise self.error(i if rows is None else rows[i], problem)
+
+
+def _listed(numbers: Flat) -> list:
+    return numbers.tolist() if isinstance(numbers, np.ndarray) else numbers
 
 
 def _is_integer(value: Any) -> bool:

@@ -186,6 +186,6 @@ def _meanings(where: str, names: Sequence[str], given: Mapping[str, str | None])
     for problem, of in problems.items():
         if of:
             example = f'{{"{of[0]}": "left_shoulder"}}, one of our names, or null to leave it out'
-            listed = ", ".join(map(repr, of))
+            listed = ", ".join(map(repr, of[:20]))[:300]
             raise InputError(f"{where}: {problem}: {listed}; give --keypoint-map FILE.json with {example}")
     return ours

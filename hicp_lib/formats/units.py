@@ -10,6 +10,7 @@ from hicp_lib.core.keypoints import INDEX
 
 _FRACTION = 1.5  # as large as fractions of an image get, when keypoints lie a little outside of it
 _SIGNED = -0.25  # below it they begin at -1: of a few that begin at 0, some lie a little outside
+_AT_ONCE = 2**12  # people looked at at a time
 _LEAST_POINTS = 3  # fewer may lie at the corner of an image by chance
 _SLACK_PX = 1.0
 _FEW = 0.02  # of the labels, which lie outside their images in public data sets, too
@@ -36,12 +37,16 @@ def refuse_fractions(path: Path | str, points_px: np.ndarray, what: str = "keypo
     InputError
         If that is what all coordinates are of half of the people or more, who have three points at least.
     """
-    given = np.isfinite(points_px).all(axis=-1) & (points_px != 0).any(axis=-1)
-    small = ((points_px <= _FRACTION) & (points_px >= -_FRACTION)).all(axis=-1)
-    people = given.sum(axis=-1) >= min(_LEAST_POINTS, points_px.shape[-2])
-    fractions = people & (small | ~given).all(axis=-1)
-    if fractions.any() and 2 * fractions.sum() >= people.sum():
-        signed = points_px[fractions][given[fractions]].min() < _SIGNED
+    n_people, n_fractions, least = 0, 0, 0.0
+    for of in (points_px[i : i + _AT_ONCE] for i in range(0, len(points_px), _AT_ONCE)):
+        given = np.isfinite(of).all(axis=-1) & (of != 0).any(axis=-1)
+        small = ((of <= _FRACTION) & (of >= -_FRACTION)).all(axis=-1)
+        people = given.sum(axis=-1) >= min(_LEAST_POINTS, of.shape[-2])
+        fractions = people & (small | ~given).all(axis=-1)
+        n_people, n_fractions = n_people + people.sum(), n_fractions + fractions.sum()
+        least = of[fractions][given[fractions]].min(initial=least)
+    if n_fractions and 2 * n_fractions >= n_people:
+        signed = least < _SIGNED
         span, first = ("[-1, 1]", "add 1, halve and ") if signed else ("[0, 1]", "")
         expected = f"expected pixels, {first}multiply by the image's width and height"
         raise InputError(f"{path}: {what}: all coordinates lie in {span}; {expected}")

@@ -19,6 +19,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, write_bytes
 from hicp_lib.core.images import read_image, write_png
 from hicp_lib.core.keypoints import FACE, GROUPS, HANDS, LIMBS, NAMES
+from hicp_lib.core.names import is_inside
 from hicp_lib.evaluation.ap.metric_table import person_oks
 from hicp_lib.formats.annotations import Annotations, rows_by_image
 from hicp_lib.formats.detection_files import read_rows
@@ -138,7 +139,7 @@ def image_paths(
     for i in found.keys() - names.keys():
         raise InputError(f"{detections}: nothing says which picture image {i} is; give --annotations")
     for name in names.values():
-        if not (images / name).resolve().is_relative_to(images.resolve()):
+        if not is_inside(name):
             raise InputError(f"{detections}: file name {name!r} leads out of the folder of pictures")
     return {i: images / name for i, name in names.items()}
 

@@ -60,7 +60,7 @@ def _of(by: str, marks: set[str], path: Path) -> Kind:
     for kind in tables()["kind"]:
         if kind["by"] == by and marks.issuperset(kind["marks"]):
             return kind
-    held = ", ".join(sorted(marks)[:6]) or "nothing"
+    held = ", ".join(mark[:40] for mark in sorted(marks)[:6]) or "nothing"
     raise InputError(f"{path}: {by} of no kind that is known; it has {held}")
 
 
@@ -127,7 +127,7 @@ def inspect(path: str | Path) -> Facts:
     kind, path = identify(Path(path))
     try:
         facts = _describe(kind, path)
-    except (OSError, ValueError, SyntaxError) as error:  # the libraries' own are among these
+    except Exception as error:  # of the libraries' many kinds
         facts = Facts(problem=one_line(error).removeprefix(f"{path}: "))
     fixed = {} if facts.problem or facts.kind else kind.get("needs", {})
     needs = {of: f"{fixed.get(of, '')} {facts.needs.get(of, '')}".strip() for of in {**fixed, **facts.needs}}

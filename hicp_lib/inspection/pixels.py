@@ -10,7 +10,7 @@ from PIL import Image
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import listed, read_bytes, read_json
-from hicp_lib.core.images import image_header
+from hicp_lib.core.images import image_header, refuse_too_large
 from hicp_lib.core.video import open_video
 from hicp_lib.detectors.mediapipe.bundles import BUNDLES
 from hicp_lib.detectors.onnx.model_file import read_model
@@ -23,6 +23,7 @@ _MOST_HEADERS = 2000  # of images of a folder that are looked into
 
 def describe_image(path: Path) -> Facts:
     """Say what a picture is; its pixels are read to the end."""
+    refuse_too_large(path, *image_header(path)[:2])
     with Image.open(path) as image:
         values = np.asarray(image)  # to the end: what is cut off is told
     says = {"size": f"{image.width} x {image.height} pixels, {image.mode}"}
@@ -51,7 +52,7 @@ def describe_video(path: Path) -> Facts:
 def describe_images(folder: Path) -> Facts:
     """Say what images a folder holds; pixels are not read."""
     paths = [folder / name for name in listed(folder, IMAGE_SUFFIXES)]
-    headers = [image_header(path) for path in paths[:_MOST_HEADERS]]
+    headers = [image_header(path) if path.is_file() else (0, 0, 1) for path in paths[:_MOST_HEADERS]]
     sizes = Counter(f"{width} x {height}" for width, height, _ in headers if width)
     shown = ", ".join(f"{size} ({n})" for size, n in sizes.most_common(3)) + ", ..." * (len(sizes) > 3)
     turned = "have a rotation flag (EXIF): viewers turn them, here they are as stored"

@@ -1,14 +1,15 @@
 """What recordings hold, and files of them: bags, cameras, trajectories, motion capture."""
 
 from collections.abc import Iterable
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import listed, read_json
+from hicp_lib.core.limited import limited_child
 from hicp_lib.inspection.facts import ORIGIN, Facts, about_times
 from hicp_lib.mocap.registration import read_registration
 from hicp_lib.recordings.bag_file import open_bag
@@ -17,7 +18,7 @@ from hicp_lib.recordings.camera_file import read_distorted_camera
 from hicp_lib.recordings.check import FURTHEST_POSE_M, check_recording
 from hicp_lib.recordings.importing import METADATA, read_pose_source
 from hicp_lib.recordings.qualisys import read_mocap
-from hicp_lib.recordings.recording import open_recording
+from hicp_lib.recordings.recording import open_recording, read_csv
 from hicp_lib.recordings.trajectories import read_trajectory
 from hicp_lib.recordings.tum import read_file_list, remarks
 
@@ -26,6 +27,10 @@ _OPTIONS = {"fps": "--rate", "depth_scale": "--depth-scale"}
 
 def describe_bag(path: Path) -> Facts:
     """Say what a bag holds: a file, or the folder of one of ROS 2."""
+    return Facts(**limited_child(path, _bag))
+
+
+def _bag(path: str) -> dict:
     with open_bag(path) as bag:
         counts = {connection.topic: connection.msgcount for connection in bag.reader.connections}
         lasts_s, poses = bag.reader.duration / 1e9, bag.topics("TFMessage", "JointState")
@@ -37,7 +42,7 @@ def describe_bag(path: Path) -> Facts:
     says |= {"depth unit": f"{streams[1].units_per_m:g} per metre", "poses": ", ".join(poses) or "none"}
     needed = "--base-frame or --joint-states" if poses else "--poses, unless the camera stands still"
     notes = [*dict.fromkeys(streams[0].notes + streams[1].notes)]
-    return Facts(says, notes, {"hicp record import": f"--bag; {needed}"})
+    return asdict(Facts(says, notes, {"hicp record import": f"--bag; {needed}"}))
 
 
 def describe_recording(folder: Path) -> Facts:
@@ -64,8 +69,8 @@ def describe_open3d(folder: Path) -> Facts:
     path = next((path for path in map(folder.joinpath, METADATA) if path.is_file()), None)
     if path is None or n_color != n_depth:
         raise InputError(f"{n_color} and {n_depth} images; expected as many, and one of {METADATA}")
-    content, facts = read_json(path), describe_camera(path)
-    times = f"{content.get('fps', 'not known how many')} per second, as {path.name} says"
+    facts, content = describe_camera(path), read_json(path)
+    times = f"{str(content.get('fps', 'not known how many'))[:40]} per second, as {path.name} says"
     missing = "".join(f" {option}" for key, option in _OPTIONS.items() if key not in content)
     needs = {"hicp record import": f"--open3d{missing} --poses, unless the camera stands still"}
     return Facts({"images": f"{n_color} in each", "times": times} | facts.says, facts.notes, needs)
@@ -73,7 +78,8 @@ def describe_open3d(folder: Path) -> Facts:
 
 def describe_camera(path: Path) -> Facts:
     """Say what a file of a camera's intrinsics holds."""
-    scale = read_json(path).get("depth_scale")
+    content = read_json(path)
+    scale = content.get("depth_scale") if isinstance(content, dict) else None
     camera, _, distorted_px = read_distorted_camera(path, 1.0 if scale is None else None)
     says = {
         "image": _size(camera),
@@ -131,7 +137,7 @@ def describe_poses(path: Path, by: str = "") -> Facts:
 
 def describe_clicks(path: Path) -> Facts:
     """Say what a table of clicked markers holds."""
-    table = pd.read_csv(path, skipinitialspace=True).astype({"frame": int, "u_px": float, "v_px": float})
+    table = read_csv(path, ["frame", "u_px", "v_px"], ["marker"])
     counts = f"{len(table)} on {table['marker'].nunique()} markers in {table['frame'].nunique()} frames"
     return Facts({"clicks": counts, "units": f"pixels, {ORIGIN}"})
 

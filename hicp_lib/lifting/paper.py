@@ -157,8 +157,13 @@ def _of_like_size(half_px: np.ndarray) -> Iterator[np.ndarray]:
     octave = np.maximum(np.frexp(half_px)[1], 2)  # up to 3 pixels are one size
     for number in np.flatnonzero(np.bincount(octave)):
         alike = np.flatnonzero(octave == number)
-        n_blocks = 1 + len(alike) * (2 * half_px[alike].max() + 1) ** 2 // _BLOCK
-        yield from np.array_split(alike, n_blocks) if n_blocks > 1 else [alike]
+        yield from _blocks(alike, half_px[alike].max())
+
+
+def _blocks(points: np.ndarray, half_px: int) -> list[np.ndarray]:
+    """Parts of points whose windows are gathered at once, of one at least."""
+    n_blocks = 1 + len(points) * (2 * int(half_px) + 1) ** 2 // _BLOCK
+    return np.array_split(points, min(n_blocks, len(points))) if n_blocks > 1 else [points]
 
 
 def _half_widths(depth_m: np.ndarray, at: np.ndarray, radius_px: np.ndarray) -> np.ndarray:
@@ -169,7 +174,8 @@ def _half_widths(depth_m: np.ndarray, at: np.ndarray, radius_px: np.ndarray) -> 
         # No corner of a neighbourhood is farther away than that of the least depth.
         limit = int(np.ceil(np.sqrt(2) * radius_px[lost].max() / MIN_DEPTH_M))
         reach = min(4 * reach, limit)
-        half[lost] = _sizes_that_reach(depth_m, at[:, lost], radius_px[lost], reach)
+        for some in _blocks(lost, reach):
+            half[some] = _sizes_that_reach(depth_m, at[:, some], radius_px[some], reach)
         lost = lost[half[lost] < 0]
     return np.maximum(half, 0)  # a hole that nothing reaches is alone, and has no depth
 

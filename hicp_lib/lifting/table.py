@@ -7,8 +7,9 @@ import pandas as pd
 
 from hicp_lib.core.camera import transform
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.errors import InputError
+from hicp_lib.core.errors import InputError, refuse_unknown
 from hicp_lib.core.keypoints import N_KEYPOINTS, NAMES
+from hicp_lib.core.progress import with_bar
 from hicp_lib.lifting.paper import BODY_RADIUS_M, REASONS, lift
 from hicp_lib.lifting.robust import METHODS, lift_robust
 from hicp_lib.recordings.recording import Recording, read_depth_m
@@ -43,7 +44,8 @@ def lift_recording(
     InputError
         For an unknown method, detections of another number of frames, or a depth image that cannot be read.
     """
-    n_steps = {method: steps_of(method)}
+    refuse_unknown("method of lifting", method, METHODS)
+    n_steps = {method: METHODS[method]}
     return lift_found(recording, {"": detections}, n_steps).drop(columns=["detector", "method"])
 
 
@@ -75,7 +77,7 @@ def lift_found(
             counts = f"{len(recording)} frames, but detections of {len(detections)} images"
             raise InputError(f"{recording.folder}: {counts}; detect people in the frames of this recording")
     frames: dict[tuple[str, str], list] = {(detector, method): [] for detector in found for method in n_steps}
-    for k in range(len(recording)):
+    for k in with_bar(range(len(recording)), "lifting", "frame"):
         depth_m = read_depth_m(recording, k)
         for (detector, method), of_one in frames.items():
             of_one.append(_lift_frame(recording, k, depth_m, found[detector][k], n_steps[method]))
@@ -110,33 +112,6 @@ def lift_pixels(
             lifted = lift(keypoints_px, depth_m, recording.intrinsics, radius_m)
             of_radius_m[rows.index] = transform(recording.T_base_cam[frame], lifted.points_m[:, 0])
     return seen_m
-
-
-def steps_of(method: str) -> int:
-    """How many of `hicp_lib.lifting.robust.STEPS` a way of lifting takes.
-
-    Parameters
-    ----------
-    method : str
-        One of `hicp_lib.lifting.robust.METHODS`.
-
-    Returns
-    -------
-    int
-
-    Raises
-    ------
-    InputError
-        For an unknown name.
-
-    Examples
-    --------
-    >>> steps_of("paper"), steps_of("robust")
-    (0, 4)
-    """
-    if method not in METHODS:
-        raise InputError(f"no method {method!r} of lifting; choose one of {', '.join(sorted(METHODS))}")
-    return METHODS[method]
 
 
 def _lift_frame(

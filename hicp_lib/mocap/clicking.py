@@ -52,7 +52,7 @@ def read_clicks(path: str | Path, recording: Recording, markers: Sequence[str]) 
     InputError
         If it is not such a table; the row is named.
     """
-    table = read_csv(path, COLUMNS)
+    table = read_csv(path, ["frame", "u_px", "v_px"], ["marker"])[COLUMNS]
     if table.empty:
         raise InputError(f"{path}: has no rows; expected one per click")
     for row, click in enumerate(table.to_dict("records"), start=2):
@@ -139,7 +139,7 @@ def _check_click(where: str, click: dict, recording: Recording, markers: Sequenc
         raise InputError(f"{where}: frame is {frame!r}; {expected}")
     if marker not in markers:
         known = ", ".join(markers)
-        raise InputError(f"{where}: marker {marker!r} is not in the motion capture; it has {known}")
+        raise InputError(f"{where}: marker {str(marker)[:80]!r} is not in the motion capture; it has {known}")
     sizes = (recording.intrinsics.width_px, recording.intrinsics.height_px)
     for name, value, size in zip(COLUMNS[2:], pixel, sizes, strict=True):
         if not is_number(value) or not inside(np.array([value, 0]), (0, 0, size, 1)):

@@ -7,6 +7,7 @@ in `eight_clicks`; `reprojection` has one without depth.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,11 @@ from hicp_lib.core.alignment import RigidFit, arun
 from hicp_lib.core.camera import transform
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
+from hicp_lib.formats.json_validation import is_number
 from hicp_lib.lifting.paper import BODY_RADIUS_M
 from hicp_lib.lifting.table import lift_pixels
 from hicp_lib.mocap.synchronisation import interpolate_mocap
-from hicp_lib.recordings.qualisys import MotionCapture
+from hicp_lib.recordings.qualisys import MAX_MARKER_M, MotionCapture
 from hicp_lib.recordings.recording import Recording
 
 CAMERA_MARKER = "camera"
@@ -208,12 +210,12 @@ def read_registration(path: str | Path) -> Registration:
     """
     content = read_json(path)
     rows = content.get("T_base_mocap") if isinstance(content, dict) else None
-    try:
-        T = np.array(rows, dtype=float)
-    except (TypeError, ValueError):
-        T = np.zeros(0)
-    if T.shape != (4, 4) or not np.isfinite(T).all() or (T[3] != [0, 0, 0, 1]).any():
-        raise InputError(f"{path}: T_base_mocap: expected 4 rows of 4 finite numbers, the last 0, 0, 0, 1")
+    lists = [row for row in rows if isinstance(row, list)] if isinstance(rows, list) else []
+    is_square = [len(row) for row in lists] == [4] * 4 and all(map(is_number, chain(*lists)))
+    T = np.array(rows, float) if is_square else np.full((4, 4), np.nan)
+    if not (np.abs(T) <= MAX_MARKER_M).all() or T[3].tolist() != [0, 0, 0, 1]:
+        expected = f"expected 4 rows of 4 numbers up to {MAX_MARKER_M:g}, the last 0, 0, 0, 1"
+        raise InputError(f"{path}: T_base_mocap: {expected}")
     R = T[:3, :3]
     if np.abs(R @ R.T - np.eye(3)).max() > _MAX_SKEW or np.linalg.det(R) < 0:
         wrong = "its first three columns are not a rotation"

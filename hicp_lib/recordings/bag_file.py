@@ -1,7 +1,7 @@
 """Messages of ROS bags: ROS 1, ROS 2 in SQLite or MCAP, and what librealsense records, which is either."""
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,8 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError, one_line
 from hicp_lib.core.extras import needs
+from hicp_lib.core.images import decode as decode_pixels
+from hicp_lib.core.limited import went_on
 
 _SURPLUS_BYTES = 4  # librealsense ends an image with the depth unit, which the message has no place for
 _RGB, _BGR = [0, 1, 2], [2, 1, 0]
@@ -39,21 +41,15 @@ class Bag:
         return sorted(topic for topic, name in named.items() if name in types)
 
     def messages(self, *topics: str) -> Iterator[tuple[str, int, Any]]:
-        """Topic, time of recording in nanoseconds, and content of every message.
-
-        Raises
-        ------
-        InputError
-            If the file is damaged.
-        """
+        """Topic, time of recording in nanoseconds, and content of every message."""
         connections = [c for c in self.reader.connections if c.topic in topics]
-        with _told(self.path):
-            for connection, recorded_ns, raw in self.reader.messages(connections) if connections else ():
-                try:
-                    message = self.reader.deserialize(raw, connection.msgtype)
-                except Exception:
-                    message = self.reader.deserialize(raw[:-_SURPLUS_BYTES], connection.msgtype)
-                yield connection.topic, recorded_ns, message
+        for connection, recorded_ns, raw in self.reader.messages(connections) if connections else ():
+            went_on()
+            try:
+                message = self.reader.deserialize(raw, connection.msgtype)
+            except Exception:
+                message = self.reader.deserialize(raw[:-_SURPLUS_BYTES], connection.msgtype)
+            yield connection.topic, recorded_ns, message
 
     def first(self, topic: str) -> Any:
         """Content of a topic's first message; None where there is none."""
@@ -75,18 +71,16 @@ def open_bag(path: str | Path) -> Iterator[Bag]:
 
     Raises
     ------
-    InputError
-        If it is none, with the reader's reason.
+    Exception
+        If it is none or damaged, here or where it is used, of many kinds: to be called in a process of its
+        own (`hicp_lib.core.limited.limited_child`).
     """
     with needs("bags"):
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
-    path = Path(path)
-    with ExitStack() as stack:
-        with _told(path):
-            types = get_typestore(Stores.LATEST)  # for files that do not define theirs
-            reader = stack.enter_context(AnyReader([path], default_typestore=types))
-        yield Bag(path, reader)
+    types = get_typestore(Stores.LATEST)  # for files that do not define theirs
+    with AnyReader([Path(path)], default_typestore=types) as reader:
+        yield Bag(Path(path), reader)
 
 
 def stamp_s(message: Any) -> float:
@@ -141,12 +135,7 @@ def decode(where: str, message: Any) -> np.ndarray:
 def _decompressed(where: str, message: Any) -> np.ndarray:
     """JPEG or PNG; depth has twelve bytes before it, the last eight for those that stand for floats."""
     is_depth, content = "compresseddepth" in message.format.lower(), np.asarray(message.data, np.uint8)
-    try:
-        image = cv2.imdecode(content[12:] if is_depth else content, cv2.IMREAD_UNCHANGED)
-    except cv2.error as error:
-        raise InputError(f"{where}: an image cannot be read ({one_line(error)})") from None
-    if image is None:
-        raise InputError(f"{where}: an image of format {message.format!r} is damaged or not JPEG or PNG")
+    image = decode_pixels(content[12 * is_depth :], f"{where}: {message.format[:40]!r}", cv2.IMREAD_UNCHANGED)
     if is_depth and message.format.startswith("32FC1"):
         scale, offset = content[4:12].copy().view("<f4")
         with np.errstate(divide="ignore"):
@@ -154,13 +143,3 @@ def _decompressed(where: str, message: Any) -> np.ndarray:
     if image.ndim == 3:
         return np.ascontiguousarray(image[..., _RGB if "compressed rgb8" in message.format else _BGR])
     return image
-
-
-@contextmanager
-def _told(path: Path) -> Iterator[None]:
-    """Whatever the reader of bags raises, for which it has many kinds, in one line."""
-    try:
-        yield
-    except Exception as error:
-        expected = "expected a bag of ROS or of RealSense that was closed after recording"
-        raise InputError(f"{path}: {expected} ({one_line(error)})") from None

@@ -10,6 +10,7 @@ from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.recordings.bag_file import Bag, decode
 from hicp_lib.recordings.bag_poses import Link, rigid
+from hicp_lib.recordings.camera_file import refuse_implausible
 from hicp_lib.recordings.rectification import undistortion
 
 _REALSENSE = re.compile(r"((/device_\d+/sensor_\d+)/\w+)/image/data")
@@ -165,9 +166,8 @@ def _camera(bag: Bag, topic: str, frame: str) -> tuple[Camera, str, np.ndarray]:
     K, D, P = (getattr(info, key if hasattr(info, key) else key.upper()) for key in "kdp")
     is_rectified = re.search("(?<![a-z])rect", topic.rpartition("/image")[2])
     fx, fy, cx, cy = (P[0], P[5], P[2], P[6]) if is_rectified else (K[0], K[4], K[2], K[5])
-    if min(fx, fy) <= 0:
-        raise InputError(f"{bag.path}: {topic}: its CameraInfo is not calibrated (focal length {fx:g})")
     camera = Camera(info.width, info.height, fx, fy, cx, cy)
+    refuse_implausible(f"{bag.path}: {topic}: its CameraInfo", camera)
     return camera, info.distortion_model, np.zeros(0) if is_rectified else D
 
 

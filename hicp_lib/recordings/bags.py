@@ -6,13 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.errors import InputError
+from hicp_lib.core.limited import limited_child
 from hicp_lib.recordings.bag_file import Bag, decode, open_bag, stamp_s
 from hicp_lib.recordings.bag_poses import frame_poses, joint_poses, read_links
 from hicp_lib.recordings.bag_streams import Stream, Topics, find_streams, realsense_links
 from hicp_lib.recordings.recording import check_size
 from hicp_lib.recordings.rectification import align_depth, rectify
 from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, associate
-from hicp_lib.recordings.writer import Poses, RecordingWriter
+from hicp_lib.recordings.writer import Poses, write_recording
 
 _SAME_PX = 0.5  # intrinsics this alike are those of one camera
 
@@ -25,7 +26,7 @@ def import_bag(
     base_frame: str | None = None,
     joints_mount: str | None = None,
 ) -> tuple[int, list[str]]:
-    """Import a bag of ROS 1 or 2, or of librealsense.
+    """Import a bag of ROS 1 or 2, or of librealsense, in a process of its own (`limited_child`).
 
     Distortion is undone and depth aligned to colour on the way. Times are those of the images' headers; an
     image of depth belongs to the nearest of colour within half of their period. Colour is stored as JPEG of
@@ -56,26 +57,32 @@ def import_bag(
     InputError
         If the bag is damaged or lacks something, or `out` holds files.
     """
+    given = poses and [of.tolist() for of in poses]
+    return limited_child(Path(path), _import, str(out), given, topics, base_frame, joints_mount)
+
+
+def _import(
+    path: str, out: str, given: list | None, topics: Topics, base_frame: str | None, joints_mount: str | None
+) -> tuple[int, list[str]]:
     notes: list[str] = []
     with open_bag(path) as bag:
         streams = color, depth = find_streams(bag, topics)
-        writer = RecordingWriter(out, color.camera, depth.units_per_m)
         T_color_depth = _alignment(bag, color, depth)
         notes += [f"{depth.topic}: aligned to {color.topic}"] if T_color_depth is not None else []
         notes += [f"{stream.topic}: {note}" for stream in streams for note in stream.notes]
         times_s, rows = _pairs(bag, color, depth, notes)
+        poses: Poses = (np.array(given[0]), np.array(given[1])) if given else (np.zeros(1), np.eye(4)[None])
         if base_frame is not None:
             T_base_cam = frame_poses(bag, read_links(bag), base_frame.strip("/"), color.frame, times_s)
             poses = _known(bag, times_s, T_base_cam, notes)
         elif joints_mount is not None:
             poses = _known(bag, times_s, joint_poses(bag, joints_mount, times_s), notes)
-        images = [_images(bag, stream, of_stream) for stream, of_stream in zip(streams, rows, strict=True)]
-        for time_s, rgb, depth_image in zip(times_s, *images, strict=True):
-            depth_m = depth_image if depth_image.dtype.kind == "f" else depth_image / depth.units_per_m
-            if T_color_depth is not None:
-                depth_m = align_depth(depth_m, depth.camera, color.camera, T_color_depth)
-            writer.add(time_s, rgb, depth_m)
-    writer.finish(poses)
+        rgb, depth_images = (_images(bag, stream, of) for stream, of in zip(streams, rows, strict=True))
+        depth_m = (of if of.dtype.kind == "f" else of / depth.units_per_m for of in depth_images)
+        if T_color_depth is not None:
+            depth_m = (align_depth(of, depth.camera, color.camera, T_color_depth) for of in depth_m)
+        frames = zip(times_s, rgb, depth_m, strict=True)
+        write_recording(out, color.camera, depth.units_per_m, frames, poses)
     return len(times_s), [f"{path}: {note}" for note in notes]
 
 

@@ -12,7 +12,9 @@ from hicp_lib.core.files import read_json, write_json
 from hicp_lib.formats.json_validation import is_number, shown
 from hicp_lib.recordings.rectification import undistortion
 
-MAX_SIDE_PX = 100_000
+MAX_SIDE_PX, MAX_PIXELS = 16_384, 2**25  # of images with depth, which are lifted whole
+_LEAST_FOCAL, _MOST_FOCAL_PX = 0.05, 6000.0  # the least as a share of the longer side: views of 170 degrees
+_MAX_SCALE = 1e5  # units of 0.01 mm, of which 16 bits hold 0.65 m
 _DISTORTION = re.compile(r"(?i)d|.*(dist|coef).*|k[1-6]|p[12]")  # however a tool names the key
 _LAYOUT = "fx, 0, 0, 0, fy, 0, cx, cy, 1"
 
@@ -21,19 +23,16 @@ def _is_side(value: object) -> bool:
     return is_number(value) and value == int(value) and 1 <= value <= MAX_SIDE_PX
 
 
-def _is_scale(value: object) -> bool:
-    return is_number(value) and value >= 1
-
-
 def _is_matrix(value: object) -> bool:
     return isinstance(value, list) and len(value) == 9 and all(map(is_number, value))
 
 
 _SIDE = f"a whole number from 1 to {MAX_SIDE_PX}, the size of the images in pixels"
+_SCALE = f"depth units per metre, 1 to {_MAX_SCALE:g} (1000 for millimetres), or --depth-scale"
 _EXPECTED: tuple[tuple[str, Callable[[object], bool], str], ...] = (
     ("width", _is_side, _SIDE), ("height", _is_side, _SIDE),
     ("intrinsic_matrix", _is_matrix, f"nine finite numbers ({_LAYOUT}), column by column"),
-    ("depth_scale", _is_scale, "depth units per metre, at least 1 (1000 for millimetres), or --depth-scale"),
+    ("depth_scale", lambda of: is_number(of) and 1 <= of <= _MAX_SCALE, _SCALE),
 )  # fmt: skip
 
 
@@ -108,7 +107,37 @@ def read_distorted_camera(
             raise InputError(f"{path}: {key}: expected {expected}; found {shown(content.get(key))}")
     focal_and_centre = _focal_and_centre(f"{path}: intrinsic_matrix", content["intrinsic_matrix"])
     intrinsics = Camera(int(content["width"]), int(content["height"]), *focal_and_centre)
+    refuse_implausible(str(path), intrinsics)
     return intrinsics, float(content["depth_scale"]), _distortion(path, content, intrinsics)
+
+
+def refuse_implausible(where: str, camera: Camera) -> None:
+    """Refuse a camera that none is: lifting would take what memory there is, for nothing.
+
+    Parameters
+    ----------
+    where : str
+        What it was read from, for messages.
+    camera : Camera
+
+    Raises
+    ------
+    InputError
+        If its images are too large, its view is wider than 170 degrees, its focal length above 6000 pixels
+        (neighbourhoods of keypoints grow with it), or its principal point more than an image away.
+    """
+    size, focal, centre = np.array(list(vars(camera).values())).reshape(3, 2)
+    low, high = _LEAST_FOCAL * size.max(), _MOST_FOCAL_PX
+    problems = {
+        f"{camera.width_px} x {camera.height_px} pixels; expected up to 32 million": size.prod() > MAX_PIXELS,
+        f"focal lengths {focal[0]:g} and {focal[1]:g}; expected {low:g} to {high:g} pixels":
+            not (low <= focal.min() and focal.max() <= high),
+        f"principal point {centre[0]:g}, {centre[1]:g}; expected pixels in the image":
+            not ((-size <= centre) & (centre <= 2 * size)).all(),
+    }  # fmt: skip
+    for problem, holds in problems.items():
+        if holds or size.min() < 1:
+            raise InputError(f"{where}: intrinsics are no camera's: {problem}")
 
 
 def write_camera(path: str | Path, intrinsics: Camera, depth_units_per_m: float) -> None:
@@ -148,7 +177,4 @@ def _focal_and_centre(where: str, matrix: list) -> tuple[float, float, float, fl
         is_by_rows = matrix[6:] == [0, 0, 1]
         hint = "write the matrix column by column" if is_by_rows else "undistort images with skew first"
         raise InputError(f"{where}: expected {_LAYOUT}, other places hold other numbers; {hint}")
-    if min(fx, fy) <= 0:
-        wrong = f"expected positive focal lengths, found {fx:g} and {fy:g}"
-        raise InputError(f"{where}: {wrong}; give them in pixels")
     return fx, fy, cx, cy

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -23,8 +23,6 @@ from hicp_lib.recordings.recording import (
     read_truth,
 )
 from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, associate, read_file_list, read_poses, remarks
-
-Read = TypeVar("Read")
 
 PLAUSIBLE_DEPTH_M = (0.1, 12.0)  # where the middle of what a camera near a robot sees must lie
 FURTHEST_POSE_M = 10.0  # from the base: a robot reaches less, a pose in millimetres more
@@ -88,7 +86,7 @@ class _Findings(list[Finding]):
     def note(self, path: Path, text: str, is_fatal: bool = False) -> None:
         self.append(Finding(f"{path}: {text}", is_fatal))
 
-    def attempt(self, read: Callable[..., Read], *arguments: object) -> Read | None:
+    def attempt(self, read: Callable, *arguments: object) -> Any:
         """What is read; None, and a finding, where it cannot be."""
         try:
             return read(*arguments)

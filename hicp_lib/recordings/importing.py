@@ -9,11 +9,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import pandas as pd
 
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import listed, read_bytes, read_json, write_bytes
+from hicp_lib.core.images import decode
 from hicp_lib.formats.json_validation import is_number, shown
 from hicp_lib.recordings.camera_file import read_distorted_camera
 from hicp_lib.recordings.recording import check_size, read_csv
@@ -24,7 +24,8 @@ from hicp_lib.recordings.writer import JPEG_QUALITY, Poses, refuse_used_folder, 
 
 METADATA = ("intrinsic.json", "camera_intrinsic.json")
 _IMAGE_KINDS = (".png", ".jpg", ".jpeg")
-_MAX_RATE_HZ = 10_000
+_MOST = 1e11  # seconds, and degrees: more is neither
+_RATES_HZ = (0.001, 10_000.0)
 
 
 def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
@@ -64,9 +65,8 @@ def read_pose_source(path: str | Path | None, mount: str = "level") -> Poses:
         return read_trajectory(path)
     from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub  # not in every installation
 
-    table = read_csv(path, ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)])
-    numbers = table.apply(pd.to_numeric, errors="coerce").to_numpy(float)
-    is_bad = ~np.isfinite(numbers).all(axis=1) | (np.diff(numbers[:, 0], prepend=-np.inf) <= 0)
+    numbers = read_csv(path, ["t_s", *(f"{joint}_deg" for joint in HEAD_JOINTS)]).to_numpy(float)
+    is_bad = ~(np.abs(numbers) <= _MOST).all(axis=1) | (np.diff(numbers[:, 0], prepend=-np.inf) <= 0)
     if is_bad.any() or len(numbers) == 0:
         row = 1 + int(np.argmax([*is_bad, True]))
         raise InputError(f"{path}: row {row}: expected numbers, and a t_s after the one before")
@@ -109,8 +109,6 @@ def import_open3d(
         If something is missing or does not match, or `out` holds files.
     """
     source, out = Path(source), Path(out)
-    if rate_hz is not None and not 0 < rate_hz < np.inf:
-        raise InputError(f"rate is {rate_hz!r}; expected frames per second")
     found = [source / name for name in METADATA if (source / name).is_file()]
     if len(found) > 1:
         raise InputError(f"{source}: holds {' and '.join(METADATA)}; keep the one of these images")
@@ -126,18 +124,23 @@ def import_open3d(
         counts = f"color/ holds {len(rgb)} images, depth/ {len(depth)}, not all of the same names"
         raise InputError(f"{source}: {counts}; expected one depth image per colour")
     rate_hz = said.get("fps") if rate_hz is None else rate_hz
-    if not (is_number(rate_hz) and 0 < rate_hz < _MAX_RATE_HZ):
-        raise InputError(f"{path}: fps: expected frames per second, found {rate_hz!r}; give --rate")
+    if not (is_number(rate_hz) and _RATES_HZ[0] <= rate_hz <= _RATES_HZ[1]):
+        expected = "expected frames per second, {:g} to {:g}".format(*_RATES_HZ)
+        raise InputError(f"{path}: fps: {expected}, found {shown(rate_hz)}; give --rate")
     times_s = _frame_numbers(rgb, notes) / rate_hz
     lasts_s, said_us = times_s[-1] + 1 / rate_hz, said.get("stream_length_usec")
     if is_number(said_us) and abs(said_us / 1e6 - lasts_s) > max(2 / rate_hz, 0.01 * lasts_s):
         lengths = f"stream_length_usec is {said_us / 1e6:.2f} s, {len(rgb)} frames are {lasts_s:.2f} s"
         notes.append(f"{path}: {lengths}; frames were dropped, or the rate is another")
     refuse_used_folder(out)
-    names = [f"rgb/{image.name}" for image in rgb], [f"depth/{image.name}" for image in depth]
-    for image, name in zip(rgb + depth, sum(names, []), strict=True):
+    is_plain = all(re.fullmatch(r"[\w.-]+", image.name) for image in rgb + depth)  # as lists can name them
+    rgb_names, depth_names = (
+        [f"{of}/{image.name if is_plain else f'{k:06d}{image.suffix}'}" for k, image in enumerate(images)]
+        for of, images in (("rgb", rgb), ("depth", depth))
+    )
+    for image, name in zip(rgb + depth, rgb_names + depth_names, strict=True):
         write_bytes(out / name, _rectified(image, intrinsics, pixels_px))
-    write_index(out, intrinsics, units_per_m, times_s, poses, names)
+    write_index(out, intrinsics, units_per_m, times_s, poses, (rgb_names, depth_names))
     return len(times_s), notes
 
 
@@ -172,9 +175,7 @@ def _frame_numbers(paths: list[Path], notes: list[str]) -> np.ndarray:
 def _rectified(path: Path, intrinsics: Camera, pixels_px: np.ndarray | None) -> bytes:
     """An image file's content, without distortion."""
     content = read_bytes(path, "expected an image")
-    image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if content else None
-    if image is None:
-        raise InputError(f"{path}: is not a whole image; expected PNG or JPEG")
+    image = decode(content, path, cv2.IMREAD_UNCHANGED)
     check_size(path, image, intrinsics)
     if pixels_px is None:
         return content

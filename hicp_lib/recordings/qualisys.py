@@ -13,13 +13,14 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, write_bytes
-from hicp_lib.recordings import c3d
+from hicp_lib.recordings.c3d import decoded, read_points
 
 _NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*")
 _MISSING = ("", "NULL", "null", "NaN", "nan", "NAN", "-nan")
 _TIME_CODE = re.compile(r"\d+(:\d+)+([:;.]\d+)*")  # SMPTE, IRIG
 _SAID_ONCE = ("FREQUENCY", "MARKER_NAMES", "NO_OF_FRAMES", "NO_OF_MARKERS")
 _MAX_RATE_HZ = 1e5
+MAX_MARKER_M = 10_000.0  # from the origin, in any direction
 _SHOWN = 40  # characters of a wrong value that a message repeats
 
 
@@ -76,13 +77,21 @@ def read_mocap(path: str | Path) -> MotionCapture:
     array([0.1, 0.2, 0.3])
     """
     path = Path(path)
-    if path.suffix.lower() == ".c3d":
-        points_m, names, rate_hz = c3d.read_points(path)
-        times_s = np.arange(len(points_m)) / rate_hz
-        return MotionCapture(times_s, names, _without_missing(points_m), rate_hz)
+    if path.suffix.lower() not in (".c3d", ".tsv"):
+        raise InputError(f"{path}: expected motion capture as .tsv or .c3d; export it so from Qualisys")
     if path.suffix.lower() == ".tsv":
-        return _read_tsv(path)
-    raise InputError(f"{path}: expected motion capture as .tsv or .c3d; export it so from Qualisys")
+        mocap = _read_tsv(path)
+    else:
+        points_m, names, rate_hz = read_points(path)
+        mocap = MotionCapture(np.arange(len(points_m)) / rate_hz, names, points_m, rate_hz)
+    far = np.argwhere(np.abs(mocap.points_m) > MAX_MARKER_M)
+    for frame, k, axis in far[:1]:
+        where = f"marker {mocap.names[k][:_SHOWN]!r} in frame {frame + 1}"
+        wrong = f"is at {mocap.points_m[frame, k, axis]:.6g} m; expected at most {MAX_MARKER_M:g}"
+        raise InputError(f"{path}: {where} {wrong}, export missing markers as missing")
+    missing = np.isnan(mocap.points_m).any(axis=2) | (mocap.points_m == 0).all(axis=2)
+    mocap.points_m[missing] = np.nan
+    return mocap
 
 
 def write_tsv(path: str | Path, mocap: MotionCapture) -> None:
@@ -109,27 +118,9 @@ def write_tsv(path: str | Path, mocap: MotionCapture) -> None:
     write_bytes(path, ("\r\n".join(lines) + "\r\n").encode())
 
 
-def write_c3d(path: str | Path, mocap: MotionCapture) -> None:
-    """Write C3D in millimetres, single precision; missing markers have the residual -1.
-
-    C3D has no column of times: the first frame is at 0, as `read_mocap` reads it.
-
-    Parameters
-    ----------
-    path : str or Path
-    mocap : MotionCapture
-
-    Raises
-    ------
-    InputError
-        For more frames than the format counts to.
-    """
-    c3d.write_points(path, mocap.points_m, mocap.names, mocap.rate_hz)
-
-
 def _read_tsv(path: Path) -> MotionCapture:
     raw = read_bytes(path, "give the path of a TSV file")
-    lines = re.split(r"\r\n|\n|\r", c3d.decoded(raw).rstrip("\r\n \x1a"))
+    lines = re.split(r"\r\n|\n|\r", decoded(raw).rstrip("\r\n \x1a"))
     start = next((k for k, line in enumerate(lines) if _is_data(line)), None)
     if start is None:
         raise InputError(
@@ -160,7 +151,7 @@ def _read_tsv(path: Path) -> MotionCapture:
         for number, row in enumerate(rows, start=start + 1)
     ]
     points_m = 1e-3 * np.array(coordinates_mm).reshape(len(rows), -1, 3)
-    return MotionCapture(times_s, names, _without_missing(points_m), rate_hz)
+    return MotionCapture(times_s, names, points_m, rate_hz)
 
 
 def _is_data(line: str) -> bool:
@@ -260,8 +251,3 @@ def _number(where: str, text: str) -> float:
         hint = "export with a decimal point" if "," in text else "expected a number or nothing"
         raise InputError(f"{where} is {text[:_SHOWN]!r}; {hint}")
     return value
-
-
-def _without_missing(points_m: np.ndarray) -> np.ndarray:
-    missing = np.isnan(points_m).any(axis=2) | (points_m == 0).all(axis=2)
-    return np.where(missing[..., None], np.nan, points_m)

@@ -20,10 +20,11 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.camera import Camera
-from hicp_lib.core.errors import InputError, one_line
-from hicp_lib.core.extras import needs
+from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes, read_json
-from hicp_lib.core.images import read_image
+from hicp_lib.core.images import decode, read_image
+from hicp_lib.core.keypoints import NAMES
+from hicp_lib.core.tables import read_table
 from hicp_lib.recordings.camera_file import read_camera
 from hicp_lib.recordings.tum import MAX_DIFFERENCE_S, associate, read_file_list, read_poses
 
@@ -33,6 +34,7 @@ TRUTH_FILE, JOINTS_FILE, SIMULATION_FILE = "truth.parquet", "joints.parquet", "s
 EXACT_DEPTH_DIR = "exact_depth"
 PER_FRAME = ("times_s", "rgb_paths", "depth_paths", "T_base_cam")
 """Attributes of a recording with an entry for each frame."""
+_MOST = 1e9  # of numbers in tables
 _TRUTH_COLUMNS = ("frame", "t_s", "keypoint", "x_m", "y_m", "z_m", "u_px", "v_px", "visible")
 
 
@@ -282,38 +284,32 @@ def read_simulation(recording: Recording) -> dict | None:
     return read_json(path) if path.is_file() else None
 
 
-def read_csv(path: str | Path, columns: Sequence[str]) -> pd.DataFrame:
+def read_csv(path: str | Path, numbers: Sequence[str], texts: Sequence[str] = ()) -> pd.DataFrame:
     """Read columns of a CSV table.
 
     Parameters
     ----------
     path : str or Path
-    columns : sequence of str
-        Those it must have.
+    numbers, texts : sequence of str
+        Columns it must have, once.
 
     Returns
     -------
     pd.DataFrame
-        Of these columns.
+        Of these columns; NaN where nothing is written.
 
     Raises
     ------
     InputError
-        If it cannot be read, or one is missing; the first is named.
+        If it cannot be read, a column is missing or there twice, or a number is none; the first is named.
     """
-    try:
-        table = pd.read_csv(path, skipinitialspace=True)
-    except (OSError, ValueError) as error:
-        expected = f"expected a CSV table with {','.join(columns)}"
-        raise InputError(f"{path}: cannot be read ({one_line(error)}); {expected}") from None
-    _check_columns(path, table, columns)
-    return table[list(columns)]
-
-
-def _check_columns(path: str | Path, table: pd.DataFrame, columns: Sequence[str]) -> None:
-    missing = [name for name in columns if name not in table.columns]
-    if missing:
-        raise InputError(f"{path}: has no column {missing[0]!r}; expected {', '.join(columns)}")
+    columns = [*numbers, *texts]
+    table = read_table(path, columns, dtype=str)[columns]
+    of_numbers = table[list(numbers)].apply(pd.to_numeric, errors="coerce")
+    for row, column in np.argwhere((of_numbers.isna() & table[list(numbers)].notna()).to_numpy())[:1]:
+        wrong = f"{numbers[column]} is {table[numbers[column]][row][:40]!r}"
+        raise InputError(f"{path}: row {row + 2}: {wrong}; expected a number")
+    return pd.concat([of_numbers, table[list(texts)]], axis=1)
 
 
 def check_size(where: str | Path, image: np.ndarray, intrinsics: Camera) -> None:
@@ -338,10 +334,9 @@ def check_size(where: str | Path, image: np.ndarray, intrinsics: Camera) -> None
 
 
 def _read_depth_m(recording: Recording, path: Path) -> np.ndarray:
-    content = np.frombuffer(read_bytes(path, "expected a depth image"), np.uint8)
-    units = cv2.imdecode(content, cv2.IMREAD_UNCHANGED) if content.size else None
-    if units is None or units.dtype != np.uint16 or units.ndim != 2:
-        raise InputError(f"{path}: is not a whole 16-bit image of one channel; write depth as 16-bit PNG")
+    units = decode(read_bytes(path, "expected a depth image"), path, cv2.IMREAD_UNCHANGED)
+    if units.dtype != np.uint16 or units.ndim != 2:
+        raise InputError(f"{path}: is not a 16-bit image of one channel; write depth as 16-bit PNG")
     check_size(path, units, recording.intrinsics)
     depth_m = units * np.float32(1 / recording.depth_units_per_m)
     depth_m[units == 0] = np.nan
@@ -352,11 +347,16 @@ def _read_table(recording: Recording, name: str, columns: tuple[str, ...]) -> pd
     path = recording.folder / name
     if not path.is_file():
         return None
-    with needs("analysis"):
-        import pyarrow as pa
-    try:
-        table = pd.read_parquet(path)
-    except (OSError, pa.ArrowException) as error:
-        raise InputError(f"{path}: is not a Parquet table ({one_line(error)})") from None
-    _check_columns(path, table, columns)
-    return table[table["frame"] < len(recording)].reset_index(drop=True)
+    table = read_table(path, columns)
+    numbers = table[[n for n in table if n != "keypoint" and (n in columns or n.endswith("_rad"))]]
+    for n, kind in numbers.dtypes.items():
+        if kind.kind not in "iuf":
+            raise InputError(f"{path}: column {n!r} is of type {kind}; expected numbers")
+    frames = numbers["frame"]
+    is_good = (frames >= 0) & (frames % 1 == 0) & ~(numbers.abs() > _MOST).any(axis=1)
+    if "keypoint" in columns:
+        is_good &= table["keypoint"].isin(NAMES)
+    if not is_good.all():
+        expected = f"expected a frame from 0, a keypoint's name, numbers up to {_MOST:g}"
+        raise InputError(f"{path}: row {1 + np.argmin(is_good)}: {expected}")
+    return table[frames < len(recording)].reset_index(drop=True)

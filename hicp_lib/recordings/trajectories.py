@@ -6,7 +6,7 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_bytes
-from hicp_lib.recordings.tum import read_poses
+from hicp_lib.recordings.tum import MAX_PLACE_M, read_poses
 
 _ROTATION_TOLERANCE = 0.01  # of R Rᵀ from the identity: files are rounded
 
@@ -48,8 +48,10 @@ def read_trajectory(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
         expected = "'k k k+1' and a matrix of 4 x 4" if is_log else "12 numbers in every line"
         raise InputError(f"{path}: is cut off or damaged; expected {expected}") from None
     R, last = T_base_cam[:, :3, :3], T_base_cam[:, 3]
+    R[np.abs(R).max(axis=(1, 2)) > 2] = 0  # no rotation, and too large to be squared
     off = np.abs(R @ R.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2)) + np.abs(last - [0, 0, 0, 1]).max(axis=1)
-    is_pose = (off <= _ROTATION_TOLERANCE) & (np.linalg.det(R) > 0) & np.isfinite(T_base_cam.sum(axis=(1, 2)))
+    is_near = (np.abs(T_base_cam[:, :3, 3]) <= MAX_PLACE_M).all(axis=1)
+    is_pose = is_near & (off <= _ROTATION_TOLERANCE) & (np.linalg.det(R) > 0)
     if is_log:
         is_pose &= (numbers[:, :2] == numbers[0, 0] + np.arange(len(numbers))[:, None]).all(axis=1)
     if not is_pose.all():

@@ -9,18 +9,21 @@ SLAM Systems*, IROS 2012.
 
 import re
 from collections.abc import Iterator, Sequence
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from pathlib import Path
 
 import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import atomic_path, read_bytes, write_bytes
+from hicp_lib.core.names import is_inside
 from hicp_lib.core.rotations import matrices_from_quaternions, quaternions_from_matrices
 
 MAX_DIFFERENCE_S = 0.02  # images and poses further apart in time do not belong together
 _UNIT_TOLERANCE = 0.01  # a quaternion's length may differ from 1 by this much: files are rounded
-_MAX_ABS = 1e20  # more is no time and no place
+_MAX_ABS = 1e20  # more is no time
+MAX_PLACE_M = 1e7  # more is no place on Earth
 _MAX_TIME_S = 1e11  # later than the year 5000: another unit
+_MAX_COLUMNS = 100  # of a table that has poses
 _SLOW_S = 5.0  # between two images: as many milliseconds are more usual
 _LIST_COLUMNS = "timestamp filename"
 _POSE_COLUMNS = "timestamp tx ty tz qx qy qz qw"
@@ -59,10 +62,12 @@ def read_file_list(path: str | Path) -> tuple[np.ndarray, list[str]]:
     """
     times_s, names = [], []
     for number, time_s, (name,) in _rows(path, _LIST_COLUMNS):
-        if not _is_inside(name):
-            raise _error(path, number, f"names {name!r}; expected a file inside the recording's folder")
+        if not is_inside(name):
+            raise _error(path, number, f"names {name[:80]!r}; expected a file inside the recording's folder")
         times_s.append(time_s)
         names.append(name)
+    if len(set(names)) < len(names):
+        raise InputError(f"{path}: names an image at two times; expected an image for each time")
     return np.array(times_s), names
 
 
@@ -90,6 +95,8 @@ def read_poses(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     rows = []
     for number, time_s, fields in _rows(path, _POSE_COLUMNS):
         pose = [_number(path, number, field) for field in fields]
+        if np.abs(pose[:3]).max() > MAX_PLACE_M:
+            raise _error(path, number, f"{fields[:3]} is no place; expected metres, up to {MAX_PLACE_M:g}")
         length = np.linalg.norm(pose[3:])
         if not abs(length - 1) <= _UNIT_TOLERANCE:
             wrong = f"has a quaternion of length {length:.4g}; expected qx qy qz qw of length 1"
@@ -202,9 +209,7 @@ def _prefix(step: float) -> str:
 
 def _text(path: str | Path) -> str:
     try:
-        return Path(path).read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); a recording needs it") from None
+        return read_bytes(path, "a recording needs it").decode("utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"{path}: is not text in UTF-8; expected a text file of the TUM layout") from None
 
@@ -244,7 +249,7 @@ def _rows(path: str | Path, columns: str) -> Iterator[tuple[int, float, list[str
 def _named_columns(line: str) -> list[int] | None:
     """Which columns are those of `_POSE_COLUMNS`, if the line names them."""
     names = re.sub(r"[\[(].*?[\])]", "", line.strip("# \r")).split("," if line.count(",") > 6 else None)
-    found = [_COLUMN.fullmatch(name.strip(" ;")) for name in names]
+    found = [_COLUMN.fullmatch(name.strip(" ;")) for name in names[:_MAX_COLUMNS]]
     keys = [(m[1] or "qt"[m[2] != "w"]).replace("p", "t") + m[2] if m else "" for m in found]
     if not all(keys.count(name) == 1 for name in _POSE_COLUMNS.split()[1:]):
         return None
@@ -253,19 +258,12 @@ def _named_columns(line: str) -> list[int] | None:
 
 def _number(path: str | Path, number: int, text: str) -> float:
     try:
-        value = float(text)
+        value = float(text.replace("_", " "))  # Python's way of writing numbers is nobody's else
     except ValueError:
         value = np.nan
     if not abs(value) < _MAX_ABS:
         raise _error(path, number, f"{text[:40]!r} is not a finite number; expected seconds and metres")
     return value
-
-
-def _is_inside(name: str) -> bool:
-    """Whether a file name cannot lead out of its folder, on any system."""
-    windows = PureWindowsPath(name)
-    is_relative = not (windows.drive or windows.root or PurePosixPath(name).root)
-    return is_relative and ".." not in windows.parts and name.isprintable()
 
 
 def _error(path: str | Path, number: int, problem: str) -> InputError:

@@ -1,6 +1,6 @@
 """Writing recordings: images one by one, then the lists that make them a recording."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import cv2
@@ -21,8 +21,11 @@ Poses = tuple[np.ndarray, np.ndarray]
 """Times (m,) in seconds and T_base_cam (m, 4, 4); one pose is for all, m without times in order."""
 
 
-class RecordingWriter:
-    """Writes a recording frame by frame; the folder is one only after `finish`.
+def write_recording(
+    folder: str | Path, intrinsics: Camera, depth_units_per_m: float,
+    frames: Iterable[tuple[float, np.ndarray, np.ndarray]], poses: Poses,
+) -> None:  # fmt: skip
+    """Write a recording frame by frame; the folder is one only at the end.
 
     Parameters
     ----------
@@ -30,70 +33,38 @@ class RecordingWriter:
         New or empty.
     intrinsics : Camera
         Of colour and of depth, which is aligned to it.
-    depth_units_per_m : float, optional
+    depth_units_per_m : float
         1000 stores millimetres, up to 65 m.
+    frames : iterable of (float, array, array)
+        Time, colour of shape (height, width, 3) and depth in metres, of which what is not finite is stored as
+        no depth.
+    poses : tuple of array
+        As of `write_index`.
 
     Raises
     ------
     InputError
-        If the folder holds files.
+        If the folder holds files, or there are no frames.
 
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
     >>> from hicp_lib.recordings.recording import open_recording
+    >>> frame, camera = (0.0, np.zeros((24, 32, 3), np.uint8), np.ones((24, 32))), (30.0, 30.0, 15.5, 11.5)
     >>> with TemporaryDirectory() as folder:
-    ...     writer = RecordingWriter(folder, Camera(32, 24, 30.0, 30.0, 15.5, 11.5))
-    ...     writer.add(0.0, np.zeros((24, 32, 3), np.uint8), np.ones((24, 32)), np.eye(4))
-    ...     writer.finish()
+    ...     write_recording(folder, Camera(32, 24, *camera), 1000, [frame], (np.zeros(1), np.eye(4)[None]))
     ...     len(open_recording(folder))
     1
     """
-
-    def __init__(self, folder: str | Path, intrinsics: Camera, depth_units_per_m: float = 1000.0):
-        self.folder = Path(folder)
-        refuse_used_folder(self.folder)
-        self.intrinsics, self.depth_units_per_m = intrinsics, depth_units_per_m
-        self._times_s: list[float] = []
-        self._poses: list[np.ndarray] = []
-
-    def add(
-        self, time_s: float, rgb: np.ndarray, depth_m: np.ndarray, T_base_cam: np.ndarray | None = None
-    ) -> None:
-        """Write a frame.
-
-        Parameters
-        ----------
-        time_s : float
-            After the frame before.
-        rgb : array, shape (height, width, 3), dtype uint8
-        depth_m : array, shape (height, width)
-            Along the camera's axis; what is not finite is stored as no depth.
-        T_base_cam : array, shape (4, 4), optional
-            Camera coordinates to the robot's base frame; the camera's own when left out.
-        """
-        write_frame(self.folder, len(self._times_s), rgb, depth_m, self.depth_units_per_m)
-        self._times_s.append(float(time_s))
-        self._poses.append(np.eye(4) if T_base_cam is None else np.asarray(T_base_cam, float))
-
-    def finish(self, poses: Poses | None = None) -> None:
-        """Write intrinsics, poses and the lists of images.
-
-        Parameters
-        ----------
-        poses : tuple of array, optional
-            In place of those given with the frames.
-
-        Raises
-        ------
-        InputError
-            If there are no frames.
-        """
-        if not self._times_s:
-            raise InputError(f"{self.folder}: no frames were added; a recording has at least one")
-        times_s = np.array(self._times_s)
-        poses = (times_s, np.array(self._poses)) if poses is None else poses
-        write_index(self.folder, self.intrinsics, self.depth_units_per_m, times_s, poses)
+    folder = Path(folder)
+    times_s: list[float] = []
+    refuse_used_folder(folder)
+    for k, (time_s, rgb, depth_m) in enumerate(frames):
+        write_frame(folder, k, rgb, depth_m, depth_units_per_m)
+        times_s.append(float(time_s))
+    if not times_s:
+        raise InputError(f"{folder}: no frames were added; a recording has at least one")
+    write_index(folder, intrinsics, depth_units_per_m, np.array(times_s), poses)
 
 
 def write_index(

@@ -94,7 +94,7 @@ def test_a_score_that_is_no_number_is_not_written_as_one(tmp_path):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (lambda table: table.drop(columns="u_px"), "is no table that hicp detect wrote .*u_px"),
+        (lambda table: table.drop(columns="u_px"), "has no column 'u_px'; expected a table with image_id"),
         (lambda table: table.assign(keypoint="wing"), "is no table that hicp detect wrote .*wing"),
     ],
 )

@@ -231,7 +231,7 @@ def image_names(folder):
     return dump(folder / "x.images.json", [{"id": 1, "file_name": "a"}, {"id": 2, "file_name": "b"}])
 
 
-@case("detections by hicp detect (Parquet)", problem="is no table that hicp detect wrote")
+@case("detections by hicp detect (Parquet)", problem="a table")
 def another_parquet(folder):
     pd.DataFrame({"x_m": [1.0, 2.0]}).to_parquet(folder / "results.json")
     return folder / "results.json"

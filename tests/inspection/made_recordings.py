@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.camera import Camera
+from hicp_lib.recordings.c3d import write_c3d
 from hicp_lib.recordings.camera_file import write_camera
-from hicp_lib.recordings.qualisys import MotionCapture, write_c3d, write_tsv
+from hicp_lib.recordings.qualisys import MotionCapture, write_tsv
 from hicp_lib.recordings.tum import write_file_list, write_poses
 from hicp_lib.robot.kinematics import HEAD_JOINTS
 from tests.inspection.cases import case, dump
@@ -200,7 +201,7 @@ def c3d_in_latin_1(folder):
     return folder / "picture.png"
 
 
-@case("motion capture, C3D", problem="ezc3d cannot read it")
+@case("motion capture, C3D", problem="its reader gave up")
 def c3d_cut_off(folder):
     write_c3d(folder / "mocap.c3d", capture())
     content = (folder / "mocap.c3d").read_bytes()
@@ -240,7 +241,7 @@ def ros2_distorted(folder):
     return write_bag(folder, info={"frame": "color_optical", "D": [0.1, 0, 0, 0, 0]})
 
 
-@case("bag of ROS 1", problem="expected a bag of ROS")
+@case("bag of ROS 1", problem="its reader gave up")
 def ros1_cut_off(folder):
     content = write_bag(folder, "ros1").read_bytes()
     (folder / "x.bag").write_bytes(content[:300])

@@ -10,7 +10,7 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.lifting.table import lift_found, lift_recording
 from hicp_lib.recordings.recording import open_recording
-from hicp_lib.recordings.writer import RecordingWriter
+from tests.recordings.writing import RecordingWriter
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
 
@@ -94,5 +94,5 @@ def test_nobody_is_an_empty_table_with_the_same_columns(recording, method):
 def test_what_does_not_fit_is_refused(recording):
     with pytest.raises(InputError, match="2 frames, but detections of 1"):
         lift_recording(recording, [detections()])
-    with pytest.raises(InputError, match="choose one of paper, robust"):
+    with pytest.raises(InputError, match="expected one of: robust, paper"):
         lift_recording(recording, [detections()] * 2, "best")

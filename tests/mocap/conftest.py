@@ -7,7 +7,6 @@ import pytest
 from hicp_lib.core.camera import project, transform
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import open_recording
-from hicp_lib.recordings.writer import RecordingWriter
 from tests.mocap.discs import (
     CAMERA_MARKER_CAM,
     INTRINSICS,
@@ -17,6 +16,7 @@ from tests.mocap.discs import (
     camera_pose,
     depth_of,
 )
+from tests.recordings.writing import RecordingWriter
 
 
 @pytest.fixture(scope="module")

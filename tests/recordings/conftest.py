@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hicp_lib.core.camera import Camera
-from hicp_lib.recordings.writer import RecordingWriter
+from tests.recordings.writing import RecordingWriter
 
 SMALL = Camera(width_px=32, height_px=24, fx_px=30.0, fy_px=31.0, cx_px=15.5, cy_px=11.5)
 

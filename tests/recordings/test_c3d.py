@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.recordings.qualisys import read_mocap, write_c3d, write_tsv
+from hicp_lib.recordings.c3d import write_c3d
+from hicp_lib.recordings.qualisys import read_mocap, write_tsv
 from hicp_lib.recordings.recording import open_recording
 from tests.recordings.c3d_files import make_c3d
 

@@ -45,7 +45,7 @@ DAMAGES = {  # what is done, what the finding says, whether the recording is of 
         "16 x 12 pixels; its camera says 32 x 24; do not crop or bin (1 of 4 colour",
         True,
     ),
-    "truth": (lambda small: (small / "truth.parquet").write_text("junk"), "is not a Parquet table", True),
+    "truth": (lambda small: (small / "truth.parquet").write_text("junk"), "cannot be read as a table", True),
     "image gone": (lambda small: (small / "depth/000001.png").unlink(), "1 of 4 listed are not", True),
     "late": (
         lambda small: edit(small / "depth.txt", lambda text: text.replace("100.1", "100.15")),

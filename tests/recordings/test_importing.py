@@ -75,7 +75,7 @@ def test_joint_angles_become_poses(tmp_path):
     np.testing.assert_allclose(T_base_cam[0], expected)
     assert times_s.tolist() == [1.5]
     path.write_text(path.read_text().replace("10.0", "ten"))
-    with pytest.raises(InputError, match="row 1: expected numbers"):
+    with pytest.raises(InputError, match="row 2: torso_yaw_deg is 'ten'; expected a number"):
         read_pose_source(path)
     path.write_text("t_s,torso_pitch_deg\n0,1\n")
     with pytest.raises(InputError, match="no column 'torso_roll_deg'"):
@@ -104,7 +104,9 @@ def test_impossible_rates_are_refused(saved, tmp_path, rate_hz):
         import_open3d(saved, tmp_path / "r", STILL, rate_hz)
 
 
-@pytest.mark.parametrize(("fps", "fits"), [(9999, True), (10_000, False), (True, False), ("20", False)])
+@pytest.mark.parametrize(
+    ("fps", "fits"), [(10_000, True), (10_001, False), (0, False), (True, False), ("20", False)]
+)
 def test_the_rate_of_a_file_is_a_number_of_frames_per_second(saved, tmp_path, fps, fits):
     (saved / "intrinsic.json").write_text(json.dumps({**FILE, "fps": fps}))
     if fits:
@@ -209,7 +211,7 @@ def test_images_of_another_size_and_damaged_ones_are_refused(saved, tmp_path, ki
         import_open3d(saved, tmp_path / "r", STILL)
     for content in (b"", b"no image"):
         (saved / kind).write_bytes(content)
-        with pytest.raises(InputError, match=f"{kind}: is not a whole image"):
+        with pytest.raises(InputError, match=f"{kind}: is not an image"):
             import_open3d(saved, tmp_path / f"s{len(content)}", STILL)
 
 
@@ -266,3 +268,21 @@ def test_a_recording_s_camera_has_no_distortion(saved, tmp_path):
     assert check_recording(tmp_path / "r") == []
     path.write_text(json.dumps({**said, "coeffs": [0.1, 0, 0, 0], "distortion_model": "plumb_bob"}))
     assert "says that images are distorted" in str(check_recording(tmp_path / "r")[0])
+
+
+@pytest.mark.parametrize(
+    "name", ["my frame {}", "#{}", "a\n{}", "-{}", "bild-ä{}", "a\u2028{}", "a;{}", "a'\"{}"]
+)
+def test_whatever_images_are_called_the_recording_can_be_used(saved, tmp_path, name):
+    renamed(saved, [name.format(k) for k in range(3)])
+    assert import_open3d(saved, tmp_path / "r", STILL)[0] == 3
+    assert check_recording(tmp_path / "r") == []
+    recording = open_recording(tmp_path / "r")
+    assert [round(float(np.nanmedian(read_depth_m(recording, k))), 3) for k in range(3)] == [1, 1.1, 1.2]
+
+
+def test_images_larger_than_their_camera_are_refused(saved, tmp_path):
+    cv2.imwrite(str(saved / "depth/00001.png"), np.zeros((11_000, 10_000), np.uint16))
+    with pytest.raises(InputError, match=r"00001.png: 10000 x 11000 pixels"):
+        import_open3d(saved, tmp_path / "r", STILL)
+    assert not (tmp_path / "r/rgb.txt").exists()

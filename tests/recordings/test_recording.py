@@ -18,8 +18,9 @@ from hicp_lib.recordings.recording import (
     read_simulation,
     read_truth,
 )
-from hicp_lib.recordings.writer import RecordingWriter, depth_name, rgb_name, write_rgb
+from hicp_lib.recordings.writer import depth_name, rgb_name, write_rgb
 from tests.recordings.conftest import SMALL, write_small
+from tests.recordings.writing import RecordingWriter
 
 
 def test_what_was_written_is_read(small):
@@ -91,14 +92,14 @@ def test_images_of_another_size_or_kind_are_refused(small):
 
 def test_a_table_that_is_none_is_refused(small):
     (small / "truth.parquet").write_bytes(b"not parquet")
-    with pytest.raises(InputError, match="truth.parquet: is not a Parquet table"):
+    with pytest.raises(InputError, match="truth.parquet: cannot be read as a table"):
         read_truth(open_recording(small))
 
 
 def test_the_writer_refuses_what_would_not_be_a_recording(tmp_path):
     write_small(tmp_path / "r")
     with pytest.raises(InputError, match="is there already"):
-        RecordingWriter(tmp_path / "r", SMALL)
+        write_small(tmp_path / "r")
     writer = RecordingWriter(tmp_path / "other", SMALL)
     with pytest.raises(InputError, match="no frames"):
         writer.finish()
@@ -127,7 +128,9 @@ def test_all_that_fits_16_bits_is_depth(tmp_path):
 
 def test_a_table_without_a_column_is_told(small):
     pd.DataFrame({"frame": [0], "t_s": [0.0]}).to_parquet(small / "truth.parquet")
-    with pytest.raises(InputError, match="truth.parquet: has no column 'keypoint'; expected frame, t_s, key"):
+    with pytest.raises(
+        InputError, match="truth.parquet: has no column 'keypoint'; expected a table with frame"
+    ):
         read_truth(open_recording(small))
 
 

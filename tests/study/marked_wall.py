@@ -8,7 +8,7 @@ from hicp_lib.core.camera import Camera, project, transform
 from hicp_lib.evaluation.space.mocap_error import JOINTS, MARKERS
 from hicp_lib.recordings.qualisys import MotionCapture
 from hicp_lib.recordings.recording import Recording, open_recording
-from hicp_lib.recordings.writer import RecordingWriter
+from tests.recordings.writing import RecordingWriter
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 T_BASE_CAM = np.array([[0.0, 0, -1, 0.1], [1, 0, 0, 0], [0, -1, 0, 0.4], [0, 0, 0, 1]])

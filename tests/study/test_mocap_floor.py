@@ -7,9 +7,9 @@ import pytest
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.keypoints import BODY, INDEX
 from hicp_lib.recordings.recording import TRUTH_FILE, Recording, open_recording
-from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.study.mocap import perfect_detections
 from hicp_lib.study.plots.palette import PERFECT
+from tests.recordings.writing import RecordingWriter
 
 CAMERA = Camera(160, 120, 300.0, 300.0, 79.5, 59.5)
 

@@ -12,10 +12,10 @@ from hicp_lib.core.errors import InputError
 from hicp_lib.core.keypoints import INDEX
 from hicp_lib.experiments.recordings.open import data_note
 from hicp_lib.recordings.recording import JOINTS_FILE, SIMULATION_FILE, TRUTH_FILE
-from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.robot.kinematics import HEAD_JOINTS
 from hicp_lib.study import mocap
 from hicp_lib.study import relative as relative_views
+from tests.recordings.writing import RecordingWriter
 
 CAMERA = Camera(width_px=64, height_px=48, fx_px=50, fy_px=50, cx_px=31.5, cy_px=23.5)
 

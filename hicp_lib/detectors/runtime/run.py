@@ -217,8 +217,8 @@ def detect_each(
             result = read_result(kept)
             waiting[key] = _Waiting(named, kept, kept if result and len(waiting) > _MOST_WAITING else result)
             # Of a combination's parts, only what is found here is kept.
-            job = partial(_detect, asked, content, named, boxes, sha256 if n_here else None)
-            yield key, None if result else job
+            part_key = sha256 if n_here else None
+            yield key, None if result else partial(_detect, asked, content, named, boxes, part_key)
 
     alike, named = partial(_identity, asked), lambda key: waiting[key].name
     # disable=None: no bar unless standard error is a terminal.

@@ -8,6 +8,7 @@ from collections.abc import Hashable, Mapping, Sequence
 
 import numpy as np
 
+from hicp_lib.core.progress import with_bar
 from hicp_lib.evaluation.ap import cocoeval
 from hicp_lib.evaluation.ap.evaluate import Evaluation
 from hicp_lib.evaluation.statistics.resampling import MIN_DRAWN, Draws, with_interval
@@ -98,7 +99,7 @@ def resample(
 
 def _samples(matches: cocoeval.Matches, weights: Sequence[np.ndarray], place: np.ndarray) -> Samples:
     block = max(1, _BLOCK // max(1, len(matches.image_rows)))
-    starts = range(0, len(weights), block)
+    starts = with_bar(range(0, len(weights), block), "bootstrap")
     blocks = (np.stack([w[place] for w in weights[i : i + block]]) for i in starts)
     parts = [cocoeval.metrics(*cocoeval.precision_recall(matches, of_block)) for of_block in blocks]
     return {name: np.concatenate([np.zeros(0), *(part[name] for part in parts)]) for name in cocoeval.METRICS}

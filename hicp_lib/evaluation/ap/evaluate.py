@@ -1,6 +1,6 @@
 """Average precision and recall of keypoint detections: COCO's protocol, its open choices in `options`."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -14,6 +14,8 @@ from hicp_lib.evaluation.ap import cocoeval
 from hicp_lib.evaluation.ap.extended_oks import PRESENCE_CUT, extended_oks, known_flags
 from hicp_lib.evaluation.ap.options import VISIBLE, Options, choose
 from hicp_lib.formats.annotations import SEGMENT_OF_BOX, Annotations
+
+_AT_ONCE = 2**12  # images whose detections are checked at a time
 
 
 @dataclass(frozen=True)
@@ -96,11 +98,9 @@ def evaluate(
         groups and options, and for area "source" where people have none.
     """
     objects, chosen = choose(group, options)
-    image_ids, stacked = check_detections(detections, annotations)
     images = np.array(sorted(annotations.images), dtype=np.int64)
+    slots, found_px, present, scores = _detections_seen(detections, annotations, images, objects, chosen)
     people = people_seen(annotations, objects, chosen)
-    image_rows, person_rows = (np.searchsorted(images, of) for of in (image_ids, people.image_ids))
-    slots, found_px, present, scores = _detections_seen(image_rows, stacked, objects, chosen)
     truth_px, flags = _flat(people.keypoints_px, objects), _flat(people.visibility, objects)
     boxes_px, areas_px2, is_crowd = (
         np.repeat(of, len(objects), axis=0) for of in (people.boxes_px, people.areas_px2, people.is_crowd)
@@ -114,7 +114,8 @@ def evaluate(
         return oks(truth_px[who], flags[who] > 0, *person, found, sigmas)
 
     counts = (flags != 0).any(axis=1) & ~is_crowd
-    truth = cocoeval.People(_slots(person_rows, objects), counts, is_crowd)
+    person_slots = _slots(np.searchsorted(images, people.image_ids), objects)
+    truth = cocoeval.People(person_slots, counts, is_crowd)
     matches = cocoeval.match(images, truth, cocoeval.Found(slots, scores), similarity, len(objects))
     precision, recall = cocoeval.precision_recall(matches)
     n_people = int(matches.n_people.sum())
@@ -134,7 +135,7 @@ def evaluate(
 
 def _flat(values: np.ndarray, objects: np.ndarray) -> np.ndarray:
     """Values of people, (n, 136, ...), as those of their objects, (n * n_objects, k, ...)."""
-    return values[:, objects].reshape(-1, objects.shape[1], *values.shape[2:])
+    return values[:, objects].reshape(len(values) * len(objects), objects.shape[1], *values.shape[2:])
 
 
 def _slots(image_rows: np.ndarray, objects: np.ndarray) -> np.ndarray:
@@ -142,23 +143,22 @@ def _slots(image_rows: np.ndarray, objects: np.ndarray) -> np.ndarray:
     return (image_rows[:, None] * len(objects) + np.arange(len(objects))).ravel()
 
 
-def check_detections(
-    detections: Mapping[int, Detections], annotations: Annotations
-) -> tuple[np.ndarray, Detections]:
-    """Refuse what an evaluator would swallow or stumble over, and put the rest one after the other.
-
-    Returns
-    -------
-    image_ids : array of int, shape (n,)
-        Of the people found.
-    found : Detections
-        All n of them.
+def check_detections(detections: Mapping[int, Detections], annotations: Annotations) -> None:
+    """Refuse what an evaluator would swallow or stumble over.
 
     Raises
     ------
     InputError
         As `evaluate`.
     """
+    for _ in _checked(detections, annotations):
+        pass
+
+
+def _checked(
+    detections: Mapping[int, Detections], annotations: Annotations
+) -> Iterator[tuple[np.ndarray, Detections]]:
+    """Image ids of people found, and these people, of some images at a time: they are not all held twice."""
     for image_id, found in detections.items():
         if image_id not in annotations.images:
             problem = "not among the annotated images; evaluate them on their own annotations"
@@ -167,10 +167,16 @@ def check_detections(
         if shapes != ((n, N_KEYPOINTS, 2), (n, N_KEYPOINTS)):
             expected = f"expected (n, {N_KEYPOINTS}, 2) and (n, {N_KEYPOINTS})"
             raise InputError(f"detections of image {image_id}: shapes {shapes}; {expected}")
-    everybody = Detections.none(), *detections.values()
-    parts = [(of.keypoints_px, of.scores, of.person_scores) for of in everybody]
-    stacked = Detections(*map(np.concatenate, zip(*parts, strict=True)))
-    image_ids = np.repeat(np.array(list(detections), dtype=np.int64), list(map(len, detections.values())))
+    ids, people = np.array(list(detections), dtype=np.int64), list(detections.values())
+    for some in (slice(i, i + _AT_ONCE) for i in range(0, len(ids), _AT_ONCE)):
+        parts = (vars(of).values() for of in people[some])
+        stacked = Detections(*map(np.concatenate, zip(*parts, strict=True)))
+        image_ids = np.repeat(ids[some], list(map(len, people[some])))
+        _refuse_unsound(stacked, image_ids)
+        yield image_ids, stacked
+
+
+def _refuse_unsound(stacked: Detections, image_ids: np.ndarray) -> None:
     sound = _sound(stacked)
     for i in np.flatnonzero(~(np.isfinite(stacked.person_scores) & sound.all(axis=1)))[:1].tolist():
         where = f"detections of image {image_ids[i]}"
@@ -181,7 +187,6 @@ def check_detections(
             score = stacked.person_scores[i]
             raise InputError(f"{where}: score of {person} is {score}; expected a finite number")
         raise InputError(f"{where}: {NAMES[k]} of {person} is {value}; expected finite numbers")
-    return image_ids, stacked
 
 
 def _sound(found: Detections) -> np.ndarray:
@@ -215,7 +220,8 @@ def people_seen(annotations: Annotations, objects: np.ndarray, options: Options)
     seen = labelled | annotations.is_crowd | (options.unlabelled == "ignore")
     if options.others == "count":
         seen &= ~annotations.is_other
-    people = replace(annotations, visibility=flags).take(seen)
+    people = replace(annotations, visibility=flags)
+    people = people if seen.all() else people.take(seen)
     return replace(people, areas_px2=_areas(people, options.area))
 
 
@@ -238,13 +244,21 @@ def _source_area(people: Annotations, i: int) -> float:
 
 
 def _detections_seen(
-    image_rows: np.ndarray, found: Detections, objects: np.ndarray, options: Options
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    detections: Mapping[int, Detections], annotations: Annotations, images: np.ndarray, objects: np.ndarray,
+    options: Options,
+) -> tuple[np.ndarray, ...]:  # fmt: skip
     """Slots, keypoints, which of them are declared present, and scores of the objects that take part."""
-    points, of_keypoints = _flat(found.keypoints_px, objects), _flat(found.scores, objects)
-    of_group = of_keypoints.mean(axis=-1)
-    given = np.isfinite(points[..., 0])
-    present = given & (of_keypoints >= PRESENCE_CUT)
-    scores = np.repeat(found.person_scores, len(objects)) if options.score == "person" else of_group
-    seen = given.any(axis=-1) | (options.absent == "count")
-    return _slots(image_rows, objects)[seen], points[seen], present[seen], scores[seen]
+    n, most, k = 0, len(objects) * sum(map(len, detections.values())), objects.shape[1]
+    of_all = np.empty(most, int), np.empty((most, k, 2)), np.empty((most, k), bool), np.empty(most)
+    for image_ids, found in _checked(detections, annotations):
+        points, of_keypoints = _flat(found.keypoints_px, objects), _flat(found.scores, objects)
+        given = np.isfinite(points[..., 0])
+        present = given & (of_keypoints >= PRESENCE_CUT)
+        of_person = np.repeat(found.person_scores, len(objects))
+        scores = of_person if options.score == "person" else of_keypoints.mean(axis=-1)
+        slots = _slots(np.searchsorted(images, image_ids), objects)
+        seen = given.any(axis=-1) | (options.absent == "count")
+        of, n = slice(n, n + int(seen.sum())), n + int(seen.sum())
+        for every, some in zip(of_all, (slots, points, present, scores), strict=True):
+            every[of] = some[seen]
+    return tuple(every[:n] for every in of_all)

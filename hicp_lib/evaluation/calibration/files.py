@@ -4,7 +4,6 @@ The table is the one the report saves: columns `detector, group, score, rate`, a
 (`calibration.calibration_table`), as Parquet there and as CSV here.
 """
 
-import io
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -12,9 +11,10 @@ import numpy as np
 import pandas as pd
 
 from hicp_lib.core.detections import Detections
-from hicp_lib.core.errors import InputError, one_line
-from hicp_lib.core.files import read_bytes, read_json, write_bytes
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.files import read_json, write_bytes
 from hicp_lib.core.keypoints import GROUPS
+from hicp_lib.core.tables import read_table
 from hicp_lib.evaluation.calibration.curves import Calibration, calibration_table, calibrations_of
 from hicp_lib.evaluation.calibration.keypoint_hits import keypoint_hits
 from hicp_lib.formats.annotations import Annotations, read_detections, write_detections
@@ -90,14 +90,7 @@ def read_calibrations(path: str | Path, detector: str = "") -> dict[str, Calibra
         If the file is unreadable, is no table of calibrations, or does not tell whose to take.
     """
     path = Path(path)
-    try:
-        content = io.BytesIO(read_bytes(path, "give a table"))
-        table = pd.read_parquet(content) if path.suffix == ".parquet" else pd.read_csv(content)
-    except (OSError, ValueError) as error:
-        problem = getattr(error, "strerror", None) or one_line(error)
-        raise InputError(f"{path}: cannot be read as a table ({problem}); give calibrations") from None
-    if list(table.columns) != _COLUMNS:
-        raise InputError(f"{path}: has not the columns {', '.join(_COLUMNS)}; write it with calibration fit")
+    table = read_table(path, _COLUMNS)
     names = table["detector"].astype(str).unique().tolist()
     if detector not in names and (detector or len(names) != 1):
         raise InputError(f"{path}: detector {detector!r} is not in it; expected one of: {', '.join(names)}")

@@ -20,7 +20,8 @@ from hicp_lib.experiments.recordings import frames
 from hicp_lib.experiments.recordings.frames import camera_poses, record_frame
 from hicp_lib.experiments.recordings.scenarios import scenario
 from hicp_lib.recordings.c3d import MAX_FRAMES as MAX_C3D_FRAMES
-from hicp_lib.recordings.qualisys import write_c3d, write_tsv
+from hicp_lib.recordings.c3d import write_c3d
+from hicp_lib.recordings.qualisys import write_tsv
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, MOCAP_FILE, RGB_LIST, Recording, open_recording
 from hicp_lib.recordings.writer import depth_name, write_depth, write_frame
 from hicp_lib.simulation.body.identities import Subject

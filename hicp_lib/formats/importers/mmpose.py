@@ -12,7 +12,6 @@
 Sources: MMPose's inferencer, `split_instances`, and `CocoMetric` ("bbox_keypoint").
 """
 
-from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,8 +19,9 @@ import numpy as np
 
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
+from hicp_lib.core.progress import with_bar
 from hicp_lib.formats.importers.people import FileRows, People, json_files, split
-from hicp_lib.formats.json_validation import CONVENTIONS, Rows, shown
+from hicp_lib.formats.json_validation import Rows, shown
 from hicp_lib.formats.layouts import layouts_of
 
 _KNOWN_KEYS = {"keypoints", "keypoint_scores", "bbox"}
@@ -47,7 +47,7 @@ def read_mmpose(path: Path) -> People:
         For anything malformed, and for predictions of a video.
     """
     files = json_files(path, (".json",), "the folder MMPoseInferencer wrote with pred_out_dir")
-    read = {file: _instances(file) for file in files.values()}
+    read = {file: _instances(file) for file in with_bar(files.values(), "reading", "file")}
     named = (n.removeprefix(_SAVED) if read[file][1] is not None else n for n, file in files.items())
     of_models = {names for _, names in read.values() if names}
     if len(of_models) > 1:
@@ -59,8 +59,7 @@ def read_mmpose(path: Path) -> People:
     for key in ("keypoint_scores", "keypoints"):
         joined.column(key)
     rows = replace(joined, rows=[row | {"keypoints": _flat(joined, i)} for i, row in enumerate(joined.rows)])
-    triples = rows.keypoints(layouts)
-    conventions = Counter(CONVENTIONS.get(len(row["keypoints"]) // 3, "by their names") for row in rows.rows)
+    triples, conventions = rows.keypoints(layouts)
     keypoints, scores = split(triples, triples[..., 2] > 0)
     counted = scores > _COUNTED_FROM
     means = np.where(counted, scores, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)

@@ -22,6 +22,7 @@ import numpy as np
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json
 from hicp_lib.core.keypoints import BODY, N_KEYPOINTS, TO_HALPE
+from hicp_lib.core.progress import with_bar
 from hicp_lib.formats.importers.people import FileRows, People, json_files, split
 from hicp_lib.formats.importers.results import OPENPOSE, read_results
 from hicp_lib.formats.json_validation import CONVENTIONS, Rows
@@ -60,7 +61,7 @@ def read_openpose(path: Path) -> People:
     if path.is_file():
         return read_results(path, OPENPOSE)
     files = json_files(path, _ENDINGS, "the folder OpenPose wrote with --write_json")
-    read = {file: _people(file) for file in files.values()}
+    read = {file: _people(file) for file in with_bar(files.values(), "reading", "file")}
     rows, source_of = FileRows.joined(path, "people", {file: people for file, (people, _) in read.items()})
     of_openpose = np.array([own for _, own in read.values()])[source_of]
     triples, conventions, n_parts = _triples(rows, of_openpose)
@@ -91,7 +92,7 @@ def _triples(rows: FileRows, of_openpose: np.ndarray) -> tuple[np.ndarray, Count
     for key, by_length in _PARTS.items():
         lists = _lists(rows, key, by_length)
         by_number = {length // 3: convention for length, convention in by_length.items()}
-        points, found = rows.points(key, lists, by_number)
+        points, found = rows.points(key, dict(lists), by_number)
         if key == _BODY:
             for i, values in lists.items():
                 convention = by_length[len(values)]

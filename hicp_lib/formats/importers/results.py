@@ -19,7 +19,6 @@ Sources: the COCO results format, and the writers of Detectron2 (`coco_evaluatio
 (`pPose_nms.py`) and OpenPose (`cocoJsonSaver.cpp`).
 """
 
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -95,12 +94,12 @@ def read_results(path: Path, dialect: Dialect) -> People:
     for i, category in enumerate(rows.column("category_id", default=PERSON_CATEGORY)):
         if type(category) is not int or category not in dialect.categories:
             raise rows.error(i, f"category_id is {shown(category)}; expected 1 (person), leave others out")
-    triples = rows.keypoints()
+    triples, conventions = rows.keypoints()
     given = triples[..., 2] > 0 if dialect.absent == "score" else (triples != 0).any(axis=-1)
     keypoints, scores = split(triples, given)
     return People(
         path, dialect.named_by, sources, source_of, keypoints - dialect.offset_px, scores,
-        rows.numbers("score"), Counter(rows.conventions()), rows.extras(_KNOWN_KEYS),
+        rows.numbers("score"), conventions, rows.extras(_KNOWN_KEYS),
     )  # fmt: skip
 
 

@@ -76,7 +76,7 @@ def test_the_reports_table_is_read_by_detector(files):
     ("content", "expected"),
     [
         ("", "cannot be read as a table"),
-        ("a,b\n1,2\n", "has not the columns"),
+        ("a,b\n1,2\n", "has no column 'detector'; expected a table with"),
         ("detector,group,score,rate\nx,feet,0.1,0.2\n", "group 'feet' is not known"),
         ("detector,group,score,rate\nx,body,0.1,0.2\nx,body,0.2,0.1\n", "rates that do not fall"),
         ("detector,group,score,rate\nx,body,0.1,1.2\n", "rates that do not fall"),
@@ -88,5 +88,5 @@ def test_what_is_no_calibration_is_refused_in_one_line(tmp_path, content, expect
     with pytest.raises(InputError, match=expected) as refused:
         read_calibrations(tmp_path / "cal.csv")
     assert "\n" not in str(refused.value)
-    with pytest.raises(InputError, match="cannot be read as a table"):
+    with pytest.raises(InputError, match="absent.csv: cannot be read"):
         read_calibrations(tmp_path / "absent.csv")

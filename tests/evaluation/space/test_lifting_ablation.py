@@ -17,7 +17,7 @@ from hicp_lib.evaluation.space.lifting_ablation import (
 from hicp_lib.lifting.body_measures import load_measures
 from hicp_lib.lifting.table import lift_found
 from hicp_lib.recordings.recording import open_recording
-from hicp_lib.recordings.writer import RecordingWriter
+from tests.recordings.writing import RecordingWriter
 
 CAMERA = Camera(64, 48, 60.0, 60.0, 32.0, 24.0)
 POSES = np.tile(np.eye(4), (3, 1, 1))

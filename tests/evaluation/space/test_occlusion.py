@@ -7,7 +7,7 @@ import pytest
 from hicp_lib.core.camera import Camera, transform
 from hicp_lib.evaluation.space.occlusion import joint_occlusion
 from hicp_lib.recordings.recording import open_recording
-from hicp_lib.recordings.writer import RecordingWriter
+from tests.recordings.writing import RecordingWriter
 
 T_BASE_CAM = np.array([[0.0, 0, -1, 0.1], [1, 0, 0, 0.2], [0, -1, 0, 0.3], [0, 0, 0, 1]])
 SIGHT_OF = {

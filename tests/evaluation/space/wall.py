@@ -8,8 +8,9 @@ import pandas as pd
 from hicp_lib.core.camera import Camera, project, transform
 from hicp_lib.evaluation.space.error_sources import Amounts
 from hicp_lib.recordings.recording import EXACT_DEPTH_DIR, JOINTS_FILE, TRUTH_FILE, Recording, open_recording
-from hicp_lib.recordings.writer import RecordingWriter, write_depth
+from hicp_lib.recordings.writer import write_depth
 from hicp_lib.robot.kinematics import HEAD_JOINTS, load_icub
+from tests.recordings.writing import RecordingWriter
 
 CAMERA = Camera(width_px=320, height_px=240, fx_px=300, fy_px=300, cx_px=159.5, cy_px=119.5)
 WALL_M = -1.2  # x of the wall, in front of the robot

@@ -6,8 +6,8 @@ import pytest
 
 from hicp_lib.core.camera import Camera
 from hicp_lib.recordings.recording import open_recording
-from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.study.plots.mocap import registration
+from tests.recordings.writing import RecordingWriter
 
 METHODS = ["paper: eight clicks, camera marker", "all clicks"]
 

@@ -6,11 +6,11 @@ import pytest
 
 from hicp_lib.core.camera import Camera
 from hicp_lib.recordings.recording import open_recording
-from hicp_lib.recordings.writer import RecordingWriter
 from hicp_lib.robot.kinematics import load_icub
 from hicp_lib.robot.posture import Posture
 from hicp_lib.robot.shape import robot_shape
 from hicp_lib.study.plots import scene3d
+from tests.recordings.writing import RecordingWriter
 
 CAMERA = Camera(width_px=64, height_px=48, fx_px=50, fy_px=50, cx_px=31.5, cy_px=23.5)
 T_BASE_CAM = np.array([[0, 0, -1, -0.05], [1, 0, 0, 0], [0, -1, 0, 0.5], [0, 0, 0, 1.0]])

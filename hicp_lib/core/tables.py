@@ -1,0 +1,63 @@
+"""Tables of others: CSV and Parquet, of which columns are asked for by name."""
+
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from hicp_lib.core.errors import InputError, one_line
+from hicp_lib.core.extras import require
+from hicp_lib.core.files import read_bytes
+from hicp_lib.core.limited import raised
+
+_MAX_COLUMNS = 1000  # of ten thousand of a name pandas makes names that differ for minutes
+_CELLS, _CELLS_PER_BYTE = 5e6, 20  # a file of a megabyte can stand for billions
+
+
+def read_table(path: str | Path, columns: Sequence[str], **options: Any) -> pd.DataFrame:
+    """Read a table that has some columns once each: Parquet where the name ends so, else CSV.
+
+    Parameters
+    ----------
+    path : str or Path
+    columns : sequence of str
+    **options : object
+        Of pandas' reader of CSV.
+
+    Returns
+    -------
+    pd.DataFrame
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, a column is missing or there twice, or it is too large for its file.
+    """
+    expected = f"expected a table with {', '.join(columns)}"
+    content = read_bytes(path, expected)
+    if is_parquet := Path(path).suffix == ".parquet":
+        require("analysis", "pyarrow")
+    try:
+        if is_parquet:
+            from pyarrow.parquet import ParquetFile
+
+            file = ParquetFile(BytesIO(content))
+            found, n_cells = file.schema_arrow.names, file.metadata.num_rows * file.metadata.num_columns
+            if n_cells > raised(_CELLS + _CELLS_PER_BYTE * len(content)):
+                raise ValueError(f"{n_cells} cells in {len(content)} bytes")
+            table = file.read().to_pandas()
+        else:
+            first = content.partition(b"\n")[0].decode("utf-8-sig", errors="replace")
+            found = [name.strip(' "\r') for name in first.split(",")]
+            if len(found) > _MAX_COLUMNS:
+                raise ValueError(f"{len(found)} columns")
+            table = pd.read_csv(BytesIO(content), skipinitialspace=True, **options)
+    except Exception as error:  # of the libraries' many kinds
+        raise InputError(f"{path}: cannot be read as a table ({one_line(error)}); {expected}") from None
+    for name in columns:
+        if (n := found.count(name)) != 1:
+            wrong = f"has column {name!r} {n} times" if n else f"has no column {name!r}"
+            raise InputError(f"{path}: {wrong}; {expected}")
+    return table

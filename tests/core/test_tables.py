@@ -1,0 +1,55 @@
+"""Tables of others: columns once each, no more cells than fit the file."""
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+
+from hicp_lib.core.errors import InputError
+from hicp_lib.core.tables import read_table
+
+CSV = {
+    "a column twice": ("a,b,a\n1,2,3\n", "column 'a' 2 times"),
+    "a column missing": ("a,c\n1,2\n", "no column 'b'"),
+    "very many columns": ("a,b" + ",x" * 10**6 + "\n1,2" + ",1" * 10**6 + "\n", "1000002 columns"),
+    "rows that differ": ("a,b\n1,2\n1,2,3\n", "cannot be read as a table"),
+    "nothing": ("", "cannot be read as a table"),
+    "no text": (b"\xff\xfe\x00a,b".decode("latin-1"), "cannot be read as a table|no column"),
+}
+
+
+@pytest.mark.parametrize("case", CSV)
+def test_csv_that_is_no_such_table_is_refused_in_one_line(tmp_path, case):
+    content, said = CSV[case]
+    path = tmp_path / "t.csv"
+    path.write_text(content, encoding="latin-1")
+    with pytest.raises(InputError, match=said) as told:
+        read_table(path, ["a", "b"])
+    message = str(told.value)
+    assert message.startswith(str(path)) and "\n" not in message and len(message) < 600
+
+
+def test_parquet_is_read_where_its_columns_are_there_once(tmp_path):
+    path = tmp_path / "t.parquet"
+    columns = [pa.array([1]), pa.array([2]), pa.array([3])]
+    parquet.write_table(pa.Table.from_arrays(columns, names=["a", "b", "c"]), path)
+    assert read_table(path, ["b", "a"]).to_dict("records") == [{"a": 1, "b": 2, "c": 3}]
+    with pytest.raises(InputError, match="no column 'd'"):
+        read_table(path, ["a", "d"])
+    parquet.write_table(pa.Table.from_arrays(columns, names=["a", "b", "a"]), path)
+    with pytest.raises(InputError, match="column 'a' 2 times"):
+        read_table(path, ["a", "b"])
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(InputError, match="t.parquet: cannot be read as a table"):
+        read_table(path, ["a", "b"])
+
+
+def test_a_small_file_that_stands_for_very_many_cells_is_not_unpacked(tmp_path, monkeypatch):
+    path = tmp_path / "t.parquet"
+    pd.DataFrame({"a": np.zeros(3_000_000), "b": 0.0}).to_parquet(path)
+    assert path.stat().st_size < 100_000
+    with pytest.raises(InputError, match="6000000 cells in"):
+        read_table(path, ["a", "b"])
+    monkeypatch.setenv("HICP_LIMITS", "2")
+    assert len(read_table(path, ["a", "b"])) == 3_000_000

@@ -1,0 +1,133 @@
+"""Options that are no numbers, not of this world, or empty."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tests.hostile.case import Case
+from tests.hostile.good import CREATE, DETECT, DRAW, EVALUATE, FIT, IMPORT, IMPORT_OPEN3D, LIFT, MMPOSE
+
+ANY = "detect --images pictures --out out.json --detector"
+NUMBERS = ("nan", "inf", "-inf", "-1", "NaN", "Infinity", "1e400", "", "text", "[1]", "null", "true", "1e300",
+           "9" * 400)  # fmt: skip
+# Detector, option, and the numbers of these that are right.
+OF_DETECTORS = (
+    ("mediapipe", "min_score", ()), ("mediapipe", "num_people", ()), ("mediapipe", "tracking_hz", ()),
+    ("mediapipe-hands", "num_hands", ()), ("mediapipe-pose", "num_poses", ()),
+    ("movenet-lightning", "padding", ()), ("movenet-lightning", "person_min_score", ()),
+    ("movenet-lightning", "threads", ()), ("movenet-multipose", "min_person_score", ()),
+    ("openpose-mobilenet", "net_height", ()), ("posenet-mobilenet", "min_score", ()),
+    ("mmpose --model model.onnx", "score_scale", ("null",)),
+    ("mmpose --model model.onnx", "input_size_px", ("null",)),
+    ("mmpose --model model.onnx", "flip_test", ("true",)),
+    ("mmpose --model model.onnx", "person_max_overlap", ()),
+)  # fmt: skip
+MORE = {"min_score": ("5",), "num_hands": ("0", "1.5", "1000000000"), 
+        "num_people": ("0", "1.5", "1000000000"),
+        "num_poses": ("0", "1.5"), "threads": ("0", "1.5", "1000000000"),
+        "padding": ("0", "1e9")}  # fmt: skip
+NULL_IS_DEFAULT = ("person_min_score", "person_max_overlap", "net_height", "score_scale", "input_size_px")
+MAY_BE_MANY = ("--seed", "--limit", "--min-pixels", "--workers", "--score-scale", "--rate", "--depth-scale",
+               "--subject")  # fmt: skip
+OF_COMMANDS = {
+    "--score-scale": f"{IMPORT} --out out.json",
+    "--min-pixels": f"{CREATE} --out out",
+    "--seed": f"{EVALUATE} --group body",
+    "--limit": f"{DRAW} --out out.html",
+    "--min-score": f"{DRAW} --out out",
+    "--rate": IMPORT_OPEN3D,
+    "--depth-scale": IMPORT_OPEN3D,
+    "--workers": f"{DETECT} --out out.json",
+    "--n": "scenes render out",
+    "--n-frames": "record simulate mocap out",
+    "--subject": "record simulate mocap out --n-frames 1",
+    "--seconds": "record camera out",
+}
+TEXT_OPTIONS = {
+    "--area": f"{EVALUATE} --group body",
+    "--sigmas": f"{EVALUATE} --group body",
+    "--group": EVALUATE,
+    "--format": "import --predictions results.json --annotations annotations.json --out out.json",
+    "--layout": "export --detections results.json --format coco --out out.json",
+    "--boxes": f"{DETECT} --out out.json",
+    "--method": f"{LIFT} --out out.parquet",
+    "--depth-camera": "record simulate mocap out --n-frames 1",
+    "--people": "scenes render out --n 1",
+    "--mount": f"{IMPORT_OPEN3D} --poses poses.txt",
+    "--orientation": f"{CREATE} --out out",
+    "--profile": "report --results out",
+    "--only": "report --results out",
+    "--model": "detect --detector mmpose --images pictures --out out.json",
+    "--person-model": f"{MMPOSE} --out out.json",
+    "--images": "detect --detector movenet-lightning --out out.json",
+    "--dataset": "detect --detector movenet-lightning --out out.json",
+    "--annotations": "dataset create --images pictures --out out",
+    "--keypoint-map": f"{CREATE} --out out",
+    "--bag": "record import out",
+    "--open3d": "record import out",
+    "--poses": IMPORT_OPEN3D,
+    "--base-frame": "record import out --bag x.bag",
+    "--color-topic": "record import out --bag x.bag",
+    "--recording": "lift --detector movenet-lightning --out out.parquet",
+}
+OUTPUTS = {
+    "detect": DETECT,
+    "create": CREATE,
+    "import": IMPORT,
+    "export": "export --detections results.json --format coco",
+    "draw": DRAW,
+    "fit": FIT,
+    "lift": LIFT,
+    "evaluate": EVALUATE,
+}
+PLACES = {"nowhere": "", "of 5,000 characters": "a" * 5000 + ".json", "below a file": "results.json/out.json",
+          "in /proc": "/proc/out.json", "in /dev": "/dev/null/out.json",
+          "with a line": "out\n.xyz"}  # fmt: skip
+PARAMETERS = {"detectors": ("", "[]", "nonsense", '["mediapipe", 7]', "NaN", "mediapipe,mediapipe"),
+              "seed": ("nan", "inf", "-1", "1.5", "", "text", "1e300"),
+              "n_images": ("0", "-1", "nan", "1e9", "inf", "", "1.5")}  # fmt: skip
+PROVIDERS = ("CPU", "cpu2", "../x", "", "CPUExecutionProvider", "nan", "/dev/zero", "<svg onload=x()>")
+
+
+def cases() -> Iterator[Case]:
+    for detector, option, right in OF_DETECTORS:
+        allowed = (*right, *(["null"] if option in NULL_IS_DEFAULT else []))
+        for number in (*NUMBERS, *MORE.get(option, ())):
+            if number not in allowed:
+                # true is 1 to Python; what is asked is that nothing breaks
+                exits = (0, 2) if number in ("true", "1e300", "1e9", "1000000000") else (2,)
+                command = [*f"{ANY} {detector}".split(), "-o", option, number]
+                shown = number if len(number) < 20 else f"{len(number)} digits"
+                yield Case(
+                    f"option: {detector.split()[0]} {option} {shown!r}", command, exits=exits, notes=True
+                )
+    for provider in PROVIDERS:
+        for detector in ("movenet-lightning", "mmpose --model model.onnx"):
+            exits = (0, 2) if "CPU" in provider else (2,)
+            command = [*f"{ANY} {detector}".split(), "-o", "provider", provider]
+            yield Case(
+                f"option: {detector.split()[0]} provider {provider!r}", command, exits=exits, notes=True
+            )
+    for option, command in OF_COMMANDS.items():
+        for number in ("nan", "inf", "-inf", "-1", "", "text", "1e400", "9" * 30, "9" * 5000):
+            many = number.startswith("9") and option in MAY_BE_MANY
+            shown = number if len(number) < 20 else f"{len(number)} digits"
+            exits = (0, 2) if many else (2,)
+            yield Case(
+                f"option: {option} {shown!r}", [*command.split(), option, number], exits=exits, notes=True
+            )
+    for option, command in TEXT_OPTIONS.items():
+        for text in ("", "nonsense", "nan", "a" * 5000, "\x1b[2J", "/dev/zero"):
+            shown = text if len(text) < 20 else f"{len(text)} characters"
+            yield Case(f"option: {option} {shown!r}", [*command.split(), option, text])
+    for name, command in OUTPUTS.items():
+        for kind, place in PLACES.items():
+            yield Case(
+                f"option: {name} --out {kind}",
+                [*command.split(), "--out", place],
+                exits=(0, 2) if "line" in kind else (2,),
+            )
+    for parameter, values in PARAMETERS.items():
+        for value in values:
+            command = ["report", "--profile", "quick", "--results", "out", "-p", parameter, value]
+            yield Case(f"option: -p {parameter} {value!r}", command)
