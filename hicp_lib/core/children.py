@@ -16,6 +16,8 @@ from pathlib import Path
 from hicp_lib.core.environment import with_variables
 
 _THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+ONE_THREAD = dict.fromkeys(_THREADS, "1")
+"""Variables that hold a process's linear algebra to one thread, read when its library is loaded."""
 _SAFE_PATH = {"PYTHONSAFEPATH": "1"}
 
 
@@ -34,7 +36,7 @@ def child_environment(**variables: str) -> dict[str, str]:
 def safe_start() -> Iterator[None]:
     """A block in which multiprocessing starts processes, with one thread each in linear algebra."""
     untrusted = {Path.cwd()} - {Path(__file__).resolve().parents[2]}  # a checkout that is not installed
-    with with_variables(**_SAFE_PATH, **dict.fromkeys(_THREADS, "1")):  # one thread at a time
+    with with_variables(**_SAFE_PATH, **ONE_THREAD):  # one thread at a time
         before = sys.path
         sys.path = [entry for entry in before if Path(entry).resolve() not in untrusted]
         try:

@@ -19,7 +19,8 @@ import orjson
 import platformdirs
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.limited import raised
+from hicp_lib.core.limited import RAISE, raised
+from hicp_lib.core.names import is_inside
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -148,7 +149,7 @@ def regular_file(path: str | Path, expected: str, max_bytes: float = math.inf) -
         raise InputError(f"{path}: is {_kind(state.st_mode)}; {expected}")
     if state.st_size > max_bytes:
         sizes = f"has {state.st_size / 1e9:.3g} GB, more than {max_bytes / 1e9:.3g}"
-        raise InputError(f"{path}: {sizes}; HICP_LIMITS=4 in the environment allows four times as much")
+        raise InputError(f"{path}: {sizes}; {RAISE}")
     return Path(path)
 
 
@@ -242,7 +243,7 @@ def kept_beside(folder: Path, name: str, **kinds: type) -> dict[str, Any]:
 def remove_inside(folder: Path, names: Iterable[str]) -> None:
     """Remove files that a list found in a folder calls its own; names that lead out of it are passed over."""
     for name in names:
-        if isinstance(name, str) and ".." not in Path(name).parts and not Path(name).is_absolute():
+        if is_inside(name):
             (folder / name).unlink(missing_ok=True)
 
 

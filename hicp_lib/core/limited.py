@@ -15,17 +15,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from hicp_lib.core.children import child_environment, end_with, lifeline
+from hicp_lib.core.children import ONE_THREAD, child_environment, end_with, lifeline
 from hicp_lib.core.errors import InputError
 
 LIMITS_VARIABLE = "HICP_LIMITS"
 _LEAST_S, _S_PER_BYTE, _MOST_S_PER_BYTE = 4.0, 1e-6, 1e-4  # of computing; the last one for readers that go on
 _LEAST_BYTES, _BYTES_PER_BYTE = 800 * 2**20, 40  # of memory
-_FEW_THREADS = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OPENCV_FOR_THREADS_NUM", "OMP_NUM_THREADS"), "1")
 _PROGRAM = """import sys; at = [*("-packages" in folder for folder in sys.path), True].index(True)
 sys.path.insert(at, sys.argv[1]); from hicp_lib.core import limited; limited.serve()"""
 _patience_s: list[float] = []  # of a limited process: how long it may compute at one thing
-_RAISE = f"if the file is sound, {LIMITS_VARIABLE}=4 in the environment allows four times as much"
+RAISE = f"{LIMITS_VARIABLE}=4 in the environment allows four times as much"
+"""What a message about a limit ends with."""
 
 
 def raised(limit: float) -> float:
@@ -79,19 +79,20 @@ def limited_child(path: Path, function: Callable, *arguments: Any) -> Any:
     command = [sys.executable, "-c", _PROGRAM, str(Path(__file__).resolve().parents[2])]
     with TemporaryDirectory() as folder, lifeline() as stdin:
         Path(folder, "question").write_text(question)
-        environment = child_environment(**_FEW_THREADS, TMPDIR=folder)
+        environment = child_environment(**ONE_THREAD, OPENCV_FOR_THREADS_NUM="1", TMPDIR=folder)
         ended = subprocess.run(command, stdin=stdin, capture_output=True, env=environment)
     code, last = ended.returncode, ended.stderr[-4096:].decode(errors="replace").strip().rpartition("\n")[2]
     answer = {} if code else json.loads(ended.stdout)
     if "value" in answer:
         return answer["value"]
+    if "error" in answer:
+        raise InputError(answer["error"])
+    took_long = code in (-signal.SIGXCPU, -signal.SIGPROF)
+    if took_long or "MemoryError" in last:
+        most = f"{limits[0]:.0f} s" if took_long else f"{limits[2] / 1e9:.2g} GB of memory"
+        raise InputError(f"{path}: reading takes more than {most}; if the file is sound, {RAISE}")
     how = signal.Signals(-code).name if code < 0 else last[:160]
-    why = answer.get("error", f"{path}: its reader gave up ({how}); is it damaged or cut off?")
-    if code in (-signal.SIGXCPU, -signal.SIGPROF):
-        why = f"{path}: reading takes more than {limits[0]:.0f} s; {_RAISE}"
-    elif code and "MemoryError" in last:
-        why = f"{path}: reading takes more than {limits[2] / 1e9:.2g} GB of memory; {_RAISE}"
-    raise InputError(why)
+    raise InputError(f"{path}: its reader gave up ({how}); is it damaged or cut off?")
 
 
 def serve() -> None:

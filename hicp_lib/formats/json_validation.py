@@ -182,7 +182,7 @@ class Rows:
         layouts : Layouts
             By the number of keypoints, a key of `hicp_lib.core.keypoints.TO_HALPE`, or what that would hold.
         width : int, optional
-            Flat per keypoint.
+            Numbers per keypoint.
 
         Returns
         -------

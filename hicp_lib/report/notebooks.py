@@ -212,13 +212,9 @@ def check_parameters(notebook: Notebook, given: dict[str, Any], origin: str) -> 
     for name, value in given.items():
         refuse_unknown(f"{origin}: {notebook.name}: parameter", name, notebook.defaults)
         default = notebook.defaults[name]
-        several = isinstance(value, list) and is_path(name, default)
+        values = value if isinstance(value, list) and is_path(name, default) else [value]
         allowed = notebook.allowed.get(name, "")
-        if (
-            several
-            and not value
-            or not all(_fits(v, default, allowed) for v in (value if several else [value]))
-        ):
+        if not values or not all(_fits(one, default, allowed) for one in values):
             raise InputError(
                 f"{origin}: {notebook.name}: '{name}' is {json.dumps(value, default=str)[:_SHOWN]}; "
                 f"expected {_article(type(default))} such as {default!r}{allowed and f' [{allowed}]'}"

@@ -25,7 +25,7 @@ from hicp_lib.core.cache import code, digest, input_sha256
 from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.files import read_json, sha256_file, write_json
-from hicp_lib.core.limited import LIMITS_VARIABLE, raised
+from hicp_lib.core.limited import RAISE, raised
 from hicp_lib.report.notebooks import is_path, read_notebook, source_sha256
 from hicp_lib.report.run import WALL_LIMIT_S, Children, Folders, Run, RunError
 from hicp_lib.report.schedule import needed, run_when_ready
@@ -241,7 +241,7 @@ def _check(run: Run, status: int | None, copy: Path, staging: Path) -> None:
     """Raise RunError unless the executed copy and its results are whole."""
     if status is None:
         took = f"took longer than {raised(WALL_LIMIT_S):g} s and was stopped"
-        raise RunError(f"{took}; run it again to go on, {LIMITS_VARIABLE}=4 allows four times as much")
+        raise RunError(f"{took}; run it again to go on, {RAISE}")
     if not copy.is_file():
         lines = (staging / "log.txt").read_text(errors="replace").strip().splitlines()
         raise RunError(f"did not run: {lines[-1] if lines else f'exit code {status}'}")
