@@ -40,3 +40,8 @@ def test_any_text_stays_one_line_without_markup(text):
 def test_numbers_and_usual_names_are_left_alone():
     for text in ("0.71", "-0.5 %", "motion_capture, 12 frames (d435)", "Würfel 3/4"):
         assert escaped(f"a {text}") == f"a {text}"
+
+
+def test_spaces_at_the_ends_stay_between_what_is_joined():
+    assert escaped(", ") == ", " and escaped(" b\n\n ") == " b "
+    assert MarkdownIt().render(escaped("  - item")) == "<p> - item</p>\n"
