@@ -8,7 +8,7 @@ import click
 
 from hicp_lib.cli.options import PATH, FiniteRange, say
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import locked_folder
+from hicp_lib.core.folders import locked_folder
 
 
 @click.command("inspect")

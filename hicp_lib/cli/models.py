@@ -4,7 +4,7 @@ import click
 
 from hicp_lib.cli.options import detector_options, given, tell_assumed, text_table
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import locked_folder
+from hicp_lib.core.folders import locked_folder
 
 
 @click.group()

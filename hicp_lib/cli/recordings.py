@@ -7,7 +7,8 @@ import click
 
 from hicp_lib.cli import options
 from hicp_lib.cli.options import PATH, FiniteRange, detector_options, given, people_option, worker_options
-from hicp_lib.core.files import locked_folder, write_table
+from hicp_lib.core.files import write_table
+from hicp_lib.core.folders import locked_folder
 
 
 @click.group()

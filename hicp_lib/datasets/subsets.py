@@ -29,7 +29,8 @@ from hicp_lib.core.cache import content, digest
 from hicp_lib.core.environment import usable_cores
 from hicp_lib.core.errors import InputError
 from hicp_lib.core.executor import run_jobs
-from hicp_lib.core.files import kept_beside, locked_folder, regular_file, remove_inside, write_json
+from hicp_lib.core.files import regular_file, write_json
+from hicp_lib.core.folders import kept_beside, locked_folder, remove_inside
 from hicp_lib.core.images import Box, as_seen, inside, is_whole_png, read_image, write_png
 from hicp_lib.core.keypoints import HEAD
 from hicp_lib.datasets.crops import crop_people, image_name, n_pixels, on_pixels, person_crops

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from hicp_lib.core.errors import InputError, one_line
-from hicp_lib.core.files import listed, read_json
+from hicp_lib.core.files import read_json
+from hicp_lib.core.folders import listed
 from hicp_lib.detectors.runtime.to_file import IMAGE_SUFFIXES
 from hicp_lib.inspection import people, pixels, recorded
 from hicp_lib.inspection.facts import Facts, tables, under_name

@@ -9,7 +9,8 @@ import numpy as np
 from PIL import Image
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import listed, read_bytes, read_json
+from hicp_lib.core.files import read_bytes, read_json
+from hicp_lib.core.folders import listed
 from hicp_lib.core.images import image_header, refuse_too_large
 from hicp_lib.core.video import open_video
 from hicp_lib.detectors.mediapipe.bundles import BUNDLES

@@ -8,7 +8,8 @@ import numpy as np
 
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import listed, read_json
+from hicp_lib.core.files import read_json
+from hicp_lib.core.folders import listed
 from hicp_lib.core.limited import limited_child
 from hicp_lib.inspection.facts import ORIGIN, Facts, about_times
 from hicp_lib.mocap.registration import read_registration

@@ -12,7 +12,8 @@ import numpy as np
 
 from hicp_lib.core.camera import Camera
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import listed, read_bytes, read_json, write_bytes
+from hicp_lib.core.files import read_bytes, read_json, write_bytes
+from hicp_lib.core.folders import listed
 from hicp_lib.core.images import decode
 from hicp_lib.formats.json_validation import is_number, shown
 from hicp_lib.recordings.camera_file import read_distorted_camera

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from hicp_lib.core.errors import InputError, refuse_unknown
-from hicp_lib.core.files import locked_folder
+from hicp_lib.core.folders import locked_folder
 from hicp_lib.detectors.registry import COMBINED, DETECTORS
 from hicp_lib.detectors.weights.default import registry
 from hicp_lib.report.book import build_book

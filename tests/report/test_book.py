@@ -12,7 +12,7 @@ import matplotlib
 import pytest
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import locked_folder
+from hicp_lib.core.folders import locked_folder
 from hicp_lib.report import book
 from hicp_lib.report.build import make_report
 from hicp_lib.report.run import Folders, RunError

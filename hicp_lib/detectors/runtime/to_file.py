@@ -11,7 +11,8 @@ import numpy as np
 
 from hicp_lib.core.detections import Detections
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import atomic_path, listed
+from hicp_lib.core.files import atomic_path
+from hicp_lib.core.folders import listed
 from hicp_lib.core.images import rotation_note
 from hicp_lib.core.video import SUFFIXES as VIDEO_SUFFIXES
 from hicp_lib.core.video import open_video

@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from hicp_lib.core.cache import key
 from hicp_lib.core.executor import Workers, resolved, run_jobs
-from hicp_lib.core.files import locked_folder
+from hicp_lib.core.folders import locked_folder
 from hicp_lib.experiments.laboratory import T_WORLD_ROOT
 from hicp_lib.experiments.recordings import frames
 from hicp_lib.experiments.recordings.frames import camera_poses, record_frame

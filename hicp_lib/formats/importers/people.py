@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import listed
+from hicp_lib.core.folders import listed
 from hicp_lib.formats.importers.matching import NamedBy
 from hicp_lib.formats.json_validation import Rows
 

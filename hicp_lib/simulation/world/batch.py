@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import kept_beside, read_json, remove_inside, sha256_file, write_json
+from hicp_lib.core.files import read_json, sha256_file, write_json
+from hicp_lib.core.folders import kept_beside, remove_inside
 
 
 def check_numbers(**limits: tuple[object, int, int]) -> None:

@@ -15,7 +15,8 @@ from tqdm import tqdm
 
 from hicp_lib.core.cache import key
 from hicp_lib.core.executor import Workers, resolved, run_jobs
-from hicp_lib.core.files import locked_folder, read_json
+from hicp_lib.core.files import read_json
+from hicp_lib.core.folders import locked_folder
 from hicp_lib.core.keypoints import N_KEYPOINTS
 from hicp_lib.formats.annotations import Annotations, ImageInfo, write_annotations
 from hicp_lib.recordings.writer import write_rgb

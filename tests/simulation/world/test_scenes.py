@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hicp_lib.core.errors import InputError
-from hicp_lib.core.files import locked_folder
+from hicp_lib.core.folders import locked_folder
 from hicp_lib.core.images import read_image
 from hicp_lib.formats.annotations import read_annotations
 from hicp_lib.simulation.body.identities import HELD_OUT, KINDS, SPLITS, split_members
