@@ -86,11 +86,13 @@ def told(name: str) -> str:
 
 
 def test_a_worker_killed_half_way_changes_nothing(slow):
-    with dask_cluster(slow, ({"SLOW_DIES_AFTER": "10"}, {}), *PRELOAD) as (address, (_, doomed, other)):
+    workers = {"SLOW_DIES_AFTER": "10"}, {"SLOW_GATE": "0"}  # the other one waits, lest it do all of it
+    with dask_cluster(slow, workers, *PRELOAD) as (address, (_, doomed, other)):
         client = slow.detect("out.json", "--dask", address)
+        assert doomed.wait(LONG_S) < 0  # it was killed,
+        slow.open_gate()
         output, errors = client.communicate(timeout=LONG_S)
         assert (client.returncode, output) == (0, told("out")), errors
-        assert doomed.wait(LONG_S) < 0  # it was killed,
         assert len(slow.computed(doomed)) == 10 and slow.computed(client) == []  # having done its part
         # What the dead worker had not handed over is done again, nothing else: at most four are under way.
         assert set(slow.computed()) == set(range(40)) and len(slow.computed()) <= 43
