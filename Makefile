@@ -13,7 +13,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export PIP_NO_INPUT := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup system report test wheel-check test-lowest lab doctor lint coverage mutants lock clean
+.PHONY: help setup system report test wheel-check test-lowest lab doctor lint coverage mutants lock release clean
 
 help:
 	@echo "make report [PROFILE=full]        run the study and build the report; quick, deep"
@@ -25,7 +25,8 @@ help:
 	@echo "make lint                         check style, types, imports and spelling"
 	@echo "make coverage                     run the tests, and tell what they do not reach"
 	@echo "make mutants                      change the code at random: do the tests notice?"
-	@echo "make lock                         pin the environment anew (needs uv)"
+	@echo "make lock                         pin the environment again (needs uv)"
+	@echo "make release VERSION=1.0.0        tag a version, with its report, wheel and checksums"
 	@echo "make clean                        remove what was built, but no download"
 
 report: setup
@@ -102,6 +103,10 @@ lock:
 	@$(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-annotate \
 	  --extra all --group mediapipe --group test --group lint --group build --custom-compile-command "make lock" \
 	  --output-file environment.lock pyproject.toml
+
+# RELEASE_ARGS=--dry-run says what it would do
+release: setup
+	@$(BIN)/python tools/release.py $(or $(VERSION),$(error name the version: make release VERSION=1.0.0)) $(RELEASE_ARGS)
 
 clean:
 	@rm -rf _build results
