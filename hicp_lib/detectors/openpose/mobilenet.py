@@ -34,7 +34,7 @@ def check_height(net_height_px: int) -> None:
 
 
 def fit(image: np.ndarray, height_px: int) -> Letterbox:
-    """Scale an image to the network's height at its aspect ratio; pad the width with black to a multiple of 16.
+    """Scale an image to the network's height; pad the width with black to a multiple of 16.
 
     Parameters
     ----------
