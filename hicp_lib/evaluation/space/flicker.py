@@ -59,7 +59,7 @@ def causal_filter(tracks_px: np.ndarray, times_s: np.ndarray) -> np.ndarray:
     tracks_px : array, shape (n, k, 2)
         NaN where not given.
     times_s : array, shape (n,)
-        Rising.
+        Increasing.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def latency_s(tracks_px: np.ndarray, filtered_px: np.ndarray, times_s: np.ndarra
     tracks_px, filtered_px : array, shape (n, k, 2)
         NaN where not given.
     times_s : array, shape (n,)
-        Rising.
+        Increasing.
 
     Returns
     -------
@@ -127,7 +127,7 @@ def flicker(
     found : mapping of str to sequence of Detections
         Of each frame, by detector.
     times_s : array, shape (n,)
-        Rising.
+        Increasing.
     draws : Draws, optional
         Of the bootstrap.
     min_score : float, optional

@@ -167,7 +167,7 @@ def median_differences(
     Returns
     -------
     DataFrame
-        Columns `detector, method, keypoint, min_score, other` (the label of the one that is taken away),
+        Columns `detector, method, keypoint, min_score, other` (the label of the subtracted case),
         `value_m, low_m, high_m, n_people` (with a median by both), `detectable_m` (`smallest_difference` of
         people's own medians); both directions are included.
     """
