@@ -240,7 +240,7 @@ def _explained(address: str, client: Client) -> Iterator[None]:
         if isinstance(error, (AttributeError, RuntimeError)) and client.status == "running":
             raise
         raise InputError(
-            f"{address}: the Dask cluster is gone ({one_line(error)}); run the same command again to go on"
+            f"{address}: the Dask cluster is gone ({one_line(error)}); run the same command again to continue"
         ) from None
 
 

@@ -99,7 +99,8 @@ def beyond(points_px: np.ndarray, low_px: ArrayLike, high_px: ArrayLike) -> np.n
 
     Parameters
     ----------
-    points_px : array, shape (..., 2) NaN does not count.
+    points_px : array, shape (..., 2)
+        NaN does not count.
     low_px, high_px : float or array, shape (..., 2)
         Minimum and maximum of both coordinates.
 

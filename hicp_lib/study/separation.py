@@ -29,7 +29,7 @@ def separations_before(
     """The separation each detector would need; a detector that gave no keypoint near the hand has none.
 
     Speeds of the hand and of the fastest joint are the highest in any of the runs. It takes a latency and a
-    control period to react; then `brakes` stop the arm. The uncertainty of the person's place is the 95th
+    control period to react; then `brakes` stop the arm. The uncertainty of the person's position is the 95th
     percentile of the detector's errors near the hand, the intrusion `beyond_keypoints_m`.
 
     Parameters
