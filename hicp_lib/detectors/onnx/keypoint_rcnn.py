@@ -86,7 +86,7 @@ class KeypointRcnn:
 
     def describe(self) -> list[Fact]:
         """What is assumed about the model."""
-        told = "told by its outputs" if self._is_told else "given"
+        told = "from its outputs" if self._is_told else "given"
         height, width = (side or "any" for side in self._model.inputs[0].shape[-2:])
         size = {"width": width, "height": height}
         own = facts(self._family, told=told, logit_middle=_LOGIT_MIDDLE, **size, **self.settings)

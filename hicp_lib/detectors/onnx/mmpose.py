@@ -129,12 +129,12 @@ def _told_udp(model: OnnxModel, is_simcc: bool, given: bool | None) -> tuple[boo
         return given, "option udp"
     told = model.told.metadata.get("udp")
     if isinstance(told, bool):
-        return told, "told by its metadata"
+        return told, "from its metadata"
     patch_px = min(model.told.first_convolution[2:], default=0)
     if is_simcc:
-        return False, "told by the outputs"
+        return False, "from the outputs"
     if patch_px >= _MIN_PATCH_PX:
-        return True, f"told by its patches of {patch_px} pixels (ViTPose, Sapiens); option udp"
+        return True, f"from its patches of {patch_px} pixels (ViTPose, Sapiens); option udp"
     return False, "ASSUMED, the file does not tell; -o udp true for networks named udp"
 
 

@@ -191,7 +191,7 @@ def _input_size(model: OnnxModel, given: list[int] | None) -> tuple[tuple[int, i
         raise model.refusal("expected crops of a fixed size, (n, 3, h, w)")
     read, metadata = (shape[3], shape[2]), model.told.metadata
     told = [metadata.get("input_w"), metadata.get("input_h")]
-    sizes = {"read from the file": read, "told by its metadata": told, "option input_size_px": given or []}
+    sizes = {"read from the file": read, "from its metadata": told, "option input_size_px": given or []}
     whole = {why: size for why, sides in sizes.items() if (size := _size(sides)) is not None}
     if given is not None and "option input_size_px" not in whole:
         raise InputError(f"input_size_px {given}: expected width and height in pixels, as in [192, 256]")

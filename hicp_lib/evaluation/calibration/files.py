@@ -1,7 +1,7 @@
 """Calibrations as files: fitted to one result file, applied to others of the same detector.
 
 The table is the one the report saves: columns `detector, group, score, rate`, a row per corner of a curve
-(`calibration.calibration_table`), as Parquet there and as CSV here.
+(`hicp_lib.evaluation.calibration.curves.calibration_table`), as Parquet there and as CSV here.
 """
 
 from collections.abc import Mapping
